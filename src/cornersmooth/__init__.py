@@ -1,0 +1,1 @@
+"""Five-axis corner smoothing."""

@@ -1,0 +1,120 @@
+"""What can go wrong, and how it is said.
+
+`CornersmoothError` is raised for what stops the work; `Finding` records what was noticed while the work went on.
+Both carry a stable code. The library raises and returns them; only `cornersmooth.cli` prints them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Severity = Literal["note", "warning", "error"]
+
+
+class CornersmoothError(Exception):
+    """Work stopped; the text says what happened and what to do.
+
+    Parameters
+    ----------
+    code : str
+        Stable identifier such as ``"CS101"`` (100s: CL input, 200s: settings, 300s: NC output, 400s: writing files,
+        500s: verification).
+    what : str
+        One clause, lower case, no full stop: what is wrong, with the offending value.
+    hint : str
+        One clause: what the user can do about it.
+    file, line, column : optional
+        Where. `line` and `column` count from 1.
+    """
+
+    #: exit code of the command line (design section 5)
+    exit_code = 3
+
+    def __init__(
+        self,
+        code: str,
+        what: str,
+        hint: str = "",
+        *,
+        file: str | None = None,
+        line: int | None = None,
+        column: int | None = None,
+    ) -> None:
+        self.code = code
+        self.what = what
+        self.hint = hint
+        self.file = file
+        self.line = line
+        self.column = column
+        super().__init__(code, what, hint, file, line, column)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Survive the trip between worker processes with every field."""
+        return _rebuild, (type(self), self.code, self.what, self.hint, self.file, self.line, self.column)
+
+    @property
+    def place(self) -> str:
+        """``FILE:LINE:COLUMN`` as far as known, or the empty string."""
+        parts = [self.file or ("<input>" if self.line is not None else "")]
+        parts += [str(number) for number in (self.line, self.column) if number is not None]
+        return ":".join(part for part in parts if part)
+
+    def __str__(self) -> str:
+        """Text of the message: ``FILE:LINE: error: what; what to do``."""
+        head = f"{self.place}: error: " if self.place else "error: "
+        return head + self.what + (f"; {self.hint}" if self.hint else "")
+
+
+def _rebuild(
+    cls: type[CornersmoothError],
+    code: str,
+    what: str,
+    hint: str,
+    file: str | None,
+    line: int | None,
+    column: int | None,
+) -> CornersmoothError:
+    return cls(code, what, hint, file=file, line=line, column=column)
+
+
+class InputError(CornersmoothError):
+    """The CL (or NC) text cannot be read or is not valid."""
+
+    exit_code = 3
+
+
+class SettingsError(CornersmoothError):
+    """An option, a configuration file or a combination of them makes no sense."""
+
+    exit_code = 2
+
+
+class OutputError(CornersmoothError):
+    """The result cannot be written."""
+
+    exit_code = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something noticed that did not stop the work.
+
+    Parameters
+    ----------
+    code : str
+        Stable identifier, as in `CornersmoothError`.
+    severity : {"note", "warning", "error"}
+    line : int
+        Source line it was first met on, 0 where no line applies.
+    text : str
+        One sentence in the user's words.
+    count : int
+        How often it was met.
+    """
+
+    code: str
+    severity: Severity
+    line: int
+    text: str
+    count: int = 1

@@ -1,0 +1,377 @@
+"""The data that travels through the program: a tool path as arrays, and its statements as a side table.
+
+Words (design section 1): a *pose* is one tool tip with its axis; a *move* takes the tool from one pose to the next;
+a *chain* is a run of linear feed moves that nothing interrupts; a *corner* is an inner pose of a chain; a *statement*
+is what the CL file says between moves. Lengths are millimetres throughout; `Program.units` says what the file spoke
+and what the NC text will speak.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.errors import Finding
+from cornersmooth.settings import Settings
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+Units = Literal["mm", "inch"]
+
+#: millimetres per unit
+MM_PER_UNIT: dict[Units, float] = {"mm": 1.0, "inch": 25.4}
+
+
+class Move(IntEnum):
+    """How a pose is reached (`Program.kind`)."""
+
+    FROM = 0  #: a start position that is stated, not moved to
+    RAPID = 1
+    LINEAR = 2  #: linear feed move: the only kind that forms chains
+    ARC = 3  #: circular or helical feed move, described in `Program.arcs`
+    HOLE = 4  #: position of a hole cycle; the cycle is a statement
+
+
+class FeedMode(IntEnum):
+    """Unit of `Program.feed`."""
+
+    PER_MINUTE = 0  #: mm/min
+    PER_REVOLUTION = 1  #: mm/rev
+
+
+class Keep(IntEnum):
+    """Why a pose must be passed exactly although it is a corner (`Program.keep`)."""
+
+    NO = 0
+    CUTTER_COMPENSATION = 1  #: the control offsets the path; rounding before the offset would be wrong
+    ARC = 2  #: a chord or an end of a linearised arc
+    CONTRADICTION = 3  #: the reader found contradicting information here
+
+
+#: statement words that only inform: they neither stop the motion nor change the state of the machine, so the path may
+#: be rounded where they stand. Everything else interrupts the chain.
+INFORMING_WORDS = frozenset(
+    {"$$", "PAINT", "PPRINT", "REMARK", "DISPLY", "PARTNO", "TPRINT", "LETTER", "INTOL", "OUTTOL", "CUTTER", "TLDATA"}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A CL statement that is not a motion; it keeps its place between moves.
+
+    Parameters
+    ----------
+    pose : int
+        Index of the pose it stands before (``len(program)`` after the last one).
+    line : int
+        Source line it starts on, from 1.
+    word : str
+        Major word in upper case (``"SPINDL"``, ``"TOOL PATH"``); ``"$$"`` for a comment.
+    args : tuple of (float | str)
+        Numbers as floats, minor words in upper case; empty arguments are ``""``. Text statements (PPRINT, PARTNO,
+        comments, ...) have one string, untouched.
+    text : str
+        The statement as written, joined over continuation lines, without line ends.
+    """
+
+    pose: int
+    line: int
+    word: str
+    args: tuple[float | str, ...] = ()
+    text: str = ""
+
+    @property
+    def interrupts(self) -> bool:
+        """Whether a chain ends here: true for all but purely informing words."""
+        return self.word not in INFORMING_WORDS
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """Side table of the circular moves, k rows; the start of arc r is the pose before ``pose[r]``.
+
+    Parameters
+    ----------
+    pose : (k,) int64
+        Index of the pose that the arc ends in, ascending.
+    centre : (k, 3) float64, mm
+        Any point of the arc's axis.
+    normal : (k, 3) float64
+        Unit vector; the rotation is positive (right-handed) about it. Dialects with the opposite convention are
+        turned round by the reader.
+    sweep : (k,) float64, rad
+        Total rotation, > 0; more than 2π for several turns. A height difference between start and end along
+        `normal` makes the arc a helix.
+    """
+
+    pose: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    normal: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    sweep: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a program came from: the `input` part of the report.
+
+    Parameters
+    ----------
+    name : str
+        File name without its folder, ``"<stdin>"`` for a stream.
+    format : str
+        ``"apt"`` or ``"points"``.
+    dialect : str
+        ``"nx"``, ``"catia"``, ``"creo"``, ``"solidworks"``, ``"hsm"``, ``"ncl"``, ``"makino"``, ``"plain"``, ``"csv"``.
+    """
+
+    name: str = "<memory>"
+    format: str = "apt"
+    dialect: str = "plain"
+
+
+@dataclass(frozen=True)
+class Program:
+    """A tool path of n poses and what is said between them.
+
+    Parameters
+    ----------
+    tip : (n, 3) float64, mm
+        Tool tip points in part coordinates.
+    axis : (n, 3) float64
+        Unit tool axis vectors from tip to spindle; always full, also where the file is modal.
+    kind : (n,) uint8
+        `Move`: how pose i is reached from pose i-1.
+    feed : (n,) float64
+        Programmed feed of the move into pose i in the unit of `feed_mode`; NaN where the file gives none.
+    line : (n,) int64
+        Source line of pose i, from 1.
+    feed_mode : (n,) uint8
+        `FeedMode` of each feed.
+    keep : (n,) uint8
+        `Keep`: reason why the pose is passed exactly, 0 for none.
+    arcs : Arcs
+        Geometry of the poses with kind `Move.ARC`.
+    statements : tuple of Statement
+        Sorted by `Statement.pose`, then by source order.
+    units : {"mm", "inch"}
+        Units of the file, and of the NC text made from it.
+    source : Source
+    findings : tuple of Finding
+        What the reader noticed.
+
+    Notes
+    -----
+    FEDRAT and RAPID are no statements: they are `feed` and `kind`.
+    """
+
+    tip: Floats
+    axis: Floats
+    kind: NDArray[np.uint8]
+    feed: Floats
+    line: Ints
+    feed_mode: NDArray[np.uint8]
+    keep: NDArray[np.uint8]
+    arcs: Arcs = field(default_factory=Arcs)
+    statements: tuple[Statement, ...] = ()
+    units: Units = "mm"
+    source: Source = field(default_factory=Source)
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.tip)
+        shapes = {
+            "tip": (n, 3),
+            "axis": (n, 3),
+            **dict.fromkeys(("kind", "feed", "line", "feed_mode", "keep"), (n,)),
+        }
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise ValueError(f"Program.{name} has shape {getattr(self, name).shape}, not {shape}")
+
+    def __len__(self) -> int:
+        return len(self.tip)
+
+    @classmethod
+    def from_poses(
+        cls,
+        tip: Floats,
+        axis: Floats,
+        *,
+        kind: NDArray[np.uint8] | None = None,
+        feed: Floats | float = np.nan,
+        line: Ints | None = None,
+        **rest: Any,
+    ) -> Program:
+        """Program of linear feed moves through the given poses; what is not given gets its plain default.
+
+        Parameters
+        ----------
+        tip : (n, 3) array_like, mm
+        axis : (n, 3) array_like
+            Any length but zero; normalised here.
+        """
+        tip = np.array(tip, dtype=np.float64).reshape(-1, 3)
+        axis = np.array(axis, dtype=np.float64).reshape(-1, 3)
+        n = len(tip)
+        return cls(
+            tip=tip,
+            axis=axis / np.linalg.norm(axis, axis=1, keepdims=True),
+            kind=np.full(n, Move.LINEAR, np.uint8) if kind is None else np.asarray(kind, np.uint8),
+            feed=np.broadcast_to(np.asarray(feed, np.float64), (n,)).copy(),
+            line=np.arange(1, n + 1) if line is None else np.asarray(line, np.int64),
+            feed_mode=rest.pop("feed_mode", np.zeros(n, np.uint8)),
+            keep=rest.pop("keep", np.zeros(n, np.uint8)),
+            **rest,
+        )
+
+    @property
+    def mm_per_unit(self) -> float:
+        """Millimetres per unit of the file and of its NC text."""
+        return MM_PER_UNIT[self.units]
+
+    @cached_property
+    def interrupted(self) -> Bools:
+        """(n+1,) bool: whether a statement that interrupts stands before pose i."""
+        flags = np.zeros(len(self) + 1, np.bool_)
+        for statement in self.statements:
+            if statement.interrupts:
+                flags[statement.pose] = True
+        return flags
+
+    @cached_property
+    def chains(self) -> Ints:
+        """(k, 2) int64: first and last pose of every chain, both included; the first is where the run starts from.
+
+        A move belongs to a chain when it is a linear feed move with a pose to come from. A chain starts anew where the
+        move before is of another kind or an interrupting statement stands at the pose.
+        """
+        n = len(self)
+        linear = self.kind == Move.LINEAR
+        linear[:1] = False  # nothing to come from
+        if n > 1:
+            linear[1:] &= self.kind[:-1] != Move.FROM  # a FROM is stated, not passed
+        inner = np.zeros(n, np.bool_)  # pose i joins two moves of one chain
+        if n > 2:
+            inner[1:-1] = linear[1:-1] & linear[2:] & ~self.interrupted[2:n]
+        first = np.flatnonzero(linear & ~np.concatenate(([False], inner[:-1]))) - 1
+        last = np.flatnonzero(linear & ~inner)
+        return np.stack((first, last), axis=1).astype(np.int64)
+
+    def with_findings(self, *more: Finding) -> Program:
+        """Return the same program with more findings."""
+        return replace(self, findings=(*self.findings, *more))
+
+
+class Status(IntEnum):
+    """What became of a corner (`Corners.status`)."""
+
+    SMOOTHED = 0
+    STRAIGHT = 1  #: turns by less than the output can show
+    REVERSAL = 2  #: turns by more than `Settings.reversal_angle`
+    AXIS_STEP = 3  #: the axis turns by more than `Settings.max_axis_step` on one side
+    FEED_CHANGE = 4  #: the feed changes here and the output form cannot change it inside a curve
+    KEPT = 5  #: `Program.keep` asks for the pose itself
+    DUPLICATE = 6  #: repeats the pose before it, or has no other pose on one side
+    TOO_SHORT = 7  #: the room for a transition is below what the output can show
+
+
+class LimitedBy(IntEnum):
+    """What set the length of a transition (`Corners.limited_by`)."""
+
+    NOTHING = 0  #: not smoothed
+    TOLERANCE = 1
+    SEGMENT = 2
+    ORIENTATION = 3
+
+
+@dataclass(frozen=True)
+class Corners:
+    """One row for every inner pose of every chain, k rows in path order.
+
+    The five control points of a smoothed row follow from it (`cornersmooth.smoothing.nurbs.control_points`): with X
+    the pose, D⁻ and D⁺ the segments to its neighbours `before` and `after`, the tip curve P has
+    ``X − trim_in·D⁻, X − ratio·trim_in·D⁻, X, X + ratio·trim_out·D⁺, X + trim_out·D⁺``, and the axis-point curve Q the
+    same with the axis points and `axis_trim_*`.
+
+    Parameters
+    ----------
+    pose, before, after : (k,) int64
+        The corner's pose and the distinct poses next to it.
+    status : (k,) uint8
+        `Status`.
+    limited_by : (k,) uint8
+        `LimitedBy`.
+    trim_in, trim_out : (k,) float64
+        Fraction of the tip segment taken by the transition before and after the corner; 0 where not smoothed.
+    axis_trim_in, axis_trim_out : (k,) float64
+        The same for the axis-point segments; the same numbers for the proportional method.
+    weights : (k, 2) float64
+        w1 (second and fourth control point) and w2 (third); the first and the last are 1.
+    ratio : (k,) float64
+        Distance of the second control point from the corner over that of the first; 2/3 in the paper.
+    tip_error, axis_error : (k,) float64, mm
+        Largest distance between corner and curve pair: at the tip, and at b = tip + H·axis.
+    orientation_error : (k,) float64, rad
+        Largest angle between the axis on the transition and on the original motion at the common parameter.
+    sync_residual : (k,) float64, mm
+        Largest ``||Q−P|−H|`` left by the synchronisation of `zhang2016`; NaN for the proportional method.
+    jump_in, jump_out : (k,) float64, rad
+        Jump of the axis at the two joints (`zhang2016`); NaN for the proportional method.
+    """
+
+    pose: Ints
+    before: Ints
+    after: Ints
+    status: NDArray[np.uint8]
+    limited_by: NDArray[np.uint8]
+    trim_in: Floats
+    trim_out: Floats
+    axis_trim_in: Floats
+    axis_trim_out: Floats
+    weights: Floats
+    ratio: Floats
+    tip_error: Floats
+    axis_error: Floats
+    orientation_error: Floats
+    sync_residual: Floats
+    jump_in: Floats
+    jump_out: Floats
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    @property
+    def smoothed(self) -> Bools:
+        """(k,) bool."""
+        return self.status == Status.SMOOTHED
+
+
+@dataclass(frozen=True)
+class SmoothProgram:
+    """A program with its rounded corners: what writers, report and feedrate planning work from.
+
+    Parameters
+    ----------
+    program : Program
+        The original motion.
+    corners : Corners
+    settings : Settings
+        What it was made with.
+    findings : tuple of Finding
+        Those of the reader and those of the smoothing.
+    """
+
+    program: Program
+    corners: Corners
+    settings: Settings
+    findings: tuple[Finding, ...] = ()

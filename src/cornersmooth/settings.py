@@ -1,0 +1,139 @@
+"""Every tolerance and option of the smoothing: name, unit, default, bounds. No other module holds such a number."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal
+
+from cornersmooth.errors import SettingsError
+
+Method = Literal["proportional", "zhang2016"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What `cornersmooth.smooth` promises and how it goes about it. Lengths in mm, angles in degrees.
+
+    Parameters
+    ----------
+    tolerance : float, mm
+        ε: bound on the deviation of the written tip path and axis-point path (design section 4).
+    axis_length : float, mm
+        H: distance of the axis point from the tip. Choose the length of the cutting edge.
+    method : {"proportional", "zhang2016"}
+    weights : (float, float)
+        w1 and w2 of the five-point curve, in (0, 3]; rounded to the three decimals that controls accept.
+    ratio : float
+        Second control point over first, in [0.5, 0.9]; the paper's 2/3 divides the leg so that knots need no care.
+    orientation_tolerance : float or None, degrees
+        τ: bound on the angle between the axis and the original axis; None leaves it to ε and H.
+    reversal_angle : float, degrees
+        A corner that turns by more (in the six-dimensional sense) stays sharp.
+    max_axis_step : float, degrees
+        A corner next to a segment whose axis turns by more stays sharp: the ruled motion is not a motion any more.
+    chord_tolerance : float or None, mm
+        Distance between the written lines and the curve in dense output; None for a tenth of ε.
+    axis_step : float or None, degrees
+        Largest change of axis in one written line next to a rounded corner; None for what ε and H ask for.
+    round_feed_changes : bool
+        Whether a corner where the feed changes may be rounded; false for output that cannot change F inside a curve.
+    tip_resolution : float, mm
+        Step of the written tip coordinates; half of it per axis is taken off ε. 0 for no rounding.
+    axis_point_resolution : float, mm
+        Step of the written axis points, or of the written vectors times H.
+    duplicate_distance : float, mm
+        Poses closer than this, in tip and axis point, are one pose.
+    """
+
+    tolerance: float = 0.01
+    axis_length: float = 10.0
+    method: Method = "proportional"
+    weights: tuple[float, float] = (1.0, 1.0)
+    ratio: float = 2.0 / 3.0
+    orientation_tolerance: float | None = None
+    reversal_angle: float = 170.0
+    max_axis_step: float = 90.0
+    chord_tolerance: float | None = None
+    axis_step: float | None = None
+    round_feed_changes: bool = True
+    tip_resolution: float = 0.0
+    axis_point_resolution: float = 0.0
+    duplicate_distance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        if self.method not in ("proportional", "zhang2016"):
+            raise SettingsError("CS201", f"unknown method {self.method!r}", "use proportional or zhang2016")
+        object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
+        for name, (low, high) in BOUNDS.items():
+            value = getattr(self, name)
+            for number in value if isinstance(value, tuple) else (value,):
+                if number is not None and not (math.isfinite(number) and low <= number <= high):
+                    raise SettingsError("CS202", f"{name} is {number:g}", f"give a value from {low:g} to {high:g}")
+        if self.tip_tolerance <= 0 or self.axis_point_tolerance <= 0:
+            raise SettingsError(
+                "CS203",
+                f"tolerance {self.tolerance:g} mm is finer than the written digits can hold",
+                f"use at least {2 * (self.tolerance - min(self.tip_tolerance, self.axis_point_tolerance)):.2g} mm",
+            )
+
+    @property
+    def tip_tolerance(self) -> float:
+        """ε less the rounding of the tip: half a step in each of three coordinates."""
+        return self.tolerance - math.sqrt(3) / 2 * self.tip_resolution
+
+    @property
+    def axis_point_tolerance(self) -> float:
+        """ε less the rounding of tip and axis point and less the share of `interpolation_share`."""
+        rounding = math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
+        return self.tolerance * (1 - self.interpolation_share) - rounding
+
+    @property
+    def interpolation_share(self) -> float:
+        """Part of ε at the axis point left to how controls turn the axis inside one line (vectors or great circle)."""
+        return 0.02
+
+    @property
+    def chord(self) -> float:
+        """Effective chord tolerance of dense output, mm."""
+        return self.tolerance / 10 if self.chord_tolerance is None else self.chord_tolerance
+
+    @property
+    def axis_step_angle(self) -> float:
+        """Largest change of axis in one written line, rad.
+
+        Between the two ways of turning from one vector to another by θ, linear vectors and great circle at constant
+        rate, lie less than θ³/54 rad (measured to θ = 90°); H times that stays below the share of ε set aside for it.
+        """
+        if self.axis_step is not None:
+            return math.radians(self.axis_step)
+        share = 54 * self.interpolation_share * self.tolerance / self.axis_length
+        return min(math.radians(15), share ** (1 / 3))
+
+    def but(self, **changes: Any) -> Settings:
+        """Return a copy with some values changed."""
+        return replace(self, **changes)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values in field order, for the report."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+
+#: decimals of a weight that every control keeps (FANUC IS-B, reference manual B-63324EN/03 4.17)
+WEIGHT_DECIMALS = 3
+
+#: closed bounds of the numeric settings
+BOUNDS: dict[str, tuple[float, float]] = {
+    "tolerance": (1e-6, 10.0),
+    "axis_length": (1e-3, 1e4),
+    "weights": (0.001, 3.0),
+    "ratio": (0.5, 0.9),
+    "orientation_tolerance": (1e-6, 90.0),
+    "reversal_angle": (1.0, 180.0),
+    "max_axis_step": (1.0, 90.0),
+    "chord_tolerance": (1e-7, 1.0),
+    "axis_step": (1e-3, 90.0),
+    "tip_resolution": (0.0, 0.1),
+    "axis_point_resolution": (0.0, 0.1),
+    "duplicate_distance": (0.0, 0.01),
+}
