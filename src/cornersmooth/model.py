@@ -353,7 +353,8 @@ class Corners:
     @property
     def smoothed(self) -> Bools:
         """(k,) bool."""
-        return self.status == Status.SMOOTHED
+        smoothed: Bools = self.status == Status.SMOOTHED
+        return smoothed
 
 
 @dataclass(frozen=True)

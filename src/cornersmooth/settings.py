@@ -108,7 +108,7 @@ class Settings:
         if self.axis_step is not None:
             return math.radians(self.axis_step)
         share = 54 * self.interpolation_share * self.tolerance / self.axis_length
-        return min(math.radians(15), share ** (1 / 3))
+        return min(math.radians(15), math.cbrt(share))
 
     def but(self, **changes: Any) -> Settings:
         """Return a copy with some values changed."""
