@@ -281,8 +281,8 @@ class Status(IntEnum):
     AXIS_STEP = 3  #: the axis turns by more than `Settings.max_axis_step` on one side
     FEED_CHANGE = 4  #: the feed changes here and the output form cannot change it inside a curve
     KEPT = 5  #: `Program.keep` asks for the pose itself
-    DUPLICATE = 6  #: repeats the pose before it, or has no other pose on one side
-    TOO_SHORT = 7  #: the room for a transition is below what the output can show
+    DUPLICATE = 6  #: repeats the pose before it
+    TOO_SHORT = 7  #: no room for a transition, or less than the output can show
 
 
 class LimitedBy(IntEnum):

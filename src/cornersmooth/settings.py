@@ -44,6 +44,8 @@ class Settings:
         Step of the written axis points, or of the written vectors times H.
     duplicate_distance : float, mm
         Poses closer than this, in tip and axis point, are one pose.
+    shortest_line : float, mm
+        A straight remainder shorter than this between two transitions is not written as a line of its own.
     """
 
     tolerance: float = 0.01
@@ -60,6 +62,7 @@ class Settings:
     tip_resolution: float = 0.0
     axis_point_resolution: float = 0.0
     duplicate_distance: float = 1e-6
+    shortest_line: float = 1e-3
 
     def __post_init__(self) -> None:
         if self.method not in ("proportional", "zhang2016"):
@@ -84,14 +87,8 @@ class Settings:
 
     @property
     def axis_point_tolerance(self) -> float:
-        """ε less the rounding of tip and axis point and less the share of `interpolation_share`."""
-        rounding = math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
-        return self.tolerance * (1 - self.interpolation_share) - rounding
-
-    @property
-    def interpolation_share(self) -> float:
-        """Part of ε at the axis point left to how controls turn the axis inside one line (vectors or great circle)."""
-        return 0.02
+        """ε less the rounding of tip and axis point."""
+        return self.tolerance - math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
 
     @property
     def chord(self) -> float:
@@ -99,16 +96,13 @@ class Settings:
         return self.tolerance / 10 if self.chord_tolerance is None else self.chord_tolerance
 
     @property
-    def axis_step_angle(self) -> float:
-        """Largest change of axis in one written line, rad.
+    def interpolation_tolerance(self) -> float:
+        """Distance, at the axis point, that turning the axis inside one written line may add, mm.
 
-        Between the two ways of turning from one vector to another by θ, linear vectors and great circle at constant
-        rate, lie less than θ³/54 rad (measured to θ = 90°); H times that stays below the share of ε set aside for it.
+        It needs no share of ε in the choice of L: on straight remainders nothing else deviates, and inside a
+        transition it vanishes at the written poses, where the deviation has its maximum.
         """
-        if self.axis_step is not None:
-            return math.radians(self.axis_step)
-        share = 54 * self.interpolation_share * self.tolerance / self.axis_length
-        return min(math.radians(15), math.cbrt(share))
+        return 0.1 * self.tolerance
 
     def but(self, **changes: Any) -> Settings:
         """Return a copy with some values changed."""
@@ -136,4 +130,5 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "tip_resolution": (0.0, 0.1),
     "axis_point_resolution": (0.0, 0.1),
     "duplicate_distance": (0.0, 0.01),
+    "shortest_line": (0.0, 1.0),
 }

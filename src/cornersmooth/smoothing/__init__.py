@@ -1,0 +1,37 @@
+"""Rounding the corners of a program: `smooth` is the whole of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from cornersmooth.model import Program, SmoothProgram
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.transition import place_corners
+
+__all__ = ["smooth"]
+
+
+def smooth(
+    program: Program,
+    settings: Settings | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> SmoothProgram:
+    """Round every corner of the program within the tolerance.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings, optional
+        Defaults: ε 0.01 mm, H 10 mm, the proportional method.
+    progress : callable, optional
+        Called now and then with (corners done, corners in all).
+
+    Returns
+    -------
+    SmoothProgram
+        Also where nothing can be rounded; every corner has a status that says why not.
+    """
+    settings = Settings() if settings is None else settings
+    corners = place_corners(program, settings, progress)
+    return SmoothProgram(program=program, corners=corners, settings=settings, findings=program.findings)

@@ -1,0 +1,91 @@
+"""Which poses are next to each other once repeated poses are seen as one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Program
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Distinct neighbours of every pose inside its chain.
+
+    Parameters
+    ----------
+    previous : (n,) int64
+        The pose that the linear move into pose i starts from, -1 where pose i is not reached inside a chain.
+    following : (n,) int64
+        The next distinct pose where pose i is an inner pose of its chain, else -1.
+    inner : (n,) bool
+        Inner poses of chains, repeated ones included: the corners.
+    duplicate : (n,) bool
+        Poses that repeat the one before them in the same chain.
+    """
+
+    previous: Ints
+    following: Ints
+    inner: Bools
+    duplicate: Bools
+
+
+def find_neighbours(program: Program, axis_length: float, distance: float) -> Neighbours:
+    """Distinct neighbours of all poses; poses within `distance` (mm, tip and axis point) of each other are one.
+
+    A run of poses that creep on by less than `distance` each but by more in total is not merged.
+    """
+    n = len(program)
+    chains = program.chains
+    chain_length = chains[:, 1] - chains[:, 0]
+    reached = np.zeros(n, np.bool_)  # by a linear move inside a chain
+    members = _ranges(chains[:, 0] + 1, chain_length)
+    reached[members] = True
+    first = np.full(n, -1, np.int64)
+    last = np.full(n, -1, np.int64)
+    first[members] = np.repeat(chains[:, 0], chain_length)
+    last[members] = np.repeat(chains[:, 1], chain_length)
+    inner = reached & (np.arange(n) != last)
+
+    duplicate = np.zeros(n, np.bool_)
+    if n > 1:
+        duplicate[1:] = reached[1:] & _closer(program, np.arange(1, n), np.arange(n - 1), axis_length, distance)
+    own = np.arange(n)
+    representative = np.maximum.accumulate(np.where(duplicate, 0, own)) if n else own
+    repeats = np.flatnonzero(duplicate)
+    if len(repeats):
+        away = repeats[~_closer(program, repeats, representative[repeats], axis_length, distance)]
+        creeping = np.isin(representative[repeats], representative[away])
+        duplicate[repeats[creeping]] = False
+        representative = np.maximum.accumulate(np.where(duplicate, 0, own))
+
+    previous = np.full(n, -1, np.int64)
+    previous[members] = np.maximum(representative[members - 1], first[members])
+    distinct = np.minimum.accumulate(np.where(duplicate, n, own)[::-1])[::-1] if n else own
+    following = np.full(n, -1, np.int64)
+    corners = np.flatnonzero(inner)
+    following[corners] = distinct[corners + 1]
+    following[following > last] = -1
+    return Neighbours(previous, following, inner, duplicate)
+
+
+def _closer(program: Program, one: Ints, other: Ints, axis_length: float, distance: float) -> Bools:
+    step = program.tip[one] - program.tip[other]
+    turn = axis_length * (program.axis[one] - program.axis[other])
+    near: Bools = (norm(step) <= distance) & (norm(step + turn) <= distance)
+    return near
+
+
+def _ranges(start: Ints, length: Ints) -> Ints:
+    """Concatenation of ``start[i] .. start[i] + length[i] - 1``."""
+    total = int(length.sum())
+    begin = np.cumsum(length) - length
+    places: Ints = np.arange(total) + np.repeat(start - begin, length)
+    return places
+
+
+def norm(vectors: Floats) -> Floats:
+    """Length of the vectors along the last axis."""
+    lengths: Floats = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    return lengths

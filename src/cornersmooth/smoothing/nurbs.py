@@ -1,0 +1,187 @@
+"""The five-point curve: a cubic NURBS on the knots {0, 0, 0, 0, ½, 1, 1, 1, 1} with weights (1, w1, w2, w1, 1).
+
+Paper equations (3), (4) and (9). On each half of the parameter range the curve is a Bézier cubic; with s = 2u on the
+first half the basis is explicit, which is what `basis` uses. On the second half it is mirrored.
+
+Seen from the corner X, with the incoming leg a (from the first control point to X), the outgoing leg b and ratio ρ of
+the inner control points, the curve is
+
+    first half:   X − σ·a + β·(b − a),    σ = R0 + ρ·R1 − ρ·R3,   β = ρ·R3
+    second half:  X + σ·b + β·(b − a),    σ, β at the mirrored parameter
+
+(R: rational basis). X − σ·a and X + σ·b are poses of the original motion, so β·(b − a) is the deviation at a common
+parameter; β is largest at u = ½, where it is c = ρ·w1/(2(w1 + w2)) and σ = 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Bools, Corners, Floats, Ints, Program
+
+KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0)
+
+
+def deviation_factor(weights: Floats, ratio: Floats) -> Floats:
+    """C of design 3.2: deviation at u = ½ over the length of the difference of the legs.
+
+    Parameters
+    ----------
+    weights : (k, 2) float64
+    ratio : (k,) float64
+
+    Returns
+    -------
+    (k,) float64
+    """
+    factor: Floats = ratio * weights[:, 0] / (2.0 * (weights[:, 0] + weights[:, 1]))
+    return factor
+
+
+def basis(u: Floats) -> Floats:
+    """Polynomial basis of the five-point curve.
+
+    Parameters
+    ----------
+    u : (m,) float64
+        Parameters in [0, 1].
+
+    Returns
+    -------
+    (m, 5) float64
+    """
+    u = np.asarray(u, np.float64)
+    second = u > 0.5
+    s = 2.0 * np.where(second, 1.0 - u, u)
+    r = 1.0 - s
+    values = np.stack(
+        (
+            r**3,
+            s * (3.0 * r * r + s * (1.5 * r + 0.25 * s)),
+            s * s * (1.5 * r + 0.5 * s),
+            0.25 * s**3,
+            np.zeros_like(s),
+        ),
+        axis=-1,
+    )
+    return np.where(second[..., None], values[..., ::-1], values)
+
+
+def rational_basis(u: Floats, weights: Floats) -> Floats:
+    """Rational basis for one or many pairs of weights.
+
+    Parameters
+    ----------
+    u : (..., m) float64
+    weights : (..., 2) float64
+        w1 and w2; leading dimensions broadcast against those of `u` without its last.
+
+    Returns
+    -------
+    (..., m, 5) float64
+    """
+    weighted = basis(u) * full_weights(weights)[..., None, :]
+    sums: Floats = weighted.sum(axis=-1, keepdims=True)
+    return weighted / sums
+
+
+def full_weights(weights: Floats) -> Floats:
+    """(..., 2) weights w1, w2 as the (..., 5) weights 1, w1, w2, w1, 1."""
+    w1, w2 = weights[..., 0], weights[..., 1]
+    one = np.ones_like(w1)
+    return np.stack((one, w1, w2, w1, one), axis=-1)
+
+
+def control_points(
+    program: Program, corners: Corners, rows: Ints | Bools | slice, axis_length: float
+) -> tuple[Floats, Floats]:
+    """Control points of the tip curve P and of the axis-point curve Q of some corners: equation (9).
+
+    Parameters
+    ----------
+    rows : (g,) int64 or (k,) bool or slice
+        Which corners; those not smoothed have all five points at the corner.
+    axis_length : float, mm
+
+    Returns
+    -------
+    P, Q : (g, 5, 3) float64, mm
+    """
+    pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
+    ratio = corners.ratio[rows]
+    tip, axis = program.tip, program.axis
+    corner = tip[pose]
+    turned = axis_length * axis[pose]
+    step_in, step_out = corner - tip[before], tip[after] - corner
+    axis_in = step_in + turned - axis_length * axis[before]
+    axis_out = step_out + axis_length * axis[after] - turned
+    tip_curve = five_points(
+        corner, step_in * corners.trim_in[rows][:, None], step_out * corners.trim_out[rows][:, None], ratio
+    )
+    axis_curve = five_points(
+        corner + turned,
+        axis_in * corners.axis_trim_in[rows][:, None],
+        axis_out * corners.axis_trim_out[rows][:, None],
+        ratio,
+    )
+    return tip_curve, axis_curve
+
+
+def five_points(corner: Floats, leg_in: Floats, leg_out: Floats, ratio: Floats) -> Floats:
+    """Control points from the corners (g, 3), the legs into and out of them (g, 3) and the ratios (g,)."""
+    points = np.repeat(corner[:, None, :], 5, axis=1)
+    points[:, 0] -= leg_in
+    points[:, 1] -= ratio[:, None] * leg_in
+    points[:, 3] += ratio[:, None] * leg_out
+    points[:, 4] += leg_out
+    return points
+
+
+def evaluate(points: Floats, weights: Floats, u: Floats) -> Floats:
+    """Points of many curves: equation (3).
+
+    Parameters
+    ----------
+    points : (g, 5, 3) float64
+    weights : (g, 2) or (2,) float64
+    u : (m,) or (g, m) float64
+
+    Returns
+    -------
+    (g, m, 3) float64
+    """
+    values: Floats = rational_basis(u, weights) @ points
+    return values
+
+
+def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
+    """Point, first and second derivative with respect to u, of many curves at common parameters.
+
+    At the knot u = ½ the left derivatives are returned; the curve is C² there.
+
+    Parameters
+    ----------
+    points : (g, 5, 3) float64
+    weights : (g, 2) float64
+    u : (m,) float64
+
+    Returns
+    -------
+    three (g, m, 3) float64
+    """
+    second = u > 0.5
+    s = 2.0 * np.where(second, 1.0 - u, u)
+    r = 1.0 - s
+    zero = np.zeros_like(s)
+    n0 = basis(u)
+    n1 = np.stack((-3 * r * r, 3 * r * r - 3 * r * s - 0.75 * s * s, 3 * r * s, 0.75 * s * s, zero), axis=-1)
+    n2 = np.stack((6 * r, -9 * r + 1.5 * s, 3 * r - 3 * s, 1.5 * s, zero), axis=-1)
+    mirrored = second[:, None]
+    n1 = 2.0 * np.where(mirrored, -n1[:, ::-1], n1)
+    n2 = 4.0 * np.where(mirrored, n2[:, ::-1], n2)
+    w = full_weights(weights)[:, None, :]
+    d0, d1, d2 = ((n * w).sum(axis=-1, keepdims=True) for n in (n0, n1, n2))
+    p0 = ((n0 * w) @ points) / d0
+    p1 = ((n1 * w) @ points - d1 * p0) / d0
+    p2 = ((n2 * w) @ points - 2.0 * d1 * p1 - d2 * p0) / d0
+    return p0, p1, p2

@@ -1,0 +1,169 @@
+"""Synchronisation of the two curves in the paper's method: equations (20) to (22).
+
+For a parameter u of the tip curve, v is sought on the axis-point curve with |Q(v) − P(u)| = H. The equation is ill
+posed: where the feed is perpendicular to the tool axis its derivative vanishes, and on the paper's own Table 1 there is
+no root at u = 0 of the third position and two over half of the range. So the root is followed on the branch that starts
+nearest to v = u; v never runs backwards; where there is no root the v that comes closest to H is taken, and what is
+missing is reported as the residual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from cornersmooth.model import Floats
+from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.neighbours import norm
+
+#: parameters of the tip curve at which residual and jumps are reported
+REPORT_PARAMETERS = np.linspace(0.0, 1.0, 9)
+
+_GRID = np.linspace(0.0, 1.0, 33)
+_HALVINGS = 36
+
+
+def matching_parameters(
+    tip_curve: Floats, axis_curve: Floats, weights: Floats, u: Floats, axis_length: float
+) -> tuple[Floats, Floats]:
+    """Parameters v(u) with |Q(v) − P(u)| = H as nearly as possible, never decreasing.
+
+    Parameters
+    ----------
+    tip_curve, axis_curve : (g, 5, 3) float64, mm
+        Control points of P and Q.
+    weights : (g, 2) float64
+    u : (m,) float64
+        Ascending parameters of the tip curve.
+    axis_length : float, mm
+        H.
+
+    Returns
+    -------
+    v : (g, m) float64
+    residual : (g, m) float64, mm
+        ``| |Q(v) − P(u)| − H |``.
+    """
+    g, m = len(tip_curve), len(u)
+    tips = nurbs.evaluate(tip_curve, weights, u)
+    grid = nurbs.evaluate(axis_curve, weights, _GRID)
+    v = np.zeros((g, m))
+    residual = np.zeros((g, m))
+    low_limit = np.zeros(g)
+    target = np.full(g, u[0])
+    for j in range(m):
+        tip = tips[:, j]
+
+        def excess(parameter: Floats, tip: Floats = tip) -> Floats:
+            point = nurbs.evaluate(axis_curve, weights, parameter[:, None])[:, 0]
+            return norm(point - tip) - axis_length
+
+        found = _follow(norm(grid - tip[:, None]) - axis_length, low_limit, target, excess)
+        v[:, j] = found
+        residual[:, j] = np.abs(excess(found))
+        low_limit = found
+        if j + 1 < m:
+            target = np.clip(found + (u[j + 1] - u[j]), 0.0, 1.0)
+    return v, residual
+
+
+def _follow(values: Floats, low_limit: Floats, target: Floats, excess: Callable[[Floats], Floats]) -> Floats:
+    """One step of the branch: the root at or above `low_limit` nearest to `target`, else the smallest excess.
+
+    Parameters
+    ----------
+    values : (g, grid) float64
+        Excess ``|Q(v) − P(u)| − H`` on the grid.
+    """
+    rows = np.arange(len(values))
+    # the cell that holds the limit counts from the limit on
+    at_limit = excess(low_limit)
+    below = _GRID[None, :] < low_limit[:, None]
+    values = np.where(below, at_limit[:, None], values)
+    places = np.maximum(_GRID[None, :], low_limit[:, None])
+    crossing = (values[:, :-1] <= 0.0) != (values[:, 1:] <= 0.0)
+    distance = np.maximum(places[:, :-1] - target[:, None], target[:, None] - places[:, 1:])
+    cell = np.argmin(np.where(crossing, np.maximum(distance, 0.0), np.inf), axis=1)
+    has_root = crossing.any(axis=1)
+
+    low, high = places[rows, cell], places[rows, cell + 1]
+    negative_low = values[rows, cell] <= 0.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        same = (excess(middle) <= 0.0) == negative_low
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    root = 0.5 * (low + high)
+    # an exact root at the limit, as at the two ends of a well synchronised corner, is kept exactly
+    root = np.where(
+        (np.abs(at_limit) <= 1e-12) & (np.abs(target - low_limit) <= np.abs(target - root)), low_limit, root
+    )
+    return np.where(has_root, root, _closest(values, places, excess))
+
+
+def _closest(values: Floats, places: Floats, excess: Callable[[Floats], Floats]) -> Floats:
+    """Parameter with the smallest ``|excess|``: grid minimum refined by ternary search in its two cells."""
+    rows = np.arange(len(values))
+    best = np.argmin(np.abs(values), axis=1)
+    low = places[rows, np.maximum(best - 1, 0)]
+    high = places[rows, np.minimum(best + 1, len(_GRID) - 1)]
+    for _ in range(_HALVINGS):
+        third = (high - low) / 3.0
+        left, right = low + third, high - third
+        keep_left = np.abs(excess(left)) <= np.abs(excess(right))
+        low, high = np.where(keep_left, low, left), np.where(keep_left, right, high)
+    middle = 0.5 * (low + high)
+    candidates = np.stack((middle, low, high, places[rows, best]))
+    misses = np.abs(np.stack([excess(candidate) for candidate in candidates]))
+    closest: Floats = candidates[np.argmin(misses, axis=0), rows]
+    return closest
+
+
+def synchronisation_report(
+    tip_legs: tuple[Floats, Floats],
+    axis_legs: tuple[Floats, Floats],
+    lever: Floats,
+    weights: Floats,
+    ratio: Floats,
+    axis_length: float,
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """How far the paper's synchronisation of some corners is from what it asks for.
+
+    Parameters
+    ----------
+    tip_legs, axis_legs : pairs of (g, 3) float64, mm
+        Vectors from the first control point to the corner and from the corner to the last one.
+    lever : (g, 3) float64, mm
+        H times the axis at the corner.
+
+    Returns
+    -------
+    residual : (g,) float64, mm
+        Largest ``||Q−P|−H|`` over `REPORT_PARAMETERS`.
+    jump_in, jump_out : (g,) float64, rad
+        Angle between the axis of the adjoining straight motion and that of the transition at its two ends.
+    orientation : (g,) float64, rad
+        Largest angle between the axis on the transition and the axis at the corner, at u = ½.
+    """
+    origin = np.zeros_like(lever)
+    tip_curve = nurbs.five_points(origin, *tip_legs, ratio)
+    axis_curve = nurbs.five_points(lever, *axis_legs, ratio)
+    v, residual = matching_parameters(tip_curve, axis_curve, weights, REPORT_PARAMETERS, axis_length)
+    ends = []
+    for at, index in ((0, 0), (4, -1)):
+        line = axis_curve[:, at] - tip_curve[:, at]
+        curve = nurbs.evaluate(axis_curve, weights, v[:, [index]])[:, 0] - tip_curve[:, at]
+        ends.append(angle_between(line, curve))
+    half = len(REPORT_PARAMETERS) // 2
+    middle = (
+        nurbs.evaluate(axis_curve, weights, v[:, [half]])[:, 0]
+        - nurbs.evaluate(tip_curve, weights, REPORT_PARAMETERS[[half]])[:, 0]
+    )
+    return residual.max(axis=1), ends[0], ends[1], angle_between(middle, lever)
+
+
+def angle_between(one: Floats, other: Floats) -> Floats:
+    """Angle between vectors along the last axis, rad; accurate for small angles too."""
+    cross = np.cross(one, other)
+    angle: Floats = np.arctan2(norm(cross), np.einsum("...i,...i->...", one, other))
+    return angle
