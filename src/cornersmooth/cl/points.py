@@ -1,0 +1,194 @@
+"""Point files: CSV and columns, one pose a line, with axis vectors, second points on the axis, or tips alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import islice
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.cl import points_header as columns
+from cornersmooth.cl import points_table as table
+from cornersmooth.cl.points_header import Layout
+from cornersmooth.cl.points_messages import error, finding
+from cornersmooth.errors import Finding
+from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Program, Source, Units
+
+#: largest ||v|−1| of an axis vector; three printed decimals leave 1e-3 (reference/cl-formats.md, fact 13)
+UNIT_TOLERANCE: Final = 1e-2
+
+#: largest spread of |B−A| over its mean in a file of second points
+DISTANCE_SPREAD: Final = 1e-2
+
+#: without a header, second points stand farther from the tip than this, in units of the file, or from the origin
+LEAST_DISTANCE: Final = 1.5
+
+#: no machine reaches farther, in units of the file
+FARTHEST: Final = 1e7
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The numbers of a file and where they come from."""
+
+    file: str
+    values: Floats
+    line: Ints
+    layout: Layout
+
+    def take(self, group: tuple[int, ...]) -> Floats:
+        """Columns of the table."""
+        first, last = group[0], group[-1]
+        in_order = group == tuple(range(first, last + 1))
+        return self.values[:, first : last + 1] if in_order else self.values[:, list(group)]
+
+    def at(self, wrong: Bools) -> int:
+        """Line of the first row that is wrong."""
+        return int(self.line[wrong.argmax()])
+
+
+def looks_like_points(data: bytes) -> bool:
+    """Whether the text starts like a point file: a row of numbers, or one line of names and then a row.
+
+    Parameters
+    ----------
+    data : bytes
+        The file, or its first kilobytes.
+    """
+    first = list(islice(table.leading_lines(data), 2))
+    if not first or any("/" in line and not columns.is_header(line) for line in first):  # a CL statement
+        return False
+    return columns.is_header(first[0]) or any(table.is_row(line) for line in first)
+
+
+def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: bool = False) -> Program:
+    """Read a CSV or column file: every row is a linear feed move to its pose.
+
+    Columns are named by a header line (also one in a comment) or known from their number: 3 are tips with axis +Z, 6
+    are tip and axis vector or tip and second point of the axis, whichever the numbers say, a seventh is the feed.
+
+    Parameters
+    ----------
+    data : bytes
+        UTF-8, UTF-16 or Windows-1252; cells between commas, semicolons, tabs or blanks; decimal commas where
+        semicolons or tabs separate; comments after ``#``, ``%`` or ``//``.
+    name : str
+        File name for messages and report.
+    units : {"mm", "inch"} or None
+        None for what the header says, or mm. Feeds are per minute in the same unit.
+    lenient : bool
+        Normalise axis vectors of any length and skip feeds that are not positive, with findings.
+
+    Returns
+    -------
+    Program
+
+    Raises
+    ------
+    InputError
+        CS150-CS164, with the line.
+    """
+    text = table.clean(data, name)
+    layout = _layout(text, name)
+    values, line = table.numbers(text, layout, name)
+    if not len(values):
+        raise error("CS150", name, None)
+    rows = _Rows(name, values, line, layout)
+    far = np.flatnonzero(np.abs(rows.take(layout.wanted)).max(axis=1) > FARTHEST)
+    if len(far):
+        raise error("CS163", name, int(line[far[0]]), limit=FARTHEST)
+    units = units or layout.units or "mm"
+    scale = MM_PER_UNIT[units]
+    axis, axis_findings = _axis(rows, scale, lenient)
+    feed, feed_findings = _feed(rows, lenient)
+    findings = [*axis_findings, *feed_findings]
+    if layout.unused:
+        findings.append(finding("CS173", text.header_line, len(layout.unused), names=", ".join(layout.unused)))
+    return Program.from_poses(
+        rows.take(layout.tip) * scale,
+        axis,
+        feed=feed * scale,
+        line=line,
+        units=units,
+        source=Source(name, format="points", dialect="csv"),
+        findings=tuple(findings),
+    )
+
+
+def _layout(text: table.PointText, name: str) -> Layout:
+    if text.header is not None and text.header_certain:
+        return columns.from_header(text.header, name, text.header_line)
+    if not text.width:
+        raise error("CS150", name, None)
+    if text.header is not None:
+        layout = columns.from_header(text.header, name, text.header_line)
+        if layout.width == text.width:
+            return layout
+    return columns.from_width(text.width, name, text.row_line)
+
+
+def _axis(rows: _Rows, scale: float, lenient: bool) -> tuple[Floats, list[Finding]]:
+    """Axis vectors of any length, and what is to be said about them."""
+    if rows.layout.second is None:
+        return np.tile((0.0, 0.0, 1.0), (len(rows.values), 1)), [finding("CS170", 0)]
+    tip, second = rows.take(rows.layout.tip), rows.take(rows.layout.second)
+    meaning = rows.layout.meaning
+    if meaning == "values":
+        meaning = "points" if _second_points(rows, tip, second) else "vectors"
+    vector = second - tip if meaning == "points" else second
+    length = np.linalg.norm(vector, axis=1)
+    zero = length == 0
+    if zero.any():
+        raise error("CS154", rows.file, rows.at(zero))
+    if meaning == "points":
+        return vector, _distances(rows, length * scale)
+    off = np.abs(length - 1) > UNIT_TOLERANCE
+    if not off.any():
+        return vector, []
+    values = {"length": float(length[off.argmax()])}
+    if not lenient:
+        raise error("CS155", rows.file, rows.at(off), **values)
+    return vector, [finding("CS174", rows.at(off), int(off.sum()), **values)]
+
+
+def _second_points(rows: _Rows, tip: Floats, second: Floats) -> bool:
+    """Whether the second three columns are points, by their numbers alone.
+
+    Most rows of a file of vectors have length 1; those that have not are for the check of the lengths. A file of
+    second points keeps its distance from the tips. What is neither must be named by a header.
+    """
+    length = np.linalg.norm(second, axis=1)
+    if 2 * np.count_nonzero(np.abs(length - 1) <= UNIT_TOLERANCE) >= len(length):
+        return False
+    distance = np.linalg.norm(second - tip, axis=1)
+    steady = len(distance) > 1 and np.ptp(distance) <= DISTANCE_SPREAD * distance.mean()
+    if steady and (distance.mean() > LEAST_DISTANCE or np.median(length) > LEAST_DISTANCE):
+        return True
+    raise error("CS157", rows.file, int(rows.line[0]))
+
+
+def _distances(rows: _Rows, distance: Floats) -> list[Finding]:
+    mean, low, high = float(distance.mean()), float(distance.min()), float(distance.max())
+    said = [finding("CS171", 0, mean=mean)]
+    if high - low > DISTANCE_SPREAD * mean:
+        farthest = np.abs(distance - mean)
+        said.append(finding("CS172", rows.at(farthest == farthest.max()), low=low, high=high))
+    return said
+
+
+def _feed(rows: _Rows, lenient: bool) -> tuple[Floats, list[Finding]]:
+    """Feed of every move in units of the file; an empty cell keeps the feed before it, as CL files do."""
+    if rows.layout.feed is None:
+        return np.full(len(rows.values), np.nan), []
+    feed = rows.values[:, rows.layout.feed].copy()
+    wrong = feed <= 0
+    said = []
+    if wrong.any():
+        value = float(feed[wrong.argmax()])
+        if not lenient:
+            raise error("CS158", rows.file, rows.at(wrong), feed=value)
+        said.append(finding("CS175", rows.at(wrong), int(wrong.sum()), feed=value))
+    given = np.where(np.isnan(feed) | wrong, -1, np.arange(len(feed)))
+    last = np.maximum.accumulate(given)
+    return np.where(last >= 0, feed[last], np.nan), said

@@ -1,0 +1,164 @@
+"""Which column of a point file is what: names of header lines, and the shapes that need no header."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from cornersmooth.cl.points_messages import error
+from cornersmooth.model import Units
+
+#: what the second three columns hold; "values" leaves it to the numbers
+Meaning = Literal["none", "vectors", "points", "values"]
+Triple = tuple[int, int, int]
+
+_SECOND_POINTS = ("xb yb zb", "x2 y2 z2", "bx by bz", "qx qy qz", "xq yq zq", "axispointx axispointy axispointz")
+_TIPS = (
+    *("x y z", "xa ya za", "x1 y1 z1", "px py pz", "xp yp zp", "posx posy posz", "tipx tipy tipz"),
+    *("pointx pointy pointz", "xt yt zt", "ax ay az"),
+)
+_VECTORS = (
+    *("i j k", "nx ny nz", "ox oy oz", "ti tj tk", "vx vy vz", "axisx axisy axisz", "ax ay az", "tx ty tz"),
+    *("ux uy uz", "dx dy dz", "vi vj vk", "ai aj ak", "ii jj kk", "xv yv zv", "dirx diry dirz", "vecx vecy vecz"),
+    *("toolaxisx toolaxisy toolaxisz", "normalx normaly normalz", "toolx tooly toolz"),
+)
+_BY_VALUES = ("u v w",)
+_FEEDS = ("f", "feed", "feedrate", "fedrat", "vf")
+_COUNTERS = ("n", "no", "nr", "num", "number", "id", "idx", "index", "line", "row", "point", "pose", "t", "time")
+
+#: units a header may state behind a name, as in ``x [mm]``
+_LENGTHS: dict[str, Units] = {"mm": "mm", "in": "inch", "inch": "inch", "inches": "inch"}
+_FEED_UNITS: dict[str, Units] = {"mm/min": "mm", "mmpm": "mm", "in/min": "inch", "ipm": "inch", "inch/min": "inch"}
+_UNIT = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_/](mm|in|inch)$")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Columns of a point file, counted from 0.
+
+    Parameters
+    ----------
+    width : int
+        Columns of every row.
+    tip : (int, int, int)
+    second : (int, int, int) or None
+        Axis vector or second point, see `meaning`.
+    meaning : {"none", "vectors", "points", "values"}
+    feed : int or None
+    unused : tuple of str
+        Names of columns that hold something nobody reads; counters and times are not counted among them.
+    units : {"mm", "inch"} or None
+        What the header says about units.
+    """
+
+    width: int
+    tip: Triple
+    second: Triple | None = None
+    meaning: Meaning = "none"
+    feed: int | None = None
+    unused: tuple[str, ...] = ()
+    units: Units | None = None
+
+    @property
+    def wanted(self) -> tuple[int, ...]:
+        """Columns that must hold a number in every row."""
+        return (*self.tip, *(self.second or ()))
+
+
+def from_width(width: int, file: str, line: int) -> Layout:
+    """Layout of a file without a header: 3, 6 or 7 columns.
+
+    Raises
+    ------
+    InputError
+        CS159 for any other number.
+    """
+    if width == 3:
+        return Layout(3, (0, 1, 2))
+    if width in (6, 7):
+        return Layout(width, (0, 1, 2), (3, 4, 5), "values", 6 if width == 7 else None)
+    raise error("CS159", file, line, got=width)
+
+
+def from_header(text: str, file: str, line: int) -> Layout:
+    """Layout that a header line names.
+
+    Raises
+    ------
+    InputError
+        CS156 where the names leave tip or axis open, CS162 for units nobody reads.
+    """
+    names = _split(text, r"[,;\t]") if re.search(r"[,;\t]", text) else _split(text, r"\s+")
+    if len(names) < 3 or not _find(_TIPS, _plain(names)):
+        names = _split(text, r"[,;\s]+")
+    plain = _plain(names)
+    twice = sorted({name for name in plain if name and plain.count(name) > 1})
+    if twice:
+        raise error("CS156", file, line, why=f"{twice[0]!r} stands there twice")
+    tip = _find(_TIPS, plain)
+    if tip is None:
+        raise error("CS156", file, line, why=f"no x, y and z in {text.strip()[:60]!r}")
+    left = [name if column not in tip else "" for column, name in enumerate(plain)]
+    second, meaning = _second(left)
+    feed = next((left.index(name) for name in _FEEDS if name in left), None)
+    used = {*tip, *(second or ()), *(() if feed is None else (feed,))}
+    unused = tuple(names[c].strip() for c, name in enumerate(left) if name and c not in used and name not in _COUNTERS)
+    if unused and second is None:  # an axis in a spelling we do not know must not become +Z in silence
+        raise error("CS156", file, line, why=f"no tool axis in {', '.join(unused)}")
+    units = _units(names, (*tip, *(second if second and meaning == "points" else ())), feed, file, line)
+    return Layout(len(names), tip, second, meaning, feed, unused, units)
+
+
+def is_header(text: str) -> bool:
+    """Whether a line of text names at least the three columns of the tip."""
+    return any(_find(_TIPS, _plain(_split(text, pattern))) for pattern in (r"[,;\t]", r"[,;\s]+"))
+
+
+def _split(text: str, pattern: str) -> list[str]:
+    """Cells of a header; a blank before a unit in brackets does not separate."""
+    return re.split(pattern, re.sub(r"\s+(?=[\[(<])", "", text.strip()))
+
+
+def _plain(names: list[str]) -> list[str]:
+    """Bare names: lower case, no quotes, units, underscores or blanks."""
+    return [re.sub(r"[^a-z0-9]", "", _UNIT.sub("", name.lower().strip(" \"'"))) for name in names]
+
+
+def _find(spellings: tuple[str, ...], names: list[str]) -> Triple | None:
+    for spelling in spellings:
+        x, y, z = spelling.split()
+        if x in names and y in names and z in names:
+            if spelling == "ax ay az" and spellings is _TIPS and "bx" not in names:
+                continue  # then it is the axis
+            return names.index(x), names.index(y), names.index(z)
+    return None
+
+
+def _second(names: list[str]) -> tuple[Triple | None, Meaning]:
+    choices: tuple[tuple[tuple[str, ...], Meaning], ...] = (
+        (_VECTORS, "vectors"),
+        (_SECOND_POINTS, "points"),
+        (_BY_VALUES, "values"),
+    )
+    for spellings, meaning in choices:
+        found = _find(spellings, names)
+        if found:
+            return found, meaning
+    return None, "none"
+
+
+def _units(names: list[str], lengths: tuple[int, ...], feed: int | None, file: str, line: int) -> Units | None:
+    said: set[Units] = set()
+    for column in (*lengths, *(() if feed is None else (feed,))):
+        match = _UNIT.search(names[column].lower().strip(" \"'"))
+        if match is None or not (match[1] or match[2]):
+            continue
+        unit = (match[1] or match[2]).replace(" ", "").replace('"', "in")
+        known = (_FEED_UNITS if column == feed else _LENGTHS).get(unit)
+        if known is None:
+            raise error("CS162", file, line, column=names[column].strip(), unit=unit)
+        said.add(known)
+    if len(said) > 1:
+        raise error("CS156", file, line, why="mm and inch in one header")
+    return said.pop() if said else None

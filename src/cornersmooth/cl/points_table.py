@@ -1,0 +1,261 @@
+"""Text of point files into a table of numbers: separators, decimal commas, comments, encodings, line numbers.
+
+Two ways lead to the same table. The fast one converts a block of lines at once and only accepts it where every line is
+laid out like its first; the careful one goes line by line, accepts what is unusual and names the line of what is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.cl.points_header import Layout, is_header
+from cornersmooth.cl.points_messages import error
+from cornersmooth.model import Floats, Ints
+from cornersmooth.text import parse_numbers
+
+_COMMENT = re.compile(rb"(?:#|%|//)[^\n]*")
+_COMMENT_MARK = re.compile(r"\s*(?:#|%|//)+(.*)")
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?", re.ASCII)
+_NOT_FINITE = re.compile(r"[+-]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+(?:,\d+)?(?:[Ee][+-]?\d+)?", re.ASCII)
+_SEPARATOR = re.compile(r"\s*,\s*|\s+")
+_FIRST_ROW = re.compile(rb"[^\n]*[^\s,;][^\n]*")
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+
+#: bytes converted at once; large enough for whole-array speed, small enough for the caches
+_BLOCK = 1 << 18
+
+_PART, _BLANK, _COMMA, _NEWLINE, _OTHER = range(5)
+
+
+def _classes() -> np.ndarray[tuple[int], np.dtype[np.uint8]]:
+    table = np.full(256, _OTHER, np.uint8)
+    table[list(b"0123456789+-.eE")] = _PART
+    table[list(b" \t")] = _BLANK
+    table[ord(",")] = _COMMA
+    table[ord("\n")] = _NEWLINE
+    return table
+
+
+_CLASS = _classes()
+
+
+@dataclass(frozen=True)
+class PointText:
+    """A point file, cleaned: no comments, newlines only, commas or blanks between cells, decimal points.
+
+    Parameters
+    ----------
+    body : bytes
+        The rows; starts where line `first_line` of the file starts.
+    first_line : int
+        From 1.
+    header : str or None
+    header_line : int
+    width, row_line : int
+        Cells of the first row and its line, 0 where there is no row.
+    header_certain : bool
+        False for a header found in a comment, which must fit the rows to be believed.
+    """
+
+    body: bytes
+    first_line: int
+    header: str | None
+    header_line: int
+    width: int
+    row_line: int
+    header_certain: bool
+
+
+def clean(data: bytes, file: str) -> PointText:
+    """Take a file apart into header and rows.
+
+    Raises
+    ------
+    InputError
+        CS160 where commas may be decimal or separating, CS161 for binary data.
+    """
+    if data.startswith(_UTF16):
+        data = data.decode("utf-16", "replace").encode()
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if b"\0" in data[:_BLOCK]:
+        raise error("CS161", file, data.count(b"\n", 0, data.index(b"\0")) + 1)
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    header, header_line, certain, start = _head(data)
+    body, first_line = data[start:], data.count(b"\n", 0, start) + 1
+    if any(mark in body for mark in (b"#", b"%", b"//")):
+        body = _COMMENT.sub(b"", body)
+    body = _plain_commas(body, file, first_line)
+    row = _FIRST_ROW.search(body)
+    width = len(_cells(_decode(row[0]).rstrip(", \t"))) if row else 0
+    row_line = first_line + body.count(b"\n", 0, row.start()) if row else 0
+    return PointText(body, first_line, header, header_line, width, row_line, certain)
+
+
+def numbers(text: PointText, layout: Layout, file: str) -> tuple[Floats, Ints]:
+    """Read the rows of a cleaned file.
+
+    Parameters
+    ----------
+    text : PointText
+    layout : Layout
+        Says which columns must hold a number, and which may (the feed); whatever stands in the others becomes NaN
+        where it is no number.
+    file : str
+        For messages.
+
+    Returns
+    -------
+    table : (n, layout.width) float64
+    line : (n,) int64
+
+    Raises
+    ------
+    InputError
+        CS151, CS152, CS153, CS164 with the line of the first row that does not fit.
+    """
+    tables, lines = [], []
+    first, start = text.first_line, 0
+    while start < len(text.body):
+        end = text.body.find(b"\n", start + _BLOCK) + 1 or len(text.body)
+        block = text.body[start:end]
+        table, row = _fast(block, layout.width) or careful(block, layout, first, file)
+        tables.append(table)
+        lines.append(row + first)
+        first, start = first + block.count(b"\n"), end
+    if not tables:
+        return np.zeros((0, layout.width)), np.zeros(0, np.int64)
+    return np.concatenate(tables), np.concatenate(lines)
+
+
+def careful(block: bytes, layout: Layout, first_line: int, file: str) -> tuple[Floats, Ints]:
+    """Table of a block that starts at `first_line`, and the line of each row less that; one line at a time."""
+    used = {*layout.wanted, *(() if layout.feed is None else (layout.feed,))}
+    table: list[list[float]] = []
+    offsets: list[int] = []
+    for offset, line in enumerate(_decode(block).split("\n")):
+        cells = _cells(line)
+        while len(cells) > layout.width and not cells[-1]:
+            cells.pop()
+        if not any(cells):
+            continue
+        if len(cells) != layout.width:
+            raise error("CS151", file, first_line + offset, got=len(cells), want=layout.width)
+        row = [_number(cell) for cell in cells]
+        for column in used:
+            if not math.isfinite(row[column]) and (cells[column] or column in layout.wanted):
+                cell = cells[column]
+                known = _NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell)
+                raise error("CS153" if known else "CS152" if cell else "CS164", file, first_line + offset, cell=cell)
+        table.append(row)
+        offsets.append(offset)
+    return np.array(table, np.float64).reshape(-1, layout.width), np.array(offsets, np.int64)
+
+
+def is_row(line: str) -> bool:
+    """Whether a line holds nothing but numbers, three at least."""
+    cells = re.split(r"[\s,;]+", line.strip(" \t,;"))
+    return len(cells) >= 3 and all(_NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell) for cell in cells)
+
+
+def leading_lines(data: bytes, most: int = 200) -> Iterator[str]:
+    """Yield the first lines that are neither blank nor comment, decoded."""
+    head = data[: most * 400]
+    if data.startswith(_UTF16):
+        head = head.decode("utf-16", "replace").encode()
+    for line in _decode(head.removeprefix(b"\xef\xbb\xbf")).splitlines()[:most]:
+        if line.strip() and not _COMMENT_MARK.match(line):
+            yield line
+
+
+def _decode(data: bytes) -> str:
+    try:
+        return data.decode()
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
+def _head(data: bytes) -> tuple[str | None, int, bool, int]:
+    """Header, its line, whether it is certain, and where the rows start."""
+    start, line, comment, comment_line = 0, 1, None, 0
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end
+        text = _decode(data[start:end])
+        mark = _COMMENT_MARK.match(text)
+        if mark:
+            if is_header(mark[1]):
+                comment, comment_line = mark[1], line
+        elif text.strip():
+            if any(_NUMBER.fullmatch(cell) for cell in re.split(r"[\s,;]+", text)):
+                break
+            return text, line, True, min(end + 1, len(data))
+        start, line = end + 1, line + 1
+    return comment, comment_line, False, min(start, len(data))
+
+
+def _plain_commas(body: bytes, file: str, first_line: int) -> bytes:
+    """Rows with commas or blanks between the cells and decimal points in them."""
+    separator = ";" if b";" in body else "\t" if b"\t" in body else None
+    at = body.find(b",")
+    if at >= 0:
+        end = body.find(b"\n", at)
+        row = _decode(body[body.rfind(b"\n", 0, at) + 1 : end if end >= 0 else len(body)]).strip()
+        cells = [cell.strip() for cell in row.split(separator)]
+        if len(cells) >= 3 and all(_DECIMAL_COMMA.fullmatch(cell) for cell in cells if cell):
+            if separator is None:
+                raise error("CS160", file, first_line + body.count(b"\n", 0, at))
+            return body.replace(b",", b".").replace(b";", b",")
+    return body.replace(b";", b",")
+
+
+def _cells(line: str) -> list[str]:
+    return _SEPARATOR.split(line.strip())
+
+
+def _number(cell: str) -> float:
+    """Value of a cell, NaN where it is no number."""
+    return float(cell.upper().replace("D", "E")) if _NUMBER.fullmatch(cell) else math.nan
+
+
+def _fast(block: bytes, width: int) -> tuple[Floats, Ints] | None:
+    """Do what `careful` does if all lines of the block are laid out like its first; None for any other."""
+    kinds = _CLASS[np.frombuffer(block, np.uint8)]
+    part = kinds == _PART
+    cell = np.flatnonzero(part & ~np.concatenate(([False], part[:-1])))
+    if not len(cell) or len(cell) % width or bool((kinds == _OTHER).any()):
+        return None
+    newline = np.flatnonzero(kinds == _NEWLINE)
+    row = np.searchsorted(newline, cell[::width])
+    if (row != np.searchsorted(newline, cell[width - 1 :: width])).any() or (np.diff(row) == 0).any():
+        return None
+    end = newline[row[0]] if row[0] < len(newline) else len(block)
+    if not _same_gaps(cell.reshape(-1, width), np.flatnonzero(kinds == _COMMA), end, len(block)):
+        return None
+    try:
+        values = parse_numbers(block.replace(b",", b" "))  # a comma may end a row
+    except ValueError:
+        return None
+    if len(values) != len(cell):
+        return None
+    return values.reshape(-1, width), row
+
+
+def _same_gaps(cell: Ints, comma: Ints, end: int, size: int) -> bool:
+    """Whether commas stand between the same cells in every row as in the first, which ends at `end`."""
+    gaps = np.searchsorted(cell[0], comma[comma < end], side="right") - 1  # a gap lies behind the cell of its number
+    if len(comma) != len(cell) * len(gaps):
+        return False
+    if not len(gaps):
+        return True
+    if gaps[0] < 0 or (np.diff(gaps) == 0).any():  # an empty cell
+        return False
+    grid = comma.reshape(len(cell), len(gaps))
+    after = np.append(cell.ravel()[1:], size).reshape(cell.shape)
+    return bool(((grid > cell[:, gaps]) & (grid < after[:, gaps])).all())

@@ -1,0 +1,365 @@
+"""Point files: every layout, every complaint, and both ways through the table."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cornersmooth.cl import points_table
+from cornersmooth.cl.points import looks_like_points, read_points
+from cornersmooth.errors import InputError
+from cornersmooth.model import FeedMode, Move, Program
+
+TIPS = np.array([[0.0, 0, 5], [1.5, -2.25, 5], [3, 0.5, 6.125], [4, 0.5, 7]])
+AXES = np.array([[0.0, 0, 1], [0.6, 0, 0.8], [0, -0.6, 0.8], [0.28, 0, 0.96]])
+
+
+def rows(*parts: np.ndarray, separator: str = ",", decimals: int = 4) -> str:
+    table = np.column_stack(parts)
+    return "\n".join(separator.join(f"{value:.{decimals}f}" for value in row) for row in table) + "\n"
+
+
+def read(text: str | bytes, **options: object) -> Program:
+    data = text if isinstance(text, bytes) else text.encode()
+    return read_points(data, name="path.csv", **options)
+
+
+def message(text: str | bytes, **options: object) -> str:
+    with pytest.raises(InputError) as caught:
+        read(text, **options)
+    return str(caught.value)
+
+
+def codes(program: Program) -> list[str]:
+    return [finding.code for finding in program.findings]
+
+
+def check(program: Program) -> None:
+    np.testing.assert_array_equal(program.tip, TIPS)
+    np.testing.assert_allclose(program.axis, AXES, atol=1e-15)
+
+
+# layouts
+
+
+def test_plain_file_is_linear_moves_with_line_numbers():
+    program = read(rows(TIPS, AXES))
+    check(program)
+    assert (program.kind == Move.LINEAR).all()
+    assert np.isnan(program.feed).all()
+    assert program.line.tolist() == [1, 2, 3, 4]
+    assert (program.source.name, program.source.format, program.source.dialect) == ("path.csv", "points", "csv")
+    assert program.units == "mm"
+    assert program.findings == ()
+    assert program.chains.tolist() == [[0, 3]]
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " ", "  ", " , ", ", ", "\t,", " ;\t"])
+@pytest.mark.parametrize("header", ["", "x,y,z,i,j,k\n", "X Y Z NX NY NZ\n", "x\ty\tz\tu\tv\tw\n", "x;y;z;ti;tj;tk\n"])
+def test_separators_and_headers(separator: str, header: str):
+    check(read(header + rows(TIPS, AXES, separator=separator)))
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " ; "])
+def test_decimal_commas(separator: str):
+    text = rows(TIPS, AXES, np.full(4, 1200.5), separator=separator).replace(".", ",")
+    program = read(text)
+    check(program)
+    assert program.feed.tolist() == [1200.5] * 4
+    check(read("x;y;z;i;j;k;f\n" + text))
+
+
+def test_decimal_commas_that_start_late_and_whole_numbers():
+    program = read("0;0;0;0;0;1\n1;2;3;0;0;1\n1,5;2;3;0;0,6;0,8\n")
+    assert program.tip[2].tolist() == [1.5, 2, 3]
+    np.testing.assert_allclose(program.axis[2], [0, 0.6, 0.8], atol=1e-15)
+
+
+def test_point_and_vector_as_two_comma_lists():
+    check(
+        read("\n".join(f"{a}, {b}, {c}; {i}, {j}, {k}" for a, b, c, i, j, k in np.column_stack((TIPS, AXES)).tolist()))
+    )
+
+
+def test_columns_go_by_their_names():
+    text = "n;f;k;j;i;Z [mm];Y [mm];X [mm]\n" + rows(
+        np.arange(4), np.full(4, 500), AXES[:, ::-1], TIPS[:, ::-1], separator=";"
+    )
+    program = read(text)
+    check(program)
+    assert program.feed.tolist() == [500] * 4
+    assert program.findings == ()
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        *("xa,ya,za,xb,yb,zb", "x1,y1,z1,x2,y2,z2", "ax,ay,az,bx,by,bz", "A_x A_y A_z B_x B_y B_z"),
+        *("x,y,z,u,v,w", '"XA","YA","ZA","XB","YB","ZB"', "px,py,pz,qx,qy,qz", ""),
+    ],
+)
+def test_second_points(names: str):
+    program = read((names + "\n" if names else "") + rows(TIPS, TIPS + 12.5 * AXES))
+    check(program)
+    assert codes(program) == ["CS171"]
+    assert "12.5 mm" in program.findings[0].text
+
+
+def test_second_points_at_distance_one_are_told_from_vectors():
+    far = TIPS + np.array([100.0, 50, 20])
+    np.testing.assert_allclose(read(rows(far, far + AXES)).axis, AXES, atol=1e-13)
+
+
+def test_second_points_whose_distance_varies_are_reported():
+    program = read("xa,ya,za,xb,yb,zb\n" + rows(TIPS, TIPS + [[10], [10], [12], [10]] * AXES))
+    np.testing.assert_allclose(program.axis, AXES, atol=1e-15)
+    finding = program.findings[1]
+    assert (finding.code, finding.severity, finding.line) == ("CS172", "warning", 4)
+    assert "from 10 to 12 mm" in finding.text
+
+
+def test_tips_alone_stand_along_z():
+    for text in (rows(TIPS), "x,y,z\n" + rows(TIPS)):
+        program = read(text)
+        np.testing.assert_array_equal(program.tip, TIPS)
+        np.testing.assert_array_equal(program.axis, np.tile([0.0, 0, 1], (4, 1)))
+        assert codes(program) == ["CS170"]
+
+
+def test_feed_is_per_minute_and_stays_until_changed():
+    program = read("x,y,z,i,j,k,feedrate\n0,0,0,0,0,1,\n1,0,0,0,0,1,300\n2,0,0,0,0,1,\n3,0,0,0,0,1,2.5e2\n")
+    assert np.isnan(program.feed[0])
+    assert program.feed[1:].tolist() == [300, 300, 250]
+    assert (program.feed_mode == FeedMode.PER_MINUTE).all()
+    assert read("x,y,z,f\n0,0,0,100\n1,0,0,200\n").feed.tolist() == [100, 200]
+
+
+def test_inches_become_millimetres():
+    for program in (
+        read(rows(TIPS, AXES, np.full(4, 10)), units="inch"),
+        read("x[in],y[in],z[in],i,j,k,f[ipm]\n" + rows(TIPS, AXES, np.full(4, 10))),
+        read("x_in y_in z_in i j k f\n" + rows(TIPS, AXES, np.full(4, 10), separator=" ")),
+    ):
+        assert program.units == "inch"
+        np.testing.assert_allclose(program.tip, TIPS * 25.4, rtol=1e-15)
+        np.testing.assert_allclose(program.feed, 254, rtol=1e-15)
+    assert read("x (in), y (in), z (in)\n" + rows(TIPS), units="mm").units == "mm"
+
+
+def test_unused_columns_are_named():
+    program = read("x,y,z,i,j,k,move,load\n0,0,0,0,0,1,linear,3\n1,0,0,0,0,1,linear,4\n")
+    assert codes(program) == ["CS173"]
+    assert "move, load" in program.findings[0].text
+
+
+# text around the rows
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_comments_blank_lines_and_line_ends(end: str):
+    text = "# made by hand\n\n% x,y,z,i,j,k\n0 0 0 0 0 1 // start\n\n   \n1 0 0 0 0 1 # on\n// x y z\n2 0 0 0 0 1"
+    program = read(text.replace("\n", end))
+    assert program.line.tolist() == [4, 7, 9]
+    assert program.tip[:, 0].tolist() == [0, 1, 2]
+
+
+def test_header_in_a_comment_counts_when_it_fits():
+    program = read("# z y x k j i\n" + rows(TIPS[:, ::-1], AXES[:, ::-1], separator=" "))
+    check(program)
+    check(read("# x y z\n" + rows(TIPS, AXES, separator=" ")))
+
+
+@pytest.mark.parametrize("encode", ["utf-8-sig", "utf-8", "cp1252", "utf-16"])
+def test_encodings(encode: str):
+    check(read(("# Fräsbahn für Schaufel\nx,y,z,i,j,k\n" + rows(TIPS, AXES)).encode(encode)))
+
+
+def test_trailing_separators_and_rows_of_separators():
+    check(read(rows(TIPS, AXES).replace("\n", ",\n")))
+    check(read("x,y,z,i,j,k\n" + rows(TIPS, AXES).replace("\n", ",,\n") + ",,,,,\n"))
+
+
+def test_exponents_signs_and_bare_points():
+    program = read("1.5E+01,+.5,-3.,0d0,0,1\n1.5D1 , 5e-1, -3 , 0,0,1.0\n")
+    assert program.tip.tolist() == [[15, 0.5, -3]] * 2
+
+
+# complaints
+
+UNIT = "0,0,0,0,0,1\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "path.csv: error: no poses in the file; give one pose a line: x y z, or x y z i j k"),
+        ("# nothing\n\n", "path.csv: error: no poses"),
+        ("x,y,z,i,j,k\n", "path.csv: error: no poses"),
+        (UNIT + "\n1,2,3,0,0\n", "path.csv:3: error: 5 columns where 6 are expected; give every line the same"),
+        (UNIT + "1,2,3,0,0,1,4\n", "path.csv:2: error: 7 columns where 6 are expected"),
+        (UNIT + "1,2,3,0,0\n1,2,3,0,0,1,4\n", "path.csv:2: error: 5 columns"),
+        ("x,y,z\n" + UNIT, "path.csv:2: error: 6 columns where 3 are expected"),
+        (UNIT + "1,2,x3,0,0,1\n", "path.csv:2: error: 'x3' is not a number; give decimal numbers"),
+        (UNIT + "1,,3,0,0,1\n", "path.csv:2: error: an empty cell where a number is expected"),
+        (UNIT + "1,2-3,3,0,0,1\n", "path.csv:2: error: '2-3' is not a number"),
+        (UNIT + "1,1_0,3,0,0,1\n", "path.csv:2: error: '1_0' is not a number"),
+        ("1,abc,3,0,0,1\n" + UNIT, "path.csv:1: error: 'abc' is not a number"),
+        (UNIT + "1,nan,3,0,0,1\n", "path.csv:2: error: 'nan' is not a finite number; give finite"),
+        (UNIT + "1,-Inf,3,0,0,1\n", "path.csv:2: error: '-Inf' is not a finite number"),
+        (UNIT + "1,1e999,3,0,0,1\n", "path.csv:2: error: '1e999' is not a finite number"),
+        (UNIT + "1,1e20,3,0,0,1\n", "path.csv:2: error: coordinate beyond 1e+07"),
+        (UNIT * 3 + "1,2,3,0,0,0\n", "path.csv:4: error: tool axis of length zero; give a vector"),
+        ("xa ya za xb yb zb\n0 0 0 0 0 9\n1 2 3 1 2 3\n", "path.csv:3: error: tool axis of length zero"),
+        (UNIT + "1,2,3,0,0,1.02\n", "path.csv:2: error: tool axis is 1.02 long, not 1; give unit vectors"),
+        ("x,y,z,i,j,k\n0,0,0,0,0,7\n", "path.csv:2: error: tool axis is 7 long"),
+        ("0,0,0,0,3,7\n0,0,0,0,1,7\n", "path.csv:1: error: cannot tell whether columns 4 to 6 are axis vectors or"),
+        ("0,0,0,0,0,7\n", "path.csv:1: error: cannot tell whether"),
+        ("\n1,2,3,4\n", "path.csv:2: error: 4 columns and no header; give 3, 6 or 7 columns, or name them"),
+        ("1,2,3,4,5\n", "path.csv:1: error: 5 columns and no header"),
+        ("a,b,c\n1,2,3\n", "path.csv:1: error: cannot make out the columns of the header: no x, y and z in 'a,b,c'"),
+        (
+            "x,y,z,b,c\n1,2,3,4,5\n",
+            "path.csv:1: error: cannot make out the columns of the header: no tool axis in b, c",
+        ),
+        ("x,y,z,i,j\n1,2,3,4,5\n", "path.csv:1: error: cannot make out the columns of the header: no tool axis"),
+        ("x,y,z,x,y,z\n" + UNIT, "path.csv:1: error: cannot make out the columns of the header: 'x' stands there"),
+        ("x[mm],y[in],z\n1,2,3\n", "path.csv:1: error: cannot make out the columns of the header: mm and inch"),
+        ("x[m],y[m],z[m]\n1,2,3\n", "path.csv:1: error: column 'x[m]' is in 'm'; give lengths in mm or inch"),
+        ("x,y,z,f[mm/s]\n1,2,3,4\n", "path.csv:1: error: column 'f[mm/s]' is in 'mm/s'"),
+        ("x,y,z,f\n1,2,3,4\n1,2,3,0\n", "path.csv:3: error: feed 0 is not positive; give the feed per minute"),
+        ("x,y,z,f\n1,2,3,fast\n", "path.csv:2: error: 'fast' is not a number"),
+        ("0,5 1,5 2,5 0,0 0,0 1,0\n", "path.csv:1: error: cannot tell decimal commas from separating commas; put semi"),
+        (b"\n1,2,3\x00\x01\n", "path.csv:2: error: the file holds bytes that are no text"),
+        ("1,2,\N{MINUS SIGN}3\n", "path.csv:1: error: '\N{MINUS SIGN}3' is not a number"),
+    ],
+)
+def test_complaints(text: str | bytes, expected: str):
+    assert message(text).startswith(expected)
+
+
+def test_lenient_reading_normalises_axes_and_skips_feeds():
+    text = "x,y,z,i,j,k,f\n0,0,0,0,0,1,100\n1,0,0,0,3,4,-5\n2,0,0,0,0,2,0\n"
+    program = read(text, lenient=True)
+    np.testing.assert_allclose(program.axis, [[0, 0, 1], [0, 0.6, 0.8], [0, 0, 1]], atol=1e-15)
+    assert program.feed.tolist() == [100] * 3
+    assert [(f.code, f.line, f.count) for f in program.findings] == [("CS174", 3, 2), ("CS175", 3, 2)]
+    assert message("x,y,z,i,j,k\n0,0,0,0,0,0\n", lenient=True).startswith("path.csv:2: error: tool axis of length zero")
+
+
+# recognition
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("x,y,z,i,j,k\n", "1 2 3\n", "\n\n# a\n1,2,3,0,0,1\n", "a,b,c\n1,2,3\n", "1,x,3\n1,2,3\n", "1;2,5;3\n"),
+        *("x/mm y/mm z/mm\n1 2 3\n", "// x y z\n1 2 3", "nan 1 2\n", "% matlab\n-1.5e3\t2\t3\n"),
+    ],
+)
+def test_point_files_are_recognised(text: str):
+    assert looks_like_points(text.encode())
+    assert looks_like_points(text.encode("utf-8-sig"))
+    assert looks_like_points(text.encode("utf-16"))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "\n", "GOTO/1,2,3\n4,5,6\n", "PARTNO X\nMULTAX\n", "$$ c\nGOTO/1,2,3\n", "%\nO0001\nG1 X1 Y2 Z3\n"),
+        *("GOTO / 1.0, 2.0, 3.0, $\n0., 0., 1.\n", "one two\nthree four\n", "1 2\n3 4\n"),
+    ],
+)
+def test_other_files_are_not(text: str):
+    assert not looks_like_points(text.encode())
+
+
+# both ways give one table
+
+CELLS = st.sampled_from(["0", "-0", "1.5", "-.25", "3.", "12345.678901", "1e2", "1D-3", "", "x", "nan", "1-2", "--1"])
+ROW = st.tuples(
+    st.lists(CELLS, min_size=5, max_size=7), st.sampled_from([",", " ", ", ", "\t", " ,", ",,"]), st.booleans()
+).map(lambda row: row[1].join(row[0]) + ("," if row[2] else ""))
+GOOD_ROW = st.lists(CELLS.filter(lambda cell: cell[:1].isdigit()), min_size=6, max_size=6).map(",".join)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.one_of(GOOD_ROW, GOOD_ROW, ROW, st.just(""), st.just(", ,")), max_size=8))
+def test_fast_way_equals_careful_way(lines: list[str]):
+    layout = points_table.Layout(6, (0, 1, 2), (3, 4, 5), "vectors")
+    text = points_table.clean(("x,y,z,i,j,k\n" + "\n".join(lines)).encode(), "path.csv")
+    outcomes = []
+    for blocks in (True, False):
+        with pytest.MonkeyPatch.context() as patch:
+            if not blocks:
+                patch.setattr(points_table, "_fast", lambda *_: None)
+            try:
+                table, line = points_table.numbers(text, layout, "path.csv")
+                outcomes.append((table.tobytes(), line.tolist()))
+            except InputError as error:
+                outcomes.append(str(error))
+    assert outcomes[0] == outcomes[1]
+
+
+def test_fast_way_takes_what_it_should(monkeypatch: pytest.MonkeyPatch):
+    def careful(*_: object) -> None:
+        raise AssertionError("the careful way was taken")
+
+    monkeypatch.setattr(points_table, "careful", careful)
+    monkeypatch.setattr(points_table, "_BLOCK", 1000)
+    expected = np.round(np.random.default_rng(1).uniform(-99, 99, (500, 3)), 4)
+    axes = np.tile([0.0, 0.6, 0.8], (500, 1))
+    for text in (
+        rows(expected, axes),
+        rows(expected, axes, separator="\t"),
+        "x y z i j k\n\n" + rows(expected, axes, separator=" ; ").replace("\n", ";\n\n"),
+        rows(expected, axes, separator=";").replace(".", ","),
+    ):
+        program = read(text)
+        np.testing.assert_array_equal(program.tip, expected)
+        lines = [line.replace(",", ".") for line in text.splitlines()]
+        for line, (x, _, _) in zip(program.line.tolist(), expected.tolist(), strict=True):
+            assert lines[line - 1].startswith(f"{x:.4f}")
+
+
+def test_a_million_rows_take_about_a_second():
+    text = (rows(np.linspace([0.0, 0, 0], [200, 300, 400], 1000), np.tile([0.0, 0.6, 0.8], (1000, 1))) * 200).encode()
+    start = time.process_time()
+    program = read(text)
+    assert len(program) == 200_000
+    assert time.process_time() - start < 2  # a fifth of the rows, ten times the time it should take
+
+
+# real files
+
+
+@pytest.mark.corpus
+@pytest.mark.parametrize(
+    ("file", "poses", "first_line", "codes_"),
+    [
+        ("hecc_point_zigzag.csv", 940, 2, []),
+        ("shenmuxin_5x_path.csv", 55, 2, []),
+        ("hust_5x_toolpath_fan.txt", 25, 1, []),
+    ],
+)
+def test_real_files(corpus: Path, file: str, poses: int, first_line: int, codes_: list[str]):
+    data = (corpus / file).read_bytes()
+    assert looks_like_points(data)
+    program = read(data)
+    assert (len(program), program.line[0], codes(program)) == (poses, first_line, codes_)
+    by_hand = [line.replace(",", " ").split() for line in data.decode().splitlines()[first_line - 1 :]]
+    values = np.array([[float(cell) for cell in row] for row in by_hand if row])
+    np.testing.assert_array_equal(program.tip, values[:, :3])
+    np.testing.assert_allclose(program.axis, values[:, 3:], atol=1e-3)
+    np.testing.assert_allclose(np.linalg.norm(program.axis, axis=1), 1, atol=1e-15)
+
+
+@pytest.mark.corpus
+def test_no_other_real_file_looks_like_points(corpus: Path):
+    point_files = {"hecc_point_zigzag.csv", "shenmuxin_5x_path.csv", "hust_5x_toolpath_fan.txt"}
+    found = {path.name for path in corpus.iterdir() if path.is_file() and looks_like_points(path.read_bytes())}
+    assert found == point_files
