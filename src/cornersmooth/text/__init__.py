@@ -1,0 +1,9 @@
+"""Fast numbers both ways: text to float64 and float64 to text.
+
+The only place where a number is rounded for output.
+"""
+
+from cornersmooth.text.parse import NumberError, parse_numbers
+from cornersmooth.text.ticks import format_number, to_ticks
+
+__all__ = ["NumberError", "format_number", "parse_numbers", "to_ticks"]

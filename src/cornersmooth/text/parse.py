@@ -1,0 +1,233 @@
+"""Text to float64, a block at a time, without a Python loop over numbers.
+
+The bytes of a block that are not digits (separators, points, signs) cut it into fields. The digits on either side of
+a point are fetched as eight-byte words and turned into integers by three multiplications, all fields at once.
+Mantissa and power of ten are exact in float64, so their quotient is the correctly rounded value: what `float` gives.
+Fields that do not fit (exponents, more digits than float64 holds) go to `float` itself, one by one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+Words = NDArray[np.uint64]
+Bools = NDArray[np.bool_]
+
+#: bytes taken at a time: the block and the arrays made from it stay in the second-level cache
+BLOCK: Final = 1 << 16
+
+#: bytes searched at a time for the separator that a block ends with
+_LOOK_BACK: Final = 256
+
+#: bytes in front of a block in its work area, so that the words of its first field are fetched like all others
+_MARGIN: Final = 16
+
+#: what a number may consist of; `float` alone would also take ``1_000``, ``nan`` and ``inf``
+_ALPHABET: Final = b"0123456789+-.eEdD"
+_FORTRAN: Final = bytes.maketrans(b"dD", b"eE")
+
+_WHITE: Final = b" \t\r\n"
+_SEPARATOR, _POINT, _SIGN, _OTHER = range(4)
+_KIND: Final = np.full(256, _OTHER, np.uint8)
+_KIND[list(_WHITE + b",")] = _SEPARATOR
+_KIND[list(b".")] = _POINT
+_KIND[list(b"+-")] = _SIGN
+
+#: powers of ten that float64 holds exactly
+_POWER: Final = np.array([float(f"1e{n}") for n in range(23)])
+
+#: mantissas below are exact in float64
+_EXACT: Final = 2.0**53
+
+#: digits that one word holds, and that two hold
+_WORD, _TWO_WORDS = 8, 16
+
+
+class NumberError(ValueError):
+    """A field is empty or is not a finite decimal number.
+
+    Parameters
+    ----------
+    what : str
+        What is wrong, with the field as written.
+    offset : int
+        Byte offset of the field in the text that was parsed, from 0.
+    """
+
+    def __init__(self, what: str, offset: int) -> None:
+        self.what = what
+        self.offset = offset
+        super().__init__(what, offset)
+
+    def __str__(self) -> str:
+        """Text of the message."""
+        return f"{self.what} at byte {self.offset}"
+
+
+def parse_numbers(data: bytes) -> Floats:
+    """Read all numbers of a text, each bit for bit what `float` makes of it.
+
+    Numbers stand between any mix of blanks, tabs, line ends and single commas. Exponents may be written with D.
+
+    Parameters
+    ----------
+    data : bytes
+        Digits, ``+ - .``, ``e E d D`` and separators only. A comma needs a number on both sides.
+
+    Returns
+    -------
+    (m,) float64
+        Negative zero keeps its sign.
+
+    Raises
+    ------
+    NumberError
+        For an empty field beside a comma, a field that is no number, or one that float64 cannot hold.
+    """
+    text = np.frombuffer(data, np.uint8)
+    # every separator is at or below the comma: never fewer places than numbers, and untouched ones cost no memory
+    places = sum(np.count_nonzero(text[k : k + BLOCK] <= ord(",")) for k in range(0, len(text), BLOCK))
+    numbers = np.empty(places + 1)
+    count = start = 0
+    commas = 1  # since the last number; the start counts as one, so that a text may not begin with a comma
+    while start < len(text):
+        stop = _block_end(text, start)
+        found, commas = _parse_block(text[start:stop], start, commas)
+        numbers[count : count + len(found)] = found
+        count += len(found)
+        start = stop
+    if count and commas:
+        raise NumberError("a comma without a number after it", data.rindex(b","))
+    return numbers[:count]
+
+
+def _block_end(text: Bytes, start: int) -> int:
+    """End of the block that begins at `start`: just after a separator, or the end of the text."""
+    stop = start + BLOCK
+    while stop < len(text):
+        tail = text[max(start, stop - _LOOK_BACK) : stop]
+        separators = np.flatnonzero(_KIND.take(tail) == _SEPARATOR)
+        if len(separators):
+            return stop - len(tail) + int(separators[-1]) + 1
+        stop += BLOCK
+    return len(text)
+
+
+def _parse_block(block: Bytes, offset: int, commas: int) -> tuple[Floats, int]:
+    """Parse the whole fields of a block that begins at `offset`; return them and the commas after the last one."""
+    area = np.zeros(_MARGIN + len(block) + 1, np.uint8)
+    area[_MARGIN:-1] = block
+    area[-1] = ord("\n")  # closes the last field
+    text = area[_MARGIN:]
+
+    special = np.flatnonzero(text - np.uint8(ord("0")) > 9)  # what is below "0" wraps round to large numbers
+    kind = _KIND.take(text.take(special))
+    end = special.compress(kind == _SEPARATOR)
+    start = np.concatenate(([0], end[:-1] + 1))
+    filled = start < end
+    commas = _count_commas(end, text.take(end) == ord(","), filled, offset, commas)
+    if not filled.all():
+        start, end = start.compress(filled), end.compress(filled)
+    if not len(end):
+        return np.empty(0), commas
+
+    first = text.take(start)
+    minus = first == ord("-")
+    signed = minus | (first == ord("+"))
+    point, careful = _find_points(special.compress(kind == _POINT), start, end)
+    whole = point - start - signed  # digits before the point
+    part = np.maximum(end - point - 1, 0)  # digits after it
+    careful |= (whole > _WORD) | (part > _TWO_WORDS) | (whole + part == 0)
+    if len(special) != np.count_nonzero(kind <= _POINT) + np.count_nonzero(signed):
+        strange = special.compress(kind >= _SIGN)
+        strange = strange[~np.isin(strange, start[signed])]
+        careful[np.searchsorted(end, strange)] = True
+    part[careful] = 0
+
+    scale = _POWER.take(part)
+    mantissa = _digits(area, point, whole) * scale
+    mantissa += _digits(area, end, np.minimum(part, _WORD))
+    if part.max() > _WORD:
+        mantissa += _digits(area, end - _WORD, np.maximum(part - _WORD, 0)) * _POWER[_WORD]
+    careful |= mantissa >= _EXACT  # below it every term and the sum are exact
+    numbers = mantissa / scale
+    numbers *= 1.0 - 2.0 * minus
+    if careful.any():
+        raw = block.tobytes()
+        for i in np.flatnonzero(careful).tolist():
+            numbers[i] = _careful(raw[start[i] : end[i]], offset + int(start[i]))
+    return numbers, commas
+
+
+def _count_commas(end: Ints, comma: Bools, filled: Bools, offset: int, commas: int) -> int:
+    """Make sure that at most one comma stands between two numbers; return how many follow the last number.
+
+    `end` are the places of all separators of a block, `comma` says which are commas, `filled` which close a number.
+    `commas` stood between the last number and the block.
+    """
+    if not commas and filled[:-1].all():  # one separator after each number
+        return 0 if filled[-1] else int(comma[-2])
+    passed = commas + np.concatenate(([0], np.cumsum(comma)))
+    between = np.diff(passed[:-1][filled], prepend=0, append=passed[-1])
+    if between.max() > 1:
+        second = between[: np.argmax(between > 1)].sum() + 2  # the comma that is too many, counted with those before
+        place = end[comma][second - commas - 1]
+        raise NumberError("an empty field beside a comma", offset + int(place))
+    return int(between[-1])
+
+
+def _find_points(points: Ints, start: Ints, end: Ints) -> tuple[Ints, Bools]:
+    """Place of the point in each field, the field's end where it has none; and which fields have more than one."""
+    if len(points) == len(end) and (start <= points).all() and (points < end).all():
+        return points, np.zeros(len(end), np.bool_)
+    first = np.searchsorted(points, start)
+    count = np.searchsorted(points, end) - first
+    return np.where(count > 0, np.append(points, 0)[first], end), count > 1
+
+
+def _digits(area: Bytes, stop: Ints, count: Ints) -> Words:
+    """Read the integers whose `count` (0 to 8) digits end before `stop`."""
+    # a byte string read as a little-endian word has its last character on top; shift counts past 63 give zero
+    windows = np.ndarray((len(area) - _WORD + 1,), "<u8", area, strides=(1,))
+    word = windows[stop + (_MARGIN - _WORD)]
+    word &= _NIBBLES << (_WORD * (_WORD - count)).astype(np.uint64)
+    for mask, factor, shift in _PAIRING:
+        word &= mask
+        word *= factor
+        word >>= shift
+    return word
+
+
+#: the values of eight ASCII digits
+_NIBBLES: Final = np.uint64(0x0F0F0F0F0F0F0F0F)
+
+#: join neighbours to two, four and eight digits: what to keep, 10^k·2^shift + 1, and where the result ends up
+_PAIRING: Final = tuple(
+    (np.uint64(mask), np.uint64((10**digits << shift) + 1), np.uint64(shift))
+    for mask, digits, shift in (
+        (0x0F0F0F0F0F0F0F0F, 1, 8),
+        (0x00FF00FF00FF00FF, 2, 16),
+        (0x0000FFFF0000FFFF, 4, 32),
+    )
+)
+
+
+def _careful(field: bytes, offset: int) -> float:
+    """Read one field by `float`, once it is sure to be plain decimal."""
+    shown = field[:40].decode("latin-1")
+    try:
+        if field.translate(None, _ALPHABET):
+            raise ValueError
+        number = float(field.translate(_FORTRAN))
+    except ValueError:
+        raise NumberError(f"{shown!r} is not a number", offset) from None
+    if not math.isfinite(number):
+        raise NumberError(f"{shown!r} is too large", offset)
+    return number
