@@ -1,0 +1,116 @@
+"""What is said about rotary axes: poses out of reach, limits, passages near the pole, rewinds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.errors import Finding, InputError
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.model import Bools, Floats, Ints
+
+#: A cut counts as near the pole where the first rotary axis turns by so many times what the tool axis turns by.
+NEAR_POLE = 20.0
+#: Turns of a rotary axis below this (degrees) are rounding.
+NO_TURN = 1e-6
+
+
+def axis_rates(angles: Floats, tip: Floats) -> Floats:
+    """How fast rotary axes turn along a path: (n, 2) degrees, (n, 3) mm -> (n-1, 2) degrees per mm.
+
+    Infinite where the tip stands still while the axis turns.
+    """
+    turn = np.abs(np.diff(angles, axis=0))
+    length = np.linalg.norm(np.diff(tip, axis=0), axis=1)[:, None]
+    moving = length > 0
+    return np.where(moving, turn / np.where(moving, length, 1.0), np.where(turn > NO_TURN, np.inf, 0.0))
+
+
+def reach_error(machine: Machine, axis: Floats, beyond: float, line: int, file: str | None) -> InputError:
+    """Say that no rotary angles give this axis."""
+    vector = ", ".join(f"{number:.6f}" for number in axis)
+    return InputError(
+        "CS361",
+        f"tool axis ({vector}) is {beyond:.3f} deg beyond the reach of {' and '.join(machine.names)} of {machine.name}",
+        "turn the part or use a machine that reaches it",
+        file=file,
+        line=line or None,
+    )
+
+
+def limit_error(
+    machine: Machine,
+    both: Floats,
+    limits: Floats,
+    words: Floats | None,
+    line: int,
+    since: int,
+    file: str | None,
+) -> InputError:
+    """Say that a rotary word leaves its limits: with either solution alone, or because the cut began on the other one.
+
+    Parameters
+    ----------
+    both : (2, 2) float64, degrees
+        Both solutions of the pose.
+    words : (2,) float64, degrees, or None
+        The words at which the furthest choice leaves the limits.
+    since : int
+        Line at which the cut starts, 0 where unknown.
+    """
+    turned = both + 360 * np.round((limits.clip(-1e6, 1e6).mean(axis=1) - both) / 360)
+    excess = np.maximum(np.maximum(limits[:, 0] - turned, turned - limits[:, 1]), 0.0)
+    alone = bool((excess.max(axis=1) > NO_TURN).all())
+    shown = turned[int(np.argmin(excess.max(axis=1)))] if alone or words is None else words
+    over = np.maximum(limits[:, 0] - shown, shown - limits[:, 1])
+    axis = int(np.argmax(over))
+    name = machine.names[axis]
+    limit = limits[axis, 0] if shown[axis] < limits[axis, 0] else limits[axis, 1]
+    text = f"{name} would have to go to {shown[axis]:.3f} deg, its limit is {limit:g} deg"
+    if alone or words is None:
+        hint = "turn the part or use a machine with more travel"
+    else:
+        text += f", in a cut from line {since} on" if since else ", in one cut"
+        hint = "interrupt the cut with a retract in rapid before, so that the axis can turn back"
+    return InputError("CS362", text, hint, file=file, line=line or None)
+
+
+def pole_finding(
+    machine: Machine,
+    tip: Floats,
+    axis: Floats,
+    angles: Floats,
+    pole_distance: Floats,
+    rapid: Bools,
+    line: Ints,
+) -> tuple[Finding, ...]:
+    """Cuts near the pole, where the first rotary axis turns fast: where, how close, how fast."""
+    turn = np.abs(np.diff(angles[:, 0]))
+    tilt = np.linalg.norm(np.diff(axis, axis=0), axis=1)
+    fast = (turn > NO_TURN) & (turn > NEAR_POLE * np.degrees(tilt)) & ~rapid[1:]
+    if not fast.any():
+        return ()
+    rates = axis_rates(angles, tip)[:, 0]
+    begins = fast & ~np.concatenate(([False], fast[:-1]))
+    edges = np.flatnonzero(fast)
+    worst = int(edges[np.argmax(rates[edges])])
+    closest = float(np.minimum(pole_distance[edges], pole_distance[edges + 1]).min())
+    name = machine.names[0]
+    speed = f"{rates[worst]:.4g} deg/mm" if np.isfinite(rates[worst]) else "with the tip standing still"
+    text = (
+        f"the tool axis comes within {closest:.3g} deg of the pole of {name}, which turns fast there: "
+        f"{turn[worst]:.4g} deg in one move, {speed}"
+    )
+    return (Finding("CS363", "warning", int(line[worst + 1]), text, int(begins.sum())),)
+
+
+def rewind_finding(machine: Machine, angles: Floats, rapid: Bools, line: Ints) -> tuple[Finding, ...]:
+    """Rapids in which an axis turns back by whole turns to stay inside its limits."""
+    step = np.diff(angles, axis=0)
+    turned = (np.abs(step) > 180 + NO_TURN) & rapid[1:, None]
+    findings = []
+    for axis, name in enumerate(machine.names):
+        moves = np.flatnonzero(turned[:, axis])
+        if len(moves):
+            text = f"{name} turns back by {abs(step[moves[0], axis]):.4g} deg in a rapid, to stay inside its limits"
+            findings.append(Finding("CS364", "warning", int(line[moves[0] + 1]), text, len(moves)))
+    return tuple(findings)

@@ -1,0 +1,203 @@
+"""A machine with two rotary axes: where they sit, which way they count, how far they go."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.model import Floats
+
+Vector = tuple[float, float, float]
+
+#: Two directions closer than this (rad) count as parallel: no second rotary axis can do its work then.
+PARALLEL = 1e-3
+
+
+@dataclass(frozen=True)
+class RotaryAxis:
+    """One rotary axis at the position where both rotary axes stand at zero.
+
+    Parameters
+    ----------
+    name : {"A", "B", "C"}
+        The address of its word in the NC text.
+    direction : (float, float, float)
+        Along the axis, any length but zero.
+    carrier : {"table", "head"}
+        Whether it carries the part or the tool.
+    point : (float, float, float), mm
+        A point on the axis: in machine coordinates for a table, from the spindle nose for a head.
+    positive : {"tool", "table"}
+        What turns right-handed about `direction` when the word grows: the tool as seen from the part (ISO 841), or
+        the table itself (LinuxCNC's trunnions). For a head both are the same, and only ``"tool"`` is accepted.
+    limits : (float, float) or None, degrees
+        Lowest and highest word; None for an axis that turns without end.
+    """
+
+    name: str
+    direction: Vector
+    carrier: Literal["table", "head"]
+    point: Vector = (0.0, 0.0, 0.0)
+    positive: Literal["tool", "table"] = "tool"
+    limits: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        where = f"rotary axis {self.name}"
+        if self.name not in ("A", "B", "C"):
+            raise SettingsError("CS253", f"rotary axis name {self.name!r} is not an address", "use A, B or C")
+        if self.carrier not in ("table", "head"):
+            raise SettingsError("CS253", f"{where}: carrier is {self.carrier!r}", "use table or head")
+        if self.positive not in ("tool", "table") or (self.carrier == "head" and self.positive != "tool"):
+            choice = "use tool" if self.carrier == "head" else "use tool or table"
+            raise SettingsError("CS253", f"{where}: positive is {self.positive!r}", choice)
+        for key in ("direction", "point"):
+            if len(getattr(self, key)) != 3 or not all(map(math.isfinite, getattr(self, key))):
+                raise SettingsError("CS253", f"{where}: {key} is not a point of space", "give three numbers")
+        if not any(self.direction):
+            raise SettingsError("CS253", f"{where}: direction is zero", "give a vector along the axis")
+        if self.limits is not None:
+            low, high = self.limits
+            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+                raise SettingsError(
+                    "CS253", f"{where}: limits are {low:g} and {high:g}", "give the lower one first, in degrees"
+                )
+
+    @property
+    def sign(self) -> float:
+        """+1 where a growing word turns the tool right-handed about `direction` as seen from the part, else -1."""
+        return 1.0 if self.positive == "tool" else -1.0
+
+    @cached_property
+    def unit(self) -> Floats:
+        """(3,) unit vector along the axis."""
+        return _unit(self.direction)
+
+    @property
+    def low(self) -> float:
+        """Lowest word, degrees; -inf for an endless axis."""
+        return -math.inf if self.limits is None else self.limits[0]
+
+    @property
+    def high(self) -> float:
+        """Highest word, degrees; inf for an endless axis."""
+        return math.inf if self.limits is None else self.limits[1]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Two rotary axes between the part and the tool; three linear axes along X, Y and Z.
+
+    Parameters
+    ----------
+    name : str
+    axes : (RotaryAxis, RotaryAxis)
+        In the order in which they are met on the way from the part to the tool: for two tables the one that carries
+        the part first, for two heads the one that carries the tool last.
+    description : str
+        One line for lists.
+    preferred : (str, float) or None
+        Name of an axis and the sign (+1, -1) that it prefers where a program starts.
+    tool_direction : (float, float, float)
+        From the tip to the spindle with both rotary axes at zero.
+    tool_length : float, mm
+        From the spindle nose to the tip; matters for heads without tool centre point control only.
+    part_zero : (float, float, float), mm
+        Where the zero of the part sits in the coordinates in which the points of the tables are given.
+    """
+
+    name: str
+    axes: tuple[RotaryAxis, RotaryAxis]
+    description: str = ""
+    preferred: tuple[str, float] | None = None
+    tool_direction: Vector = (0.0, 0.0, 1.0)
+    tool_length: float = 0.0
+    part_zero: Vector = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        where = f"machine {self.name}"
+        if len(self.axes) != 2:
+            raise SettingsError("CS253", f"{where} has {len(self.axes)} rotary axes", "describe exactly two")
+        first, second = self.axes
+        if first.name == second.name:
+            raise SettingsError("CS253", f"{where}: both rotary axes are called {first.name}", "give two names")
+        if first.carrier == "head" and second.carrier == "table":
+            raise SettingsError(
+                "CS253",
+                f"{where}: the head axis {first.name} stands before the table axis {second.name}",
+                "list the axes from the part to the tool",
+            )
+        for key in ("tool_direction", "part_zero"):
+            if len(getattr(self, key)) != 3 or not all(map(math.isfinite, getattr(self, key))):
+                raise SettingsError("CS253", f"{where}: {key} is not a point of space", "give three numbers")
+        if not any(self.tool_direction):
+            raise SettingsError("CS253", f"{where}: tool_direction is zero", "give a vector along the tool")
+        if not (math.isfinite(self.tool_length) and self.tool_length >= 0):
+            raise SettingsError("CS253", f"{where}: tool_length is {self.tool_length:g}", "give 0 mm or more")
+        if _parallel(first.unit, second.unit):
+            raise SettingsError(
+                "CS253", f"{where}: {first.name} and {second.name} are parallel", "give two different directions"
+            )
+        if _parallel(second.unit, self.tool):
+            raise SettingsError(
+                "CS253",
+                f"{where}: {second.name} turns the tool about itself",
+                "check the directions and their order, from the part to the tool",
+            )
+        if self.preferred is not None and (self.preferred[0] not in self.names or self.preferred[1] not in (-1.0, 1.0)):
+            raise SettingsError(
+                "CS253",
+                f"{where}: preferred names {self.preferred[0]!r}",
+                f"use {first.name}+, {first.name}-, {second.name}+ or {second.name}-",
+            )
+
+    @cached_property
+    def tool(self) -> Floats:
+        """(3,) unit vector from the tip to the spindle with both rotary axes at zero."""
+        return _unit(self.tool_direction)
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Addresses of the two rotary words, from the part to the tool."""
+        return self.axes[0].name, self.axes[1].name
+
+    @property
+    def limits(self) -> Floats:
+        """(2, 2) lowest and highest word of each axis, degrees; infinite where there is none."""
+        return np.array([(axis.low, axis.high) for axis in self.axes])
+
+    @property
+    def kind(self) -> str:
+        """``"table-table"``, ``"table-head"`` or ``"head-head"``."""
+        return "-".join(axis.carrier for axis in self.axes)
+
+    def describe(self) -> str:
+        """Text of a few lines for people."""
+        lines = [f"{self.name}: {self.description}" if self.description else self.name]
+        for axis, place in zip(self.axes, ("nearest to the part", "nearest to the tool"), strict=True):
+            direction = ", ".join(f"{number:.6g}" for number in axis.unit)
+            point = ", ".join(f"{number:g}" for number in axis.point)
+            span = "without end" if axis.limits is None else f"from {axis.low:g} to {axis.high:g} deg"
+            lines.append(
+                f"  {axis.name} in the {axis.carrier}, {place}: about ({direction}) through ({point}) mm, {span}, "
+                f"positive turns the {axis.positive}"
+            )
+        if self.preferred is not None:
+            lines.append(f"  starts with {self.preferred[0]} {'positive' if self.preferred[1] > 0 else 'negative'}")
+        if any(axis.carrier == "head" for axis in self.axes):
+            lines.append(f"  tool length {self.tool_length:g} mm")
+        return "\n".join(lines)
+
+
+def _unit(vector: Vector) -> Floats:
+    array = np.array(vector, dtype=np.float64)
+    unit: Floats = array / np.linalg.norm(array)
+    return unit
+
+
+def _parallel(one: Floats, other: Floats) -> bool:
+    return float(np.linalg.norm(np.cross(one, other))) < PARALLEL

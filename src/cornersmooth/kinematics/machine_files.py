@@ -1,0 +1,156 @@
+"""Machines as TOML text: those that come with the program, and the user's own."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics.machine import Machine, RotaryAxis
+
+_MACHINE_KEYS = ("name", "description", "preferred", "tool_direction", "tool_length", "part_zero", "axis")
+_AXIS_KEYS = ("name", "direction", "carrier", "point", "positive", "limits")
+
+
+def machine_names() -> tuple[str, ...]:
+    """Names of the machines that come with the program, sorted."""
+    folder = resources.files(__package__) / "machines"
+    return tuple(sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")))
+
+
+def load_machine(name_or_path: str | Path) -> Machine:
+    """Machine of that name, or described by that TOML file.
+
+    A text that ends in ``.toml`` or holds a path separator is a file; anything else is a name.
+
+    Raises
+    ------
+    SettingsError
+        The name is unknown (with the closest known one), the file cannot be read, or it does not describe a machine.
+    """
+    given = str(name_or_path)
+    if isinstance(name_or_path, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
+        try:
+            text = Path(name_or_path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else "not UTF-8 text"
+            raise SettingsError(
+                "CS251", f"machine file cannot be read: {reason}", "check the name", file=given
+            ) from error
+        return parse_machine(text, file=given, name=Path(name_or_path).stem)
+    known = machine_names()
+    if given not in known:
+        close = difflib.get_close_matches(given, known, n=1)
+        advice = f"did you mean {close[0]}? " if close else ""
+        raise SettingsError(
+            "CS250", f"unknown machine {given!r}", f"{advice}use a TOML file or one of {', '.join(known)}"
+        )
+    text = (resources.files(__package__) / "machines" / f"{given}.toml").read_text(encoding="utf-8")
+    return parse_machine(text, file=f"{given}.toml", name=given)
+
+
+def parse_machine(text: str, *, file: str = "<machine>", name: str = "machine") -> Machine:
+    """Machine that a TOML text describes.
+
+    Parameters
+    ----------
+    text : str
+        Keys: ``name``, ``description``, ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``part_zero``
+        and two tables ``[[axis]]`` with ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``.
+    file : str
+        For messages.
+    name : str
+        Where the text has none.
+
+    Raises
+    ------
+    SettingsError
+        The text is not TOML, has an unknown key (with the closest known one), or does not describe a machine.
+    """
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError("CS251", f"not TOML: {error}", "correct the text", file=file) from error
+    try:
+        _check_keys(table, _MACHINE_KEYS, "")
+        entries = table.get("axis", [])
+        if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+            raise SettingsError("CS253", "axis is not a list of tables", "write [[axis]] twice")
+        if len(entries) != 2:
+            raise SettingsError("CS253", f"{len(entries)} rotary axes are described", "write [[axis]] exactly twice")
+        first, second = (_axis(entry, number) for number, entry in enumerate(entries, start=1))
+        return Machine(
+            name=_text(table, "name", name),
+            axes=(first, second),
+            description=_text(table, "description", ""),
+            preferred=_preferred(table),
+            tool_direction=_vector(table, "tool_direction", (0.0, 0.0, 1.0)),
+            tool_length=_number(table.get("tool_length", 0.0), "tool_length"),
+            part_zero=_vector(table, "part_zero", (0.0, 0.0, 0.0)),
+        )
+    except SettingsError as error:
+        raise SettingsError(error.code, error.what, error.hint, file=file) from error
+
+
+def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
+    where = f"axis {number}: "
+    _check_keys(entry, _AXIS_KEYS, where)
+    for key in ("name", "direction", "carrier"):
+        if key not in entry:
+            raise SettingsError("CS253", f"{where}{key} is missing", f"add {key} = ...")
+    limits = entry.get("limits")
+    if limits is not None:
+        if not isinstance(limits, list) or len(limits) != 2:
+            raise SettingsError("CS253", f"{where}limits is {limits!r}", "write limits = [lowest, highest] in degrees")
+        limits = (_number(limits[0], f"{where}limits"), _number(limits[1], f"{where}limits"))
+    return RotaryAxis(
+        name=_text(entry, "name", ""),
+        direction=_vector(entry, "direction", (0.0, 0.0, 0.0), where),
+        carrier=entry["carrier"],
+        point=_vector(entry, "point", (0.0, 0.0, 0.0), where),
+        positive=entry.get("positive", "tool"),
+        limits=limits,
+    )
+
+
+def _check_keys(table: dict[str, Any], known: tuple[str, ...], where: str) -> None:
+    for key in table:
+        if key not in known:
+            close = difflib.get_close_matches(key, known, n=1)
+            advice = f"did you mean {close[0]}?" if close else f"known keys are {', '.join(known)}"
+            raise SettingsError("CS252", f"{where}unknown key {key!r}", advice)
+
+
+def _text(table: dict[str, Any], key: str, default: str) -> str:
+    value = table.get(key, default)
+    if not isinstance(value, str):
+        raise SettingsError("CS253", f"{key} is {value!r}", "write it as text in quotes")
+    return value
+
+
+def _number(value: object, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise SettingsError("CS253", f"{key} is {value!r}", "give a number")
+    return float(value)
+
+
+def _vector(
+    table: dict[str, Any], key: str, default: tuple[float, float, float], where: str = ""
+) -> tuple[float, float, float]:
+    value = table.get(key, default)
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise SettingsError("CS253", f"{where}{key} is {value!r}", "give three numbers in brackets")
+    x, y, z = (_number(number, where + key) for number in value)
+    return x, y, z
+
+
+def _preferred(table: dict[str, Any]) -> tuple[str, float] | None:
+    value = table.get("preferred")
+    if value is None:
+        return None
+    if not isinstance(value, str) or len(value) != 2 or value[1] not in "+-":
+        raise SettingsError("CS253", f"preferred is {value!r}", 'write an axis and its sign, as in preferred = "A+"')
+    return value[0], 1.0 if value[1] == "+" else -1.0

@@ -1,0 +1,82 @@
+"""Positions of the linear axes where the control does not keep the tool tip itself, and feed as inverse time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.orientation import radians, rotate
+from cornersmooth.model import Floats
+
+
+def machine_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
+    """Words of the linear axes that bring the tool tip to points of the part.
+
+    Parameters
+    ----------
+    tip : (n, 3) float64, mm
+        In part coordinates.
+    angles : (n, 2) float64, degrees
+
+    Returns
+    -------
+    (n, 3) float64, mm
+        Counted from the zero of the part and with the length of the tool compensated: with both rotary axes at zero
+        they are the tip itself. LinuxCNC's trtfuncs.c computes the same joints (its offsets are the points here).
+    """
+    turned = tip + machine.part_zero
+    for index, axis in enumerate(machine.axes):
+        if axis.carrier == "table":
+            turned = _about(axis.unit, axis.point, -axis.sign * radians(angles[:, index]), turned)
+    position: Floats = turned - machine.part_zero - _swing(machine, angles)
+    return position
+
+
+def tip_position(machine: Machine, position: Floats, angles: Floats) -> Floats:
+    """Tool tip in part coordinates for words of the linear and rotary axes: the inverse of `machine_position`."""
+    turned: Floats = position + machine.part_zero + _swing(machine, angles)
+    for index in (1, 0):
+        axis = machine.axes[index]
+        if axis.carrier == "table":
+            turned = _about(axis.unit, axis.point, axis.sign * radians(angles[:, index]), turned)
+    tip: Floats = turned - machine.part_zero
+    return tip
+
+
+def inverse_time(length: Floats, feed: Floats, turn: Floats, rotary_feed: float) -> Floats:
+    """Feed words of G93: moves per minute, so that the tip runs with its feed.
+
+    Parameters
+    ----------
+    length : (n,) float64, mm
+        Way of the tip along the part.
+    feed : (n,) float64, mm/min
+    turn : (n,) float64, degrees
+        The larger turn of the two rotary axes.
+    rotary_feed : float, degrees/min
+        What no rotary axis exceeds; the only limit where the tip stands still.
+
+    Returns
+    -------
+    (n,) float64, 1/min
+        Infinite for a move of nothing.
+    """
+    minutes = np.maximum(length / feed, turn / rotary_feed)
+    some = minutes > 0
+    return np.where(some, 1 / np.where(some, minutes, 1.0), np.inf)
+
+
+def _swing(machine: Machine, angles: Floats) -> Floats:
+    """Way of the tip when the heads turn and the linear axes stand: (n, 3) mm."""
+    tip = np.zeros((len(angles), 3))
+    for index in (1, 0):
+        axis = machine.axes[index]
+        if axis.carrier == "head":
+            point = machine.tool_length * machine.tool + np.array(axis.point)
+            tip = _about(axis.unit, point, axis.sign * radians(angles[:, index]), tip)
+    return tip
+
+
+def _about(direction: Floats, point: Floats | tuple[float, float, float], angle: Floats, points: Floats) -> Floats:
+    centre = np.asarray(point)
+    return centre + rotate(direction, angle, points - centre)
