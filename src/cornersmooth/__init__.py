@@ -1,1 +1,64 @@
-"""Five-axis corner smoothing."""
+"""Rounds the corners of five-axis tool paths within a tolerance.
+
+The whole program in three calls::
+
+    program = cornersmooth.read("part.cls")
+    smoothed = cornersmooth.smooth(program, cornersmooth.Settings(tolerance=0.04))
+    with open("part.nc", "wb") as stream:
+        cornersmooth.write(smoothed, stream)
+
+Nothing is imported before it is used, so that the command line answers at once.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cornersmooth.cl import read
+    from cornersmooth.errors import CornersmoothError, Finding
+    from cornersmooth.model import Corners, Program, SmoothProgram, Statement
+    from cornersmooth.nc import fit_settings, write
+    from cornersmooth.report import report
+    from cornersmooth.settings import Settings
+    from cornersmooth.smoothing import smooth
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "read": "cl",
+    "smooth": "smoothing",
+    "fit_settings": "nc",
+    "write": "nc",
+    "report": "report",
+    "Settings": "settings",
+    "CornersmoothError": "errors",
+    "Finding": "errors",
+    "Corners": "model",
+    "Program": "model",
+    "SmoothProgram": "model",
+    "Statement": "model",
+}
+
+__all__ = [
+    "Corners",
+    "CornersmoothError",
+    "Finding",
+    "Program",
+    "Settings",
+    "SmoothProgram",
+    "Statement",
+    "fit_settings",
+    "read",
+    "report",
+    "smooth",
+    "write",
+]
+
+
+def __getattr__(name: str) -> Any:
+    from importlib import import_module
+
+    if name not in _HOME:
+        raise AttributeError(f"module 'cornersmooth' has no attribute {name!r}")
+    return getattr(import_module(f"cornersmooth.{_HOME[name]}"), name)

@@ -1,0 +1,149 @@
+"""Where text comes from and goes to: standard streams, refusals, writing that loses nothing.
+
+A regular file is written beside its place and moved there when it is whole and on the disk; an error, Ctrl-C, a full
+disk or a closed pipe leave the old file or none. (click's ``File(atomic=True)`` moves half-written files too.)
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, BinaryIO
+
+from cornersmooth.errors import InputError, OutputError, SettingsError
+
+STANDARD = "-"
+
+
+def read_input(path: str) -> tuple[bytes, str]:
+    """Contents and display name of an input; ``-`` is standard input.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+    if path == STANDARD:
+        return sys.stdin.buffer.read(), "<stdin>"
+    try:
+        return Path(path).read_bytes(), path
+    except OSError as failure:
+        raise InputError("CS100", f"cannot read it: {_reason(failure)}", "check the path", file=path) from failure
+
+
+def check_output(path: str, inputs: list[str], *, force: bool, ours: bytes | None = None) -> None:
+    """Refuse an output that would destroy something.
+
+    Parameters
+    ----------
+    path : str
+    inputs : list of str
+        Files that are read: an output is never one of them.
+    ours : bytes, optional
+        How a file begins that an earlier run of the same command made; such a file is replaced without `force`.
+
+    Raises
+    ------
+    SettingsError
+        The output is an input.
+    OutputError
+        It exists and may not be replaced, or cannot be written at all.
+    """
+    if path == STANDARD:
+        return
+    for source in inputs:
+        if source != STANDARD and _same(path, source):
+            raise SettingsError("CS220", f"{path} is the input", "choose another name for the output")
+    if os.path.isdir(path):
+        raise OutputError("CS401", "is a folder", "name a file, or use -d for a folder", file=path)
+    folder = os.path.dirname(os.path.realpath(path))
+    if not os.path.isdir(folder):
+        raise OutputError("CS402", f"there is no folder {folder}", "make it first", file=path)
+    if os.path.isfile(path) and not force and not _begins_with(path, ours):
+        raise OutputError("CS403", "exists already", "use --force to replace it", file=path)
+
+
+@contextlib.contextmanager
+def open_output(path: str) -> Iterator[BinaryIO]:
+    """Binary stream to the output; a regular file appears under its name only when the block ends without an error.
+
+    Raises
+    ------
+    OutputError
+        Anything the operating system refuses, a full disk included. A closed pipe stays a BrokenPipeError.
+    """
+    if path == STANDARD:
+        with _failing_as_output("<stdout>"):
+            yield sys.stdout.buffer
+            sys.stdout.buffer.flush()
+        return
+    with _failing_as_output(path):
+        if os.path.exists(path) and not stat.S_ISREG(os.stat(path).st_mode):
+            with open(path, "wb") as device:  # a device or a pipe cannot be replaced, only written to
+                yield device
+            return
+        with _replacing(os.path.realpath(path)) as stream:
+            yield stream
+
+
+@contextlib.contextmanager
+def _replacing(target: str) -> Iterator[BinaryIO]:
+    folder, name = os.path.split(target)
+    handle, temporary = tempfile.mkstemp(prefix=f".{name}.", suffix=".part", dir=folder)
+    try:
+        stream: IO[bytes]
+        with os.fdopen(handle, "wb") as stream:
+            yield stream
+            stream.flush()
+            os.fchmod(stream.fileno(), _mode_for(target))
+            os.fsync(stream.fileno())
+        os.replace(temporary, target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
+        raise
+
+
+def _mode_for(target: str) -> int:
+    """Permissions of the file that is replaced, else those of any new file."""
+    with contextlib.suppress(OSError):
+        return stat.S_IMODE(os.stat(target).st_mode)
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask
+
+
+@contextlib.contextmanager
+def _failing_as_output(path: str) -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as failure:
+        raise OutputError(
+            "CS404", f"cannot write it: {_reason(failure)}", "the old file, if any, is untouched", file=path
+        ) from failure
+
+
+def _same(one: str, other: str) -> bool:
+    try:
+        return os.path.samefile(one, other)
+    except OSError:
+        return os.path.realpath(one) == os.path.realpath(other)
+
+
+def _begins_with(path: str, ours: bytes | None) -> bool:
+    if ours is None:
+        return False
+    with contextlib.suppress(OSError), open(path, "rb") as stream:
+        return stream.read(len(ours)) == ours
+    return False
+
+
+def _reason(failure: OSError) -> str:
+    return (failure.strerror or str(failure)).lower()

@@ -1,0 +1,145 @@
+"""One input from reading to report: what `smooth` does for each file, in this process or another."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from cornersmooth.cli.files import check_output, open_output, read_input
+from cornersmooth.errors import CornersmoothError, OutputError, SettingsError
+
+#: how the reports of earlier runs begin; such files are replaced without being asked
+_OUR_JSON = b'{\n "schema": "cornersmooth-report/'
+_OUR_CSV = b"corner,line,x,y,z,tip_angle_deg,"
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to do with one input; every field survives the way to another process.
+
+    Parameters
+    ----------
+    source, target : str
+        Input and NC file; ``-`` for the standard streams.
+    reports : tuple of str
+    reading : dict
+        Keyword arguments of `cornersmooth.cl.read`.
+    settings : dict
+        Keyword arguments of `Settings`.
+    """
+
+    source: str
+    target: str
+    reports: tuple[str, ...]
+    reading: dict[str, Any]
+    settings: dict[str, Any]
+    control: str
+    form: str | None
+    feed: float | None
+    force: bool
+
+
+@dataclass
+class Outcome:
+    """What became of a job: the report, or the error."""
+
+    job: Job
+    exit_code: int = 0
+    message: str = ""
+    contents: dict[str, Any] = field(default_factory=dict)
+
+
+def check(job: Job) -> None:
+    """Refuse what would fail later or destroy something; nothing is read or written."""
+    outputs = [job.target, *job.reports]
+    check_output(job.target, [job.source], force=job.force)
+    for path in job.reports:
+        suffix = os.path.splitext(path)[1].lower()
+        if suffix not in (".json", ".csv"):
+            raise SettingsError("CS221", f"cannot tell the form of the report {path}", "let it end in .json or .csv")
+        check_output(path, [job.source], force=job.force, ours=_OUR_JSON if suffix == ".json" else _OUR_CSV)
+    real = [os.path.realpath(path) for path in outputs if path != "-"]
+    if len(set(real)) < len(real):
+        raise SettingsError("CS222", "two outputs have the same name", "give each its own")
+
+
+def run_job(job: Job, progress: Progress | None = None) -> Outcome:
+    """Read, smooth, write, report; errors of the input or output become part of the outcome.
+
+    A BrokenPipeError and KeyboardInterrupt pass through.
+    """
+    outcome = Outcome(job)
+    try:
+        check(job)
+        outcome.contents = _smooth_file(job, progress)
+    except CornersmoothError as failure:
+        outcome.exit_code = failure.exit_code
+        outcome.message = str(failure)
+    except MemoryError:
+        outcome.exit_code = 3
+        outcome.message = f"{job.source}: error: not enough memory for this file; cut it at a tool change"
+    return outcome
+
+
+def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
+    import numpy as np
+
+    from cornersmooth.cl import read
+    from cornersmooth.nc import choose_form, fit_settings, write
+    from cornersmooth.report import corners_csv, report, report_json
+    from cornersmooth.settings import Settings
+    from cornersmooth.smoothing import smooth
+
+    seconds: dict[str, float] = {}
+
+    def step(stage: str) -> Callable[[int, int], None] | None:
+        return None if progress is None else lambda done, total: progress(stage, done, total)
+
+    form = choose_form(job.control, job.form)
+    with _timed(seconds, "read"):
+        data, name = read_input(job.source)
+        program = read(data, name=name, **job.reading)
+        del data
+        if job.feed is not None:
+            program = replace(program, feed=np.where(np.isnan(program.feed), job.feed, program.feed))
+    settings = fit_settings(Settings(**job.settings), form, program.units)
+    with _timed(seconds, "smooth"):
+        smoothed = smooth(program, settings, progress=step("smoothing"))
+    with _timed(seconds, "write"), open_output(job.target) as stream:
+        written = write(smoothed, stream, control=job.control, form=form.name, progress=step("writing"))
+    contents = report(smoothed, blocks_out=written.blocks, seconds=seconds, findings=written.findings)
+    for path in job.reports:
+        with open_output(path) as stream:
+            texts = iter([report_json(contents)]) if path.lower().endswith(".json") else corners_csv(smoothed)
+            for text in texts:
+                stream.write(text.encode("utf-8"))
+    return contents
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    begin = time.perf_counter()
+    yield
+    seconds[stage] = round(time.perf_counter() - begin, 6)
+
+
+def make_folder(path: str) -> None:
+    """Make the folder for the outputs.
+
+    Raises
+    ------
+    OutputError
+        It cannot be made.
+    """
+    try:
+        os.makedirs(path, exist_ok=True)
+    except OSError as failure:
+        raise OutputError(
+            "CS405", f"cannot make the folder: {failure.strerror}", "choose another", file=path
+        ) from failure

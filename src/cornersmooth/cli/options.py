@@ -1,0 +1,172 @@
+"""Every option of the command line, once; commands pick what they need.
+
+Lengths are millimetres; the suffixes ``mm`` and ``in`` are accepted.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+_LENGTH = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(mm|in|inch|\")?")
+
+
+class Length(click.ParamType[float]):
+    """A length in mm, or in inches with the suffix ``in``."""
+
+    name = "mm"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Text to millimetres."""
+        if isinstance(value, float):
+            return value
+        match = _LENGTH.fullmatch(str(value).strip())
+        if not match:
+            self.fail(f"{value!r} is not a length; write 0.04, 0.04mm or 0.0015in", param, ctx)
+        number = float(match[1]) * (1.0 if match[2] in (None, "mm") else 25.4)
+        if not (math.isfinite(number) and number > 0.0):
+            self.fail(f"{value!r} is not a positive length", param, ctx)
+        return number
+
+
+class Weights(click.ParamType[tuple[float, float]]):
+    """Two positive numbers with a comma between."""
+
+    name = "w1,w2"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        """Text to two numbers."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            first, second = (float(part) for part in str(value).split(","))
+        except ValueError:
+            self.fail(f"{value!r} is not two numbers; write 1,0.7", param, ctx)
+        return first, second
+
+
+class Jobs(click.ParamType[int]):
+    """A number of processes."""
+
+    name = "n"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Text to a count; 0 stands for all cores."""
+        try:
+            number = int(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number of processes; put a bare -j behind the file names", param, ctx)
+        if number < 0:
+            self.fail("the number of processes cannot be negative", param, ctx)
+        return number
+
+
+LENGTH = Length()
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+tolerance = click.option(
+    "-e", "--tolerance", type=LENGTH, default=0.01, show_default=True, help="Largest deviation of the written path."
+)
+axis_length = click.option(
+    "-H",
+    "--axis-length",
+    type=LENGTH,
+    default=10.0,
+    show_default=True,
+    help="Distance from the tool tip to the second point that keeps the tolerance: the length of the cutting edge.",
+)
+method = click.option(
+    "--method",
+    type=click.Choice(["proportional", "zhang2016"]),
+    default="proportional",
+    show_default=True,
+    help="How the pair of curves is made: the default, or the paper as published.",
+)
+weights = click.option(
+    "--weights", type=Weights(), default=(1.0, 1.0), help="Weights w1,w2 of the curves, up to 3. [default: 1,1]"
+)
+orientation_tolerance = click.option(
+    "--orientation-tolerance", type=float, metavar="DEG", help="Largest deviation of the tool axis besides -e and -H."
+)
+reversal_angle = click.option(
+    "--reversal-angle",
+    type=float,
+    metavar="DEG",
+    default=170.0,
+    show_default=True,
+    help="Corners that turn by more stay sharp.",
+)
+chord = click.option(
+    "--chord", type=LENGTH, help="Distance between the written lines and the curve. [default: a tenth of -e]"
+)
+axis_step = click.option(
+    "--axis-step",
+    type=float,
+    metavar="DEG",
+    help="Largest change of the tool axis in one line beside a rounded corner.",
+)
+output = click.option(
+    "-o", "--output", type=click.Path(), help="NC file, - for standard output. [default: - for a single input]"
+)
+directory = click.option(
+    "-d", "--directory", type=click.Path(), help="Folder for the NC files of several inputs, made where missing."
+)
+jobs = click.option(
+    "-j",
+    "--jobs",
+    type=Jobs(),
+    default=1,
+    is_flag=False,
+    flag_value=0,
+    help="Processes for several inputs; a bare -j takes all cores.",
+)
+form = click.option("-f", "--form", type=str, metavar="g1|g6.2", help="Dense lines or NURBS blocks. [default: g1]")
+control = click.option(
+    "--control", type=str, metavar="NAME", default="fanuc", show_default=True, help="Control the NC text is for."
+)
+reports = click.option(
+    "--report",
+    "reports",
+    type=click.Path(),
+    multiple=True,
+    help="Write a report; .json or .csv decides the form. May be repeated; {stem} stands for the input's name.",
+)
+force = click.option("--force", is_flag=True, help="Replace existing files.")
+quiet = click.option("-q", "--quiet", is_flag=True, help="Only errors.")
+verbose = click.option("-v", "--verbose", count=True, help="More: every finding, times of the stages.")
+feed = click.option("--feed", type=float, metavar="MM/MIN", help="Feed for moves that the CL file gives none for.")
+units = click.option(
+    "--units", type=click.Choice(["mm", "inch"]), help="Units of the input, where it does not say or says it wrong."
+)
+dialect = click.option("--dialect", type=str, metavar="NAME", help="CL dialect, instead of what the text looks like.")
+input_format = click.option(
+    "--input-format", type=click.Choice(["apt", "points"]), help="Form of the input, instead of what it looks like."
+)
+arc_rule = click.option(
+    "--arc-rule", type=click.Choice(["left", "right", "tangent"]), help="Sense of CIRCLE about its axis."
+)
+lenient = click.option("--lenient", is_flag=True, help="Go on after errors in the input where it is safe.")
+
+
+def reading(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every command that reads CL files."""
+    return _apply(function, (input_format, dialect, units, arc_rule, lenient))
+
+
+def smoothing(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every command that smooths."""
+    return _apply(
+        function,
+        (tolerance, axis_length, method, weights, orientation_tolerance, reversal_angle, chord, axis_step),
+    )
+
+
+def _apply(function: Callable[..., Any], options: tuple[Decorator, ...]) -> Callable[..., Any]:
+    for option in reversed(options):
+        function = option(function)
+    return function

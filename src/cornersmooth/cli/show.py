@@ -1,0 +1,120 @@
+"""What a person sees on the terminal: everything but the NC text goes to standard error."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from cornersmooth.cli.job import Outcome, Progress
+
+#: findings shown without -v
+_FINDINGS_SHOWN = 10
+
+
+def console() -> Console:
+    """Console on standard error; rich itself honours NO_COLOR and a missing terminal."""
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def progress_bar(quiet: bool) -> Iterator[Progress | None]:
+    """Progress callback drawing a bar, or None where nobody would see it."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console(), transient=True) as bar:
+        tasks: dict[str, Any] = {}
+
+        def advance(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=total)
+            bar.update(tasks[stage], completed=done, total=total)
+
+        yield advance
+
+
+def show_findings(source: str, contents: dict[str, Any], verbose: int) -> None:
+    """Print the findings of one file, warnings first, each on its line."""
+    ranked = sorted(contents["findings"], key=lambda finding: ("error", "warning", "note").index(finding["severity"]))
+    if not verbose:
+        ranked = [finding for finding in ranked if finding["severity"] != "note"]
+    shown = ranked if verbose else ranked[:_FINDINGS_SHOWN]
+    for finding in shown:
+        place = f"{source}:{finding['line']}" if finding["line"] else source
+        times = f" ({finding['count']} times)" if finding["count"] > 1 else ""
+        print_line(f"{place}: {finding['severity']}: {finding['text']}{times}")
+    if len(ranked) > len(shown):
+        print_line(f"{source}: {len(ranked) - len(shown)} more findings; -v shows them")
+
+
+def show_summary(contents: dict[str, Any], verbose: int) -> None:
+    """Print the small table of one file."""
+    from rich.table import Table
+
+    summary, settings = contents["summary"], contents["settings"]
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold")
+    table.add_column()
+    given = contents["input"]
+    table.add_row("input", f"{given['name']}: {given['dialect']}, {given['poses']} poses, {given['units']}")
+    kept = ", ".join(f"{count} {reason}" for reason, count in summary["not_smoothed"].items())
+    table.add_row("corners", f"{summary['smoothed']} of {summary['corners']} rounded" + (f" ({kept})" if kept else ""))
+    table.add_row("limited by", f"tolerance {summary['limited_by_tolerance']}, segment {summary['limited_by_segment']}")
+    table.add_row(
+        "error",
+        f"tip {summary['max_tip_error_mm']:.4f} mm, axis point {summary['max_axis_error_mm']:.4f} mm "
+        f"(H {settings['axis_length']:g} mm), tolerance {settings['tolerance']:g} mm",
+    )
+    table.add_row("tool axis", f"{summary['max_orientation_error_deg']:.4f} deg")
+    if "max_sync_residual_mm" in summary:
+        table.add_row(
+            "zhang2016",
+            f"largest ||Q-P|-H| {summary['max_sync_residual_mm']:.4g} mm, "
+            f"largest jump of the axis at a joint {summary['max_joint_jump_deg']:.4g} deg",
+        )
+    table.add_row("blocks", f"{summary['blocks_in']} in, {summary['blocks_out']} out")
+    if verbose:
+        times = ", ".join(f"{stage} {value:.3f}" for stage, value in summary["seconds"].items())
+        table.add_row("seconds", times)
+    console().print(table)
+
+
+def show_batch(outcomes: list[Outcome]) -> None:
+    """Print one row for every file."""
+    from rich.table import Table
+
+    table = Table("file", "result", "corners", "rounded", "tip mm", "axis mm", "blocks", box=None, pad_edge=False)
+    for outcome in outcomes:
+        name = outcome.job.source
+        if not outcome.contents:
+            table.add_row(name, f"failed ({outcome.exit_code})", "", "", "", "", "")
+            continue
+        summary = outcome.contents["summary"]
+        table.add_row(
+            name,
+            "done" if outcome.exit_code == 0 else f"exit {outcome.exit_code}",
+            str(summary["corners"]),
+            str(summary["smoothed"]),
+            f"{summary['max_tip_error_mm']:.4f}",
+            f"{summary['max_axis_error_mm']:.4f}",
+            str(summary["blocks_out"]),
+        )
+    failed = sum(outcome.exit_code != 0 for outcome in outcomes)
+    out = console()
+    out.print(table)
+    out.print(f"{len(outcomes)} files, {failed} failed" if failed else f"{len(outcomes)} files done")
+
+
+def print_line(text: str) -> None:
+    """Print plain text to standard error, as it is: no markup, no wrapping."""
+    print(text, file=sys.stderr)  # noqa: T201

@@ -1,0 +1,169 @@
+"""``cornersmooth smooth``: CL files in, NC text and reports out."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import click
+
+from cornersmooth.cli import options
+from cornersmooth.cli.files import STANDARD
+from cornersmooth.cli.job import Job, Outcome, check, make_folder, run_job
+from cornersmooth.cli.show import print_line, progress_bar, show_batch, show_findings, show_summary
+from cornersmooth.errors import CornersmoothError
+
+_READING = ("dialect", "units", "arc_rule", "lenient")
+_SETTINGS = ("tolerance", "axis_length", "method", "weights", "orientation_tolerance", "reversal_angle", "axis_step")
+
+
+@click.command(
+    "smooth",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit codes: 0 done; 1 done, but a promise is broken; 2 wrong usage or configuration; "
+    "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
+)
+@click.argument("inputs", nargs=-1, required=True, metavar="IN...")
+@options.tolerance
+@options.output
+@options.form
+@options.axis_length
+@options.directory
+@options.jobs
+@options.reports
+@options.control
+@options.method
+@options.weights
+@options.orientation_tolerance
+@options.reversal_angle
+@options.chord
+@options.axis_step
+@options.feed
+@options.reading
+@options.force
+@options.quiet
+@options.verbose
+def command(inputs: tuple[str, ...], **given: Any) -> int:
+    """Round the corners of the CL files IN and write NC text.
+
+    IN is an APT/CL file (NX, CATIA, Creo, ...) or a table of points (x y z i j k, or two points); - is standard input.
+    The written path stays within the tolerance of the CL path, at the tool tip and at the axis point.
+
+    \b
+    Examples:
+      cornersmooth smooth part.cls -e 0.04 -o part.nc
+      cornersmooth smooth part.cls -e 0.04 -f g6.2 -o part.nc --report part.json --report part.csv
+      cornersmooth smooth part.ncl -e 0.0005in -H 25 -o part.nc
+      cornersmooth smooth *.cls -e 0.04 -d out/ -j 2
+      cat part.cls | cornersmooth smooth - -e 0.04 > part.nc
+    """
+    jobs = _make_jobs(inputs, given)
+    quiet, verbose = given["quiet"], given["verbose"]
+    if len(jobs) == 1 and not given["directory"]:
+        check(jobs[0])
+        with progress_bar(quiet) as progress:
+            outcome = run_job(jobs[0], progress)
+        _tell(outcome, quiet, verbose)
+        if outcome.contents and not quiet:
+            show_summary(outcome.contents, verbose)
+        return outcome.exit_code
+    outcomes = []
+    for outcome in _run_all(jobs, given["jobs"]):
+        _tell(outcome, quiet, verbose)
+        outcomes.append(outcome)
+    if not quiet:
+        show_batch(outcomes)
+    worst: int = max(outcome.exit_code for outcome in outcomes)
+    return worst
+
+
+def _tell(outcome: Outcome, quiet: bool, verbose: int) -> None:
+    if outcome.message:
+        print_line(outcome.message)
+    if outcome.contents and not quiet:
+        show_findings(outcome.job.source, outcome.contents, verbose)
+
+
+def _run_all(jobs: list[Job], processes: int) -> Any:
+    """Outcomes in the order of the inputs; a failed file does not stop the others."""
+    processes = min(processes or os.cpu_count() or 1, len(jobs))
+    if processes == 1:
+        yield from map(run_job, jobs)
+        return
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        try:
+            yield from pool.map(run_job, jobs)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
+    """One job for every input, all of them checked for names that clash."""
+    folder, output = given["directory"], given["output"]
+    if folder and output:
+        raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
+    if len(inputs) > 1 and not folder:
+        raise click.UsageError("several inputs need -d FOLDER; -o goes with a single input")
+    if len(inputs) > 1 and STANDARD in inputs:
+        raise click.UsageError("standard input goes with no other input")
+    reports = given["reports"]
+    if len(inputs) > 1 and any("{stem}" not in path for path in reports):
+        raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
+    settings = {name: given[name] for name in _SETTINGS} | {"chord_tolerance": given["chord"]}
+    reading = {name: given[name] for name in _READING} | {"format": given["input_format"]}
+    _try_settings(settings, given)
+    if folder:
+        make_folder(folder)
+    jobs = []
+    for source in inputs:
+        stem = "stdin" if source == STANDARD else os.path.splitext(os.path.basename(source))[0]
+        target = os.path.join(folder, f"{stem}.nc") if folder else output or STANDARD
+        jobs.append(
+            Job(
+                source=source,
+                target=target,
+                reports=tuple(path.replace("{stem}", stem) for path in reports),
+                reading=reading,
+                settings=settings,
+                control=given["control"],
+                form=given["form"],
+                feed=given["feed"],
+                force=given["force"],
+            )
+        )
+    by_target: dict[str, str] = {}
+    for job in jobs:
+        for path in (job.target, *job.reports):
+            if path != STANDARD and by_target.setdefault(path, job.source) != job.source:
+                raise click.UsageError(f"{by_target[path]} and {job.source} would both be written to {path}")
+    _check_against_inputs(jobs)
+    return jobs
+
+
+def _try_settings(settings: dict[str, Any], given: dict[str, Any]) -> None:
+    """Refuse wrong settings before any file is touched."""
+    from cornersmooth.nc import choose_form
+    from cornersmooth.settings import Settings
+
+    Settings(**settings)
+    choose_form(given["control"], given["form"])
+    if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
+        raise click.UsageError("--feed must be a positive number of mm/min")
+
+
+def _check_against_inputs(jobs: list[Job]) -> None:
+    """No output of one job may be the input of another."""
+    from cornersmooth.cli.files import check_output
+
+    sources = [job.source for job in jobs]
+    for job in jobs:
+        for path in (job.target, *job.reports):
+            try:
+                check_output(path, sources, force=True)
+            except CornersmoothError as failure:
+                if failure.exit_code == 2:
+                    raise

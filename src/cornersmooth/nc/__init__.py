@@ -1,0 +1,135 @@
+"""NC text from a smoothed program: the registry of controls and forms, and `write`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from cornersmooth.errors import Finding, SettingsError
+from cornersmooth.model import SmoothProgram, Units
+from cornersmooth.nc import fanuc
+from cornersmooth.nc.control import Form
+from cornersmooth.nc.motion import MotionWriter
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.sampling import curve_rows, dense_rows
+
+__all__ = ["FORMS", "Form", "Written", "choose_form", "fit_settings", "write"]
+
+#: every control with its forms; the first is the control's default
+FORMS: dict[str, dict[str, Form]] = {"fanuc": {form.name: form for form in (fanuc.G1, fanuc.G62)}}
+
+
+class Stream(Protocol):
+    """What text is written to: any binary stream."""
+
+    def write(self, data: bytes, /) -> object:
+        """Write the bytes."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """What `write` put out.
+
+    Parameters
+    ----------
+    blocks : int
+        NC blocks, head and tail included.
+    findings : tuple of Finding
+    """
+
+    blocks: int
+    findings: tuple[Finding, ...]
+
+
+def choose_form(control: str = "fanuc", form: str | None = None) -> Form:
+    """Return the form of a control by name; the control's default where `form` is None.
+
+    Raises
+    ------
+    SettingsError
+        Unknown control, or a form that the control does not have.
+    """
+    forms = FORMS.get(control)
+    if forms is None:
+        raise SettingsError("CS210", f"unknown control {control!r}", f"choose one of {', '.join(sorted(FORMS))}")
+    if form is None:
+        return next(iter(forms.values()))
+    if form not in forms:
+        raise SettingsError("CS211", f"{control} has no form {form!r}", f"choose one of {', '.join(forms)}")
+    return forms[form]
+
+
+def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
+    """Settings that know the digits and the abilities of the output form, so that ε holds for the written numbers."""
+    return settings.but(
+        tip_resolution=form.tip_resolution(units),
+        axis_point_resolution=form.axis_point_resolution(units, settings.axis_length),
+        round_feed_changes=settings.round_feed_changes and not form.curves,
+    )
+
+
+def write(
+    smoothed: SmoothProgram,
+    stream: Stream,
+    *,
+    control: str = "fanuc",
+    form: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Written:
+    """Write the NC text of a smoothed program.
+
+    Parameters
+    ----------
+    smoothed : SmoothProgram
+        Made with settings that fit the form (`fit_settings`), or ε is exceeded by the rounding.
+    stream : binary stream
+        Written in blocks; memory does not grow with the program.
+    progress : callable, optional
+        Called now and then with (poses done, poses in all).
+
+    Raises
+    ------
+    SettingsError
+        Unknown control or form.
+    OutputError
+        A number that the form cannot hold.
+    """
+    chosen = choose_form(control, form)
+    program = smoothed.program
+    statements = fanuc.statement_writer(chosen)
+    motion = MotionWriter(chosen, program, statements)
+    head = fanuc.head(program)
+    stream.write(_text(head))
+    for rows in curve_rows(smoothed) if chosen.curves else dense_rows(smoothed):
+        for text in motion.write(rows):
+            stream.write(text)
+        if progress is not None and len(rows.move):
+            progress(int(rows.move[-1]) + 1, len(program))
+    for text in motion.finish():
+        stream.write(text)
+    tail = fanuc.tail(statements)
+    stream.write(_text(tail))
+    return Written(len(head) + motion.blocks + len(tail), tuple(_findings(motion, statements.findings())))
+
+
+def _text(blocks: list[str]) -> bytes:
+    return "".join(block + "\n" for block in blocks).encode("ascii")
+
+
+def _findings(motion: MotionWriter, findings: list[Finding]) -> list[Finding]:
+    if motion.without_feed:
+        findings.append(
+            Finding(
+                "CS311",
+                "warning",
+                motion.without_feed_line,
+                "feed move without a feed in the CL file; most controls stop with an alarm, give one with --feed",
+                motion.without_feed,
+            )
+        )
+    if motion.repeated:
+        findings.append(
+            Finding("CS312", "note", 0, "move of zero length in the written digits left out", motion.repeated)
+        )
+    return findings

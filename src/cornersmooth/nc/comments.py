@@ -1,0 +1,30 @@
+"""Comments in NC text: ASCII, no parentheses inside, lines of bearable length."""
+
+from __future__ import annotations
+
+import unicodedata
+
+#: characters of a comment's text in one block; controls truncate or refuse long ones
+_LONGEST = 120
+
+_SPELLED = {"ß": "ss", "Ø": "O", "ø": "o", "Æ": "AE", "æ": "ae", "Œ": "OE", "œ": "oe", "đ": "d", "Đ": "D", "ł": "l"}
+
+
+def plain_text(text: str) -> str:
+    """Return the text in the characters that controls accept in a comment; what has no such form becomes ``?``."""
+    text = "".join(_SPELLED.get(letter, letter) for letter in text)
+    decomposed = unicodedata.normalize("NFKD", text)
+    kept = "".join(letter for letter in decomposed if not unicodedata.combining(letter))
+    ascii_text = kept.encode("ascii", "replace").decode("ascii")
+    printable = "".join(letter if letter.isprintable() else " " for letter in ascii_text)
+    return " ".join(printable.translate(str.maketrans("()%", "[]/")).split())
+
+
+def comment_lines(text: str) -> list[str]:
+    """Text as one or more comments in parentheses; none for an empty text."""
+    rest = plain_text(text)
+    lines = []
+    while rest:
+        lines.append(f"({rest[:_LONGEST]})")
+        rest = rest[_LONGEST:].lstrip()
+    return lines

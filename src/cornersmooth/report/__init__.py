@@ -1,0 +1,150 @@
+"""The report of one smoothed program: a dictionary, and its JSON and CSV forms."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from cornersmooth.errors import Finding
+from cornersmooth.model import Floats, LimitedBy, Move, SmoothProgram, Status
+from cornersmooth.report.corners import STATUS_NAMES, corner_table, worst_corners
+from cornersmooth.smoothing.neighbours import norm
+
+__all__ = ["SCHEMA", "corners_csv", "report", "report_json"]
+
+SCHEMA = "cornersmooth-report/1"
+
+_CSV_BLOCK = 4096
+
+
+def report(
+    smoothed: SmoothProgram,
+    *,
+    blocks_out: int | None = None,
+    seconds: Mapping[str, float] | None = None,
+    findings: tuple[Finding, ...] = (),
+) -> dict[str, Any]:
+    """Everything the JSON report says (design section 7); keys carry their unit.
+
+    Parameters
+    ----------
+    blocks_out : int, optional
+        NC blocks written.
+    seconds : mapping, optional
+        Time of each stage.
+    findings : tuple of Finding
+        Those of the writer, besides those of the program.
+    """
+    from cornersmooth import __version__
+
+    program, corners = smoothed.program, smoothed.corners
+    done = corners.smoothed
+    chains = program.chains
+    summary: dict[str, Any] = {
+        "corners": len(corners),
+        "smoothed": int(done.sum()),
+        "limited_by_tolerance": int((corners.limited_by == LimitedBy.TOLERANCE).sum()),
+        "limited_by_segment": int((corners.limited_by == LimitedBy.SEGMENT).sum()),
+        "limited_by_orientation": int((corners.limited_by == LimitedBy.ORIENTATION).sum()),
+        "not_smoothed": {
+            STATUS_NAMES[status]: count
+            for status in Status
+            if status != Status.SMOOTHED and (count := int((corners.status == status).sum()))
+        },
+        "max_tip_error_mm": _largest(corners.tip_error),
+        "max_axis_error_mm": _largest(corners.axis_error),
+        "max_orientation_error_deg": float(np.degrees(_largest(corners.orientation_error))),
+        "length_mm": _feed_length(smoothed),
+        "blocks_in": int(np.count_nonzero(program.kind != Move.FROM)),
+        "blocks_out": blocks_out,
+        "seconds": dict(seconds or {}),
+    }
+    if smoothed.settings.method == "zhang2016":
+        summary["max_sync_residual_mm"] = _largest(corners.sync_residual[done])
+        summary["max_joint_jump_deg"] = float(
+            np.degrees(max(_largest(corners.jump_in[done]), _largest(corners.jump_out[done])))
+        )
+    return {
+        "schema": SCHEMA,
+        "tool": {"name": "cornersmooth", "version": __version__},
+        "input": {
+            "name": program.source.name,
+            "format": program.source.format,
+            "dialect": program.source.dialect,
+            "units": program.units,
+            "poses": len(program),
+            "feed_moves": int(np.isin(program.kind, (Move.LINEAR, Move.ARC)).sum()),
+            "statements": len(program.statements),
+            "chains": len(chains),
+        },
+        "settings": smoothed.settings.as_dict(),
+        "summary": summary,
+        "findings": [
+            {
+                "code": finding.code,
+                "severity": finding.severity,
+                "line": finding.line,
+                "text": finding.text,
+                "count": finding.count,
+            }
+            for finding in (*smoothed.findings, *findings)
+        ],
+        "worst": _records(smoothed),
+    }
+
+
+def report_json(contents: Mapping[str, Any]) -> str:
+    """Contents as JSON text; numbers that JSON has no word for (NaN, infinity) become null."""
+    return json.dumps(_plain(contents), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def corners_csv(smoothed: SmoothProgram) -> Iterator[str]:
+    """The table of corners as CSV text, a block of rows at a time."""
+    count = len(smoothed.corners)
+    for start in range(0, max(count, 1), _CSV_BLOCK):
+        table = corner_table(smoothed, np.arange(start, min(start + _CSV_BLOCK, count)))
+        if start == 0:
+            yield ",".join(table) + "\n"
+        columns = [column.tolist() for column in table.values()]
+        form = ",".join("%.10g" if isinstance(c, np.ndarray) and c.dtype.kind == "f" else "%s" for c in table.values())
+        yield "".join(form % row + "\n" for row in zip(*columns, strict=True))
+
+
+def _records(smoothed: SmoothProgram) -> list[dict[str, Any]]:
+    table = {name: column.tolist() for name, column in corner_table(smoothed, worst_corners(smoothed)).items()}
+    return [dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)]
+
+
+def _largest(values: Floats) -> float:
+    return float(np.nanmax(values, initial=0.0))
+
+
+def _feed_length(smoothed: SmoothProgram) -> float:
+    """Length of the linear and circular feed moves of the tip in the CL data, mm."""
+    program = smoothed.program
+    if len(program) < 2:
+        return 0.0
+    step = norm(np.diff(program.tip, axis=0))
+    kind, from_kind = program.kind[1:], program.kind[:-1]
+    straight = float(step[(kind == Move.LINEAR) & (from_kind != Move.FROM)].sum())
+    arcs = program.arcs
+    if not len(arcs):
+        return straight
+    start, end = program.tip[arcs.pose - 1], program.tip[arcs.pose]
+    spoke = start - arcs.centre
+    rise = np.einsum("ij,ij->i", end - start, arcs.normal)
+    spoke = spoke - np.einsum("ij,ij->i", spoke, arcs.normal)[:, None] * arcs.normal
+    return straight + float(np.hypot(norm(spoke) * arcs.sweep, rise).sum())
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return value

@@ -1,0 +1,106 @@
+"""The report's table of corners: design section 7, one row a corner."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
+from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.smoothing.synchronise import angle_between
+
+STATUS_NAMES = {
+    Status.SMOOTHED: "smoothed",
+    Status.STRAIGHT: "straight",
+    Status.REVERSAL: "reversal",
+    Status.AXIS_STEP: "axis_step",
+    Status.FEED_CHANGE: "feed_change",
+    Status.KEPT: "kept",
+    Status.DUPLICATE: "duplicate",
+    Status.TOO_SHORT: "too_short",
+}
+LIMIT_NAMES = {
+    LimitedBy.NOTHING: "",
+    LimitedBy.TOLERANCE: "tolerance",
+    LimitedBy.SEGMENT: "segment",
+    LimitedBy.ORIENTATION: "orientation",
+}
+
+Column = Floats | Ints | NDArray[np.str_]
+
+#: parameters at which the curvature of a transition is looked at; it peaks at or near the middle
+_CURVATURE_AT = np.array([0.2, 0.3, 0.38, 0.44, 0.48, 0.5, 0.52, 0.56, 0.62, 0.7, 0.8])
+
+
+def corner_table(smoothed: SmoothProgram, rows: Ints) -> dict[str, Column]:
+    """Columns of the table for some corners.
+
+    Parameters
+    ----------
+    rows : (g,) int64
+        Rows of `smoothed.corners`.
+
+    Returns
+    -------
+    dict
+        Column name, with its unit, to an array of g values; the columns of design section 7, and for the paper's
+        method `sync_residual_mm`, `joint_jump_in_deg` and `joint_jump_out_deg`.
+    """
+    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    pose, before, after = corners.pose[rows], corners.before[rows], np.maximum(corners.after[rows], 0)
+    tip_in, tip_out = program.tip[pose] - program.tip[before], program.tip[after] - program.tip[pose]
+    tip_out[corners.after[rows] < 0] = 0.0
+    turn_in = settings.axis_length * (program.axis[pose] - program.axis[before])
+    turn_out = settings.axis_length * (program.axis[after] - program.axis[pose])
+    turn_out[corners.after[rows] < 0] = 0.0
+    axis_in, axis_out = tip_in + turn_in, tip_out + turn_out
+    columns: dict[str, Column] = {
+        "corner": pose.astype(np.int64),
+        "line": program.line[pose],
+        "x": program.tip[pose, 0],
+        "y": program.tip[pose, 1],
+        "z": program.tip[pose, 2],
+        "tip_angle_deg": np.degrees(angle_between(tip_in, tip_out)),
+        "axis_angle_deg": np.degrees(angle_between(axis_in, axis_out)),
+        "tip_length_in_mm": norm(tip_in) * corners.trim_in[rows],
+        "tip_length_out_mm": norm(tip_out) * corners.trim_out[rows],
+        "axis_length_in_mm": norm(axis_in) * corners.axis_trim_in[rows],
+        "axis_length_out_mm": norm(axis_out) * corners.axis_trim_out[rows],
+        "tip_error_mm": corners.tip_error[rows],
+        "axis_error_mm": corners.axis_error[rows],
+        "orientation_error_deg": np.degrees(corners.orientation_error[rows]),
+        "curvature_max_per_mm": _largest_curvature(smoothed, rows),
+        "limited_by": _names(LIMIT_NAMES, corners.limited_by[rows]),
+        "status": _names(STATUS_NAMES, corners.status[rows]),
+    }
+    if settings.method == "zhang2016":
+        columns["sync_residual_mm"] = corners.sync_residual[rows]
+        columns["joint_jump_in_deg"] = np.degrees(corners.jump_in[rows])
+        columns["joint_jump_out_deg"] = np.degrees(corners.jump_out[rows])
+    return columns
+
+
+def _names(names: dict[Status, str] | dict[LimitedBy, str], codes: NDArray[np.uint8]) -> NDArray[np.str_]:
+    return np.array([names[code] for code in sorted(names)])[codes]  # type: ignore[index]
+
+
+def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:
+    """Largest curvature of the tip curve, 1/mm; 0 where it has no length or there is no transition."""
+    curvature = np.zeros(len(rows))
+    for block in np.array_split(np.arange(len(rows)), max(1, len(rows) // 8192)):
+        chosen = rows[block]
+        curve, _ = nurbs.control_points(smoothed.program, smoothed.corners, chosen, smoothed.settings.axis_length)
+        _, first, second = nurbs.derivatives(curve, smoothed.corners.weights[chosen], _CURVATURE_AT)
+        speed = norm(first)
+        swing = norm(np.cross(first, second))
+        bent = np.divide(swing, speed**3, out=np.zeros_like(speed), where=speed > 1e-12)
+        curvature[block] = bent.max(axis=1)
+    return curvature
+
+
+def worst_corners(smoothed: SmoothProgram, count: int = 20) -> Ints:
+    """Rows of the smoothed corners nearest to the tolerance, the worst first; ties in path order."""
+    rows = np.flatnonzero(smoothed.corners.smoothed)
+    error = np.maximum(smoothed.corners.tip_error[rows], smoothed.corners.axis_error[rows])
+    return rows[np.argsort(-error, kind="stable")[:count]]
