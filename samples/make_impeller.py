@@ -72,7 +72,8 @@ class Step:
 
 def unit(vectors: Floats) -> Floats:
     """Vectors of length 1."""
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    scaled: Floats = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return scaled
 
 
 def flank(t: Floats, depth: float, side: int) -> tuple[Floats, Floats]:
