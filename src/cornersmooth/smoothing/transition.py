@@ -186,14 +186,19 @@ def _proportional(legs: Legs, weights: Floats, ratio: Floats, settings: Settings
 
     # The construction runs on chords of the sphere, the promise is about b = tip + H·axis at constant H. The bound
     # |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are evaluated and shortened until they keep it.
+    bends = _Bends(legs, per_in, per_out, bend_tip, bend_turn, weights, ratio, factor, axis_length)
     shortest_lever = axis_length * half_cosine - length * per_length_turn  # below |B−A| of both motions
     bound = length * (per_length_tip + _divide(axis_length * per_length_turn, np.maximum(shortest_lever, 0.0)))
-    rows = np.flatnonzero((status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance))
-    axis_error = np.zeros(len(length))
-    if len(rows):
-        shortened = _keep_axis_point(legs, rows, per_in, per_out, bend_tip, bend_turn, weights, ratio, length, settings)
-        cut = shortened < length[rows]
-        limited_by[rows[cut]] = LimitedBy.TOLERANCE
+    doubtful = (status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance)
+    # with all weights 1 the deviation at s = 2u is at most s³·(E + G·(1−s)), E that at u = ½ and G the lever's turn
+    # over the half times H|O′−O|; so while G < 3E, here with a margin of two, the largest is E itself
+    turn = np.maximum(norm(legs.turn_in) * per_in[:, 0], norm(legs.turn_out) * per_out[:, 0]) * length / axis_length
+    tilt = 2.0 * turn * length * per_length_turn
+    peaks = (tilt <= 1.5 * bends.middle(length)) & (turn < 0.5) & (weights == 1.0).all(axis=1)
+    probed = np.flatnonzero(doubtful & ~peaks)
+    for rows, measure in ((np.flatnonzero(doubtful & peaks), bends.middle), (probed, bends.probe)):
+        shortened = _keep(length, rows, measure, settings.axis_point_tolerance)
+        limited_by[rows[shortened < length[rows]]] = LimitedBy.TOLERANCE
         length[rows] = shortened
     shortest = 4.0 * settings.tip_resolution
     status[(status == Status.SMOOTHED) & (length <= shortest)] = Status.TOO_SHORT
@@ -201,16 +206,9 @@ def _proportional(legs: Legs, weights: Floats, ratio: Floats, settings: Settings
     smoothed = status == Status.SMOOTHED
     length = np.where(smoothed, length, 0.0)
     limited_by[~smoothed] = LimitedBy.NOTHING
-    lever = axis_length * legs.axis
-    offset = (factor * length)[:, None]
-    turned = lever + offset * bend_turn  # Q − P at u = ½
-    axis_error = norm(offset * bend_tip + axis_length * turned / norm(turned)[:, None] - lever)
-    if len(rows):
-        probed = _axis_point_deviation(
-            legs, rows, per_in, per_out, bend_tip, bend_turn, weights, ratio, length, settings
-        )
-        axis_error[rows] = np.maximum(axis_error[rows], probed)
-    sine = norm(np.cross(turned, legs.axis)) / axis_length
+    axis_error = bends.middle(length)
+    if len(probed):
+        axis_error[probed] = np.maximum(axis_error[probed], bends.probe(length[probed], probed))
     trim_in, trim_out = length / length_in, length / length_out
     nothing = np.full(len(length), np.nan)
     return _Block(
@@ -222,72 +220,81 @@ def _proportional(legs: Legs, weights: Floats, ratio: Floats, settings: Settings
         axis_trim_out=trim_out,
         tip_error=per_length_tip * length,
         axis_error=axis_error,
-        orientation_error=np.arctan2(sine, _dot(turned, legs.axis) / axis_length),
+        orientation_error=bends.middle_turn(length),
         sync_residual=nothing,
         jump_in=nothing,
         jump_out=nothing,
     )
 
 
-def _keep_axis_point(
-    legs: Legs,
-    rows: Ints,
-    per_in: Floats,
-    per_out: Floats,
-    bend_tip: Floats,
-    bend_turn: Floats,
-    weights: Floats,
-    ratio: Floats,
-    length: Floats,
-    settings: Settings,
-) -> Floats:
-    """Lengths of the given rows, shortened until ``|b′−b|`` keeps the tolerance at constant H."""
+@dataclass(frozen=True)
+class _Bends:
+    """Deviation of proportional transitions from the original motion at constant H, as functions of their length.
+
+    Methods take the lengths (mm) of all corners, or of some with their rows.
+    """
+
+    legs: Legs
+    per_in: Floats  # 1/m(D⁻), (g, 1)
+    per_out: Floats
+    bend_tip: Floats  # (U⁺ − U⁻)_A
+    bend_turn: Floats  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
+    weights: Floats
+    ratio: Floats
+    factor: Floats
+    axis_length: float
+
+    def middle(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """|b′−b| at u = ½, where b is the axis point of the corner itself, mm."""
+        offset = (self.factor[rows] * length)[:, None]
+        lever = self.axis_length * self.legs.axis[rows]
+        turned = lever + offset * self.bend_turn[rows]  # Q − P
+        turned *= (self.axis_length / norm(turned))[:, None]
+        return norm(offset * self.bend_tip[rows] + turned - lever)
+
+    def middle_turn(self, length: Floats) -> Floats:
+        """Angle between the axis at u = ½ and that of the corner, rad."""
+        axis = self.legs.axis
+        shift = (self.factor * length / self.axis_length)[:, None] * self.bend_turn
+        along = _dot(shift, axis)
+        across = np.sqrt(np.maximum(_square(shift) - along * along, 0.0))
+        return np.arctan2(across, 1.0 + along)
+
+    def probe(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
+        """Largest |b′−b| at common parameters over both halves, mm."""
+        reach, inner = length[:, None], self.ratio[rows][:, None]
+        sway = nurbs.rational_basis(_PROBES, self.weights[rows])  # (g, probes, 5)
+        beta = inner * sway[..., 3]
+        sigma = sway[..., 0] + inner * (sway[..., 1] - sway[..., 3])
+        lever = self.axis_length * self.legs.axis[rows][:, None, :]
+        shift = (beta * reach)[..., None]
+        tip_shift = shift * self.bend_tip[rows][:, None, :]
+        turn_shift = shift * self.bend_turn[rows][:, None, :]
+        largest = np.zeros(len(length))
+        sides = (
+            (-1.0, self.legs.turn_in[rows] * self.per_in[rows]),
+            (1.0, self.legs.turn_out[rows] * self.per_out[rows]),
+        )
+        for side, rate in sides:
+            original = lever + (side * sigma * reach)[..., None] * rate[:, None, :]  # B − A of the ruled motion
+            rounded = original + turn_shift
+            away = rounded / norm(rounded)[..., None] - original / norm(original)[..., None]
+            largest = np.maximum(largest, norm(tip_shift + self.axis_length * away).max(axis=1))
+        return largest
+
+
+def _keep(length: Floats, rows: Ints, measure: Callable[[Floats, Ints], Floats], tolerance: float) -> Floats:
+    """Lengths of the given rows, shortened until the measured deviation keeps the tolerance."""
     # a thousandth is left to what lies between two probes of a flat maximum
-    allowed = 0.999 * settings.axis_point_tolerance
+    allowed = 0.999 * tolerance
     length = length.copy()
     pending = rows
-    for _ in range(60):
-        deviation = _axis_point_deviation(
-            legs, pending, per_in, per_out, bend_tip, bend_turn, weights, ratio, length, settings
-        )
+    while len(pending):
+        deviation = measure(length[pending], pending)
         over = deviation > allowed
-        if not over.any():
-            break
         pending = pending[over]
         length[pending] *= 0.9999 * allowed / deviation[over]
     return length[rows]
-
-
-def _axis_point_deviation(
-    legs: Legs,
-    rows: Ints,
-    per_in: Floats,
-    per_out: Floats,
-    bend_tip: Floats,
-    bend_turn: Floats,
-    weights: Floats,
-    ratio: Floats,
-    length: Floats,
-    settings: Settings,
-) -> Floats:
-    """Largest ``|b′−b|`` at common parameters, b = tip + H·axis, over both halves of some transitions, mm."""
-    axis_length = settings.axis_length
-    reach = length[rows][:, None]
-    sway = nurbs.rational_basis(_PROBES, weights[rows])  # (g, probes, 5)
-    inner = ratio[rows][:, None]
-    beta = inner * sway[..., 3]
-    sigma = sway[..., 0] + inner * (sway[..., 1] - sway[..., 3])
-    lever = axis_length * legs.axis[rows][:, None, :]
-    shift = (beta * reach)[..., None]
-    tip_shift = shift * bend_tip[rows][:, None, :]
-    turn_shift = shift * bend_turn[rows][:, None, :]
-    largest = np.zeros(len(rows))
-    for side, rate in ((-1.0, legs.turn_in[rows] * per_in[rows]), (1.0, legs.turn_out[rows] * per_out[rows])):
-        original = lever + (side * sigma * reach)[..., None] * rate[:, None, :]  # B − A of the ruled motion
-        rounded = original + turn_shift
-        away = tip_shift + axis_length * (rounded / norm(rounded)[..., None] - original / norm(original)[..., None])
-        largest = np.maximum(largest, norm(away).max(axis=1))
-    return largest
 
 
 def _zhang2016(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> _Block:
