@@ -1,0 +1,167 @@
+"""What every pose contributes to the written motion: straight remainders, transitions, and how many lines each takes.
+
+Design 3.5. How many lines a transition takes follows from its geometry. With all weights 1 the first half of the curve
+is, in s = 2u, the straight leg plus s³ times the deviation, so the chord error of a step Δs is proportional to s·Δs²;
+nodes s = (j/n)^(2/3) make it the same in every step and n = sqrt(bend/(18·chord)), 15 % more for the first step, where
+s³ is not yet parabolic.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.neighbours import find_neighbours, norm
+
+#: bend (mm) that one line per half may bridge, over the chord tolerance
+_BEND_PER_CHORD = 15.6
+
+#: most lines in one half of a transition and in one straight remainder
+_MOST_LINES = 400
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What every pose contributes, arrays over the n poses of the program."""
+
+    row: Ints  # row of `Corners`, -1 where the pose is no smoothed corner
+    skip: Bools  # contributes nothing: repeats another pose, or is stated only
+    start: Ints  # pose the straight line into pose i starts from, -1 for none
+    following: Ints
+    entry: Floats  # fraction of the incoming segment where the straight remainder starts
+    exit: Floats  # and where it ends
+    axis_entry: Floats
+    axis_exit: Floats
+    line: Bools  # the straight remainder has a length
+    pieces: Ints  # lines it is written in
+
+
+def lay_out(smoothed: SmoothProgram, *, dense: bool) -> Layout:
+    """Lay out the smoothed motion; straight remainders are divided into several lines only for `dense` output."""
+    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    n = len(program)
+    around = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
+    row = np.full(n, -1, np.int64)
+    round_rows = np.flatnonzero(corners.smoothed)
+    row[corners.pose[round_rows]] = round_rows
+    skip = program.kind == Move.FROM
+    skip[corners.pose[corners.status == Status.DUPLICATE]] = True
+
+    start = around.previous
+    known = np.maximum(start, 0)
+    trims = {}
+    for name, source in (
+        ("out", "trim_out"),
+        ("axis_out", "axis_trim_out"),
+        ("in", "trim_in"),
+        ("axis_in", "axis_trim_in"),
+    ):
+        per_pose = np.zeros(n)
+        per_pose[corners.pose] = getattr(corners, source)
+        trims[name] = per_pose
+    from_corner = start >= 0
+    entry = np.where(from_corner, trims["out"][known], 0.0)
+    axis_entry = np.where(from_corner, trims["axis_out"][known], 0.0)
+    exit_, axis_exit = 1.0 - trims["in"], 1.0 - trims["axis_in"]
+
+    # a remainder below the shortest line, and short beside the transition it leads to, is no line of its own
+    step = norm(program.tip - program.tip[known])
+    swing = norm(program.tip - program.tip[known] + settings.axis_length * (program.axis - program.axis[known]))
+    tip_rest, axis_rest = step * (exit_ - entry), swing * (axis_exit - axis_entry)
+    tip_leg, axis_leg = step * trims["in"], swing * trims["axis_in"]
+    joins = (row >= 0) & (row[known] >= 0) & from_corner
+    for rest, leg in ((tip_rest, tip_leg), (axis_rest, axis_leg)):
+        joins &= (rest <= 1e-9) | ((rest < settings.shortest_line) & (rest < 0.1 * leg))
+    pieces = np.ones(n, np.int64)
+    plan = Layout(row, skip, start, around.following, entry, exit_, axis_entry, axis_exit, ~joins, pieces)
+    if dense:
+        _divide_remainders(smoothed, plan)
+    return plan
+
+
+def _turn_limit(settings: Settings, half_turn: Floats) -> Floats:
+    """Largest change of axis in one line inside a segment whose axis turns by twice `half_turn`, rad.
+
+    Two things set it, each given half of `Settings.interpolation_tolerance` at distance H: controls turn vectors
+    linearly or on the great circle, which differ by up to θ³/54; and the ruled motion turns fastest in the middle of
+    its segment, so that equal shares of a line's parameter and of the original's differ by up to θ²·tan(half_turn)/4.
+    """
+    share = settings.interpolation_tolerance / 2.0 / settings.axis_length
+    limit = np.full_like(half_turn, math.cbrt(54.0 * share))
+    tangent = np.tan(np.minimum(half_turn, math.radians(60)))
+    steep = tangent > 0.0
+    limit[steep] = np.minimum(limit[steep], np.sqrt(4.0 * share / tangent[steep]))
+    if settings.axis_step is not None:
+        limit = np.minimum(limit, math.radians(settings.axis_step))
+    return limit
+
+
+def _divide_remainders(smoothed: SmoothProgram, plan: Layout) -> None:
+    """Set `plan.pieces`: lines per straight remainder, from the change of axis along it."""
+    program, settings = smoothed.program, smoothed.settings
+    linear = np.flatnonzero((plan.start >= 0) & ~plan.skip & plan.line)
+    chord = norm(program.axis[linear] - program.axis[plan.start[linear]])
+    share = settings.interpolation_tolerance / settings.axis_length
+    turning = chord**3 / 54.0 + chord**2 / 4.0 * np.tan(np.minimum(chord, 2.0) / 2.0) > share
+    if settings.axis_step is not None:
+        turning |= 2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)) > math.radians(settings.axis_step)
+    pose, chord = linear[turning], chord[turning]
+    half = np.arcsin(np.minimum(chord / 2.0, 1.0))
+    ruled = half <= math.radians(settings.max_axis_step) / 2.0 + 1e-12
+    pose, half = pose[ruled], half[ruled]
+    if not len(pose):
+        return
+    # angle of the ruled axis from the middle of its segment: tan φ is linear in the fraction
+    low = np.arctan((2.0 * plan.axis_entry[pose] - 1.0) * np.tan(half))
+    high = np.arctan((2.0 * plan.axis_exit[pose] - 1.0) * np.tan(half))
+    turn = high - low
+    as_one = turn**2 / 4.0 * np.abs(np.tan((low + high) / 2.0)) + turn**3 / 54.0
+    pieces = np.ceil(turn / _turn_limit(settings, np.maximum(np.abs(low), np.abs(high))) - 1e-9)
+    if settings.axis_step is None:
+        pieces[as_one <= share] = 1
+    plan.pieces[pose] = np.clip(pieces, 1, _MOST_LINES).astype(np.int64)
+
+
+def lines_per_half(smoothed: SmoothProgram) -> Ints:
+    """(k,) lines per half of every transition: n for nodes (j/n)^(2/3), −n for nodes j/n; 0 where not smoothed."""
+    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    lines = np.zeros(len(corners), np.int64)
+    rows = np.flatnonzero(corners.smoothed)
+    for block in np.array_split(rows, max(1, len(rows) // 65536)):
+        pose, before, after = corners.pose[block], corners.before[block], corners.after[block]
+        tip_in, tip_out = program.tip[pose] - program.tip[before], program.tip[after] - program.tip[pose]
+        turn_in = settings.axis_length * (program.axis[pose] - program.axis[before])
+        turn_out = settings.axis_length * (program.axis[after] - program.axis[pose])
+        bends = (
+            tip_out * corners.trim_out[block][:, None] - tip_in * corners.trim_in[block][:, None],
+            (tip_out + turn_out) * corners.axis_trim_out[block][:, None]
+            - (tip_in + turn_in) * corners.axis_trim_in[block][:, None],
+        )
+        # the deviation of other shapes, in terms of the shape with all weights 1 and ratio 2/3
+        shape = 6.0 * nurbs.deviation_factor(corners.weights[block], corners.ratio[block])
+        bend = np.sqrt(np.maximum(_square(bends[0]), _square(bends[1]))) * np.maximum(shape, 1.0)
+        by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
+        number = np.ceil(by_chord - 1e-9)
+
+        sine = np.sqrt(np.maximum(_square(turn_in), _square(turn_out))) / (2.0 * settings.axis_length)
+        half_turn = np.arcsin(np.minimum(sine, 1.0))
+        reach = np.maximum(
+            np.maximum(corners.axis_trim_in[block], corners.trim_in[block]),
+            np.maximum(corners.axis_trim_out[block], corners.trim_out[block]),
+        )
+        by_turn = 2.0 * half_turn * reach / _turn_limit(settings, half_turn)
+        graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
+        even = np.maximum(np.ceil(1.5 * by_chord), np.ceil(by_turn - 1e-9))
+        chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))
+        lines[block] = np.clip(chosen, -_MOST_LINES, _MOST_LINES).astype(np.int64)
+    return lines
+
+
+def _square(vectors: Floats) -> Floats:
+    square: Floats = np.einsum("...i,...i->...", vectors, vectors)
+    return square
