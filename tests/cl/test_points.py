@@ -26,7 +26,7 @@ def rows(*parts: np.ndarray, separator: str = ",", decimals: int = 4) -> str:
 
 def read(text: str | bytes, **options: object) -> Program:
     data = text if isinstance(text, bytes) else text.encode()
-    return read_points(data, name="path.csv", **options)
+    return read_points(data, **{"name": "path.csv"} | options)
 
 
 def message(text: str | bytes, **options: object) -> str:
@@ -57,6 +57,8 @@ def test_plain_file_is_linear_moves_with_line_numbers():
     assert program.units == "mm"
     assert program.findings == ()
     assert program.chains.tolist() == [[0, 3]]
+    assert read(rows(TIPS), name="folder/path.csv").source.name == "path.csv"
+    assert message("1,2\n", name="folder/path.csv").startswith("folder/path.csv:1: error: 2 columns")
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", " ", "  ", " , ", ", ", "\t,", " ;\t"])

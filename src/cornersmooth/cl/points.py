@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import islice
+from pathlib import PurePath
 from typing import Final
 
 import numpy as np
@@ -74,7 +75,7 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
         UTF-8, UTF-16 or Windows-1252; cells between commas, semicolons, tabs or blanks; decimal commas where
         semicolons or tabs separate; comments after ``#``, ``%`` or ``//``.
     name : str
-        File name for messages and report.
+        File name for messages; the report gets it without its folder.
     units : {"mm", "inch"} or None
         None for what the header says, or mm. Feeds are per minute in the same unit.
     lenient : bool
@@ -111,7 +112,7 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
         feed=feed * scale,
         line=line,
         units=units,
-        source=Source(name, format="points", dialect="csv"),
+        source=Source(PurePath(name).name, format="points", dialect="csv"),
         findings=tuple(findings),
     )
 
