@@ -1,0 +1,104 @@
+"""Readers of cutter location data: APT / CL files of all dialects, and tables of points."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import replace
+from typing import Final
+
+from cornersmooth.cl.arcs import RULES, ArcRule
+from cornersmooth.cl.dialects import NAMES as DIALECTS
+from cornersmooth.cl.messages import unknown
+from cornersmooth.cl.source import clean, load
+from cornersmooth.model import MM_PER_UNIT, Program, Units
+
+__all__ = ["DIALECTS", "FORMATS", "read"]
+
+FORMATS: Final = ("apt", "points")
+
+#: how much of a file decides on its format
+HEAD: Final = 1 << 16
+
+#: a statement that only a CL file has
+_CL_STATEMENT: Final = re.compile(
+    rb"^[ \t]*((GOTO|FROM|CIRCLE|FEDRAT|LOADTL|SPINDL|UNITS?|MULTAX|TLDATA|PAINT|MSYS|TOOL PATH|CUTTER|MACHIN)[ \t]*/"
+    rb"|PARTNO|PPRINT|REMARK|RAPID|\$\$)",
+    re.MULTILINE | re.IGNORECASE,
+)
+
+
+def read(
+    source: str | os.PathLike[str] | bytes,
+    *,
+    name: str | None = None,
+    format: str | None = None,
+    dialect: str | None = None,
+    units: Units | None = None,
+    arc_rule: ArcRule | None = None,
+    lenient: bool = False,
+    axis_length: float | None = None,
+) -> Program:
+    """Read a tool path.
+
+    Parameters
+    ----------
+    source : path or bytes
+        A file, plain or gzip, or its contents.
+    name : str or None
+        Name for messages; None for the path as given.
+    format : {"apt", "points"} or None
+        None recognises it by the contents.
+    dialect : str or None
+        One of `DIALECTS`; None recognises it.
+    units : {"mm", "inch"} or None
+        Overrides what the file says.
+    arc_rule : {"left", "right", "tangent"} or None
+        Sense of rotation of CIRCLE about its normal; None for what the dialect means.
+    lenient : bool
+        Go on where that is safe, and say so in the findings.
+    axis_length : float or None, mm
+        Accepted for symmetry with `Settings`; readers of vectors need none.
+
+    Returns
+    -------
+    Program
+        Lengths in mm; `Program.findings` says what was assumed.
+
+    Raises
+    ------
+    InputError
+        ``FILE:LINE: error: what; what to do``.
+    SettingsError
+        CS230 for a format, dialect, unit or rule that does not exist.
+    """
+    del axis_length
+    for what, value, choices in (
+        ("format", format, FORMATS),
+        ("dialect", dialect, DIALECTS),
+        ("units", units, tuple(MM_PER_UNIT)),
+        ("arc rule", arc_rule, RULES),
+    ):
+        if value is not None and value not in choices:
+            raise unknown(what, value, choices)
+    data, name = load(source, name)
+    if format is None:
+        format = _recognise(data)
+    if format == "points":
+        from cornersmooth.cl.points import read_points
+
+        program = read_points(data, name=name, units=units, lenient=lenient)
+    else:
+        from cornersmooth.cl.apt import read_apt
+
+        text = clean(data, name)
+        program = read_apt(text, name=name, dialect=dialect, units=units, arc_rule=arc_rule, lenient=lenient)
+    return replace(program, source=replace(program.source, name=os.path.basename(name)))
+
+
+def _recognise(data: bytes) -> str:
+    if _CL_STATEMENT.search(data[:HEAD]):
+        return "apt"
+    from cornersmooth.cl.points import looks_like_points
+
+    return "points" if looks_like_points(data[:HEAD]) else "apt"

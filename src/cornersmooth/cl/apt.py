@@ -1,0 +1,172 @@
+"""Reader of APT / CL files: bytes to `Program`."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.cl import arcs as arc_geometry
+from cornersmooth.cl.arcs import ArcRule, ArcTable
+from cornersmooth.cl.builder import Builder
+from cornersmooth.cl.bulk import blocks
+from cornersmooth.cl.dialects import by_name, recognise
+from cornersmooth.cl.grammar import Decode, Record, read_records
+from cornersmooth.cl.interpret import Interpreter
+from cornersmooth.cl.messages import error, finding
+from cornersmooth.errors import Finding
+from cornersmooth.model import MM_PER_UNIT, Arcs, Keep, Move, Program, Source, Units
+
+#: what stands between plain GOTO lines is often the same (RAPID; PAINT/COLOR,31): gaps of up to so many lines are
+#: taken apart once, and no more than so many different ones remembered
+LONGEST_GAP: Final = 3
+REMEMBERED: Final = 4096
+
+
+def read_apt(
+    data: bytes,
+    *,
+    name: str,
+    dialect: str | None = None,
+    units: Units | None = None,
+    arc_rule: ArcRule | None = None,
+    lenient: bool = False,
+    fast: bool = True,
+) -> Program:
+    """Read an APT / CL text.
+
+    Parameters
+    ----------
+    data : bytes
+        Text with LF line ends (`cornersmooth.cl.source.load` makes it so).
+    name : str
+        File name for messages and report.
+    dialect : str or None
+        Name of a `Dialect`; None recognises it.
+    units : {"mm", "inch"} or None
+        None for what the file says.
+    arc_rule : {"left", "right", "tangent"} or None
+        Sense of rotation of CIRCLE about its normal; None for the dialect's.
+    lenient : bool
+        Go on where that is safe, with findings.
+    fast : bool
+        Convert plain GOTO lines in bulk; the result is the same, bit for bit.
+
+    Returns
+    -------
+    Program
+
+    Raises
+    ------
+    InputError
+        CS100-CS128, with the line.
+    """
+    known = by_name(dialect) if dialect else recognise(data)
+    decode = _decoder(data)
+    builder = Builder(name, short_axis_up=known.short_axis == "up", lenient=lenient)
+    arcs = ArcTable()
+    machine = Interpreter(name, known, builder, arcs, arc_rule, lenient)
+    _run(data, machine, decode, fast)
+    machine.end()
+    if not builder.n:
+        raise error("CS101", name, None)
+    return _program(machine, units)
+
+
+def _run(data: bytes, machine: Interpreter, decode: Decode, fast: bool) -> None:
+    remembered: dict[tuple[bytes, ...], list[Record]] = {}
+    done = 0
+
+    def obey(lines: list[bytes], first: int, follows: str) -> None:
+        key = tuple(lines) if len(lines) <= LONGEST_GAP else ()
+        for record in remembered.get(key, ()) if key else ():
+            machine.obey(record.moved(first - 1))
+        if key in remembered:
+            return
+        records = []
+        for record in read_records(lines, first, decode, machine.file, follows):
+            machine.obey(record)
+            if key:
+                records.append(record.moved(1 - first))
+        if key and len(remembered) < REMEMBERED:
+            remembered[key] = records
+
+    for block in blocks(data, fast=fast):
+        machine.builder.enter(block)
+        done += block.size
+        follows = "GOTO" if done < len(data) else "the end of the file"
+        begin = 0
+        rows = block.rows.tolist()
+        for run, (start, stop) in enumerate(block.runs.tolist()):
+            if begin < start:
+                obey(block.lines[begin:start], block.first + begin, "GOTO")
+            if machine.stopped:
+                return
+            machine.plain(rows[run + 1] - rows[run], block.first + start)
+            begin = stop
+        if begin < len(block.lines):
+            obey(block.lines[begin:], block.first + begin, follows)
+        if machine.stopped:
+            return
+
+
+def _decoder(data: bytes) -> Decode:
+    """UTF-8 if all of it is; else Windows-1252, as CATIA writes its headers."""
+    if not data.isascii():
+        try:
+            data.decode("utf-8")
+        except UnicodeDecodeError:
+            return lambda line: line.decode("cp1252", "replace")
+    return lambda line: line.decode("utf-8")
+
+
+def _program(machine: Interpreter, asked: Units | None) -> Program:
+    builder = machine.builder
+    units, said = _units(machine, asked)
+    scale = MM_PER_UNIT[units]
+    tip = builder.tips()
+    axis, axis_findings = builder.axes()
+    kind = builder.kinds()
+    line = builder.lines()
+    resolved = arc_geometry.resolve(machine.arcs, tip, kind, machine.file, machine.arc_rule)
+    kind[resolved.lines] = Move.LINEAR
+    keep = builder.keep.spread(builder.n).astype(np.uint8)
+    keep[resolved.kept] = Keep.CONTRADICTION
+    keep[resolved.kept - 1] = Keep.CONTRADICTION
+    for index in machine.unitless_feeds:
+        builder.feed.value[index] *= scale
+    arcs = Arcs(resolved.arcs.pose, resolved.arcs.centre * scale, resolved.arcs.normal, resolved.arcs.sweep)
+    return Program(
+        tip=tip * scale,
+        axis=axis,
+        kind=kind,
+        feed=builder.feed.spread(builder.n),
+        line=line,
+        feed_mode=builder.feed_mode.spread(builder.n).astype(np.uint8),
+        keep=keep,
+        arcs=arcs,
+        statements=tuple(machine.statements),
+        units=units,
+        source=Source(machine.file, "apt", machine.dialect.name),
+        findings=(*said, *machine.findings(), *axis_findings, *resolved.findings),
+    )
+
+
+def _units(machine: Interpreter, asked: Units | None) -> tuple[Units, list[Finding]]:
+    """Units of the file: as asked for, as stated, as the feeds suggest, or as the dialect has them."""
+    stated = machine.stated_units
+    for line, now, pose in stated:
+        if now != stated[0][1] and pose and not asked:
+            raise error("CS116", machine.file, line, word="UNITS", new=now, old=stated[0][1])
+    if asked:
+        other = [line for line, now, _ in stated if now != asked]
+        if other:
+            text = {"stated": "inch" if asked == "mm" else "mm", "units": asked}
+            return asked, [finding("CS133", other[0], len(other), **text)]
+        return asked, []
+    if stated:
+        return stated[-1][1], []
+    if machine.feed_units:
+        return machine.feed_units[0], [finding("CS132", 0, units=machine.feed_units[0], why="from the feeds")]
+    units = machine.dialect.units
+    return units, [finding("CS132", 0, units=units, why=f"as usual for {machine.dialect.name} files")]

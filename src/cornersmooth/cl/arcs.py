@@ -1,0 +1,271 @@
+"""Circular moves: what each dialect writes, and the one geometry it is turned into.
+
+The sense of rotation about the normal depends on the dialect: NX and Makino FF (11 numbers and more) turn left-handed,
+Creo (7), SolidWorks CAM (6) and HSM's MOVARC right-handed. Neighbouring lines tell whether that is right: an arc that
+leaves them by a cusp but would join them smoothly the other way round is a contradiction, and reported.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.cl.grammar import Record
+from cornersmooth.cl.messages import error, finding
+from cornersmooth.errors import Finding
+from cornersmooth.model import Arcs, Bools, Floats, Ints, Move
+
+ArcRule = Literal["left", "right", "tangent"]
+RULES: Final[tuple[ArcRule, ...]] = ("left", "right", "tangent")
+
+#: start and end may miss the circle by so many printed digits, or by this part of the radius
+RADIUS_DIGITS: Final = 10
+RADIUS_SHARE: Final = 1e-3
+
+#: an arc whose ends are closer than so many printed digits, but not equal, is a line: with the wrong sense it would be
+#: a full circle (NX coremill sample, line 2579: 0.1 um on R 68.9)
+SHORTEST_DIGITS: Final = 2
+
+#: decimals of coordinates at least: integers say nothing about the resolution
+LEAST_DECIMALS: Final = 3
+
+#: a neighbour is tangent, or exactly opposite, within this angle
+TANGENT: Final = math.radians(10)
+
+#: a neighbouring line votes if it is longer than so many printed digits
+VOTING_DIGITS: Final = 100
+
+#: more turns than any thread has
+MOST_TURNS: Final = 10_000
+
+#: |normal| may miss 1 by
+NORMAL_TOLERANCE: Final = 1e-2
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """A circular move before its ends are known; lengths as written, the rotation right-handed about `normal`."""
+
+    line: int
+    word: str
+    centre: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    radius: float  #: NaN where not written
+    turns: int = 1  #: the arc is the last of them
+    sweep: float = math.nan  #: rad, NaN where not written
+    resolution: float = 1e-4  #: step of the printed coordinates
+    certain: bool = False  #: the sense of rotation is no matter of dialect
+
+
+def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | None, decimals: int) -> Arc:
+    """Read CIRCLE or MOVARC.
+
+    Parameters
+    ----------
+    record : Record
+    values : list of float
+        Its numbers, in order.
+    file : str
+        For messages.
+    rule : {"left", "right", "tangent"} or None
+        Sense of rotation that overrides the dialect's; "tangent" is settled when the neighbours are known.
+    decimals : int
+        Digits behind the point that the dialect prints at most.
+
+    Raises
+    ------
+    InputError
+        CS120, CS124, CS125, CS127
+    """
+    words = [value for value in record.args if isinstance(value, str)]
+    count = len(values)
+    turns, sweep = 1.0, math.nan
+    if record.word == "MOVARC":
+        wanted, fits = "x,y,z,i,j,k,r,ANGLE,a", count == 8 and words == ["ANGLE"]
+        sweep = math.radians(values[-1]) if fits else sweep
+    else:
+        wanted = "x,y,z,i,j,k (and r), or 11 numbers and TIMES,n"
+        fits = (count in (6, 7, 11) and not words) or (count == 12 and words == ["TIMES"])
+        turns = values[-1] if count == 12 and fits else turns
+    if not fits:
+        raise error("CS120", file, record.line, word=record.word, count=count, s="s"[: count != 1], want=wanted)
+    length = math.hypot(*values[3:6])
+    if not abs(length - 1) <= NORMAL_TOLERANCE:
+        raise error("CS124", file, record.line, word=record.word, length=length)
+    radius = values[6] if count > 6 else math.nan
+    if radius <= 0 or math.isinf(radius):
+        raise error("CS125", file, record.line, word=record.word, radius=radius)
+    if not (1 <= turns <= MOST_TURNS and turns == int(turns)):
+        raise error("CS127", file, record.line, word="CIRCLE", value=turns, limit=MOST_TURNS)
+    if not math.isnan(sweep) and not 0 < sweep <= 2 * math.pi * MOST_TURNS:
+        raise error("CS127", file, record.line, word="MOVARC", value=sweep / (2 * math.pi), limit=MOST_TURNS)
+    left = rule == "left" if rule in ("left", "right") else count >= 11
+    sign = -1 / length if left else 1 / length
+    printed = max((len(digits) for digits in re.findall(r"\.([0-9]*)", record.text)), default=0)
+    return Arc(
+        record.line,
+        record.word,
+        (values[0], values[1], values[2]),
+        (sign * values[3], sign * values[4], sign * values[5]),
+        radius,
+        int(turns),
+        sweep,
+        10.0 ** -max(printed, decimals, LEAST_DECIMALS),
+        certain=rule in ("left", "right"),
+    )
+
+
+@dataclass
+class ArcTable:
+    """The arcs of one file, in the order of their end poses."""
+
+    pose: list[int] = field(default_factory=list)
+    arc: list[Arc] = field(default_factory=list)
+
+    def add(self, pose: int, arc: Arc) -> None:
+        """Note that this pose ends this arc."""
+        self.pose.append(pose)
+        self.arc.append(arc)
+
+    def column(self, get: Callable[[Arc], object]) -> Floats:
+        """One attribute of all arcs."""
+        return np.array([get(arc) for arc in self.arc], np.float64)
+
+
+@dataclass(frozen=True)
+class ResolvedArcs:
+    """Arcs with both ends, and what became of the rest."""
+
+    arcs: Arcs
+    lines: Ints  #: poses of arcs that are lines
+    kept: Ints  #: poses whose arcs contradict their neighbours
+    findings: tuple[Finding, ...]
+
+
+def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, rule: ArcRule | None) -> ResolvedArcs:
+    """Find sweep and sense of all arcs from the poses around them.
+
+    Parameters
+    ----------
+    table : ArcTable
+    tip : (n, 3) float64
+        Tips as written, in the unit of the arcs.
+    kind : (n,) uint8
+        `Move` of every pose.
+    file : str
+        For messages.
+    rule : {"left", "right", "tangent"} or None
+
+    Raises
+    ------
+    InputError
+        CS123 where an end is not on the circle, CS126 where a stated angle is not the arc's.
+    """
+    if not table.arc:
+        none = np.zeros(0, np.int64)
+        return ResolvedArcs(Arcs(), none, none, ())
+    pose = np.array(table.pose, np.int64)
+    centre = table.column(lambda arc: arc.centre)
+    normal = table.column(lambda arc: arc.normal)
+    radius = table.column(lambda arc: arc.radius)
+    resolution = table.column(lambda arc: arc.resolution)
+    full_turns = table.column(lambda arc: arc.turns) - 1
+    stated = table.column(lambda arc: arc.sweep)
+    start, end = tip[pose - 1] - centre, tip[pose] - centre
+    start_height, end_height = _dot(start, normal), _dot(end, normal)
+    start = start - start_height[:, None] * normal
+    end = end - end_height[:, None] * normal
+
+    start_radius, end_radius = _length(start), _length(end)
+    radius = np.where(np.isnan(radius), start_radius, radius)
+    allowed = np.maximum(RADIUS_DIGITS * resolution, RADIUS_SHARE * radius)
+    for which, distance in (("start", start_radius), ("end", end_radius)):
+        off = ~(np.abs(distance - radius) <= allowed) | (distance == 0)
+        if off.any():
+            first = int(off.argmax())
+            values = {"which": which, "distance": distance[first], "radius": radius[first]}
+            raise error("CS123", file, table.arc[first].line, **values)
+
+    chord = _length(end - start)
+    rise = np.abs(end_height - start_height)
+    closed = chord < resolution / 2
+    turn = np.arctan2(_dot(np.cross(start, end), normal), _dot(start, end)) % (2 * np.pi)
+    turn = np.where(closed, 2 * np.pi, turn)
+    short = (chord < SHORTEST_DIGITS * resolution) & ~closed & (full_turns == 0)
+    short &= np.isnan(stated) | (stated < np.pi)
+    short |= closed & (rise > 0) & (rise < SHORTEST_DIGITS * resolution) & np.isnan(stated) & (full_turns == 0)
+    turn, full_turns = _as_stated(table, turn, full_turns, stated, resolution / radius, short, file)
+
+    agree, against = _votes(tip, kind, pose, start, end, normal, resolution)
+    contrary = (against > 0) & (agree == 0) & ~short & np.isnan(stated)
+    findings = []
+    if rule == "tangent":
+        turned = contrary & ~closed
+        normal = np.where(contrary[:, None], -normal, normal)
+        turn = np.where(turned, 2 * np.pi - turn, turn)
+    if contrary.any():
+        how = "as the neighbours ask" if rule == "tangent" else "as written"
+        first = int(contrary.argmax())
+        findings.append(finding("CS142", table.arc[first].line, int(contrary.sum()), how=how))
+    if short.any():
+        findings.append(finding("CS141", table.arc[int(short.argmax())].line, int(short.sum())))
+    good = ~short
+    arcs = Arcs(pose[good], centre[good], normal[good], (turn + 2 * np.pi * full_turns)[good])
+    return ResolvedArcs(arcs, pose[short], pose[contrary], tuple(findings))
+
+
+def _as_stated(
+    table: ArcTable, turn: Floats, full_turns: Floats, stated: Floats, noise: Floats, short: Bools, file: str
+) -> tuple[Floats, Floats]:
+    """Turns of arcs that say their angle: it decides between nothing and a full circle, and adds whole turns."""
+    given = ~np.isnan(stated) & ~short
+    if not given.any():
+        return turn, full_turns
+    whole = np.round((stated - turn) / (2 * np.pi))
+    miss = np.abs(stated - turn - 2 * np.pi * whole)
+    wrong = given & ~(miss <= RADIUS_DIGITS * noise + RADIUS_SHARE * np.maximum(stated, 1))
+    if wrong.any():
+        first = int(wrong.argmax())
+        arc = table.arc[first]
+        written, found = math.degrees(arc.sweep), math.degrees(turn[first])
+        why = f"its angle is {written:g} degrees, its end stands at {found:g}"
+        raise error("CS126", file, arc.line, word=arc.word, why=why)
+    return turn, np.where(given, np.maximum(whole, 0), full_turns)
+
+
+def _votes(
+    tip: Floats, kind: NDArray[np.uint8], pose: Ints, start: Floats, end: Floats, normal: Floats, resolution: Floats
+) -> tuple[Ints, Ints]:
+    """Count, for every arc, the neighbouring lines that it joins smoothly and those it would meet by a cusp."""
+    agree, against = np.zeros(len(pose), np.int64), np.zeros(len(pose), np.int64)
+    last = len(tip) - 1
+    before = np.maximum(pose - 2, 0)
+    after = np.minimum(pose + 1, last)
+    sides = (
+        (tip[pose - 1] - tip[before], start, (pose > 1) & (kind[pose - 1] == Move.LINEAR)),
+        (tip[after] - tip[pose], end, (pose < last) & (kind[after] == Move.LINEAR)),
+    )
+    for line, spoke, there in sides:
+        tangent = np.cross(normal, spoke)
+        line = line - _dot(line, normal)[:, None] * normal
+        length, reach = _length(line), _length(tangent)
+        there = there & (length > VOTING_DIGITS * resolution) & (reach > 0)
+        cosine = _dot(line, tangent) / np.where(there, length * reach, 1.0)
+        agree += there & (cosine > math.cos(TANGENT))
+        against += there & (cosine < -math.cos(TANGENT))
+    return agree, against
+
+
+def _dot(left: Floats, right: Floats) -> Floats:
+    product: Floats = np.einsum("ij,ij->i", left, right)
+    return product
+
+
+def _length(vectors: Floats) -> Floats:
+    return np.sqrt(_dot(vectors, vectors))

@@ -1,0 +1,247 @@
+"""Collects poses and changes of state in file order and makes the arrays of a `Program` from them, all at once.
+
+Poses of the fast path stay in the arrays they came in; poses read one by one are merged in at the end. State (feed,
+kind of move, axis, cutter compensation) is a short list of changes, spread over the poses by array operations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.cl.bulk import Block
+from cornersmooth.cl.messages import error, finding
+from cornersmooth.errors import Finding
+from cornersmooth.model import Bools, Floats, Ints, Keep, Move
+
+Vector = tuple[float, float, float]
+T = TypeVar("T", np.float64, np.int64, np.bool_)
+
+#: largest ||v|−1| of an axis vector: three printed decimals leave 1e-3
+UNIT_TOLERANCE: Final = 1e-2
+
+#: no machine reaches farther, in units of the file
+FARTHEST: Final = 1e7
+
+UP: Final[Vector] = (0.0, 0.0, 1.0)
+
+
+@dataclass
+class Changes:
+    """A state that keeps its value until the next change: values and the poses they begin at."""
+
+    at: list[int]
+    value: list[float]
+
+    def set(self, pose: int, value: float) -> None:
+        """Let the state be `value` from this pose on."""
+        if value != self.value[-1]:
+            self.at.append(pose)
+            self.value.append(value)
+
+    @property
+    def now(self) -> float:
+        """The value at the end."""
+        return self.value[-1]
+
+    def spread(self, n: int) -> Floats:
+        """(n,) float64: the value at every pose."""
+        at = np.array([*self.at, n])
+        return np.repeat(np.array(self.value), np.diff(np.minimum(at, n)))
+
+
+@dataclass
+class Builder:
+    """Poses and state changes of one file; lengths and feeds as written.
+
+    Parameters
+    ----------
+    file : str
+        For messages.
+    short_axis_up : bool
+        Whether a pose without an axis has +Z instead of the last one.
+    lenient : bool
+        Normalise axis vectors of any length, with a finding.
+    """
+
+    file: str
+    short_axis_up: bool = False
+    lenient: bool = False
+    n: int = 0
+    feed: Changes = field(default_factory=lambda: Changes([0], [float("nan")]))
+    feed_mode: Changes = field(default_factory=lambda: Changes([0], [0.0]))
+    keep: Changes = field(default_factory=lambda: Changes([0], [float(Keep.NO)]))
+    kind: Changes = field(default_factory=lambda: Changes([0], [float(Move.LINEAR)]))
+    axis_locked: Changes = field(default_factory=lambda: Changes([0], [0.0]))
+    special: dict[int, Move] = field(default_factory=dict)
+    axis_set: list[tuple[int, Vector]] = field(default_factory=lambda: [(0, UP)])
+    _blocks: list[Block] = field(default_factory=list)
+    _single_at: list[int] = field(default_factory=list)
+    _single_tip: list[Vector] = field(default_factory=list)
+    _single_axis: list[Vector | None] = field(default_factory=list)
+    _single_line: list[int] = field(default_factory=list)
+    _rows_before: int = 0
+    _last_single: bool = False
+    _axis_now: Vector = UP
+    _axis_row: int = 0
+
+    def enter(self, block: Block) -> None:
+        """Take the next block; its plain poses follow by `take`."""
+        if self._blocks:
+            self._remember(self.last_axis())
+            self._rows_before += len(self._blocks[-1].tip)
+        self._blocks.append(block)
+
+    def take(self, count: int) -> None:
+        """Append the next poses of the block."""
+        self.n += count
+        self._last_single = False
+
+    def add(self, tip: Vector, axis: Vector | None, line: int) -> None:
+        """Append one pose."""
+        self._single_at.append(self.n)
+        self._single_tip.append(tip)
+        self._single_axis.append(axis)
+        self._single_line.append(line)
+        self.n += 1
+        self._last_single = True
+        if axis is not None and not self.axis_locked.now:
+            self._remember(axis)
+
+    def last_tip(self) -> Vector:
+        """Tip of the last pose."""
+        if self._last_single:
+            return self._single_tip[-1]
+        x, y, z = self._blocks[-1].tip[self._row()].tolist()
+        return x, y, z
+
+    def last_axis(self) -> Vector:
+        """Axis that a pose without one of its own would have here."""
+        if self.axis_locked.now or not self._blocks:
+            return self._axis_now
+        block = self._blocks[-1]
+        rows = self._row() + 1
+        if rows > 0 and self._rows_before + rows > self._axis_row:
+            own = np.flatnonzero(block.own_axis[max(self._axis_row - self._rows_before, 0) : rows])
+            if len(own) and not (self.short_axis_up and not block.own_axis[rows - 1]):
+                x, y, z = block.axis[np.count_nonzero(block.own_axis[:rows]) - 1].tolist()
+                return x, y, z
+        return self._axis_now
+
+    def set_axis(self, axis: Vector) -> None:
+        """Let poses without an axis of their own have this one from here on."""
+        self.axis_set.append((self.n, axis))
+        self._remember(axis)
+
+    def lock_axis(self, locked: bool) -> None:
+        """Ignore (or heed again) the axes that poses have of their own."""
+        self._remember(self.last_axis())
+        self.axis_locked.set(self.n, float(locked))
+
+    def _remember(self, axis: Vector) -> None:
+        self._axis_now = axis
+        self._axis_row = self.n - len(self._single_at)
+
+    def _row(self) -> int:
+        """Row of the last plain pose in the last block."""
+        return self.n - 1 - len(self._single_at) - self._rows_before
+
+    def tips(self) -> Floats:
+        """(n, 3) float64: all tips, as written.
+
+        Raises
+        ------
+        InputError
+            CS113 for a coordinate that is not finite or out of all reason.
+        """
+        tip = self._merge([block.tip for block in self._blocks], np.array(self._single_tip).reshape(-1, 3))
+        wrong = ~(np.abs(tip) <= FARTHEST)
+        if wrong.any():
+            row, column = np.argwhere(wrong)[0]
+            value = float(tip[row, column])
+            raise error("CS113", self.file, int(self.lines()[row]), value=value, limit=FARTHEST)
+        return tip
+
+    def lines(self) -> Ints:
+        """(n,) int64: line of every pose."""
+        return self._merge([block.line for block in self._blocks], np.array(self._single_line, np.int64))
+
+    def axes(self) -> tuple[Floats, list[Finding]]:
+        """(n, 3) float64: the unit axis of every pose, and what is to be said about them.
+
+        Raises
+        ------
+        InputError
+            CS111 for a zero vector, CS112 for one that is no unit vector.
+        """
+        single = [axis is not None for axis in self._single_axis]
+        own = self._merge([block.own_axis for block in self._blocks], np.array(single, np.bool_))
+        given = np.flatnonzero(own)
+        single_axis = np.array([axis for axis in self._single_axis if axis is not None]).reshape(-1, 3)
+        single_at = np.array(self._single_at, np.int64)[np.array(single, np.bool_)]
+        bulk = [block.axis for block in self._blocks]
+        vector = merge(bulk, single_axis, np.searchsorted(given, single_at), len(given))
+        findings: list[Finding] = []
+        unit = self._normalise(vector, given, findings)
+
+        locked = self.axis_locked.spread(self.n) > 0
+        dropped = locked[given]
+        if dropped.any():
+            findings.append(finding("CS137", int(self.lines()[given[dropped][0]]), int(dropped.sum())))
+            unit, given = unit[~dropped], given[~dropped]
+        if len(given) == self.n:
+            return unit, findings
+        at = np.array([pose for pose, _ in self.axis_set])
+        known = np.array([axis for _, axis in self.axis_set])
+        if not self.short_axis_up:
+            order = np.argsort(np.concatenate((at, given)), kind="stable")  # what was set before a pose comes first
+            at, known = np.concatenate((at, given))[order], np.concatenate((known, unit))[order]
+        axis = known[np.searchsorted(at, np.arange(self.n), side="right") - 1]
+        axis[given] = unit
+        return axis, findings
+
+    def _normalise(self, vector: Floats, pose: Ints, findings: list[Finding]) -> Floats:
+        with np.errstate(over="ignore", invalid="ignore"):
+            length = np.sqrt(np.einsum("ij,ij->i", vector, vector))
+            wrong = ~(np.abs(length - 1) <= UNIT_TOLERANCE)
+        if wrong.any():
+            first = int(wrong.argmax())
+            value = float(length[first])
+            zero = (length == 0) | ~np.isfinite(length)
+            if zero.any() or not self.lenient:
+                first = int((zero if self.lenient else wrong).argmax())
+                value = float(length[first])
+                code = "CS111" if value == 0 else "CS112"
+                raise error(code, self.file, int(self.lines()[pose[first]]), length=value)
+            findings.append(finding("CS139", int(self.lines()[pose[first]]), int(wrong.sum()), length=value))
+        unit: Floats = vector / length[:, None]
+        return unit
+
+    def kinds(self) -> NDArray[np.uint8]:
+        """(n,) uint8: `Move` of every pose."""
+        kind = self.kind.spread(self.n).astype(np.uint8)
+        if self.special:
+            kind[np.fromiter(self.special, np.int64)] = np.fromiter(self.special.values(), np.uint8)
+        return kind
+
+    def _merge(self, bulk: list[NDArray[T]], single: NDArray[T]) -> NDArray[T]:
+        return merge(bulk, single, np.array(self._single_at, np.int64), self.n)
+
+
+def merge(bulk: list[NDArray[T]], single: NDArray[T], at: Ints, n: int) -> NDArray[T]:
+    """Put single rows at their places among the bulk rows."""
+    whole = bulk[0] if len(bulk) == 1 else np.concatenate(bulk)
+    whole = whole[: n - len(single)]  # reading may have stopped inside a block
+    if not len(single):
+        return whole
+    if not len(whole):
+        return single
+    merged = np.zeros((n, *single.shape[1:]), single.dtype)
+    alone: Bools = np.zeros(n, np.bool_)
+    alone[at] = True
+    merged[alone] = single
+    merged[~alone] = whole
+    return merged

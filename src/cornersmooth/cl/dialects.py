@@ -1,0 +1,93 @@
+"""What CAM systems mean by the same words: dialects as data, and how they are recognised.
+
+Facts and their sources stand in the format notes of the project; the fingerprints are the words that only one system
+writes.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from cornersmooth.cl.messages import unknown
+from cornersmooth.model import Units
+
+Hand = Literal["left", "right"]
+
+#: how much of a file is looked at
+HEAD: Final = 1 << 16
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """The rules that differ between CAM systems.
+
+    Parameters
+    ----------
+    name : str
+    fingerprint : bytes
+        Regular expression, searched in the head of a file, line by line.
+    long_arcs : {"left", "right"}
+        Turning sense of CIRCLE with 11 or more numbers about its normal.
+    short_axis : {"hold", "up"}
+        What a GOTO of three numbers means for the axis: the last one, or +Z.
+    units : {"mm", "inch"}
+        Where the file does not say.
+    decimals : int
+        Digits behind the point of coordinates.
+    strips_zeros : bool
+        Whether zeros at their end are left out, so that a statement alone does not tell the digits.
+    """
+
+    name: str
+    fingerprint: bytes
+    long_arcs: Hand = "left"
+    short_axis: Literal["hold", "up"] = "hold"
+    units: Units = "mm"
+    decimals: int = 4
+    strips_zeros: bool = False
+
+
+#: in the order in which they are tried: the more telling fingerprint first
+DIALECTS: Final[tuple[Dialect, ...]] = (
+    Dialect("makino", rb"^PPRINT/APTCL-SPEC, *MAKINO", decimals=7),
+    Dialect("creo", rb"^\$\$\* +Pro/CLfile|^\$\$-> *(FEATNO|MFGNO|CSYS|CUTTER|END) */", short_axis="up", decimals=10),
+    Dialect("catia", rb"^\$\$ +CATIA APT VERSION|^\$\$\*CATIA0", decimals=5),
+    Dialect("solidworks", rb"^(CSI_SET_\w+|TRNTYP)/", decimals=6, strips_zeros=True),
+    Dialect("hsm", rb"^(MODE/(MILL|TURN)|MOVARC/|CSI_TOOL_PATH/)", short_axis="up", decimals=6, strips_zeros=True),
+    Dialect("ncl", rb"^REMARK .*NCLCAM", units="inch"),
+    Dialect("nx", rb"^(TOOL PATH/|TLDATA/|MSYS/|END-OF-PATH|PAINT/)"),
+    Dialect("plain", rb"(?!)"),
+)
+
+NAMES: Final = tuple(dialect.name for dialect in DIALECTS)
+
+
+def recognise(data: bytes) -> Dialect:
+    """Return the dialect of a CL text by its fingerprint; `plain` where nothing tells.
+
+    Parameters
+    ----------
+    data : bytes
+        The text; its first 64 KiB decide.
+    """
+    head = data[:HEAD]
+    return next(
+        (dialect for dialect in DIALECTS if re.search(dialect.fingerprint, head, re.MULTILINE | re.IGNORECASE)),
+        DIALECTS[-1],
+    )
+
+
+def by_name(name: str) -> Dialect:
+    """Return the dialect of this name.
+
+    Raises
+    ------
+    SettingsError
+        CS230, with the names there are.
+    """
+    for dialect in DIALECTS:
+        if dialect.name == name:
+            return dialect
+    raise unknown("dialect", name, NAMES)

@@ -1,0 +1,99 @@
+"""What the readers of CL files say: codes CS100-CS149, one place for all texts.
+
+Texts take their values by `str.format`. The readers of point files have their own table (`points_messages`).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from cornersmooth.errors import Finding, InputError, SettingsError, Severity
+
+#: code: (what is wrong, what to do)
+ERRORS: Final[dict[str, tuple[str, str]]] = {
+    # the file
+    "CS100": ("cannot be read: {why}", "check the path and the permissions"),
+    "CS101": ("holds no tool positions", "give a CL file with GOTO statements, or a table of points"),
+    "CS102": ("is a binary file", "write the CL data as text: NX .cls, CATIA .aptsource, Creo .ncl, ..."),
+    "CS103": ("is not a complete gzip file: {why}", "compress it again"),
+    # statements
+    "CS104": ("{word} ends in a continuation sign but {next} follows", "complete the statement or remove the $"),
+    "CS105": ("a line of numbers that continues no GOTO: {text!r}", "write the statement in front of its numbers"),
+    "CS106": ("{word} cannot be read: {token!r} is not a number", "give decimal numbers separated by commas"),
+    "CS107": ("{word} is followed by {text!r} instead of '/'", "write {word}/ and its numbers"),
+    "CS108": ("unknown motion statement {word}", "export the path with GOTO and CIRCLE statements"),
+    "CS109": ("unknown statement {word}: is it {near}?", "correct the word; a motion must not be lost"),
+    # poses
+    "CS110": ("{word} with {count} number{s}", "give {want}"),
+    "CS111": ("tool axis of length zero", "give a vector from tip to spindle"),
+    "CS112": ("tool axis is {length:.6g} long, not 1", "give unit vectors, or read with --lenient to normalise them"),
+    "CS113": ("coordinate {value:g} is out of range", "give finite coordinates within {limit:g}"),
+    "CS114": ("{word} is incremental and stands before the first position", "begin with FROM or GOTO"),
+    # state
+    "CS115": ("{word}/{text} is not understood", "{want}"),
+    "CS116": ("{word} changes to {new} after positions in {old}", "split the file, or convert it to one unit"),
+    "CS117": ("{word} changes the coordinates of what follows", "export the path in one coordinate system"),
+    "CS118": ("{word} after FINI", "split the file at FINI, or remove what follows it"),
+    "CS119": ("{word} needs a positive feed, not {value:g}", "correct the feed"),
+    # arcs and curves
+    "CS120": ("{word} with {count} number{s}", "give {want}"),
+    "CS121": ("{word} without a GOTO after it", "give the end point of the arc right after it"),
+    "CS122": ("{word} without a position to start from", "give a GOTO before the arc"),
+    "CS123": (
+        "{which} of the arc is {distance:.6g} from its centre, not {radius:.6g}",
+        "correct centre, radius or position; units of the file",
+    ),
+    "CS124": ("{word} has a normal of length {length:.6g}", "give the unit vector of the arc's axis"),
+    "CS125": ("{word} has a radius of {radius:g}", "give a positive radius"),
+    "CS126": ("{word} cannot be resolved: {why}", "export arcs as CIRCLE statements or as points"),
+    "CS127": ("{word} with {value:g} turns", "give 1 to {limit:g}"),
+    "CS128": ("NURBS cannot be read: {why}", "export the path with GOTO statements"),
+}
+
+#: code: (what is wrong with the call, what to do)
+SETTINGS: Final[dict[str, tuple[str, str]]] = {
+    "CS230": ("unknown {what} {value!r}", "use one of {choices}"),
+}
+
+#: code: (severity, sentence)
+FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
+    "CS129": ("warning", "the last GOTO is cut short by the end of the file: read with the axis before it"),
+    "CS130": ("warning", "unknown statement {word}; kept in place"),
+    "CS131": ("warning", "line is no CL statement; kept in place as text"),
+    "CS132": ("note", "the file states no units: {units} assumed ({why})"),
+    "CS133": ("warning", "the file says {stated}, read as {units} as asked for"),
+    "CS134": ("warning", "GOTO numbers separated by blanks instead of commas"),
+    "CS135": ("note", "FEDRAT between RAPID and its GOTO: the move stays rapid"),
+    "CS136": ("warning", "FEDRAT/{text} is not understood; kept in place, the feed stays"),
+    "CS137": ("warning", "axis vectors after MULTAX/OFF are ignored: the axis is locked"),
+    "CS138": ("note", "poses under CUTCOM are passed exactly: the control offsets the path"),
+    "CS139": ("warning", "tool axis is {length:.6g} long, not 1; normalised"),
+    "CS140": ("warning", "RAPID/{text}: the move is made at feed"),
+    "CS141": ("note", "arcs shorter than the printed digits can tell are read as lines"),
+    "CS142": ("warning", "arc turns the other way than its neighbours: read {how}, corners there are kept"),
+    "CS143": ("warning", "{word} changes the coordinates of what follows; ignored"),
+    "CS144": ("warning", "{what}; ignored"),
+    "CS145": ("note", "NURBS curves are read as lines within {tolerance:g} mm"),
+    "CS146": ("warning", "positions in more than one coordinate system ({word} changes); check the part zero"),
+    "CS147": ("warning", "the tool axis turns along an arc; how it turns is not defined"),
+    "CS148": ("warning", "FEDRAT without a unit: {unit} assumed"),
+    "CS149": ("note", "GOHOME without coordinates is kept as a statement"),
+}
+
+
+def error(code: str, file: str, line: int | None, **values: object) -> InputError:
+    """Return the error of this code at FILE:LINE, ready to be raised."""
+    what, hint = ERRORS[code]
+    return InputError(code, what.format(**values), hint.format(**values), file=file, line=line)
+
+
+def unknown(what: str, value: str, choices: tuple[str, ...]) -> SettingsError:
+    """Return the error for an option value that is none of the choices."""
+    text, hint = SETTINGS["CS230"]
+    return SettingsError("CS230", text.format(what=what, value=value), hint.format(choices=", ".join(choices)))
+
+
+def finding(code: str, line: int, count: int = 1, **values: object) -> Finding:
+    """Return the finding of this code."""
+    severity, text = FINDINGS[code]
+    return Finding(code, severity, line, text.format(**values), count)
