@@ -99,11 +99,12 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
     far = np.flatnonzero(np.abs(rows.take(layout.wanted)).max(axis=1) > FARTHEST)
     if len(far):
         raise error("CS163", name, int(line[far[0]]), limit=FARTHEST)
+    findings = [] if units or layout.units else [finding("CS176", 0)]
     units = units or layout.units or "mm"
     scale = MM_PER_UNIT[units]
     axis, axis_findings = _axis(rows, scale, lenient)
     feed, feed_findings = _feed(rows, lenient)
-    findings = [*axis_findings, *feed_findings]
+    findings += [*axis_findings, *feed_findings]
     if layout.unused:
         findings.append(finding("CS173", text.header_line, len(layout.unused), names=", ".join(layout.unused)))
     return Program.from_poses(

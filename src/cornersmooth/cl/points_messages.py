@@ -43,6 +43,7 @@ FINDINGS: dict[str, tuple[Severity, str]] = {
     "CS173": ("warning", "columns not used: {names}"),
     "CS174": ("warning", "tool axis is {length:.6g} long, not 1; normalised"),
     "CS175": ("warning", "feed {feed:g} is not positive; the feed before it is kept"),
+    "CS176": ("note", "the file states no units: mm assumed"),
 }
 
 
