@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -59,6 +61,21 @@ def test_passes_keep_chord_and_spacing(generator: ModuleType):
         assert turn.max() < 1.01 * generator.LARGEST_TURN
 
 
+def test_show_smooths_all_of_them_within_their_tolerances(tmp_path: Path):
+    done = subprocess.run(
+        [sys.executable, SAMPLES / "show.py", tmp_path], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    reports = {path.stem: json.loads(path.read_text()) for path in tmp_path.glob("*.json")}
+    assert set(reports) == {"paper_table1", "impeller_nx", "impeller_catia"}
+    for name, report in reports.items():
+        summary, tolerance = report["summary"], report["settings"]["tolerance"]
+        assert summary["smoothed"] == summary["corners"] > 0
+        assert 0.9 * tolerance < max(summary["max_tip_error_mm"], summary["max_axis_error_mm"]) <= tolerance
+        assert f"{name}.nc" in done.stdout
+        assert len((tmp_path / f"{name}.nc").read_text().splitlines()) > summary["blocks_in"]
+
+
 def test_paper_table_is_read_as_second_points_ten_millimetres_up():
     program = read_points((SAMPLES / "paper_table1.csv").read_bytes(), name="paper_table1.csv")
     assert program.tip.tolist() == [
@@ -68,4 +85,4 @@ def test_paper_table_is_read_as_second_points_ten_millimetres_up():
         [179.5084, -11.8775, -68.4966],
     ]
     np.testing.assert_allclose(program.tip[1] + 10 * program.axis[1], [176.2593, -7.9576, -58.1921], atol=1e-4)
-    assert [finding.code for finding in program.findings] == ["CS171"]
+    assert [finding.code for finding in program.findings] == ["CS176", "CS171"]
