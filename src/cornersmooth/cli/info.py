@@ -1,0 +1,122 @@
+"""``cornersmooth info``: what a CL file holds and what would limit the rounding of its corners."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cornersmooth.cli import options
+from cornersmooth.cli.files import read_input
+
+if TYPE_CHECKING:
+    from cornersmooth.report.info import Info, Spread
+
+_READING = ("dialect", "units", "arc_rule", "lenient")
+
+
+@click.command(
+    "info",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid.",
+)
+@click.argument("source", metavar="IN")
+@options.tolerance
+@options.axis_length
+@options.reading
+@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines to read.")
+def command(source: str, tolerance: float, axis_length: float, as_json: bool, **given: Any) -> int:
+    """Say what the CL file IN holds: dialect, moves, lengths, turns, axis changes, arcs, statements, findings.
+
+    IN is an APT/CL file or a table of points; - is standard input. -e and -H do not write anything: they tell how many
+    corners that tolerance would round, and what would limit them.
+
+    \b
+    Examples:
+      cornersmooth info part.cls
+      cornersmooth info part.ncl -e 0.05 -H 25
+      cornersmooth info part.cls --json > part.json
+    """
+    from cornersmooth.cl import read
+    from cornersmooth.report.info import describe, info_json
+
+    data, name = read_input(source)
+    reading = {key: given[key] for key in _READING} | {"format": given["input_format"]}
+    info = describe(read(data, name=name, **reading), tolerance, axis_length)
+    if as_json:
+        click.echo(info_json(info), nl=False)
+        return 0
+    rows = [row for part in (_file(info), _motion(info), _axis(info), _corners(info)) for row in part]
+    width = max(len(label) for label, _ in rows)
+    for label, text in rows:
+        click.echo(f"{label:<{width}}  {text}".rstrip())
+    for finding in info.findings:
+        place = f"{name}:{finding.line}" if finding.line else name
+        times = f" ({finding.count} times)" if finding.count > 1 else ""
+        click.echo(f"{place}: {finding.severity}: {finding.text}{times}")
+    return 0
+
+
+Rows = Iterator[tuple[str, str]]
+
+
+def _file(info: Info) -> Rows:
+    yield "file", f"{info.name}: {info.dialect}, {info.units}"
+    yield "poses", _counts(info.motion.moves)
+    if info.statements:
+        yield "statements", _counts(info.statements)
+
+
+def _motion(info: Info) -> Rows:
+    motion = info.motion
+    yield "chains", f"{motion.chains}, the longest {motion.longest_chain_poses} poses"
+    yield "path", f"{motion.feed_length_mm:.6g} mm of lines at feed, {motion.rapid_length_mm:.6g} mm of rapids"
+    low, high = (" ".join(f"{value:.6g}" for value in corner) for corner in (motion.box_min_mm, motion.box_max_mm))
+    yield "box", f"{low} to {high} mm"
+    feeds = [
+        *(f"{value:g}" for value in motion.feeds_mm_per_min),
+        *(f"{value:g}/rev" for value in motion.feeds_mm_per_rev),
+    ]
+    missing = f"{motion.feed_moves_without_feed} moves without" if motion.feed_moves_without_feed else ""
+    yield "feeds", "; ".join(part for part in (", ".join(feeds) + " mm" * bool(feeds), missing) if part)
+    yield "segments", _spread(motion.segment_length_mm, "mm")
+    if info.arcs.count:
+        yield "arcs", f"{info.arcs.count}, {info.arcs.helices} of them helices"
+        yield "arc radius", _spread(info.arcs.radius_mm, "mm")
+        yield "arc sweep", _spread(info.arcs.sweep_deg, "deg")
+
+
+def _axis(info: Info) -> Rows:
+    axis = info.axis
+    meaning = {"fixed": "one direction", "indexed": "turns between cuts only", "simultaneous": "turns while cutting"}
+    yield "tool axis", meaning[axis.kind]
+    yield "tilt from +Z", _spread(axis.tilt_deg, "deg")
+    yield "axis steps", _spread(axis.step_deg, "deg")
+    kinds = {"translations": axis.translations, "pure rotations": axis.rotations, "repetitions": axis.repetitions}
+    yield "", _counts({name: count for name, count in kinds.items() if count}) or "every segment moves and turns"
+
+
+def _corners(info: Info) -> Rows:
+    corners = info.corners
+    yield "corners", f"{corners.count}, {corners.sharp} sharper than 10 deg"
+    yield "turns", _spread(corners.tip_turn_deg, "deg")
+    yield (
+        f"at {corners.tolerance_mm:g} mm",
+        f"{corners.smoothed} would be rounded: {corners.limited_by_segment} limited by segment length, "
+        f"{corners.limited_by_tolerance} by the tolerance (axis point at {corners.axis_length_mm:g} mm)",
+    )
+    if corners.not_smoothed:
+        yield "stay sharp", _counts(corners.not_smoothed)
+    yield "deviation", _spread(corners.deviation_mm, "mm")
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
+
+
+def _spread(spread: Spread, unit: str) -> str:
+    if not spread.count:
+        return "none"
+    levels = f"{spread.min:.4g} / {spread.p5:.4g} / {spread.p50:.4g} / {spread.p95:.4g} / {spread.max:.4g}"
+    return f"{levels} {unit} (least, 5 %, half, 95 %, most; {spread.count})"
