@@ -17,6 +17,8 @@ from cornersmooth.model import Bools, Floats, Ints
 REWIND_COST = 1e9
 #: What a start on the solution that is not preferred costs, in degrees of rotation: more than any start turn.
 PREFERENCE_COST = 1e3
+#: What a piece costs that leaves the limits in every turn.
+OUTSIDE_COST = 1e12
 #: Words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
 LIMIT_SLACK = 1e-9
 #: An axis with room for more turns than this is taken as endless first; only where that fails its turns are searched.
@@ -86,7 +88,7 @@ def choose(pieces: Pieces, limits: Floats) -> tuple[Ints, Floats]:
     ------
     NoChoiceError
     """
-    branch = _cheapest_branches(pieces)
+    branch = _cheapest_branches(pieces, limits)
     turns = _nearest_turns(pieces, branch)
     if _inside(pieces, branch, turns, limits):
         return branch, turns
@@ -101,11 +103,14 @@ def choose(pieces: Pieces, limits: Floats) -> tuple[Ints, Floats]:
     return branch, _nearest_turns(pieces, branch, fixed, finite)
 
 
-def _cheapest_branches(pieces: Pieces) -> Ints:
-    """Branches with the least rotation between pieces, without a look at the limits: two states per piece."""
+def _cheapest_branches(pieces: Pieces, limits: Floats) -> Ints:
+    """Branches with the least rotation between pieces that fit into the limits, each in some turn: two states each."""
+    lowest = np.ceil((limits[:, 0] - LIMIT_SLACK - pieces.low) / 360)  # turns that bring the piece inside
+    highest = np.floor((limits[:, 1] + LIMIT_SLACK - pieces.high) / 360)
+    outside = np.where((lowest > highest).any(axis=2), OUTSIDE_COST, 0.0)
     step = pieces.first[1:, None, :, :] - pieces.last[:-1, :, None, :]  # [edge, from, to, axis]
-    cost = np.abs(step - 360 * np.round(step / 360)).sum(axis=3)
-    start = (pieces.dislike + np.abs(pieces.first[0]).sum(axis=1)).tolist()
+    cost = np.abs(step - 360 * np.round(step / 360)).sum(axis=3) + outside[1:, None, :]
+    start = (pieces.dislike + np.abs(pieces.first[0]).sum(axis=1) + outside[0]).tolist()
     best, origins = [start[0], start[1]], []
     for (stay0, swap01), (swap10, stay1) in cost.tolist():
         into0, into1 = (best[0] + stay0, best[1] + swap10), (best[0] + swap01, best[1] + stay1)

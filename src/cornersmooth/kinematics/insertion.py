@@ -19,9 +19,11 @@ from cornersmooth.model import Bools, Floats, Ints
 #: A segment is looked at in these places; its error vanishes in all of them only if it is none.
 PLACES = (0.25, 0.5, 0.75)
 #: Rounds of division, and the most parts that a segment is divided into in one of them.
-ROUNDS, PARTS = 24, 8
-#: Errors fall with the square of the number of parts where the motion is smooth; divided for so much of the tolerance.
-AIM = 0.9
+ROUNDS, PARTS = 24, 64
+#: A smooth motion errs ¾ of its largest error at a quarter of its way; one as near to that, and without a large turn
+#: (degrees), is divided at once into as many parts as the square law of its error says for AIM of the tolerance. All
+#: others are halved.
+SMOOTH, SMOOTH_TURN, AIM = 0.1, 30.0, 0.95
 
 
 @dataclass(frozen=True)
@@ -116,11 +118,11 @@ def insertions(
     found: list[_Intervals] = []
     motion = _Motion(machine, tip, axis, tolerance, tip_tolerance, max_step)
     for _ in range(ROUNDS):
-        excess = motion.excess(open_)
-        open_, excess = open_.take(excess > 1), excess[excess > 1]
-        if not len(open_.segment):
+        parts = motion.parts(open_)
+        open_, parts = open_.take(parts > 1), parts[parts > 1]
+        if not len(parts):
             break
-        open_, inserted = motion.divide(open_, excess)
+        open_, inserted = motion.divide(open_, parts)
         found.append(inserted)
     segment = np.concatenate([part.segment for part in found] or [np.zeros(0, np.int64)])
     fraction = np.concatenate([part.start for part in found] or [np.zeros(0)])
@@ -167,6 +169,11 @@ class _Intervals:
     start_branch: Ints
     end_branch: Ints
 
+    @property
+    def turn(self) -> Floats:
+        """(p, 2) degrees."""
+        return np.abs(self.end_angles - self.start_angles)
+
     def take(self, which: Bools | Ints) -> _Intervals:
         return _Intervals(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
@@ -182,31 +189,44 @@ class _Motion:
     tip_tolerance: float | None
     max_step: float | None
 
-    def excess(self, parts: _Intervals) -> Floats:
-        """Largest error of each part over its tolerance: (p,), above 1 where it must be divided."""
-        turn = np.abs(parts.end_angles - parts.start_angles)
-        worst = np.zeros(len(turn))
+    def parts(self, intervals: _Intervals) -> Ints:
+        """Into how many parts each interval is to be divided: 1 where it is good as it is."""
+        turn = intervals.turn
+        parts = np.ones(len(turn), np.int64)
         if self.max_step is not None:
-            worst = (turn.max(axis=1, initial=0.0) / self.max_step) ** 2
+            parts += np.ceil(turn.max(axis=1, initial=0.0) / self.max_step - 1).clip(0).astype(np.int64)
         check = np.arange(len(turn))
         if self.tip_tolerance is None:
             # Path on the sphere and great circle both leave their chord by less than (turn)²/8.
             check = np.flatnonzero(np.radians(turn.sum(axis=1)) ** 2 / 4 > np.radians(self.tolerance))
-        part = parts.take(check)
-        for place in PLACES:
-            worst[check] = np.maximum(worst[check], self._excess_at(part, place))
-        return worst
+        checked = intervals.take(check)
+        ends = None if self.tip_tolerance is None else self._ends(checked)
+        excess = np.stack([self._excess_at(checked, place, ends) for place in PLACES])
+        worst = excess.max(axis=0, initial=0.0)
+        smooth = (np.abs(excess[[0, 2]] - 0.75 * excess[1]) <= SMOOTH * excess[1]).all(axis=0)
+        smooth &= checked.turn.sum(axis=1) <= SMOOTH_TURN
+        count = np.where(smooth, np.ceil(np.sqrt(worst / AIM)), 2).astype(np.int64)
+        parts[check] = np.where(worst > 1, np.maximum(count, 2), parts[check])
+        return np.minimum(parts, PARTS)
 
-    def _excess_at(self, part: _Intervals, place: float) -> Floats:
+    def _ends(self, part: _Intervals) -> tuple[Floats, Floats, Floats, Floats]:
+        """Tip and linear words at both ends of each interval: four times (p, 3), mm."""
+        start, _ = ruled(self.tip, self.axis, part.segment, part.start)
+        end, _ = ruled(self.tip, self.axis, part.segment, part.end)
+        words = (
+            machine_position(self.machine, start, part.start_angles),
+            machine_position(self.machine, end, part.end_angles),
+        )
+        return start, end, *words
+
+    def _excess_at(self, part: _Intervals, place: float, ends: tuple[Floats, Floats, Floats, Floats] | None) -> Floats:
+        """Error at one place of each interval over its tolerance: (p,)."""
         words = part.start_angles * (1 - place) + part.end_angles * place
         fraction = part.start * (1 - place) + part.end * place
         off: Floats = np.zeros(len(fraction))
-        if self.tip_tolerance is not None:
-            start, _ = ruled(self.tip, self.axis, part.segment, part.start)
-            end, _ = ruled(self.tip, self.axis, part.segment, part.end)
-            joints = machine_position(self.machine, start, part.start_angles) * (1 - place)
-            joints = joints + machine_position(self.machine, end, part.end_angles) * place
-            real = tip_position(self.machine, joints, words)
+        if ends is not None and self.tip_tolerance is not None:
+            start, end, from_, to = ends
+            real = tip_position(self.machine, from_ * (1 - place) + to * place, words)
             way = end - start
             square = np.einsum("ij,ij->i", way, way)
             along = np.einsum("ij,ij->i", real - start, way) / np.where(square > 0, square, 1.0)
@@ -216,13 +236,12 @@ class _Motion:
         _, wanted = ruled(self.tip, self.axis, part.segment, fraction)
         return np.maximum(off, angle_between(tool_axis(self.machine, words), wanted) / self.tolerance)
 
-    def divide(self, parts: _Intervals, excess: Floats) -> tuple[_Intervals, _Intervals]:
-        """Equal parts of each interval, as many as its error asks for: the new intervals, and the new points."""
-        count = np.clip(np.ceil(np.sqrt(excess / AIM)), 2, PARTS).astype(np.int64)
+    def divide(self, intervals: _Intervals, count: Ints) -> tuple[_Intervals, _Intervals]:
+        """Divide each interval into so many equal parts: the new intervals, and those that start with a new point."""
         owner = np.repeat(np.arange(len(count)), count)
         number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
         share = (number / count[owner])[:, None]
-        old = parts.take(owner)
+        old = intervals.take(owner)
         start = old.start + (old.end - old.start) * share[:, 0]
         words = old.start_angles * (1 - share) + old.end_angles * share
         branch = old.start_branch.copy()

@@ -202,8 +202,10 @@ def radians(angles: Floats) -> Floats:
 def rotate(direction: Floats, angle: Floats, vectors: Floats) -> Floats:
     """Vectors turned about a unit direction by angles in radians (Rodrigues): (3,), (n,), (n or 1, 3) -> (n, 3)."""
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y, z = direction
+    across = np.array(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)))  # v @ across = direction × v, faster than np.cross
     along = (vectors @ direction)[:, None] * direction
-    turned: Floats = along + (vectors - along) * cosine + np.cross(direction, vectors) * sine
+    turned: Floats = along + (vectors - along) * cosine + (vectors @ across) * sine
     return turned
 
 

@@ -1,0 +1,144 @@
+"""Machines: the built-in ones, and what is said about files that describe none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics import load_machine, machine_names, parse_machine
+
+PLAIN = """
+name = "mine"
+preferred = "B-"
+tool_length = 120
+part_zero = [1, 2, 3]
+[[axis]]
+name = "C"
+carrier = "table"
+direction = [0, 0, 2]
+point = [10, 0, 0]
+positive = "table"
+limits = [-360, 360]
+[[axis]]
+name = "B"
+carrier = "head"
+direction = [0, 1, 0]
+"""
+
+
+def test_built_in_machines_load_and_describe_themselves():
+    names = machine_names()
+    assert set(names) >= {
+        "xyzac-trt",
+        "xyzbc-trt",
+        "table-ac",
+        "table-bc",
+        "head-table-bc",
+        "head-ac",
+        "nutated-bc",
+    }
+    for name in names:
+        machine = load_machine(name)
+        text = machine.describe()
+        assert machine.name == name
+        assert text.startswith(f"{name}: {machine.description}")
+        assert all(f"\n  {axis.name} in the {axis.carrier}" in text for axis in machine.axes)
+    assert load_machine("head-ac").kind == "head-head"
+    assert load_machine("nutated-bc").kind == "table-head"
+
+
+def test_file_is_read_whole(tmp_path: Path):
+    path = tmp_path / "mine.toml"
+    path.write_text(PLAIN, encoding="utf-8")
+    machine = load_machine(path)
+    assert machine == load_machine(str(path))
+    assert machine.names == ("C", "B")
+    assert machine.preferred == ("B", -1.0)
+    assert machine.axes[0].sign == -1
+    np.testing.assert_array_equal(machine.axes[0].unit, [0, 0, 1])
+    np.testing.assert_array_equal(machine.limits, [[-360, 360], [-np.inf, np.inf]])
+    assert "positive turns the table" in machine.describe()
+    assert "B in the head, nearest to the tool: about (0, 1, 0) through (0, 0, 0) mm, without end" in machine.describe()
+
+
+def test_file_without_name_takes_that_of_the_file(tmp_path: Path):
+    path = tmp_path / "mill.toml"
+    path.write_text(PLAIN.replace('name = "mine"', ""), encoding="utf-8")
+    assert load_machine(path).name == "mill"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("tool_length", "tool_lenght", "m.toml: error: unknown key 'tool_lenght'; did you mean tool_length?"),
+        ("direction = [0, 0, 2]", "dirction = [0, 0, 2]", "axis 1: unknown key 'dirction'; did you mean direction?"),
+        ("part_zero", "zzz", "unknown key 'zzz'; known keys are name, description, preferred"),
+        ("[0, 0, 2]", "[0, 0, 0]", "rotary axis C: direction is zero; give a vector along the axis"),
+        ("[0, 0, 2]", "[0, 0]", "axis 1: direction is [0, 0]; give three numbers in brackets"),
+        ("[0, 0, 2]", "[0, 0, nan]", "rotary axis C: direction is not a point of space"),
+        ("[0, 0, 2]", "[0, 1, 0]", "machine mine: C and B are parallel; give two different directions"),
+        ("[0, 1, 0]", "[0, 0, 1]", "machine mine: C and B are parallel"),
+        ('name = "B"', 'name = "C"', "machine mine: both rotary axes are called C"),
+        ('name = "B"', 'name = "Q"', "rotary axis name 'Q' is not an address; use A, B or C"),
+        ('carrier = "table"', 'carrier = "bed"', "rotary axis C: carrier is 'bed'; use table or head"),
+        ('"B-"', '"A-"', "machine mine: preferred names 'A'; use C+, C-, B+ or B-"),
+        ('"B-"', '"negative"', "preferred is 'negative'; write an axis and its sign"),
+        ("[-360, 360]", "[360, -360]", "rotary axis C: limits are 360 and -360; give the lower one first"),
+        ("[-360, 360]", "360", "axis 1: limits is 360; write limits = [lowest, highest] in degrees"),
+        ("120", '"long"', "tool_length is 'long'; give a number"),
+        ("120", "-1", "machine mine: tool_length is -1; give 0 mm or more"),
+        ('positive = "table"', 'positive = "left"', "rotary axis C: positive is 'left'; use tool or table"),
+        ('carrier = "head"', 'carrier = "head"\npositive = "table"', "rotary axis B: positive is 'table'; use tool"),
+        ('carrier = "head"\n', "", "axis 2: carrier is missing; add carrier = ..."),
+        ("[1, 2, 3]", "[1, 2, 3", "m.toml: error: not TOML: "),
+        (
+            'carrier = "table"\ndirection = [0, 0, 2]\npoint = [10, 0, 0]\npositive = "table"',
+            'carrier = "head"\ndirection = [0, 0, 2]',
+            None,
+        ),
+    ],
+)
+def test_what_is_wrong_is_said(old: str, new: str, message: str | None):
+    assert old in PLAIN
+    text = PLAIN.replace(old, new)
+    if message is None:
+        assert parse_machine(text).kind == "head-head"
+        return
+    with pytest.raises(SettingsError) as caught:
+        parse_machine(text, file="m.toml")
+    assert message in str(caught.value)
+    assert str(caught.value).startswith("m.toml: error: ")
+
+
+def test_order_of_axes_is_checked():
+    text = PLAIN.replace('carrier = "table"', 'carrier = "HEAD"').replace('carrier = "head"', 'carrier = "table"')
+    text = text.replace('"HEAD"', '"head"').replace('positive = "table"\n', "")
+    with pytest.raises(SettingsError, match="the head axis C stands before the table axis B; list the axes from"):
+        parse_machine(text)
+
+
+def test_axis_along_the_tool_is_refused():
+    with pytest.raises(SettingsError, match="C turns the tool about itself; check the directions and their order"):
+        parse_machine(
+            '[[axis]]\nname = "A"\ncarrier = "table"\ndirection = [1, 0, 0]\n'
+            '[[axis]]\nname = "C"\ncarrier = "table"\ndirection = [0, 0, 1]\n'
+        )
+
+
+def test_number_of_axes_is_checked():
+    with pytest.raises(SettingsError, match=r"1 rotary axes are described; write \[\[axis\]\] exactly twice"):
+        parse_machine('[[axis]]\nname = "A"\ncarrier = "table"\ndirection = [1, 0, 0]\n')
+
+
+def test_unknown_names_and_files(tmp_path: Path):
+    with pytest.raises(SettingsError, match=r"unknown machine 'xyzac_trt'; did you mean xyzac-trt\? use a TOML file"):
+        load_machine("xyzac_trt")
+    with pytest.raises(SettingsError, match=r"missing\.toml: error: machine file cannot be read: No such file"):
+        load_machine(tmp_path / "missing.toml")
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SettingsError, match="not UTF-8 text"):
+        load_machine(binary)
