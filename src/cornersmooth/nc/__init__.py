@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -12,7 +13,7 @@ from cornersmooth.nc import fanuc
 from cornersmooth.nc.control import Form
 from cornersmooth.nc.motion import MotionWriter
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.sampling import curve_rows, dense_rows
+from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
 
 __all__ = ["FORMS", "Form", "Written", "choose_form", "fit_settings", "write"]
 
@@ -101,7 +102,7 @@ def write(
     motion = MotionWriter(chosen, program, statements)
     head = fanuc.head(program)
     stream.write(_text(head))
-    for rows in curve_rows(smoothed) if chosen.curves else dense_rows(smoothed):
+    for rows in _one_ahead(curve_rows(smoothed) if chosen.curves else dense_rows(smoothed)):
         for text in motion.write(rows):
             stream.write(text)
         if progress is not None and len(rows.move):
@@ -111,6 +112,15 @@ def write(
     tail = fanuc.tail(statements)
     stream.write(_text(tail))
     return Written(len(head) + motion.blocks + len(tail), tuple(_findings(motion, statements.findings())))
+
+
+def _one_ahead(blocks: Iterator[Rows]) -> Iterator[Rows]:
+    """Compute the next block of rows while the last one is written: numpy leaves the interpreter free meanwhile."""
+    with ThreadPoolExecutor(1) as pool:
+        coming = pool.submit(next, blocks, None)
+        while (rows := coming.result()) is not None:
+            coming = pool.submit(next, blocks, None)
+            yield rows
 
 
 def _text(blocks: list[str]) -> bytes:

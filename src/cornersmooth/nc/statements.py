@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from cornersmooth.errors import Finding
@@ -45,7 +46,8 @@ class StatementWriter:
             if handler or statement.word not in _DESCRIBING:
                 self.not_understood[statement.word] += 1
                 self.first_line.setdefault(statement.word, statement.line)
-            return comment_lines(statement.text or statement.word)
+            text = statement.text.removeprefix("$$").strip() if statement.word == "$$" else statement.text
+            return comment_lines(text or statement.word)
         return written
 
     def begin_motion(self) -> list[str]:
@@ -133,7 +135,7 @@ def _compensation(writer: StatementWriter, statement: Statement) -> list[str] | 
     return [code if code == "G40" else f"{code} D{writer.tool or 1}"]
 
 
-_HANDLERS = {
+_HANDLERS: dict[str, Callable[[StatementWriter, Statement], list[str] | None]] = {
     "LOADTL": _tool,
     "LOAD": _tool,
     "TURRET": _tool,

@@ -85,6 +85,20 @@ def rational_basis(u: Floats, weights: Floats) -> Floats:
     return weighted / sums
 
 
+def leg_coefficients(u: Floats, weights: Floats, ratio: float) -> Floats:
+    """Coefficients of corner, incoming and outgoing leg in the curve's points, for one pair of weights and one ratio.
+
+    Returns
+    -------
+    (m, 3) float64
+        The first column is 1: the basis sums to it.
+    """
+    shares = rational_basis(u, weights)
+    incoming = -shares[:, 0] - ratio * shares[:, 1]
+    outgoing = shares[:, 4] + ratio * shares[:, 3]
+    return np.stack((np.ones_like(incoming), incoming, outgoing), axis=-1)
+
+
 def full_weights(weights: Floats) -> Floats:
     """(..., 2) weights w1, w2 as the (..., 5) weights 1, w1, w2, w1, 1."""
     w1, w2 = weights[..., 0], weights[..., 1]

@@ -164,7 +164,7 @@ def _nodes(lines: int) -> Floats:
 
 def _fill_transitions(smoothed: SmoothProgram, layout: Layout, block: _Block, halves: Ints) -> None:
     """Points of the transitions of the block, first point included; corners of equal count together."""
-    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    points_of = _paper_points if smoothed.settings.method == "zhang2016" else _proportional_points
     here = layout.row[block.poses] >= 0
     poses, last = block.poses[here], block.last[here]
     rows = layout.row[poses]
@@ -172,24 +172,45 @@ def _fill_transitions(smoothed: SmoothProgram, layout: Layout, block: _Block, ha
     for lines in np.unique(number):
         chosen = np.flatnonzero(number == lines)
         u = _nodes(int(lines))
-        tip_curve, axis_curve = nurbs.control_points(program, corners, rows[chosen], settings.axis_length)
-        weights = corners.weights[rows[chosen]]
-        uniform = weights[0] if (weights == weights[0]).all() else weights
-        points = nurbs.evaluate(tip_curve, uniform, u)
-        if settings.method == "zhang2016":
-            v, _ = matching_parameters(tip_curve, axis_curve, weights, u, settings.axis_length)
-            tops = nurbs.evaluate(axis_curve, weights, v)
-            tops[:, -1] = axis_curve[:, -1]  # the straight motion behind starts from its own axis: equation (26)
-        else:
-            tops = nurbs.evaluate(axis_curve, uniform, u)
+        points, levers = points_of(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
-        block.tip[where] = points
-        block.other[where] = _unit(tops - points)
+        block.tip[where], block.other[where] = points[:, 1:], _unit(levers[:, 1:])
         block.move[where[:, len(u) // 2 :]] = layout.following[poses[chosen]][:, None]
         first = layout.line[poses[chosen]]
         at = where[first, 0] - 1
-        block.tip[at] = tip_curve[first, 0]
-        block.other[at] = _unit(axis_curve[first, 0] - tip_curve[first, 0])
+        block.tip[at], block.other[at] = points[first, 0], _unit(levers[first, 0])
+
+
+def _proportional_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
+    """Tips and vectors along the tool, (g, 1 + m, 3) each, of transitions at u = 0 and the given parameters."""
+    program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
+    u = np.concatenate(([0.0], u))
+    weights, ratio = corners.weights[rows], corners.ratio[rows]
+    if not ((weights == weights[0]).all() and (ratio == ratio[0]).all()):
+        tip_curve, axis_curve = nurbs.control_points(program, corners, rows, height)
+        return nurbs.evaluate(tip_curve, weights, u), nurbs.evaluate(axis_curve - tip_curve, weights, u)
+    pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
+    trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
+    tips, levers = np.zeros((2, len(rows), 3, 3))
+    for parts, values in ((tips, program.tip), (levers, program.axis)):
+        at = values[pose]
+        parts[:, 0] = at
+        parts[:, 1] = trim_in * (at - values[before])
+        parts[:, 2] = trim_out * (values[after] - at)
+    coefficients = nurbs.leg_coefficients(u, weights[0], float(ratio[0]))
+    return coefficients @ tips, coefficients @ levers
+
+
+def _paper_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
+    """Return the same for the paper's method, the axis-point curve at the synchronised parameters."""
+    corners, height = smoothed.corners, smoothed.settings.axis_length
+    weights = corners.weights[rows]
+    tip_curve, axis_curve = nurbs.control_points(smoothed.program, corners, rows, height)
+    v, _ = matching_parameters(tip_curve, axis_curve, weights, u, height)
+    points = nurbs.evaluate(tip_curve, weights, np.concatenate(([0.0], u)))
+    tops = nurbs.evaluate(axis_curve, weights, np.concatenate((np.zeros((len(rows), 1)), v), axis=1))
+    tops[:, -1] = axis_curve[:, -1]  # the straight motion behind starts from its own axis: equation (26)
+    return points, tops - points
 
 
 def _fill_divided(smoothed: SmoothProgram, layout: Layout, block: _Block) -> None:
