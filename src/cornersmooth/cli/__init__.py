@@ -18,6 +18,7 @@ from cornersmooth import __version__
 #: name of each command, its module and its line in the list of commands
 COMMANDS = {
     "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC text."),
+    "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
 }
 
 EXIT_INTERRUPTED = 130

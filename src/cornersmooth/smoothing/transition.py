@@ -24,6 +24,12 @@ BLOCK = 16384
 #: parameters u at which the deviation at constant H is evaluated; it is largest near u = ½
 _PROBES = 0.5 * np.array([0.5, 0.7, 0.8, 0.87, 0.92, 0.96, 0.98, 1.0])
 
+#: share of the tolerance left to what lies between two probes of a flat maximum
+_BETWEEN_PROBES = 1e-3
+
+#: relative size of what is only arithmetic
+_EXACT = 1e-10
+
 
 class Legs(NamedTuple):
     """The two segments at g corners, in space and seen from the tool axis.
@@ -189,15 +195,18 @@ def _proportional(legs: Legs, weights: Floats, ratio: Floats, settings: Settings
     bends = _Bends(legs, per_in, per_out, bend_tip, bend_turn, weights, ratio, factor, axis_length)
     shortest_lever = axis_length * half_cosine - length * per_length_turn  # below |B−A| of both motions
     bound = length * (per_length_tip + _divide(axis_length * per_length_turn, np.maximum(shortest_lever, 0.0)))
-    doubtful = (status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance)
+    doubtful = (status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance * (1.0 + _EXACT))
     # with all weights 1 the deviation at s = 2u is at most s³·(E + G·(1−s)), E that at u = ½ and G the lever's turn
     # over the half times H|O′−O|; so while G < 3E, here with a margin of two, the largest is E itself
     turn = np.maximum(norm(legs.turn_in) * per_in[:, 0], norm(legs.turn_out) * per_out[:, 0]) * length / axis_length
     tilt = 2.0 * turn * length * per_length_turn
     peaks = (tilt <= 1.5 * bends.middle(length)) & (turn < 0.5) & (weights == 1.0).all(axis=1)
     probed = np.flatnonzero(doubtful & ~peaks)
-    for rows, measure in ((np.flatnonzero(doubtful & peaks), bends.middle), (probed, bends.probe)):
-        shortened = _keep(length, rows, measure, settings.axis_point_tolerance)
+    for rows, measure, share in (
+        (np.flatnonzero(doubtful & peaks), bends.middle, 1.0),
+        (probed, bends.probe, 1.0 - _BETWEEN_PROBES),
+    ):
+        shortened = _keep(length, rows, measure, share * settings.axis_point_tolerance)
         limited_by[rows[shortened < length[rows]]] = LimitedBy.TOLERANCE
         length[rows] = shortened
     shortest = 4.0 * settings.tip_resolution
@@ -285,15 +294,13 @@ class _Bends:
 
 def _keep(length: Floats, rows: Ints, measure: Callable[[Floats, Ints], Floats], tolerance: float) -> Floats:
     """Lengths of the given rows, shortened until the measured deviation keeps the tolerance."""
-    # a thousandth is left to what lies between two probes of a flat maximum
-    allowed = 0.999 * tolerance
     length = length.copy()
     pending = rows
     while len(pending):
         deviation = measure(length[pending], pending)
-        over = deviation > allowed
+        over = deviation > tolerance * (1.0 + _EXACT)
         pending = pending[over]
-        length[pending] *= 0.9999 * allowed / deviation[over]
+        length[pending] *= tolerance / deviation[over] * (1.0 - _EXACT)
     return length[rows]
 
 

@@ -1,0 +1,221 @@
+"""The closed forms of design 3.4, the paper's table, and the promises that need no NC text."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+from cornersmooth.model import LimitedBy, Program, Status
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import nurbs, smooth
+
+TABLE_1 = (
+    np.array(
+        [
+            [174.1311, -6.4621, -68.1138],
+            [176.0862, -6.8579, -68.1299],
+            [178.2366, -8.4623, -68.2326],
+            [179.5084, -11.8775, -68.4966],
+        ]
+    ),
+    np.array(
+        [
+            [174.2154, -7.4301, -58.1611],
+            [176.2593, -7.9576, -58.1921],
+            [178.4059, -9.7816, -58.3215],
+            [179.5424, -13.4244, -58.6170],
+        ]
+    ),
+)
+
+
+def plane_corner(turn_deg: float, leg: float = 100.0) -> Program:
+    """Two equal segments in the XY plane that turn by the angle, axis +Z."""
+    turn = np.radians(turn_deg)
+    tips = np.array([[-leg, 0, 0], [0, 0, 0], [leg * np.cos(turn), leg * np.sin(turn), 0]])
+    return Program.from_poses(tips, np.tile([0.0, 0.0, 1.0], (3, 1)))
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "tips", "axes"),
+    [(0.078, (0.0729, 0.0780), (0.0780, 0.0767)), (0.15, (0.0729, 0.1265), (0.0789, 0.1307))],
+)
+def test_table_2_of_the_paper(tolerance, tips, axes):
+    tip, top = TABLE_1
+    corners = smooth(Program.from_poses(tip, top - tip), Settings(tolerance=tolerance, method="zhang2016")).corners
+    assert corners.tip_error == pytest.approx(tips, abs=1e-4)
+    assert corners.axis_error == pytest.approx(axes, abs=1e-4)
+    assert (corners.sync_residual > 1e-6).all(), "there is no exact root on this table"
+    assert np.isfinite(corners.jump_in).all()
+    assert np.isfinite(corners.jump_out).all()
+
+
+def test_basis_is_the_b_spline_basis_on_the_papers_knots():
+    u = np.linspace(0.0, 1.0, 101)
+    expected = np.stack([BSpline(nurbs.KNOTS, np.eye(5)[i], 3)(u) for i in range(5)], axis=-1)
+    assert nurbs.basis(u) == pytest.approx(expected, abs=1e-15)
+
+
+@pytest.mark.parametrize("turn", [5.0, 30.0, 60.0, 90.0, 120.0, 150.0, 169.0])
+def test_curvature_and_deviation_of_a_plane_corner(turn):
+    smoothed = smooth(plane_corner(turn), Settings(tolerance=0.05))
+    beta = np.radians(turn) / 2
+    length = 100.0 * smoothed.corners.trim_in[0]
+    assert 3 * 0.05 / np.sin(beta) == pytest.approx(length, rel=1e-9)
+    curve, _ = nurbs.control_points(smoothed.program, smoothed.corners, slice(None), 10.0)
+    u = np.linspace(0.0, 1.0, 2001)
+    point, first, second = (value[0] for value in nurbs.derivatives(curve, np.ones((1, 2)), u))
+    curvature = np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3
+    assert curvature.max() == pytest.approx(2 * np.sin(beta) / (length * np.cos(beta) ** 2), rel=1e-9)
+    assert curvature[0] == pytest.approx(0.0, abs=1e-9)
+    assert curvature[-1] == pytest.approx(0.0, abs=1e-9)
+    assert np.linalg.norm(first[0]) == pytest.approx(2 * length)
+    assert np.linalg.norm(point, axis=1).min() == pytest.approx(0.05, rel=1e-9), "corner to curve"
+    to_leg = np.abs(point[:1001, 1])
+    assert to_leg.max() == pytest.approx(0.05 * np.cos(beta), rel=1e-9), "curve to polyline"
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (1.0, 0.4), (0.6, 1.7), (2.5, 0.3)])
+@pytest.mark.parametrize("ratio", [0.55, 2 / 3, 0.85])
+def test_deviation_factor_holds_for_free_weights_and_ratio(weights, ratio):
+    settings = Settings(tolerance=0.02, weights=weights, ratio=ratio)
+    smoothed = smooth(plane_corner(70.0), settings)
+    curve, _ = nurbs.control_points(smoothed.program, smoothed.corners, slice(None), 10.0)
+    points = nurbs.evaluate(curve, smoothed.corners.weights, np.linspace(0, 1, 1001))[0]
+    assert np.linalg.norm(points, axis=1).min() == pytest.approx(0.02, rel=1e-9)
+
+
+def random_program(seed: int, count: int, *, step: float = 3.0, wobble: float = 0.15) -> Program:
+    rng = np.random.default_rng(seed)
+    tips = np.cumsum(rng.normal(size=(count, 3)) * step, axis=0)
+    axes = np.array([0.0, 0.0, 2.0]) + np.cumsum(rng.normal(size=(count, 3)) * wobble, axis=0)
+    return Program.from_poses(tips, axes)
+
+
+def axis_by_tip_length(tip_curve, axis_curve, weights, at):
+    """Axis and its first two derivatives with respect to tip arc length, at one end of each transition."""
+    u = np.array([float(at)])
+    _, p1, p2 = (value[:, 0] for value in nurbs.derivatives(tip_curve, weights, u))
+    p0 = tip_curve[:, 0 if at == 0 else 4]
+    q0, q1, q2 = (value[:, 0] for value in nurbs.derivatives(axis_curve, weights, u))
+    v0, v1, v2 = q0 - p0, q1 - p1, q2 - p2
+    return _unit_derivatives(v0, v1, v2, p1, p2)
+
+
+def _unit_derivatives(v0, v1, v2, p1, p2):
+    """Derivatives of v/|v| by arc length of p, from derivatives by a common parameter."""
+    dot = lambda a, b: (a * b).sum(axis=-1, keepdims=True)  # noqa: E731
+    norm = np.sqrt(dot(v0, v0))
+    o0 = v0 / norm
+    n1 = dot(o0, v1)
+    o1 = (v1 - n1 * o0) / norm
+    n2 = dot(o1, v1) + dot(o0, v2)
+    o2 = (v2 - n2 * o0 - 2 * n1 * o1) / norm
+    speed = np.sqrt(dot(p1, p1))
+    rate = dot(p1, p2) / speed
+    return o0, o1 / speed, (o2 - o1 * rate / speed) / speed**2
+
+
+def test_orientation_is_twice_differentiable_in_tip_length_at_the_joints():
+    smoothed = smooth(random_program(7, 400), Settings(tolerance=0.5))
+    program, corners = smoothed.program, smoothed.corners
+    rows = np.flatnonzero(corners.smoothed)
+    assert len(rows) > 300
+    tip_curve, axis_curve = nurbs.control_points(program, corners, rows, 10.0)
+    tops = program.tip + 10.0 * program.axis
+    for at, near, far, trim in (
+        (0, corners.before[rows], corners.pose[rows], 1.0 - corners.trim_in[rows]),
+        (1, corners.pose[rows], corners.after[rows], corners.trim_out[rows]),
+    ):
+        tip_step, top_step = program.tip[far] - program.tip[near], tops[far] - tops[near]
+        lever = 10.0 * program.axis[near] + trim[:, None] * (top_step - tip_step)
+        line = _unit_derivatives(lever, top_step - tip_step, np.zeros_like(lever), tip_step, np.zeros_like(lever))
+        curve = axis_by_tip_length(tip_curve, axis_curve, corners.weights[rows], at)
+        for of_line, of_curve in zip(line, curve, strict=True):
+            scale = np.maximum(np.linalg.norm(of_line, axis=1), 1e-3)
+            assert (np.linalg.norm(of_line - of_curve, axis=1) / scale).max() <= 1e-9
+
+
+def test_moving_turning_scaling_and_reversing_the_path_commute_with_smoothing():
+    program = random_program(3, 200)
+    settings = Settings(tolerance=0.05)
+    plain = smooth(program, settings).corners
+    rotation = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    moved = Program.from_poses(program.tip @ rotation.T + [5.0, -3.0, 11.0], program.axis @ rotation.T)
+    bigger = Program.from_poses(program.tip * 3.0, program.axis)
+    backwards = Program.from_poses(program.tip[::-1], program.axis[::-1])
+    for corners, order in (
+        (smooth(moved, settings).corners, slice(None)),
+        (smooth(bigger, settings.but(tolerance=0.15, axis_length=30.0)).corners, slice(None)),
+    ):
+        assert corners.trim_in[order] == pytest.approx(plain.trim_in, rel=1e-9, abs=1e-12)
+        assert corners.trim_out[order] == pytest.approx(plain.trim_out, rel=1e-9, abs=1e-12)
+    turned = smooth(backwards, settings).corners
+    assert turned.trim_in[::-1] == pytest.approx(plain.trim_out, rel=1e-9, abs=1e-12)
+    assert turned.status[::-1].tolist() == plain.status.tolist()
+
+
+def simultaneous_deviation(smoothed, rows, u):
+    """Largest tip and axis-point distance at the common parameter, computed from the poses alone."""
+    program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
+    tip_curve, axis_curve = nurbs.control_points(program, corners, rows, height)
+    shares = nurbs.rational_basis(u, corners.weights[rows])
+    ratio = corners.ratio[rows][:, None]
+    first = shares[..., 0] + ratio * (shares[..., 1] - shares[..., 3])
+    second = shares[..., 4] + ratio * (shares[..., 3] - shares[..., 1])
+    towards = np.where(u <= 0.5, corners.before[rows][:, None], corners.after[rows][:, None])
+    trim = np.where(u <= 0.5, corners.trim_in[rows][:, None], corners.trim_out[rows][:, None])
+    fraction = (np.where(u <= 0.5, first, second) * trim)[..., None]
+    pose = corners.pose[rows][:, None]
+    tip = program.tip[pose] + fraction * (program.tip[towards] - program.tip[pose])
+    lever = program.axis[pose] + fraction * (program.axis[towards] - program.axis[pose])
+    top = tip + height * lever / np.linalg.norm(lever, axis=-1, keepdims=True)
+    points = nurbs.evaluate(tip_curve, corners.weights[rows], u)
+    levers = nurbs.evaluate(axis_curve, corners.weights[rows], u) - points
+    tops = points + height * levers / np.linalg.norm(levers, axis=-1, keepdims=True)
+    return np.linalg.norm(points - tip, axis=-1).max(axis=1), np.linalg.norm(tops - top, axis=-1).max(axis=1)
+
+
+@pytest.mark.parametrize("wobble", [0.02, 0.3, 1.0])
+@pytest.mark.parametrize("axis_length", [10.0, 50.0])
+def test_tip_and_axis_point_keep_the_tolerance_at_one_common_parameter(wobble, axis_length):
+    smoothed = smooth(random_program(11, 3000, wobble=wobble), Settings(tolerance=0.04, axis_length=axis_length))
+    corners = smoothed.corners
+    rows = np.flatnonzero(corners.smoothed)
+    tip, top = simultaneous_deviation(smoothed, rows, np.linspace(0, 1, 401))
+    assert tip.max() <= 0.04 + 1e-12
+    assert top.max() <= 0.04 + 1e-10
+    assert top == pytest.approx(corners.axis_error[rows], rel=2e-3, abs=1e-6)
+    assert tip == pytest.approx(corners.tip_error[rows], rel=1e-9)
+
+
+def test_orientation_tolerance_is_kept_and_said():
+    smoothed = smooth(random_program(5, 1000, wobble=0.5), Settings(tolerance=1.0, orientation_tolerance=0.2))
+    corners = smoothed.corners
+    assert (corners.limited_by == LimitedBy.ORIENTATION).any()
+    assert np.degrees(corners.orientation_error.max()) <= 0.2 * (1 + 1e-9)
+
+
+def test_reversals_and_flips_stay_sharp():
+    tips = np.array([[0, 0, 0], [10, 0, 0], [0, 0, 0], [0, 10, 0], [0, 20, 1]], float)
+    axes = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, -1]], float)
+    corners = smooth(Program.from_poses(tips, axes), Settings()).corners
+    assert corners.status.tolist() == [Status.REVERSAL, Status.SMOOTHED, Status.AXIS_STEP]
+
+
+@pytest.mark.parametrize("creep", [0.0, 1e-9])
+def test_repeated_poses_are_one_corner(creep):
+    tips = np.array([[0, 0, 0], [10, 0, 0], [10, creep, 0], [10, creep, creep], [10, 10, 0]], float)
+    axes = np.tile([0.0, 0.0, 1.0], (5, 1))
+    corners = smooth(Program.from_poses(tips, axes), Settings()).corners
+    assert corners.status.tolist() == [Status.SMOOTHED, Status.DUPLICATE, Status.DUPLICATE]
+    assert corners.before[0] == 0
+    assert corners.after[0] == 4
+
+
+def test_poses_that_creep_on_are_not_merged():
+    step = 0.9e-6
+    tips = np.concatenate(([[-5.0, 0, 0]], np.arange(2000)[:, None] * [step, 0, 0], [[5.0, 5.0, 0]]))
+    corners = smooth(Program.from_poses(tips, np.tile([0.0, 0, 1], (len(tips), 1))), Settings()).corners
+    assert not (corners.status == Status.DUPLICATE).any()
