@@ -1,0 +1,142 @@
+"""Time the whole ``cornersmooth smooth`` command beside a plain C program: ``bench.py [--points N] [--runs K]``.
+
+Both read the same file of five-axis points and write the same kind of NC text; runs alternate, medians are shown.
+The C program (`baseline.c`) leaves out all that is not reading, rounding corners and writing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+FORMS = ("g1", "g6.2")
+TOLERANCE, AXIS_LENGTH = 0.01, 10.0  # mm
+POINTS = 1_000_000
+HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one process took."""
+
+    wall: float
+    user: float
+    system: float
+    memory: float  # MB at the peak
+
+    @property
+    def processor(self) -> float:
+        """Seconds of processor time."""
+        return self.user + self.system
+
+
+def run(command: Sequence[str | Path]) -> Run:
+    """Run a command to its end; SystemExit with its messages if it fails."""
+    with tempfile.TemporaryFile() as messages:
+        start = time.perf_counter()
+        process = subprocess.Popen([str(word) for word in command], stdout=messages, stderr=messages)
+        _, status, usage = os.wait4(process.pid, 0)
+        wall = time.perf_counter() - start
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode:
+            messages.seek(0)
+            said = messages.read().decode(errors="replace")
+            sys.exit(f"{Path(command[0]).name} ended with {process.returncode}:\n{said}")
+    per_megabyte = 1 << 20 if sys.platform == "darwin" else 1 << 10  # ru_maxrss: bytes there, kilobytes elsewhere
+    return Run(wall, usage.ru_utime, usage.ru_stime, usage.ru_maxrss / per_megabyte)
+
+
+def typical(runs: Sequence[Run]) -> Run:
+    """Medians of what several runs took."""
+    return Run(*(median(getattr(one, name) for one in runs) for name in ("wall", "user", "system", "memory")))
+
+
+def count_lines(path: Path) -> int:
+    """Line ends in a file."""
+    with path.open("rb") as file:
+        return sum(piece.count(b"\n") for piece in iter(lambda: file.read(1 << 20), b""))
+
+
+def find_command() -> Path:
+    """Return the cornersmooth beside this Python, or else the one on the path."""
+    found = shutil.which("cornersmooth", path=str(Path(sys.executable).parent)) or shutil.which("cornersmooth")
+    return Path(found) if found else sys.exit("no cornersmooth command: install the package first")
+
+
+def compile_baseline(folder: Path) -> Path:
+    """Compile the C program."""
+    compiler = shutil.which("cc") or shutil.which("gcc") or sys.exit("no C compiler: install gcc")
+    program = folder / "baseline"
+    subprocess.run([compiler, "-O2", "-o", program, HERE / "baseline.c", "-lm"], check=True)
+    return program
+
+
+def compare(form: str, path: Path, folder: Path, programs: dict[str, Path], runs: int) -> None:
+    """Time one output form and print its table."""
+    written = {name: folder / f"{name}-{form}.nc" for name in programs}
+    report = folder / "report.json"
+    options: list[str | Path] = [
+        "-e",
+        f"{TOLERANCE}",
+        "-H",
+        f"{AXIS_LENGTH}",
+        "-f",
+        form,
+        "--report",
+        report,
+        "--force",
+        "-q",
+    ]
+    commands: dict[str, list[str | Path]] = {
+        "cornersmooth": [programs["cornersmooth"], "smooth", path, *options, "-o", written["cornersmooth"]],
+        "baseline.c": [programs["baseline.c"], path, written["baseline.c"], f"{TOLERANCE}", f"{AXIS_LENGTH}"],
+    }
+    if form == "g6.2":
+        commands["baseline.c"].append("--g6.2")
+    taken: dict[str, list[Run]] = {name: [] for name in commands}
+    for _ in range(runs):
+        for name, command in commands.items():
+            taken[name].append(run(command))
+
+    print(f"\n{form}: {'':17}    wall s   user+sys s   peak MB        lines")
+    summary = {name: typical(one) for name, one in taken.items()}
+    for name, one in summary.items():
+        lines = count_lines(written[name])
+        print(f"  {name:20}  {one.wall:8.2f}   {one.processor:10.2f}   {one.memory:7.0f}   {lines:10,}")
+    ours, plain = summary["cornersmooth"], summary["baseline.c"]
+    print(f"  {'ratio':20}  {ours.wall / plain.wall:8.2f}   {ours.processor / plain.processor:10.2f}")
+    seconds = json.loads(report.read_text())["summary"]["seconds"]
+    print("  stages of the last run: " + ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
+
+
+def main() -> None:
+    """Make the file, compile the C program, time both."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--points", type=int, default=POINTS, help="points of the file (default %(default)s)")
+    parser.add_argument("--runs", type=int, default=3, help="runs of each program (default %(default)s)")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="bench-") as name:
+        folder = Path(name)
+        path = folder / "bench.cls"
+        # in a process of its own: what this one has in memory would count as a peak of those it starts
+        subprocess.run([sys.executable, HERE / "make_clsf.py", path, str(given.points)], check=True)
+        programs = {"cornersmooth": find_command(), "baseline.c": compile_baseline(folder)}
+        print(
+            f"{given.points:,} points, {path.stat().st_size / 1e6:.1f} MB, tolerance {TOLERANCE} mm, {given.runs} runs"
+        )
+        for form in FORMS:
+            compare(form, path, folder, programs, given.runs)
+
+
+if __name__ == "__main__":
+    main()
