@@ -7,12 +7,13 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.cl import arcs as arc_geometry
-from cornersmooth.cl.arcs import ArcRule, ArcTable
+from cornersmooth.cl.arcs import ArcRule
 from cornersmooth.cl.builder import Builder
 from cornersmooth.cl.bulk import blocks
 from cornersmooth.cl.dialects import by_name, recognise
 from cornersmooth.cl.grammar import Decode, Record, read_records
-from cornersmooth.cl.interpret import Interpreter
+from cornersmooth.cl.interpret import end, obey, plain
+from cornersmooth.cl.machine import Machine
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import MM_PER_UNIT, Arcs, Keep, Move, Program, Source, Units
@@ -64,28 +65,27 @@ def read_apt(
     known = by_name(dialect) if dialect else recognise(data)
     decode = _decoder(data)
     builder = Builder(name, short_axis_up=known.short_axis == "up", lenient=lenient)
-    arcs = ArcTable()
-    machine = Interpreter(name, known, builder, arcs, arc_rule, lenient)
+    machine = Machine(name, known, builder, arc_rule, lenient)
     _run(data, machine, decode, fast)
-    machine.end()
+    end(machine)
     if not builder.n:
         raise error("CS101", name, None)
     return _program(machine, units)
 
 
-def _run(data: bytes, machine: Interpreter, decode: Decode, fast: bool) -> None:
+def _run(data: bytes, machine: Machine, decode: Decode, fast: bool) -> None:
     remembered: dict[tuple[bytes, ...], list[Record]] = {}
     done = 0
 
-    def obey(lines: list[bytes], first: int, follows: str) -> None:
+    def take(lines: list[bytes], first: int, follows: str) -> None:
         key = tuple(lines) if len(lines) <= LONGEST_GAP else ()
         for record in remembered.get(key, ()) if key else ():
-            machine.obey(record.moved(first - 1))
+            obey(machine, record.moved(first - 1))
         if key in remembered:
             return
         records = []
         for record in read_records(lines, first, decode, machine.file, follows):
-            machine.obey(record)
+            obey(machine, record)
             if key:
                 records.append(record.moved(1 - first))
         if key and len(remembered) < REMEMBERED:
@@ -99,13 +99,13 @@ def _run(data: bytes, machine: Interpreter, decode: Decode, fast: bool) -> None:
         rows = block.rows.tolist()
         for run, (start, stop) in enumerate(block.runs.tolist()):
             if begin < start:
-                obey(block.lines[begin:start], block.first + begin, "GOTO")
+                take(block.lines[begin:start], block.first + begin, "GOTO")
             if machine.stopped:
                 return
-            machine.plain(rows[run + 1] - rows[run], block.first + start)
+            plain(machine, rows[run + 1] - rows[run], block.first + start)
             begin = stop
         if begin < len(block.lines):
-            obey(block.lines[begin:], block.first + begin, follows)
+            take(block.lines[begin:], block.first + begin, follows)
         if machine.stopped:
             return
 
@@ -120,7 +120,7 @@ def _decoder(data: bytes) -> Decode:
     return lambda line: line.decode("utf-8")
 
 
-def _program(machine: Interpreter, asked: Units | None) -> Program:
+def _program(machine: Machine, asked: Units | None) -> Program:
     builder = machine.builder
     units, said = _units(machine, asked)
     scale = MM_PER_UNIT[units]
@@ -148,11 +148,11 @@ def _program(machine: Interpreter, asked: Units | None) -> Program:
         statements=tuple(machine.statements),
         units=units,
         source=Source(machine.file, "apt", machine.dialect.name),
-        findings=(*said, *machine.findings(), *axis_findings, *resolved.findings),
+        findings=(*said, *machine.findings, *axis_findings, *resolved.findings),
     )
 
 
-def _units(machine: Interpreter, asked: Units | None) -> tuple[Units, list[Finding]]:
+def _units(machine: Machine, asked: Units | None) -> tuple[Units, list[Finding]]:
     """Units of the file: as asked for, as stated, as the feeds suggest, or as the dialect has them."""
     stated = machine.stated_units
     for line, now, pose in stated:

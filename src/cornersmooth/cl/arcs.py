@@ -8,7 +8,6 @@ leaves them by a cusp but would join them smoothly the other way round is a cont
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Literal
@@ -36,7 +35,7 @@ SHORTEST_DIGITS: Final = 2
 LEAST_DECIMALS: Final = 3
 
 #: a neighbour is tangent, or exactly opposite, within this angle
-TANGENT: Final = math.radians(10)
+TANGENT: Final = math.radians(15)
 
 #: a neighbouring line votes if it is longer than so many printed digits
 VOTING_DIGITS: Final = 100
@@ -107,7 +106,7 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
         raise error("CS127", file, record.line, word="MOVARC", value=sweep / (2 * math.pi), limit=MOST_TURNS)
     left = rule == "left" if rule in ("left", "right") else count >= 11
     sign = -1 / length if left else 1 / length
-    printed = max((len(digits) for digits in re.findall(r"\.([0-9]*)", record.text)), default=0)
+    printed = max(len(number.partition(".")[2].strip()) for number in record.text.partition("/")[2].split(",")[:3])
     return Arc(
         record.line,
         record.word,
@@ -127,11 +126,16 @@ class ArcTable:
 
     pose: list[int] = field(default_factory=list)
     arc: list[Arc] = field(default_factory=list)
+    inner: list[tuple[int, tuple[float, float, float]]] = field(default_factory=list)
 
     def add(self, pose: int, arc: Arc) -> None:
         """Note that this pose ends this arc."""
         self.pose.append(pose)
         self.arc.append(arc)
+
+    def pass_through(self, points: list[tuple[float, float, float]]) -> None:
+        """Note that the next arc that is added passes these points."""
+        self.inner += [(len(self.arc), point) for point in points]
 
     def column(self, get: Callable[[Arc], object]) -> Floats:
         """One attribute of all arcs."""
@@ -203,6 +207,20 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
     turn, full_turns = _as_stated(table, turn, full_turns, stated, resolution / radius, short, file)
 
     agree, against = _votes(tip, kind, pose, start, end, normal, resolution)
+    if table.inner:
+        row = np.array([row for row, _ in table.inner], np.int64)
+        spoke = np.array([point for _, point in table.inner]) - centre[row]
+        spoke = spoke - _dot(spoke, normal[row])[:, None] * normal[row]
+        off = ~(np.abs(_length(spoke) - radius[row]) <= allowed[row])
+        if off.any():
+            first = int(off.argmax())
+            values = {"which": "point", "distance": _length(spoke)[first], "radius": radius[row[first]]}
+            raise error("CS123", file, table.arc[row[first]].line, **values)
+        passed = np.arctan2(_dot(np.cross(start[row], spoke), normal[row]), _dot(start[row], spoke)) % (2 * np.pi)
+        clear = np.minimum(passed, 2 * np.pi - passed) * radius[row] > VOTING_DIGITS * resolution[row]
+        beyond = passed > turn[row] + allowed[row] / radius[row]
+        np.add.at(agree, row, clear & ~beyond)
+        np.add.at(against, row, clear & beyond)
     contrary = (against > 0) & (agree == 0) & ~short & np.isnan(stated)
     findings = []
     if rule == "tangent":

@@ -39,8 +39,12 @@ class Changes:
     def set(self, pose: int, value: float) -> None:
         """Let the state be `value` from this pose on."""
         if value != self.value[-1]:
-            self.at.append(pose)
-            self.value.append(value)
+            self.append(pose, value)
+
+    def append(self, pose: int, value: float) -> None:
+        """Let the state be `value` from this pose on, also where it is already."""
+        self.at.append(pose)
+        self.value.append(value)
 
     @property
     def now(self) -> float:
@@ -115,7 +119,11 @@ class Builder:
         """Tip of the last pose."""
         if self._last_single:
             return self._single_tip[-1]
-        x, y, z = self._blocks[-1].tip[self._row()].tolist()
+        row, block = self._row(), len(self._blocks) - 1
+        while row < 0:  # nothing of the last block was taken yet
+            block -= 1
+            row += len(self._blocks[block].tip)
+        x, y, z = self._blocks[block].tip[row].tolist()
         return x, y, z
 
     def last_axis(self) -> Vector:

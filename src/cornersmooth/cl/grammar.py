@@ -177,10 +177,16 @@ def arguments(body: str) -> tuple[Argument, ...]:
     return tuple(_argument(part.strip()) for part in parts)
 
 
+def number(token: str) -> float | None:
+    """Return the number that a token is, None for anything else."""
+    found = NUMBER.fullmatch(token)
+    return None if found is None else float((found[1] + found[2]).replace("D", "E").replace("d", "e"))
+
+
 def _argument(token: str) -> Argument:
-    number = NUMBER.fullmatch(token)
-    if number is not None:
-        return float((number[1] + number[2]).replace("D", "E").replace("d", "e"))
+    value = number(token)
+    if value is not None:
+        return value
     return token if token.startswith("'") else token.upper()
 
 

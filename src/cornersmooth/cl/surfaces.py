@@ -1,0 +1,193 @@
+"""Arcs written as drive surfaces: CATIA's and Creo's TLON,GOFWD with CIRCLE or CYLNDR, CATIA's HELICAL.
+
+::
+
+    INDIRV/tx,ty,tz
+    TLON,GOFWD/(CIRCLE/xc,yc,zc,r),ON,[2,INTOF,](LINE/x1,y1,z1,x2,y2,z2)
+
+The tool leaves its position along the circle in the direction of INDIRV and stops where the check surface behind ON
+(a line, or a plane) is met for the first time, or the second time with 2,INTOF (Dassault, Syntax of Generated APT
+Instructions; PostWorks 15.1 appendix G). CAM systems let the line end in the end point of the arc.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.cl.arcs import LEAST_DECIMALS, MOST_TURNS, NORMAL_TOLERANCE, RADIUS_DIGITS, RADIUS_SHARE, Arc
+from cornersmooth.cl.builder import Vector
+from cornersmooth.cl.grammar import Record, number
+from cornersmooth.cl.messages import error
+from cornersmooth.errors import InputError
+from cornersmooth.model import Floats
+
+_SURFACE: Final = re.compile(r"\((CIRCLE|CYLNDR)/(CANON,)?([^()]*)\)", re.IGNORECASE)
+_LINE: Final = re.compile(r"\(LINE/([^()]*)\)", re.IGNORECASE)
+_POINT: Final = re.compile(r"\(POINT/([^()]*)\)", re.IGNORECASE)
+_PLANE: Final = re.compile(r"\(PLANE/([^()A-Z]*)\)", re.IGNORECASE)
+_MEETING: Final = re.compile(r",([0-9]+),INTOF,", re.IGNORECASE)
+
+Direction = tuple[str, Vector] | None
+
+
+def read_drive_arc(record: Record, start: Vector, direction: Direction, file: str) -> tuple[Arc, Vector]:
+    """Read TLON,GOFWD on a circle or cylinder; return the arc and its end point.
+
+    Parameters
+    ----------
+    record : Record
+    start : (x, y, z)
+        Where the tool stands; the unit of the file.
+    direction : (word, vector) or None
+        INDIRV or INDIRP before it.
+    file : str
+        For messages.
+
+    Raises
+    ------
+    InputError
+        CS123, CS125, CS126
+    """
+    text = "".join(record.text.split())
+    surface, _, check = text.partition(",ON,")
+    found = _SURFACE.search(surface)
+    if found is None or not check:
+        raise _refuse(record, file, "only CIRCLE and CYLNDR with a check surface behind ON are understood")
+    values = _values(found[3], record, file)
+    plain = found[1].upper() == "CIRCLE" and not found[2]
+    if len(values) != (4 if plain else 7):
+        raise _refuse(record, file, f"{found[1].upper()} has {len(values)} numbers")
+    centre, radius = np.array(values[:3]), values[-1]
+    spoke = np.array(start) - centre
+    tangent = _tangent(record, np.array(start), direction, file)
+    if plain:
+        normal = np.cross(spoke, tangent)
+    else:
+        axis = np.array(values[3:6])
+        if not abs(np.linalg.norm(axis) - 1) <= NORMAL_TOLERANCE:
+            raise error("CS124", file, record.line, word=record.word, length=float(np.linalg.norm(axis)))
+        normal = math.copysign(1.0, float(np.dot(np.cross(spoke, tangent), axis))) * axis
+    size = float(np.linalg.norm(normal))
+    if not 0 < size < math.inf:
+        raise _refuse(record, file, "its direction points through the centre")
+    arc = _arc(record, centre, normal / size, radius, found[3], file)
+    return arc, _end(record, arc, np.array(start), f",{check}", file)
+
+
+def read_helix(record: Record, start: Vector, direction: Direction, file: str) -> tuple[Arc, Vector]:
+    """Read HELICAL/centre,tangent,axis,pitch,radius[,angle,height,turns],end; return the arc and its end point.
+
+    Raises
+    ------
+    InputError
+        CS106, CS120, CS124-CS127
+    """
+    values = [value for value in record.args if isinstance(value, float)]
+    if len(values) != len(record.args) or len(values) not in (14, 17):
+        want = "centre, tangent, axis, pitch, radius, (angle, height, turns,) end"
+        raise error("CS120", file, record.line, word="HELICAL", count=len(values), s="s", want=want)
+    centre, tangent, axis = np.array(values[:9]).reshape(3, 3)
+    pitch, radius = values[9:11]
+    end = np.array(values[-3:])
+    length = float(np.linalg.norm(axis))
+    if not abs(length - 1) <= NORMAL_TOLERANCE:
+        raise error("CS124", file, record.line, word="HELICAL", length=length)
+    axis = axis / length
+    side = float(np.dot(np.cross(np.array(start) - centre, tangent), axis))
+    if not (side != 0 and math.isfinite(side) and pitch > 0):
+        raise _refuse(record, file, "it has no direction or no pitch")
+    sweep = 2 * math.pi * abs(float(np.dot(end - np.array(start), axis))) / pitch
+    if not 0 < sweep <= 2 * math.pi * MOST_TURNS:
+        raise error("CS127", file, record.line, word="HELICAL", value=sweep / (2 * math.pi), limit=MOST_TURNS)
+    arc = _arc(record, centre, math.copysign(1.0, side) * axis, radius, record.text.partition("/")[2], file, sweep)
+    return arc, _vector(end)
+
+
+def _arc(
+    record: Record, centre: Floats, normal: Floats, radius: float, text: str, file: str, sweep: float = math.nan
+) -> Arc:
+    if not 0 < radius < math.inf:
+        raise error("CS125", file, record.line, word=record.word, radius=radius)
+    printed = max(len(token.partition(".")[2].strip()) for token in text.split(",")[:3])
+    resolution = 10.0 ** -max(printed, LEAST_DECIMALS)
+    return Arc(record.line, record.word, _vector(centre), _vector(normal), radius, 1, sweep, resolution, certain=True)
+
+
+def _tangent(record: Record, start: Floats, direction: Direction, file: str) -> Floats:
+    if direction is None:
+        raise _refuse(record, file, "no INDIRV or INDIRP says which way round")
+    word, vector = direction
+    return np.array(vector) - start if word == "INDIRP" else np.array(vector)
+
+
+def _end(record: Record, arc: Arc, start: Floats, check: str, file: str) -> Vector:
+    """End of the arc: a point of the check surface that is on the circle, or where the two meet."""
+    centre, normal = np.array(arc.centre), np.array(arc.normal)
+    found = _MEETING.search(check)
+    wanted = int(found[1]) if found is not None else 1
+    near = max(RADIUS_DIGITS * arc.resolution, RADIUS_SHARE * arc.radius)
+    lines, points, planes = _LINE.findall(check), _POINT.findall(check), _PLANE.findall(check)
+    if lines:
+        values = _values(lines[-1], record, file)
+        if len(values) != 6:
+            raise _refuse(record, file, f"LINE has {len(values)} numbers")
+        origin, last = np.array(values).reshape(2, 3)
+        plane = np.cross(last - origin, normal)
+    elif points:
+        values = _values(points[-1], record, file)
+        if len(values) != 3:
+            raise _refuse(record, file, f"POINT has {len(values)} numbers")
+        origin, last = centre, np.array(values)
+        plane = np.cross(last - origin, normal)
+    elif planes:
+        values = _values(planes[-1], record, file)
+        if len(values) != 4:
+            raise _refuse(record, file, f"PLANE has {len(values)} numbers")
+        plane = np.array(values[:3])
+        origin, last = plane * values[3], None
+    else:
+        raise _refuse(record, file, "its check surface is not understood")
+    spoke = start - centre
+    if last is not None:
+        out = last - centre
+        height = float(np.dot(out, normal))
+        if abs(float(np.linalg.norm(out - height * normal)) - arc.radius) <= near:
+            return _vector(last)
+    # the plane of the check surface cuts the circle where a·cos + b·sin = c
+    spoke = spoke - float(np.dot(spoke, normal)) * normal
+    a, b = float(np.dot(spoke, plane)), float(np.dot(np.cross(normal, spoke), plane))
+    c = float(np.dot(origin - centre, plane))
+    if not 0 < math.hypot(a, b) < math.inf or not abs(c) <= math.hypot(a, b):
+        raise _refuse(record, file, "circle and check surface do not meet")
+    middle, half = math.atan2(b, a), math.acos(c / math.hypot(a, b))
+    least = near / arc.radius
+    angles = sorted(least + (middle + side * half - least) % (2 * math.pi) for side in (-1, 1))
+    if not 1 <= wanted <= len(angles):
+        raise _refuse(record, file, f"there is no meeting {wanted}")
+    angle = angles[wanted - 1]
+    height = float(np.dot(start - centre, normal))
+    turned = math.cos(angle) * spoke + math.sin(angle) * np.cross(normal, spoke)
+    return _vector(centre + turned + height * normal)
+
+
+def _values(text: str, record: Record, file: str) -> list[float]:
+    values = []
+    for token in text.split(","):
+        value = number(token)
+        if value is None or not math.isfinite(value):
+            raise error("CS106", file, record.line, word=record.word, token=token)
+        values.append(value)
+    return values
+
+
+def _vector(array: Floats) -> Vector:
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def _refuse(record: Record, file: str, why: str) -> InputError:
+    return error("CS126", file, record.line, word=record.word, why=why)
