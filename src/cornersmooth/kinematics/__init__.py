@@ -6,7 +6,7 @@ from cornersmooth.kinematics.machine import Machine, RotaryAxis
 from cornersmooth.kinematics.machine_files import load_machine, machine_names, parse_machine
 from cornersmooth.kinematics.orientation import Solutions, solutions, tool_axis
 from cornersmooth.kinematics.position import inverse_time, machine_position, tip_position
-from cornersmooth.kinematics.route import RotaryPath, rotary_angles
+from cornersmooth.kinematics.route import RotaryPath, rapid_moves, rotary_angles
 
 __all__ = [
     "FilledPath",
@@ -23,6 +23,7 @@ __all__ = [
     "machine_names",
     "machine_position",
     "parse_machine",
+    "rapid_moves",
     "rotary_angles",
     "solutions",
     "tip_position",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.kinematics.findings import limit_error
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.orientation import angle_between, continued, solutions, tool_axis, wrap
 from cornersmooth.kinematics.position import machine_position, tip_position
@@ -24,6 +25,8 @@ ROUNDS, PARTS = 24, 64
 #: (degrees), is divided at once into as many parts as the square law of its error says for AIM of the tolerance. All
 #: others are halved.
 SMOOTH, SMOOTH_TURN, AIM = 0.1, 30.0, 0.95
+#: The largest error lies beside the places looked at: what is found there is held to this share of the tolerance.
+SMOOTH_SHARE, ROUGH_SHARE = 0.98, 0.8
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,8 @@ def insertions(
     rapid: Bools | None = None,
     tip_tolerance: float | None = None,
     max_step: float | None = None,
+    line: Ints | None = None,
+    file: str | None = None,
 ) -> Insertions:
     """Points that a path needs so that straight blocks between its rotary words stay on the ruled motion.
 
@@ -102,6 +107,13 @@ def insertions(
         run linearly. None where the control keeps the tip on its line.
     max_step : float or None, degrees
         Largest turn of a rotary axis in one block.
+    line, file : (n,) int64 and str, optional
+        For messages.
+
+    Raises
+    ------
+    InputError
+        A rotary axis would leave its limits on the way between two poses within them (CS362).
     """
     rapid = np.zeros(len(axis), np.bool_) if rapid is None else rapid
     branch = _branches(machine, axis, angles, tolerance / 2)
@@ -128,7 +140,18 @@ def insertions(
     fraction = np.concatenate([part.start for part in found] or [np.zeros(0)])
     inner = np.concatenate([part.start_angles for part in found] or [np.zeros((0, 2))])
     order = np.lexsort((fraction, segment))
-    return Insertions(segment[order], fraction[order], inner[order], np.unique(open_.segment))
+    segment, fraction, inner = segment[order], fraction[order], inner[order]
+    limits = machine.limits
+    inside = np.clip(inner, limits[:, 0], limits[:, 1])
+    # At the pole the second axis may stop at its limit; anywhere else the way itself is outside.
+    outside = np.abs(inner - inside).max(axis=1, initial=0.0) > tolerance / 2
+    if outside.any():
+        first = int(np.argmax(outside))
+        here = slice(first, first + 1)
+        both = solutions(machine, ruled(tip, axis, segment[here], fraction[here])[1]).angles[0]
+        number = 0 if line is None else int(line[segment[first] + 1])
+        raise limit_error(machine, both, limits, inner[first], number, 0, file)
+    return Insertions(segment, fraction, inside, np.unique(open_.segment))
 
 
 def fill(tip: Floats, axis: Floats, angles: Floats, more: Insertions) -> FilledPath:
@@ -205,6 +228,7 @@ class _Motion:
         worst = excess.max(axis=0, initial=0.0)
         smooth = (np.abs(excess[[0, 2]] - 0.75 * excess[1]) <= SMOOTH * excess[1]).all(axis=0)
         smooth &= checked.turn.sum(axis=1) <= SMOOTH_TURN
+        worst /= np.where(smooth, SMOOTH_SHARE, ROUGH_SHARE)
         count = np.where(smooth, np.ceil(np.sqrt(worst / AIM)), 2).astype(np.int64)
         parts[check] = np.where(worst > 1, np.maximum(count, 2), parts[check])
         return np.minimum(parts, PARTS)

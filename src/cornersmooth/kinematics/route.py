@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.kinematics.choice import LIMIT_SLACK, PREFERENCE_COST, NoChoiceError, Pieces, choose
@@ -18,7 +19,7 @@ from cornersmooth.kinematics.orientation import (
     solutions,
     tool_axis,
 )
-from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints, Move
 
 #: A step of the first angle larger than this (degrees) is followed on its way to see which way round it goes.
 WIDE_STEP = 90.0
@@ -111,6 +112,17 @@ def rotary_angles(
     findings = pole_finding(machine, tip, axis, angles, found.pole_distance, rapid, line)
     findings += rewind_finding(machine, angles, rapid, line)
     return RotaryPath(angles, deviation, findings)
+
+
+def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
+    """Poses of a program whose move does not cut, so that solution and turn may change in it: (n,) bool.
+
+    Everything but linear feed moves and arcs, and what follows a start position that is stated, not moved to.
+    """
+    rapid: Bools = (kind != Move.LINEAR) & (kind != Move.ARC)
+    rapid[1:] |= kind[:-1] == Move.FROM
+    rapid[:1] = True
+    return rapid
 
 
 def _steady_angles(

@@ -1,0 +1,170 @@
+"""Points inserted into blocks, judged by walking along every block ourselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cornersmooth.errors import InputError
+from cornersmooth.kinematics import (
+    FilledPath,
+    Machine,
+    RotaryAxis,
+    fill,
+    insertions,
+    load_machine,
+    machine_names,
+    machine_position,
+    rapid_moves,
+    rotary_angles,
+    tip_position,
+    tool_axis,
+)
+from cornersmooth.kinematics.orientation import angle_between
+from cornersmooth.model import Move
+
+STEPS = 24
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def random_path(seed: int, n: int = 60) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-4, -0.3)
+    walk = np.cumsum(rng.normal(size=(n, 2)) * size, axis=0)
+    if seed % 2:
+        walk = np.round(walk, 4)
+    axis = unit(np.column_stack((np.sin(walk), np.ones(n))))
+    tip = np.cumsum(rng.uniform(0, 2, (n, 3)), axis=0)
+    if seed % 3 == 0:
+        tip = np.repeat(tip[::4], 4, axis=0)[:n]  # the tip stands still while the tool turns
+    return tip, axis
+
+
+def walked(path: FilledPath) -> np.ndarray:
+    """Words along every block: (blocks, steps, 2)."""
+    share = np.linspace(0, 1, STEPS)[:, None]
+    return path.angles[:-1, None] * (1 - share) + path.angles[1:, None] * share
+
+
+def axis_error(machine: Machine, path: FilledPath, words: np.ndarray) -> np.ndarray:
+    """Smallest angle, at each step, to the ruled motion of the block: degrees, (blocks, steps)."""
+    got = tool_axis(machine, words.reshape(-1, 2)).reshape(*words.shape[:2], 3)
+    share = np.linspace(0, 1, 401)[:, None]
+    ruled = unit(path.axis[:-1, None] * (1 - share) + path.axis[1:, None] * share)
+    cosine = np.einsum("bsk,brk->bsr", got, ruled)
+    nearest = np.take_along_axis(ruled, cosine.argmax(axis=2)[:, :, None], axis=1)
+    return angle_between(got, nearest)
+
+
+def tip_error(machine: Machine, path: FilledPath, words: np.ndarray) -> np.ndarray:
+    """Distance of the tip from its line when all five axes run linearly: mm, (blocks, steps)."""
+    joints = machine_position(machine, path.tip, path.angles)
+    share = np.linspace(0, 1, STEPS)[:, None]
+    joints = joints[:-1, None] * (1 - share) + joints[1:, None] * share
+    tip = tip_position(machine, joints.reshape(-1, 3), words.reshape(-1, 2)).reshape(joints.shape)
+    way = np.diff(path.tip, axis=0)[:, None]
+    square = (way**2).sum(axis=2, keepdims=True)
+    along = ((tip - path.tip[:-1, None]) * way).sum(axis=2, keepdims=True) / np.where(square > 0, square, 1)
+    return np.linalg.norm(tip - path.tip[:-1, None] - np.clip(along, 0, 1) * way, axis=2)
+
+
+@pytest.mark.parametrize("name", machine_names())
+@pytest.mark.parametrize("seed", range(6))
+def test_axis_stays_on_the_ruled_motion(name: str, seed: int):
+    machine = load_machine(name)
+    tip, axis = random_path(seed)
+    tolerance = 0.05
+    angles = rotary_angles(machine, tip, axis, tolerance=tolerance).angles
+    more = insertions(machine, tip, axis, angles, tolerance=tolerance, max_step=10.0)
+    assert len(more.unsolved) == 0
+    path = fill(tip, axis, angles, more)
+    assert axis_error(machine, path, walked(path)).max() <= tolerance * 1.001
+    assert np.abs(np.diff(path.angles, axis=0)).max() <= 10.0 + 1e-9
+    np.testing.assert_array_equal(path.angles[~path.inserted], angles)
+    np.testing.assert_array_equal(path.tip[~path.inserted], tip)
+    np.testing.assert_array_equal(np.bincount(path.pose[1:], minlength=60)[1:] - 1, more.counts(60))
+
+
+@pytest.mark.parametrize("name", machine_names())
+@pytest.mark.parametrize("seed", range(6))
+def test_tip_stays_on_its_line_without_control_of_it(name: str, seed: int):
+    machine = load_machine(name)
+    tip, axis = random_path(seed)
+    angles = rotary_angles(machine, tip, axis, tolerance=0.05).angles
+    more = insertions(machine, tip, axis, angles, tolerance=0.05, tip_tolerance=0.01)
+    assert len(more.unsolved) == 0
+    path = fill(tip, axis, angles, more)
+    words = walked(path)
+    assert tip_error(machine, path, words).max() <= 0.01 * 1.001
+    assert axis_error(machine, path, words).max() <= 0.05 * 1.001
+    # The points are needed: without them the tip leaves its line.
+    bare = fill(tip, axis, angles, insertions(machine, tip, axis, angles, tolerance=180.0))
+    assert not bare.inserted.any()
+    assert len(more) == 0 or tip_error(machine, bare, walked(bare)).max() > 0.009
+
+
+def test_few_points_where_the_motion_is_smooth():
+    """The tip of a table at radius r leaves the line by r·θ²/8: equal parts, as many as that asks for."""
+    machine = load_machine("table-bc")
+    angle = np.radians(np.array([0.0, 10.0]))
+    axis = np.stack((np.sin(angle), np.zeros(2), np.cos(angle)), axis=1)
+    tip = np.array([[0.0, 0, 100], [0.001, 0, 100]])
+    angles = rotary_angles(machine, tip, axis, tolerance=5.0).angles
+    more = insertions(machine, tip, axis, angles, tolerance=5.0, tip_tolerance=0.01)
+    needed = np.sqrt(100 * np.radians(10) ** 2 / 8 / 0.01)
+    assert needed <= len(more) + 1 <= np.ceil(needed * 1.1)
+    np.testing.assert_allclose(np.diff(more.fraction), 1 / (len(more) + 1))
+
+
+def test_rapids_need_no_points():
+    machine = load_machine("table-ac")
+    tip, axis = random_path(4)
+    rapid = np.arange(60) % 2 == 0
+    angles = rotary_angles(machine, tip, axis, tolerance=0.01, rapid=rapid).angles
+    more = insertions(machine, tip, axis, angles, tolerance=0.01, rapid=rapid)
+    assert not rapid[more.segment + 1].any()
+    assert len(insertions(machine, tip, axis, angles, tolerance=0.01)) > len(more) > 0
+
+
+def test_jump_is_not_hidden():
+    """Angles that jump to the other solution far from the pole cannot be joined by points."""
+    machine = load_machine("table-ac")
+    axis = unit(np.array([[0.5, 0, 1.0], [0.5, 0.01, 1]]))
+    angles = rotary_angles(machine, np.zeros((2, 3)), axis, tolerance=0.01).angles
+    angles[1] = angles[1] * [1, -1] + [180, 0]
+    np.testing.assert_allclose(tool_axis(machine, angles), axis, atol=1e-12)
+    more = insertions(machine, np.zeros((2, 3)), axis, angles, tolerance=0.01)
+    assert more.unsolved.tolist() == [0]
+
+
+def test_limit_on_the_way_between_two_poses():
+    """Both ends tilt by 100 deg, the shortest turn between them by more."""
+    plain = load_machine("table-ac")
+    tilting = RotaryAxis("A", (1, 0, 0), "table", limits=(-105, 105))
+    machine = Machine("tight", (plain.axes[0], tilting))
+    tilt, azimuth = np.radians(100), np.radians(np.array([0, 120]))
+    axis = np.stack((np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.full(2, np.cos(tilt))), axis=1)
+    tip = np.array([[0.0, 0, 0], [10, 0, 0]])
+    angles = rotary_angles(machine, tip, axis, tolerance=0.01).angles
+    with pytest.raises(InputError, match=r"p\.cls:9: error: A would have to go to .* its limit is 105 deg"):
+        insertions(machine, tip, axis, angles, tolerance=0.01, line=np.array([8, 9]), file="p.cls")
+
+
+def test_nothing_to_do():
+    machine = load_machine("table-ac")
+    for n in (0, 1):
+        more = insertions(machine, np.zeros((n, 3)), np.tile([[0, 0, 1.0]], (n, 1)), np.zeros((n, 2)), tolerance=0.01)
+        assert len(more) == 0
+        assert len(fill(np.zeros((n, 3)), np.tile([[0, 0, 1.0]], (n, 1)), np.zeros((n, 2)), more).pose) == n
+
+
+def test_moves_that_do_not_cut():
+    kind = np.array(
+        [Move.FROM, Move.LINEAR, Move.LINEAR, Move.RAPID, Move.ARC, Move.HOLE, Move.HOLE, Move.LINEAR], np.uint8
+    )
+    assert rapid_moves(kind).tolist() == [True, True, False, True, False, True, True, False]
+    assert rapid_moves(kind[2:]).tolist() == [True, True, False, True, True, False]
+    assert rapid_moves(kind[:0]).tolist() == []
