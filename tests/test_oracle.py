@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+from oracle import motion
 from oracle.distance import deviation
 from oracle.frechet import frechet_distance, leash_is_enough
 from oracle.motion import Original, Path, arc_points, curve_point, unit, written_path
@@ -31,6 +32,7 @@ G1 = [
     "G49",
 ]
 G62 = [
+    "G43 H1",
     "G0 X0.0000 Y0.0000 Z0.0000 U0.0000 V0.0000 W10.0000",
     "G1 X9.0000 Y0.0000 Z0.0000 U9.0000 V0.0000 W10.0000 F250.",
     "G6.2 P4 K0. X9.0000 Y0.0000 Z0.0000 U9.0000 V0.0000 W10.0000 R1.",
@@ -43,6 +45,7 @@ G62 = [
     "K1.",
     "K1.",
     "G1 X10.0000 Y10.0000 Z0.0000 U10.0000 V10.0000 W10.0000",
+    "G49",
 ]
 
 
@@ -90,19 +93,21 @@ def test_refuses_bad_g1(index: int, old: str, new: str) -> None:
 @pytest.mark.parametrize(
     ("index", "old", "new"),
     [
-        (2, "X9.0000", "X9.0001"),  # not at the current position
-        (2, "P4 ", ""),
-        (3, "K0. ", ""),
-        (3, " R1.", ""),
-        (3, " R1.", " R1.0005"),
-        (6, "K0.5", "K0."),
-        (7, "K1.", "K1. R1."),
-        (7, "K1.", "M8\nK1."),
-        (10, "K1.", "G1 X10.0000 Y2.0000 Z0.0000 U10.0000 V2.0000 W10.0000"),
-        (10, "K1.", "K1.\nK1."),
-        (10, "K1.", "K1.\nM8"),
-        (2, "G6.2", "G43.5 H1\nG6.2"),
-        (2, "G6.2", "G95\nG6.2"),
+        (3, "X9.0000", "X9.0001"),  # not at the current position
+        (3, "P4 ", ""),
+        (4, "K0. ", ""),
+        (4, " R1.", ""),
+        (4, " R1.", " R1.0005"),
+        (7, "K0.5", "K0."),
+        (8, "K1.", "K1. R1."),
+        (8, "K1.", "M8\nK1."),
+        (11, "K1.", "G1 X10.0000 Y2.0000 Z0.0000 U10.0000 V2.0000 W10.0000"),
+        (11, "K1.", "K1.\nK1."),
+        (11, "K1.", "K1.\nM8"),
+        (3, "G6.2", "G43.5 H1\nG6.2"),
+        (3, "G6.2", "G95\nG6.2"),
+        (3, "G6.2", "G41 D1\nG6.2"),
+        (11, "K1.", "(note)\nK1."),
     ],
 )
 def test_refuses_bad_g62(index: int, old: str, new: str) -> None:
@@ -302,3 +307,22 @@ def test_the_error_line_is_the_line() -> None:
         parse(changed(G1, 2, "X10.0000", "X10.00"), "g1")
     assert re.match(rf"{len(HEAD) + 3}: not a block", str(caught.value))
     assert leash_is_enough(np.zeros((2, 3)), np.zeros((3, 3)), 0.0)
+
+
+@pytest.mark.parametrize("limit", [0.001, 0.1])
+def test_sampling_is_fine_enough(limit: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two lines with vectors stand for one ruled motion of 80 degrees: measured again 30 times finer."""
+    angle = math.radians(80)
+    ends = np.array([[0, 0, 1.0], [math.sin(angle), 0, math.cos(angle)]])
+    original = Original(np.array([[0.0, 0, 0], [20, 0, 0]]), ends)
+    body = G1[:2]
+    for x, axis in ((10, unit(ends.sum(axis=0))), (20, ends[1])):
+        words = " ".join(f"{letter}{value:.7f}" for letter, value in zip("IJK", axis, strict=True))
+        body = [*body, f"G1 X{x}.0000 Y0.0000 Z0.0000 {words}"]
+    found = []
+    for share in (motion.SAGITTA_SHARE, motion.SAGITTA_SHARE / 1000):
+        monkeypatch.setattr(motion, "SAGITTA_SHARE", share)
+        (path,) = written_path(parse(text([*body, "G49"]), "g1"), H, limit)
+        found.append(deviation(path, original, H, 1.0).worst)
+    assert found[0] == pytest.approx(found[1], rel=1e-3)
+    assert found[1] > 0.05

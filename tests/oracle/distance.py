@@ -9,7 +9,7 @@ matching's fault, and one below it is a proof.
 
 Own error: tips of straight blocks are exact. On curves and for b the distance is evaluated on the true paths at samples
 with chords of at most `motion.SAGITTA_SHARE` of the limit; between samples both paths bend alike and the error is the
-difference of two such bends, below 1 % of it where the paths follow each other (tested).
+difference of two such bends: `test_oracle` finds it below a thousandth of the deviation.
 """
 
 from __future__ import annotations

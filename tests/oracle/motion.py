@@ -24,8 +24,11 @@ KNOT_VECTOR = np.array([float(knot) for knot in KNOTS])
 #: parameters of the samples on a curve; u = 1/2 is among them
 CURVE_PARAMETERS = np.linspace(0.0, 1.0, 97)
 #: share of the limit that a chord may hide of the path of b
-SAGITTA_SHARE = 0.05
+SAGITTA_SHARE = 0.2
 COARSEST_STEP = math.radians(2)
+FLIP = math.radians(179.9)
+#: a block that turns the axis by more has at least so many samples: what happens in its middle counts
+STRAIGHT, FEWEST = 1e-3, 4
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,9 @@ def _turned(start: Floats, end: Floats, part: Floats, turn: str) -> Floats:
     return unit(near * unit(start) + far * unit(end))
 
 
-def written_path(written: Written, axis_length: float, limit: float, turn: str = "vector") -> list[Path]:
+def written_path(
+    written: Written, axis_length: float, limit: float, turn: str = "vector", *, rapids: bool = False
+) -> list[Path]:
     """Feed motion between rapids: one `Path` per rapid, its end position first.
 
     Parameters
@@ -119,6 +124,8 @@ def written_path(written: Written, axis_length: float, limit: float, turn: str =
         The tolerance that will be asked for: samples are close enough to judge it.
     turn : {"vector", "great circle"}
         How the control turns the axis inside a G1 block with tool vectors.
+    rapids : bool
+        Whether rapids are part of the path: then there is one, from the first position to the last.
     """
     step = axis_step(axis_length, limit)
     blocks = written.blocks
@@ -135,7 +142,7 @@ def written_path(written: Written, axis_length: float, limit: float, turn: str =
     for index, block in enumerate(blocks):
         if isinstance(block, Code):
             continue
-        if isinstance(block, Line) and (block.rapid or block.start is None):
+        if isinstance(block, Line) and ((block.rapid and not rapids) or block.start is None):
             last = len(samples[index])
             runs.append([samples[index].slice(last - 1, last)])
         else:
@@ -160,7 +167,10 @@ def _line_paths(
         first, last = start[:, 3:] - start[:, :3], end[:, 3:] - end[:, :3]
     else:
         first, last = start[:, 3:], end[:, 3:]
-    count = np.maximum(1, np.ceil(angle_between(first, last) / step)).astype(int)
+    turn_by = angle_between(first, last)
+    # between opposite vectors there is no way to turn: the ends alone count
+    count = np.where(turn_by < FLIP, np.ceil(turn_by / step), 0).astype(int)
+    count = np.maximum(count, np.where((turn_by > STRAIGHT) & (turn_by < FLIP), FEWEST, 1))
     offset = np.concatenate(([0], np.cumsum(count)))
     row = np.repeat(np.arange(len(lines)), count)
     part = ((np.arange(offset[-1]) - offset[row] + 1) / count[row])[:, None]
@@ -204,7 +214,7 @@ class Original:
         """Tip polyline (n,3) and finely sampled path of b (m,3)."""
         if len(self) < 2:
             return self.tip, self.tip + axis_length * self.axis
-        step = axis_step(axis_length, limit * 0.02)
+        step = axis_step(axis_length, limit * 0.005)
         count = np.maximum(1, np.ceil(angle_between(self.axis[:-1], self.axis[1:]) / step)).astype(int)
         parts = [pose + np.arange(n) / n for pose, n in enumerate(count)]
         return self.tip, self.at(np.append(np.concatenate(parts), len(self) - 1.0), axis_length)[1]

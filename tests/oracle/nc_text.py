@@ -102,8 +102,9 @@ class _State:
     feed: str | None = None
     per_revolution: bool = False
     plane: int = 17
-    tool_vector: bool = False  # G43.5
-    tool: int | None = None
+    tool_length: bool = False  # G43.5 in form g1, G43 in form g6.2
+    compensation: bool = False  # G41, G42
+    changed: bool = False  # a tool change leaves the machine elsewhere: the next move is one
     ended: bool = False
     in_curve: bool = False  # the last motion block was a knot: only a group 01 code may follow
     blocks: list[Block] = field(default_factory=list)
@@ -123,7 +124,8 @@ CODE = re.compile(
     |S\d+(?:\.\d*[1-9])?\ M[34]|S\d+(?:\.\d*[1-9])?  # spindle
     |M(?:0|1|3|4|5|7|8|9|19)  # stops, spindle, coolant
     |G4\ P\d+                 # dwell, ms
-    |G43\.5\ H\d+|G49         # tool vector on and off
+    |G43(?:\.5)?\ H\d+|G49    # tool length along the tool vector or along Z, and off
+    |G40|G4[12]\ D\d+         # cutter compensation
     |G1[789]|G9[45]           # plane, feed mode
     """,
     re.VERBOSE,
@@ -190,8 +192,8 @@ class _Grammar:
         elif match := self.arc.fullmatch(line):
             self.circular(match, number, state)
         elif line == "M30":
-            if state.tool_vector:
-                raise BadTextError(f"{number}: M30 while G43.5 is on")
+            if state.tool_length:
+                raise BadTextError(f"{number}: M30 while tool length is on")
             state.ended = True
             state.blocks.append(Code(number, line))
         elif re.fullmatch(r"G2[01] G90 G94 G17 G40 G49 G80", line) and state.position is None:
@@ -205,12 +207,16 @@ class _Grammar:
     def code(self, line: str, number: int, state: _State) -> None:
         if state.in_curve and not line.startswith("("):
             raise BadTextError(f"{number}: {line!r} while G6.2 is modal; a G0 or G1 must end it first")
-        if line.startswith("G43.5"):
-            if self.form != "g1":
-                raise BadTextError(f"{number}: G43.5 in form {self.form}")
-            state.tool_vector = True
+        if line.startswith("G43"):
+            if line.startswith("G43.5") is not (self.form == "g1"):
+                raise BadTextError(f"{number}: {line} in form {self.form}")
+            if state.tool_length:
+                raise BadTextError(f"{number}: {line} while tool length is on")
+            state.tool_length = True
         elif line == "G49":
-            state.tool_vector = False
+            state.tool_length = False
+        elif line.startswith(("G40", "G41", "G42")):
+            state.compensation = line != "G40"
         elif line in ("G94", "G95"):
             if state.per_revolution == (line == "G95"):
                 raise BadTextError(f"{number}: {line} is modal already")
@@ -220,8 +226,10 @@ class _Grammar:
             if state.plane == int(line[1:]):
                 raise BadTextError(f"{number}: {line} is modal already")
             state.plane = int(line[1:])
-        elif line.startswith("T") and state.tool_vector:
-            raise BadTextError(f"{number}: tool change while G43.5 is on")
+        elif line.startswith("T"):
+            if state.tool_length:
+                raise BadTextError(f"{number}: tool change while tool length is on")
+            state.changed = True
         state.blocks.append(Code(number, line))
 
     def straight(self, match: re.Match[str], number: int, state: _State) -> None:
@@ -262,6 +270,8 @@ class _Grammar:
             )
         if state.per_revolution:
             raise BadTextError(f"{number}: PS1006, G6.2 in G95")
+        if state.compensation or not state.tool_length:
+            raise BadTextError(f"{number}: PS1006, G6.2 in G41 or G42, or tool length is off")
         value = self.feed(number, first[8], state)
         words, weights = [first.groups()[0:6]], [first[7]]
         for offset, knot in enumerate(KNOTS[1:5], 1):
@@ -282,10 +292,11 @@ class _Grammar:
 
     def moves(self, number: int, words: tuple[str, ...], state: _State) -> None:
         """Checks that every block with motion shares."""
-        if self.form == "g1" and not state.tool_vector:
-            raise BadTextError(f"{number}: motion with tool vectors before G43.5")
-        if words == state.position:
+        if not state.tool_length:
+            raise BadTextError(f"{number}: motion without tool length")
+        if words == state.position and not state.changed:
             raise BadTextError(f"{number}: zero-length move to {words}")
+        state.changed = False
 
     def feed(self, number: int, word: str | None, state: _State) -> float | None:
         """Feed in mm per minute or revolution that holds for this block."""
