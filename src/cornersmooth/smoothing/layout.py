@@ -16,10 +16,13 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.neighbours import find_neighbours, norm
+from cornersmooth.smoothing.neighbours import norm
 
 #: bend (mm) that one line per half may bridge, over the chord tolerance
 _BEND_PER_CHORD = 15.6
+
+#: poses or corners measured at once: their intermediate arrays fit the processor's cache
+_BLOCK = 16384
 
 #: most lines in one half of a transition and in one straight remainder
 _MOST_LINES = 400
@@ -43,45 +46,63 @@ class Layout:
 
 def lay_out(smoothed: SmoothProgram, *, dense: bool) -> Layout:
     """Lay out the smoothed motion; straight remainders are divided into several lines only for `dense` output."""
-    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    program, corners = smoothed.program, smoothed.corners
     n = len(program)
-    around = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
     row = np.full(n, -1, np.int64)
-    round_rows = np.flatnonzero(corners.smoothed)
-    row[corners.pose[round_rows]] = round_rows
+    rounded = np.flatnonzero(corners.smoothed)
+    row[corners.pose[rounded]] = rounded
     skip = program.kind == Move.FROM
-    skip[corners.pose[corners.status == Status.DUPLICATE]] = True
+    repeated = np.flatnonzero(corners.status == Status.DUPLICATE)
+    skip[corners.pose[repeated]] = True
 
-    start = around.previous
+    start = np.full(n, -1, np.int64)
+    start[corners.pose] = corners.before
+    last = program.chains[:, 1]
+    origin = np.arange(n) - 1  # of a pose behind repeated ones: the first of them
+    origin[corners.pose[repeated] + 1] = corners.before[repeated]
+    start[last] = origin[last]
+    following = np.full(n, -1, np.int64)
+    following[corners.pose] = corners.after
+
+    linear = start >= 0
     known = np.maximum(start, 0)
-    trims = {}
-    for name, source in (
-        ("out", "trim_out"),
-        ("axis_out", "axis_trim_out"),
-        ("in", "trim_in"),
-        ("axis_in", "axis_trim_in"),
-    ):
-        per_pose = np.zeros(n)
-        per_pose[corners.pose] = getattr(corners, source)
-        trims[name] = per_pose
-    from_corner = start >= 0
-    entry = np.where(from_corner, trims["out"][known], 0.0)
-    axis_entry = np.where(from_corner, trims["axis_out"][known], 0.0)
-    exit_, axis_exit = 1.0 - trims["in"], 1.0 - trims["axis_in"]
+    entry, leave = _ends(n, corners.pose, corners.trim_in, corners.trim_out, linear, known)
+    axis_entry, axis_leave = entry, leave
+    if corners.axis_trim_in is not corners.trim_in:
+        axis_entry, axis_leave = _ends(n, corners.pose, corners.axis_trim_in, corners.axis_trim_out, linear, known)
+    line, pieces = np.ones(n, np.bool_), np.ones(n, np.int64)
+    layout = Layout(row, skip, start, following, entry, leave, axis_entry, axis_leave, line, pieces)
+    for begin in range(0, n, _BLOCK):
+        poses = begin + np.flatnonzero(linear[begin : begin + _BLOCK] & ~skip[begin : begin + _BLOCK])
+        _measure_remainders(smoothed, layout, poses, dense=dense)
+    return layout
 
+
+def _ends(n: int, pose: Ints, trim_in: Floats, trim_out: Floats, linear: Bools, known: Ints) -> tuple[Floats, Floats]:
+    """Fractions of the segments into all poses where their straight remainders start and end."""
+    entry, leave = np.zeros(n), np.ones(n)
+    entry[pose] = trim_out
+    leave[pose] -= trim_in
+    return np.where(linear, entry[known], 0.0), leave
+
+
+def _measure_remainders(smoothed: SmoothProgram, layout: Layout, poses: Ints, *, dense: bool) -> None:
+    """Set `line` and `pieces` of the layout for some poses that are reached by linear moves."""
+    program, settings = smoothed.program, smoothed.settings
+    start = layout.start[poses]
+    step = program.tip[poses] - program.tip[start]
+    turn = program.axis[poses] - program.axis[start]
     # a remainder below the shortest line, and short beside the transition it leads to, is no line of its own
-    step = norm(program.tip - program.tip[known])
-    swing = norm(program.tip - program.tip[known] + settings.axis_length * (program.axis - program.axis[known]))
-    tip_rest, axis_rest = step * (exit_ - entry), swing * (axis_exit - axis_entry)
-    tip_leg, axis_leg = step * trims["in"], swing * trims["axis_in"]
-    joins = (row >= 0) & (row[known] >= 0) & from_corner
-    for rest, leg in ((tip_rest, tip_leg), (axis_rest, axis_leg)):
+    joins = (layout.row[poses] >= 0) & (layout.row[start] >= 0)
+    for length, entry, leave in (
+        (norm(step), layout.entry, layout.exit),
+        (norm(step + settings.axis_length * turn), layout.axis_entry, layout.axis_exit),
+    ):
+        rest, leg = length * (leave[poses] - entry[poses]), length * (1.0 - leave[poses])
         joins &= (rest <= 1e-9) | ((rest < settings.shortest_line) & (rest < 0.1 * leg))
-    pieces = np.ones(n, np.int64)
-    plan = Layout(row, skip, start, around.following, entry, exit_, axis_entry, axis_exit, ~joins, pieces)
+    layout.line[poses[joins]] = False
     if dense:
-        _divide_remainders(smoothed, plan)
-    return plan
+        _divide(settings, layout, poses[~joins], norm(turn)[~joins])
 
 
 def _turn_limit(settings: Settings, half_turn: Floats) -> Floats:
@@ -101,30 +122,26 @@ def _turn_limit(settings: Settings, half_turn: Floats) -> Floats:
     return limit
 
 
-def _divide_remainders(smoothed: SmoothProgram, plan: Layout) -> None:
-    """Set `plan.pieces`: lines per straight remainder, from the change of axis along it."""
-    program, settings = smoothed.program, smoothed.settings
-    linear = np.flatnonzero((plan.start >= 0) & ~plan.skip & plan.line)
-    chord = norm(program.axis[linear] - program.axis[plan.start[linear]])
+def _divide(settings: Settings, layout: Layout, poses: Ints, chord: Floats) -> None:
+    """Set `pieces`: lines per straight remainder, from the change of axis along it, given as its chord."""
     share = settings.interpolation_tolerance / settings.axis_length
     turning = chord**3 / 54.0 + chord**2 / 4.0 * np.tan(np.minimum(chord, 2.0) / 2.0) > share
     if settings.axis_step is not None:
         turning |= 2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)) > math.radians(settings.axis_step)
-    pose, chord = linear[turning], chord[turning]
-    half = np.arcsin(np.minimum(chord / 2.0, 1.0))
+    pose, half = poses[turning], np.arcsin(np.minimum(chord[turning] / 2.0, 1.0))
     ruled = half <= math.radians(settings.max_axis_step) / 2.0 + 1e-12
     pose, half = pose[ruled], half[ruled]
     if not len(pose):
         return
     # angle of the ruled axis from the middle of its segment: tan φ is linear in the fraction
-    low = np.arctan((2.0 * plan.axis_entry[pose] - 1.0) * np.tan(half))
-    high = np.arctan((2.0 * plan.axis_exit[pose] - 1.0) * np.tan(half))
+    low = np.arctan((2.0 * layout.axis_entry[pose] - 1.0) * np.tan(half))
+    high = np.arctan((2.0 * layout.axis_exit[pose] - 1.0) * np.tan(half))
     turn = high - low
     as_one = turn**2 / 4.0 * np.abs(np.tan((low + high) / 2.0)) + turn**3 / 54.0
     pieces = np.ceil(turn / _turn_limit(settings, np.maximum(np.abs(low), np.abs(high))) - 1e-9)
     if settings.axis_step is None:
         pieces[as_one <= share] = 1
-    plan.pieces[pose] = np.clip(pieces, 1, _MOST_LINES).astype(np.int64)
+    layout.pieces[pose] = np.clip(pieces, 1, _MOST_LINES).astype(np.int64)
 
 
 def lines_per_half(smoothed: SmoothProgram) -> Ints:
@@ -132,7 +149,7 @@ def lines_per_half(smoothed: SmoothProgram) -> Ints:
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
     lines = np.zeros(len(corners), np.int64)
     rows = np.flatnonzero(corners.smoothed)
-    for block in np.array_split(rows, max(1, len(rows) // 65536)):
+    for block in np.array_split(rows, max(1, len(rows) // _BLOCK)):
         pose, before, after = corners.pose[block], corners.before[block], corners.after[block]
         tip_in, tip_out = program.tip[pose] - program.tip[before], program.tip[after] - program.tip[pose]
         turn_in = settings.axis_length * (program.axis[pose] - program.axis[before])

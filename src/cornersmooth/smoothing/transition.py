@@ -101,6 +101,8 @@ def place_corners(program: Program, settings: Settings, progress: Callable[[int,
         },
         **{name: np.full(k, np.nan) for name in ("sync_residual", "jump_in", "jump_out")},
     )
+    if settings.method == "proportional":  # the same fractions on both curves: one array
+        whole.axis_trim_in, whole.axis_trim_out = whole.trim_in, whole.trim_out
     for start in range(0, k, BLOCK):
         rows = start + np.flatnonzero(status[start : start + BLOCK] == Status.SMOOTHED)
         if len(rows):
