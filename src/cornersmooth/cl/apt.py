@@ -23,6 +23,9 @@ from cornersmooth.model import MM_PER_UNIT, Arcs, Keep, Move, Program, Source, U
 LONGEST_GAP: Final = 3
 REMEMBERED: Final = 4096
 
+#: an axis that differs by less is the same one, printed again
+AXIS_NOISE: Final = 1e-6
+
 
 def read_apt(
     data: bytes,
@@ -133,6 +136,8 @@ def _program(machine: Machine, asked: Units | None) -> Program:
     keep = builder.keep.spread(builder.n).astype(np.uint8)
     keep[resolved.kept] = Keep.CONTRADICTION
     keep[resolved.kept - 1] = Keep.CONTRADICTION
+    turned = np.abs(axis[resolved.arcs.pose] - axis[resolved.arcs.pose - 1]).max(axis=1, initial=0) > AXIS_NOISE
+    along = [finding("CS147", int(line[resolved.arcs.pose[turned]][0]), int(turned.sum()))] if turned.any() else []
     for index in machine.unitless_feeds:
         builder.feed.value[index] *= scale
     arcs = Arcs(resolved.arcs.pose, resolved.arcs.centre * scale, resolved.arcs.normal, resolved.arcs.sweep)
@@ -148,16 +153,19 @@ def _program(machine: Machine, asked: Units | None) -> Program:
         statements=tuple(machine.statements),
         units=units,
         source=Source(machine.file, "apt", machine.dialect.name),
-        findings=(*said, *machine.findings, *axis_findings, *resolved.findings),
+        findings=(*said, *machine.findings, *axis_findings, *resolved.findings, *along),
     )
 
 
 def _units(machine: Machine, asked: Units | None) -> tuple[Units, list[Finding]]:
     """Units of the file: as asked for, as stated, as the feeds suggest, or as the dialect has them."""
     stated = machine.stated_units
+    guess, why = _usual_units(machine)
+    before = stated[0][1] if stated and not stated[0][2] else guess
     for line, now, pose in stated:
-        if now != stated[0][1] and pose and not asked:
-            raise error("CS116", machine.file, line, word="UNITS", new=now, old=stated[0][1])
+        if pose and now != before and not asked:
+            raise error("CS116", machine.file, line, word="UNITS", new=now, old=before)
+        before = now
     if asked:
         other = [line for line, now, _ in stated if now != asked]
         if other:
@@ -166,7 +174,10 @@ def _units(machine: Machine, asked: Units | None) -> tuple[Units, list[Finding]]
         return asked, []
     if stated:
         return stated[-1][1], []
+    return guess, [finding("CS132", 0, units=guess, why=why)]
+
+
+def _usual_units(machine: Machine) -> tuple[Units, str]:
     if machine.feed_units:
-        return machine.feed_units[0], [finding("CS132", 0, units=machine.feed_units[0], why="from the feeds")]
-    units = machine.dialect.units
-    return units, [finding("CS132", 0, units=units, why=f"as usual for {machine.dialect.name} files")]
+        return machine.feed_units[0], "as in its feeds"
+    return machine.dialect.units, f"as usual for {machine.dialect.name} files"

@@ -9,31 +9,35 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.words import KNOWN_WORDS
+from cornersmooth.errors import InputError
 
 Argument = float | str
 
 #: a decimal number; FORTRAN writes D exponents, some posts a blank after the sign
-NUMBER: Final = re.compile(r"([+-]?)[ \t]*((?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[EeDd][+-]?[0-9]+)?)")
+NUMBER: Final = re.compile(r"([+-]?)[ \t]*((?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[EeDd][+-]?[0-9]+)?)")
 
-#: the start of a line that holds nothing but further numbers of the statement before it
-NUMERIC_LINE: Final = re.compile(r"[ \t]*[+-]?[ \t]*\.?[0-9]+[0-9.EeDd+\-, \t]*(\$.*)?$")
+#: a line that holds nothing but further numbers of the statement before it
+_NUMERIC_LINE: Final = re.compile(r"(?:[+-][ \t]*)?\.?[0-9][0-9.EeDd+\-, \t]*(\$.*)?$")
 
 #: sequence numbers and labels: ``N27   ,``, ``C12 ,``, ``N10 ``, ``ID)``
-_LABEL: Final = re.compile(r"(?:[NC][0-9]+[ \t]*,|N[0-9]+[ \t]+|[A-Za-z0-9]+\))[ \t]*(?=[A-Za-z$])", re.IGNORECASE)
+_LABEL: Final = re.compile(r"(?:[NC][0-9]+[ \t]*,|N[0-9]+(?=[ \t])|[A-Z0-9]+\))[ \t]*(?=[A-Z$])", re.IGNORECASE)
 
 #: a text word at the start of a statement; six letters are a field of their own in APT, blanks may not follow
-_TEXT: Final = re.compile(r"(?i)(PARTNO|PPRINT|INSERT|REMARK|LETTER|TPRINT|DISPLY|TOOL[ \t]+PATH)[ \t]*(/?)")
+_TEXT: Final = re.compile(r"(PARTNO|PPRINT|INSERT|REMARK|LETTER|TPRINT|DISPLY|TOOL[ \t]+PATH)[ \t]*(/?)", re.IGNORECASE)
 
 #: a major word: what stands before the slash, or the first word of a statement without one
-_WORD: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.*-]*")
+_WORD: Final = re.compile(r"[A-Z][A-Z0-9_.*-]*", re.IGNORECASE)
 
-#: a statement that begins a new line although the line before asked for a continuation
-_NEW_STATEMENT: Final = re.compile(r"[ \t]*([A-Za-z][A-Za-z0-9 ,_-]*?)[ \t]*(/|\$*[ \t]*$)")
+#: words that may stand alone on a line and cannot be a minor word of the line before
+_LONELY_WORDS: Final = frozenset({"RAPID", "FINI", "END", "GOHOME", "AUTOPS", "END-OF-PATH", "OPSTOP"})
+
+#: words after which a file that is cut short was closed by hand
+_CLOSING: Final = frozenset({"FINI", "END"})
 
 Decode = Callable[[bytes], str]
 
@@ -57,6 +61,8 @@ class Record:
         What follows the word where no slash does; empty for a proper statement.
     points : tuple of (int, args)
         Lines of further numbers after the statement, with their own line numbers.
+    cut_short : bool
+        Whether the file ends where the statement should go on.
     """
 
     line: int
@@ -65,11 +71,41 @@ class Record:
     text: str = ""
     rest: str = ""
     points: tuple[tuple[int, tuple[Argument, ...]], ...] = ()
+    cut_short: bool = False
 
     def moved(self, lines: int) -> Record:
         """Return the same statement so many lines further down."""
         points = tuple((line + lines, args) for line, args in self.points)
-        return Record(self.line + lines, self.word, self.args, self.text, self.rest, points)
+        return Record(self.line + lines, self.word, self.args, self.text, self.rest, points, self.cut_short)
+
+
+@dataclass
+class _Lines:
+    """Consecutive lines, taken one by one."""
+
+    lines: Sequence[bytes]
+    first: int
+    decode: Decode
+    file: str
+    follows: str
+    at: int = 0
+
+    def peek(self) -> str | None:
+        """Return the next line without blanks around it, None after the last one."""
+        return self.decode(self.lines[self.at]).strip() if self.at < len(self.lines) else None
+
+    def take(self) -> tuple[int, str]:
+        """Return number and text of the next line."""
+        text = self.peek()
+        assert text is not None
+        self.at += 1
+        return self.first + self.at - 1, text
+
+    def incomplete(self, line: int, text: str) -> InputError:
+        """Return the error for a statement that the next line does not continue."""
+        more = self.peek()
+        follows = self.follows if more is None else _name(more)
+        return error("CS104", self.file, line, word=_name(text), next=follows)
 
 
 def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, follows: str) -> Iterator[Record]:
@@ -93,76 +129,94 @@ def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, 
     InputError
         CS104, CS105
     """
-    at = 0
-    while at < len(lines):
-        text = decode(lines[at]).strip()
-        line = first + at
-        at += 1
-        if not text:
-            continue
+    source = _Lines(lines, first, decode, file, follows)
+    while source.at < len(lines):
+        line, text = source.take()
         if text.startswith("$$"):
-            while _is_creo_table(text) and at < len(lines) and NUMERIC_LINE.match(decode(lines[at])):
-                text = text.rstrip()[:-1].rstrip() + " " + decode(lines[at]).strip()
-                at += 1
-            yield Record(line, "$$", (text[2:].strip(),), text)
+            yield _comment(source, line, text)
             continue
         label = _LABEL.match(text)
         if label is not None:
             text = text[label.end() :]
+        if not text:
+            continue
         found = _TEXT.match(text)
         if found is not None:
-            while found[2] and text.endswith("$") and not text.endswith("$$") and at < len(lines):
-                more = decode(lines[at]).strip()
-                if _begins_statement(more):
-                    break
-                text = text[:-1].rstrip() + " " + more
-                at += 1
-            yield Record(line, _squeeze(found[1]), (text[found.end() :].strip(),), text)
-            continue
-        if NUMERIC_LINE.match(text):
+            yield _text_statement(source, line, text, found)
+        elif _NUMERIC_LINE.match(text):
             raise error("CS105", file, line, text=text)
+        else:
+            yield from _statements(source, line, text)
 
-        text, goes_on, comment = _cut(text)
+
+def _comment(source: _Lines, line: int, text: str) -> Record:
+    while text.startswith("$$->") and text.endswith("$"):  # Creo's CSYS tables go on in the next line
+        more = source.peek()
+        if more is None or not _NUMERIC_LINE.match(more):
+            break
+        text = f"{text[:-1].rstrip()} {source.take()[1]}"
+    return Record(line, "$$", (text[2:].strip(),), text)
+
+
+def _text_statement(source: _Lines, line: int, text: str, found: re.Match[str]) -> Record:
+    parts = [text]
+    while found[2] and parts[-1].endswith("$") and not parts[-1].endswith("$$"):
+        more = source.peek()
+        if more is None or _begins_statement(more):
+            break  # the sign is text
+        parts[-1] = parts[-1][:-1].rstrip()
+        parts.append(source.take()[1])
+    text = " ".join(parts)
+    return Record(line, _squeeze(found[1]), (text[found.end() :].strip(),), text)
+
+
+def _statements(source: _Lines, line: int, text: str) -> Iterator[Record]:
+    """Yield the statements of a line, joined with its continuation lines, and the comment behind them."""
+    part, goes_on, comment = _cut(text)
+    parts = [part]
+    cut_short = False
+    while goes_on:
+        more = source.peek()
+        if more is None or _begins_statement(more):
+            if more is None or _name(parts[0]) != "GOTO" or _name(more) not in _CLOSING:
+                raise source.incomplete(line, parts[0])
+            cut_short = True
+            break
+        part, goes_on, comment = _cut(source.take()[1])
+        parts.append(part)
+    text = " ".join(filter(None, parts))
+    statements = [part for part in map(str.strip, _split(text, ";")) if part]
+    for part in statements[:-1]:
+        yield _parse(part, line)
+    if statements:
+        yield _parse(statements[-1], line, cut_short) if cut_short else _with_points(source, line, statements[-1])
+    if comment:
+        yield Record(line, "$$", (comment[2:].strip(),), comment)
+
+
+def _with_points(source: _Lines, line: int, text: str) -> Record:
+    """Parse a statement and take the lines of further numbers after it.
+
+    A comma at the end of a line continues the statement even without a `$`.
+    """
+    parts = [text]
+    points: list[tuple[int, tuple[Argument, ...]]] = []
+    while (more := source.peek()) is not None and _NUMERIC_LINE.match(more):
+        point_line, more = source.take()
+        part, goes_on, _ = _cut(more)
+        numbers = [part]
         while goes_on:
-            if at == len(lines):
-                raise error("CS104", file, line, word=_name(text), next=follows)
-            more = decode(lines[at]).strip()
-            if _begins_statement(more):
-                closed = _name(text) == "GOTO" and _name(more) in ("FINI", "END")
-                if not closed:
-                    raise error("CS104", file, line, word=_name(text), next=_name(more))
-                text = text.rstrip(", \t") + " $"
-                break
-            at += 1
-            more, goes_on, more_comment = _cut(more)
-            comment = comment or more_comment
-            text = (text + " " + more).strip()
-        statements = [part for part in (part.strip() for part in _split(text, ";")) if part]
-        for part in statements[:-1]:
-            yield _parse(part, line)
-        if statements:
-            record = _parse(statements[-1], line)
-            points = []
-            while at < len(lines) and NUMERIC_LINE.match(numbers := decode(lines[at])):
-                point_line = first + at
-                numbers, goes_on, _ = _cut(numbers)
-                at += 1
-                while goes_on and at < len(lines) and NUMERIC_LINE.match(more := decode(lines[at])):
-                    more, goes_on, _ = _cut(more)
-                    numbers += " " + more
-                    at += 1
-                if goes_on:
-                    after = _name(decode(lines[at])) if at < len(lines) else follows
-                    raise error("CS104", file, point_line, word=record.word, next=after)
-                if record.args and record.args[-1] == "":  # a comma at the end of the line continues it too
-                    record = _parse(record.text + " " + numbers.strip(), line)
-                else:
-                    points.append((point_line, arguments(numbers)))
-            if points:
-                record = Record(line, record.word, record.args, record.text, record.rest, tuple(points))
-            yield record
-        if comment:
-            yield Record(line, "$$", (comment[2:].strip(),), comment)
+            more = source.peek()
+            if more is None or not _NUMERIC_LINE.match(more):
+                raise source.incomplete(line, text)
+            part, goes_on, _ = _cut(source.take()[1])
+            numbers.append(part)
+        if not points and parts[-1].endswith(","):
+            parts += numbers
+        else:
+            points.append((point_line, arguments(" ".join(numbers))))
+    record = _parse(" ".join(parts), line)
+    return replace(record, points=tuple(points)) if points else record
 
 
 def arguments(body: str) -> tuple[Argument, ...]:
@@ -190,18 +244,16 @@ def _argument(token: str) -> Argument:
     return token if token.startswith("'") else token.upper()
 
 
-def _parse(text: str, line: int) -> Record:
+def _parse(text: str, line: int, cut_short: bool = False) -> Record:
     head, slash, body = text.partition("/")
-    if slash:
-        word = _squeeze(head)
-        body = body.removesuffix("$")  # a GOTO that its file cuts short
-        if _WORD.match(word):
-            return Record(line, word, arguments(body), text)
+    if slash and _WORD.match(word := _squeeze(head)):
+        body = body.rstrip(", \t") if cut_short else body
+        return Record(line, word, arguments(body), text, cut_short=cut_short)
     found = _WORD.match(text)
     if found is None:
         return Record(line, "", (text,), text)
-    if text.upper() in KNOWN_WORDS or _squeeze(text) in KNOWN_WORDS:
-        return Record(line, _squeeze(text), (), text)
+    if (word := _squeeze(text)) in KNOWN_WORDS:
+        return Record(line, word, (), text)
     rest = text[found.end() :].strip()
     return Record(line, found[0].upper(), (rest,) if rest else (), text, rest)
 
@@ -259,16 +311,5 @@ def _split(text: str, separator: str) -> list[str]:
 
 def _begins_statement(text: str) -> bool:
     """Whether a line that should continue another one is a statement of its own."""
-    found = _NEW_STATEMENT.match(text)
-    return found is not None and (
-        _squeeze(found[1]) in KNOWN_WORDS if found[2].startswith("/") else _squeeze(found[1]) in _LONELY_WORDS
-    )
-
-
-def _is_creo_table(text: str) -> bool:
-    """Whether a comment is one of Creo's ``$$-> CSYS`` tables, which go on after a `$`."""
-    return text.startswith("$$->") and text.endswith("$")
-
-
-#: words that may stand alone on a line and cannot be a minor word of the line before
-_LONELY_WORDS: Final = frozenset({"RAPID", "FINI", "END", "GOHOME", "AUTOPS", "END-OF-PATH", "OPSTOP"})
+    head, slash, _ = text.partition("/")
+    return _squeeze(head) in KNOWN_WORDS if slash else _squeeze(text.rstrip("$")) in _LONELY_WORDS

@@ -76,7 +76,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS145": ("note", "NURBS curves are read as lines within {tolerance:g} mm"),
     "CS146": ("warning", "positions in more than one coordinate system ({word} changes); check the part zero"),
     "CS147": ("warning", "the tool axis turns along an arc; how it turns is not defined"),
-    "CS148": ("warning", "FEDRAT without a unit: {unit} assumed"),
+    "CS148": ("warning", "FEDRAT without a unit is read in the unit of the file"),
     "CS149": ("note", "GOHOME without coordinates is kept as a statement"),
 }
 

@@ -28,7 +28,7 @@ def _goto(machine: Machine, record: Record) -> None:
         machine.arcs.pass_through([tip for _, tip, _ in poses[:-1]])
         poses = poses[-1:]
     for line, tip, axis in poses:
-        if record.text.endswith("$"):
+        if record.cut_short:
             machine.note("CS129", line)
             axis = machine.builder.last_axis()
         machine.add(tip, axis, line)
@@ -42,6 +42,7 @@ def _from(machine: Machine, record: Record) -> None:
 
 def _gohome(machine: Machine, record: Record) -> None:
     if not record.args:
+        machine.note("CS149", record.line)
         machine.keep(record)
         return
     tip, axis = _pose(machine, record, record.args, record.line)

@@ -60,6 +60,8 @@ def _feed(machine: Machine, record: Record) -> None:
         return
     if machine.rapid:
         machine.note("CS135", record.line)
+    if not units:
+        machine.note("CS148", record.line)
     builder = machine.builder
     scale, mode = FEED_UNITS[units[0]] if units else (None, FeedMode(int(builder.feed_mode.now)))
     if scale is None:
@@ -122,7 +124,7 @@ def _msys(machine: Machine, record: Record) -> None:
 
 def _cutcom(machine: Machine, record: Record) -> None:
     option = record.args[0] if record.args else ""
-    if option in ("LEFT", "RIGHT", "ON"):
+    if option in ("LEFT", "RIGHT", "ON") and "LENGTH" not in record.args:
         if not machine.builder.keep.now:
             machine.note("CS138", record.line)
         machine.builder.keep.set(machine.builder.n, float(Keep.CUTTER_COMPENSATION))

@@ -58,12 +58,15 @@ KNOWN_WORDS: Final = TEXT_WORDS | MOTION_WORDS | STRANGE_MOTION_WORDS | FRAME_WO
 
 
 def near_motion_word(word: str) -> str | None:
-    """Return the guarded word that `word` misses by one letter (wrong, missing, added or swapped), if any.
+    """Return the guarded word that `word` misses by one letter (wrong, missing, added or swapped) or runs on from.
 
     Short names of post-processor words are not mistaken for motion: words below four letters are never near.
     """
     if len(word) < 4 or word in KNOWN_WORDS:
         return None
+    letters = word[: next((i for i, letter in enumerate(word) if not letter.isalpha()), len(word))]
+    if letters in GUARDED_WORDS:  # GOTO12.5,3: its slash is missing
+        return letters
     return next((guarded for guarded in sorted(GUARDED_WORDS) if _one_edit(word, guarded)), None)
 
 
