@@ -154,6 +154,11 @@ def test_hundreds_of_texts() -> None:
     check(XYZ, ticks, prefix, list(range(m)), suffix, list(range(m))[::-1])
 
 
+def test_no_rows() -> None:
+    text, offsets = XYZ.rows(np.zeros((0, 3), np.int64), [], [], [], [])
+    assert (text, offsets.tolist()) == (b"", [0])
+
+
 def test_strided_ticks() -> None:
     ticks = np.arange(-3000, 3000).reshape(-1, 6)
     m = len(ticks)
@@ -187,7 +192,7 @@ def test_what_does_not_fit_is_refused() -> None:
     for ids in ([0, 1], [-1, 0], 1):
         with pytest.raises(IndexError):
             XYZ.rows(good, [b""], ids, [b"\n"], 0)
-    with pytest.raises(ValueError, match="broadcast"):
+    with pytest.raises(ValueError, match="shape"):
         XYZ.rows(good, [b""], [0, 0, 0], [b"\n"], 0)
     with pytest.raises(ValueError, match="wider"):
         RowFormat((b"X" * 3000,), (4,)).rows(good[:, :1], [b""], 0, [b"\n"], 0)

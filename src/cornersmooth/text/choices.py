@@ -32,14 +32,19 @@ class Choices:
     """
 
     def __init__(self, texts: Sequence[bytes], ids: ArrayLike, count: int, *, align_right: bool) -> None:
-        refuse_zero_bytes(texts)
         self._texts = texts
-        self._ids = np.broadcast_to(np.asarray(ids), (count,))
+        given = np.asarray(ids)
+        self._ids = np.full(count, given) if given.ndim == 0 else given
+        if self._ids.shape != (count,):
+            raise ValueError(f"ids of shape {given.shape} for {count} rows")
         if count and not 0 <= self._ids.min() <= self._ids.max() < len(texts):
             raise IndexError(f"ids from {self._ids.min()} to {self._ids.max()} for {len(texts)} texts")
-        sizes = np.array([len(text) for text in texts], np.int64)
-        self._outside = np.where(sizes > LONGEST_LAID_OUT, sizes, 0)
-        inside = [b"" if outside else text for text, outside in zip(texts, self._outside, strict=True)]
+        refuse_zero_bytes(texts)
+        used = np.bincount(self._ids, minlength=len(texts)).tolist()
+        inside = [
+            text if number and len(text) <= LONGEST_LAID_OUT else b"" for text, number in zip(texts, used, strict=True)
+        ]
+        self._outside = np.array([len(text) if len(text) > LONGEST_LAID_OUT else 0 for text in texts], np.int64)
         longest = max(map(len, inside), default=0)
         self.width = next((w for w in (0, 1, 2, 4) if longest <= w), -(-longest // WORD) * WORD)
         fill = bytes.rjust if align_right else bytes.ljust
@@ -62,7 +67,7 @@ class Choices:
 
     @property
     def all_laid_out(self) -> bool:
-        """Whether no text is long."""
+        """Whether no text is too long for that."""
         return not self._outside.any()
 
     def __getitem__(self, row: int) -> bytes:

@@ -5,7 +5,8 @@ A number is written from right to left, a group of digits at a time. Zero bytes 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -82,45 +83,64 @@ class Cell:
         self.whole[-1].put(matrix, left, alone)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Layout:
-    """Columns of a row, added from left to right.
+    """Columns of a row.
 
     Parameters
     ----------
-    template : bytearray
-        A row with its constant characters; zero bytes where others are written.
-    cells : list of Cell
+    template : (width,) uint8
+        A row with its constant characters; zero bytes where others are written. The width is a multiple of `WORD`.
+    cells : tuple of Cell
+    tail : int
+        First column of what stands behind the numbers; what stands before them begins in column 0.
     """
 
-    template: bytearray = field(default_factory=bytearray)
-    cells: list[Cell] = field(default_factory=list)
+    template: Bytes
+    cells: tuple[Cell, ...]
+    tail: int
 
-    def add(self, characters: bytes) -> int:
-        """Add columns to the template; return the first."""
-        self.template += characters
-        return len(self.template) - len(characters)
 
-    def add_number(
-        self, lowest: int, highest: int, decimals: int, *, plus: bool, trim: bool, leading_zero: bool
-    ) -> None:
-        """Add the columns of a number that has from `lowest` to `highest` ticks."""
-        sign = self.add(b"\0") if lowest < 0 or plus else None
-        digits = len(str(max(-lowest, highest) // 10**decimals))
-        whole = [Group(self.add(bytes(n)), n, whole_table(n)) for n in _groups(digits, leading=(1, 2, GROUP))]
+@lru_cache(maxsize=256)
+def lay_out(
+    words: tuple[bytes, ...],
+    decimals: tuple[int, ...],
+    plus: bool,
+    trim: bool,
+    leading_zero: bool,
+    digits: tuple[int, ...],
+    negative: tuple[bool, ...],
+    head: int,
+    tail: int,
+) -> Layout:
+    """Lay out rows: `head` columns, each word with a number, `tail` columns.
+
+    The first five are those of `RowFormat`. Every number has at most so many `digits` before the point, and a place for
+    its sign where some of its column are `negative`.
+    """
+    row = bytearray(head)
+
+    def add(characters: bytes) -> int:
+        row.extend(characters)
+        return len(row) - len(characters)
+
+    cells = []
+    for word, places, before_point, some_negative in zip(words, decimals, digits, negative, strict=True):
+        add(word)
+        sign = add(b"\0") if plus or some_negative else None
+        whole = [Group(add(bytes(n)), n, whole_table(n)) for n in _groups(before_point, leading=(1, 2, GROUP))]
         part: list[Group] = []
-        for n in _groups(decimals, leading=(1, 2, 3, GROUP)):
+        for n in _groups(places, leading=(1, 2, 3, GROUP)):
             with_point = n % 2 == 1  # elements have 2 or 4 bytes: the point makes an odd group even
             if not part and not with_point:
-                self.add(b".")
-            part.append(Group(self.add(bytes(n + with_point)), n, part_table(n, with_point)))
+                add(b".")
+            part.append(Group(add(bytes(n + with_point)), n, part_table(n, with_point)))
         if not part and trim:
-            self.add(b".")
-        self.cells.append(Cell(sign, tuple(whole[::-1]), tuple(part[::-1]), plus, trim, leading_zero))
-
-    def fill_up(self) -> None:
-        """Round the width up to whole words, at least one."""
-        self.add(bytes(-len(self.template) % WORD if self.template else WORD))
+            add(b".")
+        cells.append(Cell(sign, tuple(whole[::-1]), tuple(part[::-1]), plus, trim, leading_zero))
+    behind = add(bytes(tail))
+    add(bytes(-len(row) % WORD if row else WORD))
+    return Layout(np.frombuffer(bytes(row), np.uint8), tuple(cells), behind)
 
 
 def _groups(digits: int, leading: tuple[int, ...]) -> list[int]:

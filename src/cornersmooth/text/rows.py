@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cornersmooth.errors import OutputError
 from cornersmooth.text.choices import Choices, refuse_zero_bytes, splice
-from cornersmooth.text.layout import WORD, Layout
+from cornersmooth.text.layout import WORD, Layout, lay_out
 from cornersmooth.text.ticks import MOST_DECIMALS, TICK_LIMIT
 
 Ints = NDArray[np.int64]
@@ -107,31 +107,35 @@ class RowFormat:
         if ticks.ndim != 2 or ticks.shape[1] != len(self.words):
             raise ValueError(f"ticks of shape {ticks.shape} for {len(self.words)} words")
         m = len(ticks)
-        heads = Choices(prefix, prefix_id, m, align_right=True)
-        tails = Choices(suffix, suffix_id, m, align_right=False)
         if not m:
             return b"", np.zeros(1, np.int64)
-        layout, tail = self._lay_out(ticks, heads.width, tails.width)
-        blocks = list(_write_blocks(ticks, layout, heads, tails, tail))
+        heads = Choices(prefix, prefix_id, m, align_right=True)
+        tails = Choices(suffix, suffix_id, m, align_right=False)
+        blocks = list(_write_blocks(ticks, self._lay_out(ticks, heads.width, tails.width), heads, tails))
         offsets = np.zeros(m + 1, np.int64)
         np.cumsum(np.concatenate([lengths for _, lengths in blocks]), out=offsets[1:])
         return b"".join([text for text, _ in blocks]), offsets
 
-    def _lay_out(self, ticks: Ints, head: int, tail: int) -> tuple[Layout, int]:
-        """Lay out rows for (m, c) ticks between so many bytes at either end; return where those at the end begin."""
-        lowest, highest = (_by_column(reduce, ticks) for reduce in (np.minimum, np.maximum))
-        if any(low < -TICK_LIMIT or high > TICK_LIMIT for low, high in zip(lowest, highest, strict=True)):
+    def _lay_out(self, ticks: Ints, head: int, tail: int) -> Layout:
+        """Lay out rows for (m, c) ticks between so many bytes at either end."""
+        lowest, highest = _by_column(np.minimum, ticks), _by_column(np.maximum, ticks)
+        if lowest and not -TICK_LIMIT <= min(lowest) <= max(highest) <= TICK_LIMIT:
             raise OutputError("CS301", "a number is too large to be written", "please report this with the input file")
-        layout = Layout()
-        layout.add(bytes(head))
-        for word, low, high, decimals in zip(self.words, lowest, highest, self.decimals, strict=True):
-            layout.add(word)
-            layout.add_number(low, high, decimals, plus=self.plus, trim=self.trim, leading_zero=self.leading_zero)
-        start = layout.add(bytes(tail))
-        layout.fill_up()
+        largest = [max(-low, high) for low, high in zip(lowest, highest, strict=True)]
+        layout = lay_out(
+            self.words,
+            self.decimals,
+            self.plus,
+            self.trim,
+            self.leading_zero,
+            tuple(len(str(n // 10**places)) for n, places in zip(largest, self.decimals, strict=True)),
+            tuple(low < 0 for low in lowest),
+            head,
+            tail,
+        )
         if len(layout.template) > WIDEST:
             raise ValueError(f"rows of {len(layout.template)} bytes are wider than {WIDEST}")
-        return layout, start
+        return layout
 
 
 def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
@@ -145,19 +149,17 @@ def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
     return found
 
 
-def _write_blocks(
-    ticks: Ints, layout: Layout, heads: Choices, tails: Choices, tail: int
-) -> Iterator[tuple[bytes, Ints]]:
+def _write_blocks(ticks: Ints, layout: Layout, heads: Choices, tails: Choices) -> Iterator[tuple[bytes, Ints]]:
     """Write rows a block at a time; give the text of each block and the sizes of its rows."""
     m, width = len(ticks), len(layout.template)
-    matrix = np.tile(np.frombuffer(layout.template, np.uint8), (min(BLOCK, m), 1))
+    matrix = np.repeat(layout.template[None, :], min(BLOCK, m), axis=0)
     for start in range(0, m, BLOCK):
         stop = min(start + BLOCK, m)
         block = matrix[: stop - start]
         heads.write(start, stop, block, 0)
         for column, cell in enumerate(layout.cells):
             cell.write(ticks[start:stop, column], block)
-        tails.write(start, stop, block, tail)
+        tails.write(start, stop, block, layout.tail)
         used = block != 0
         # compress takes the same time for every pattern; a Boolean index is slower for many short runs
         text = block.reshape(-1).compress(used.reshape(-1)).tobytes()
