@@ -1,0 +1,407 @@
+"""What each statement means, on small files written by hand."""
+
+from __future__ import annotations
+
+import gzip
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.model import FeedMode, Keep, Move, Program
+
+UP = [0.0, 0.0, 1.0]
+
+
+def program(text: str, **options: object) -> Program:
+    return read(text.encode(), name="x.cls", **options)  # type: ignore[arg-type]
+
+
+def codes(result: Program) -> dict[str, int]:
+    return {finding.code: finding.count for finding in result.findings if finding.code != "CS132"}
+
+
+def words(result: Program) -> list[tuple[int, int, str]]:
+    return [(statement.pose, statement.line, statement.word) for statement in result.statements]
+
+
+# --- positions ---------------------------------------------------------------------------------------------------
+
+
+def test_goto_forms() -> None:
+    result = program("GOTO/1.,.5,-0.25\nGOTO / 1, 2, 3, 0, .6, .8\ngoto  /  4.,5.,6.\nGO TO/7,8,9,0,1,0,1,0,0\n")
+    assert result.tip.tolist() == [[1, 0.5, -0.25], [1, 2, 3], [4, 5, 6], [7, 8, 9]]
+    assert result.axis.tolist() == [UP, [0, 0.6, 0.8], [0, 0.6, 0.8], [0, 1, 0]]
+    assert result.kind.tolist() == [Move.LINEAR] * 4
+    assert result.line.tolist() == [1, 2, 3, 4]
+    assert np.isnan(result.feed).all()
+    assert result.statements == ()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "GOTO/1,2,3,$\n0,.6,.8",
+        "GOTO/1,2,3,  $ what stands here is a comment\n 0, .6, .8",
+        "GOTO/ $\n1,$\n2,3 $ $$ 1ST\n,0,.6,.8",
+        "GOTO/1,2,3,\n0,.6,.8",
+        "N27   , GOTO/1,2,3,0,.6,.8",
+        "C12 , GOTO/1,2,3,0,.6,.8",
+        "N10 GOTO/1,2,3,0,.6,.8",
+        "ID1) GOTO/1,2,3,0,.6,.8",
+        "GOTO/1.D0,+2E0,3.0e+00,0,6d-1,8E-01",
+        "GOTO/1,2,3,0,.6,.8 $$ behind",
+        "GOTO/1 2\t3 0 .6 .8",
+        "GOTO/- 1,2,3,0,.6,.8\nGODLTA/2,0",
+    ],
+)
+def test_goto_spellings(text: str) -> None:
+    result = program(text)
+    assert result.tip[-1].tolist() == [1, 2, 3]
+    assert np.allclose(result.axis[-1], [0, 0.6, 0.8], rtol=0, atol=1e-15)
+    assert result.line[0] == 1
+
+
+def test_coordinate_lines_are_further_points() -> None:
+    result = program("GOTO/1,1,1\n2,2,2\n 3,3,3,0,1,0\nRAPID\nGOTO/4,4,4\n5,5,5,$\n0,.6,.8\n")
+    assert result.tip[:, 0].tolist() == [1, 2, 3, 4, 5]
+    assert result.line.tolist() == [1, 2, 3, 5, 6]
+    assert result.kind.tolist() == [Move.LINEAR] * 3 + [Move.RAPID, Move.LINEAR]
+    assert result.axis[3:].tolist() == [[0, 1, 0], [0, 0.6, 0.8]]
+
+
+def test_axis_is_normalised() -> None:
+    result = program("GOTO/0,0,0,0.1,0.2,0.975\n")
+    assert np.linalg.norm(result.axis[0]) == pytest.approx(1, abs=1e-15)
+    assert result.axis[0] == pytest.approx(np.array([0.1, 0.2, 0.975]) / np.linalg.norm([0.1, 0.2, 0.975]), abs=1e-15)
+
+
+def test_long_axis_needs_lenient() -> None:
+    with pytest.raises(InputError, match=r"x\.cls:1: error: tool axis is 2 long"):
+        program("GOTO/0,0,0,0,0,2\n")
+    result = program("GOTO/0,0,0,0,0,2\nGOTO/0,0,0,0,3,0\n", lenient=True)
+    assert result.axis.tolist() == [UP, [0, 1, 0]]
+    assert codes(result) == {"CS139": 2}
+
+
+def test_creo_leaves_out_plus_z() -> None:
+    head = "$$*         Pro/CLfile  Version 9.0\n"
+    body = "GOTO / 0, 0, 0,  $\n0, .6, .8\nGOTO / 1, 0, 0\n"
+    assert program(head + body).axis.tolist() == [[0, 0.6, 0.8], UP]
+    assert program(body).axis.tolist() == [[0, 0.6, 0.8], [0, 0.6, 0.8]]
+    assert program(head + body, dialect="nx").axis.tolist() == [[0, 0.6, 0.8], [0, 0.6, 0.8]]
+
+
+def test_solidworks_csys_sets_the_axis() -> None:
+    text = (
+        "TRNTYP/WORLD,0,0,0\nGOTO/0,0,0,0,.6,.8\nCSYS/0,0,1.,0,0,1.,0,0,-1.,0,0,0\nGOTO/0,0,0\nTLAXIS/0,1,0\nGOTO/1,0,0"
+    )
+    assert program(text).axis.tolist() == [[0, 0.6, 0.8], [1, 0, 0], [0, 1, 0]]
+
+
+def test_tool_path_starts_upright() -> None:
+    text = "TOOL PATH/A,TOOL,B\nGOTO/0,0,0,0,1,0\nEND-OF-PATH\nTOOL PATH/B,TOOL,B\nGOTO/0,0,0\n"
+    assert program(text).axis.tolist() == [[0, 1, 0], UP]
+
+
+def test_multax_off_locks_the_axis() -> None:
+    text = "MULTAX\nGOTO/0,0,0,0,1,0\nMULTAX/OFF\nGOTO/1,0,0,1,0,0\nGOTO/2,0,0\nMULTAX/ON\nGOTO/3,0,0,1,0,0\n"
+    result = program(text)
+    assert result.axis.tolist() == [[0, 1, 0]] * 3 + [[1, 0, 0]]
+    assert codes(result) == {"CS137": 1}
+
+
+def test_incremental_positions() -> None:
+    text = "FROM/1,1,1,0,0,1\nGODLTA/1,2\nGODLTA/0,0,3,0,.6,.8\nGODLTA/-5\nGOTO/0,0,0,0,1,0\nRAPID\nGODLTA/2\n"
+    result = program(text)
+    assert result.tip == pytest.approx(np.array([[1, 1, 1], [2, 3, 1], [2, 3, 4], [2, 0, 0], [0, 0, 0], [0, 2, 0]]))
+    assert result.kind.tolist() == [Move.FROM, 2, 2, 2, 2, Move.RAPID]
+
+
+def test_from_and_gohome() -> None:
+    result = program("FROM/0,0,9,0,1,0\nRAPID\nGOTO/0,0,5\nGOTO/0,0,0\nGOHOME/0,0,9\nGOHOME\n")
+    assert result.kind.tolist() == [Move.FROM, Move.RAPID, Move.LINEAR, Move.RAPID]
+    assert result.axis.tolist() == [[0, 1, 0]] * 4
+    assert words(result) == [(4, 6, "GOHOME")]
+
+
+# --- rapid and feed ----------------------------------------------------------------------------------------------
+
+
+def test_rapid_holds_for_one_motion_and_the_feed_comes_back() -> None:
+    text = "FEDRAT/MMPM,250.\nGOTO/0,0,0\nRAPID \nGOTO/1,0,0\nGOTO/2,0,0\nRAPID/\nRAPID\n$$ x\nGOTO/3,0,0\nGOTO/4,0,0\n"
+    result = program(text)
+    assert result.kind.tolist() == [2, 1, 2, 1, 2]
+    assert result.feed.tolist() == [250] * 5
+    assert words(result) == [(3, 8, "$$")]
+
+
+def test_rapid_modes() -> None:
+    result = program("RAPID/ON\nGOTO/0,0,0\nGOTO/1,0,0\nRAPID/OFF\nGOTO/2,0,0\nRAPID/FEDTO,LENGTH,2.\nGOTO/3,0,0\n")
+    assert result.kind.tolist() == [1, 1, 2, 2]
+    assert codes(result) == {"CS140": 1}
+
+
+def test_feed_between_rapid_and_goto_keeps_the_rapid() -> None:
+    result = program("RAPID\nFEDRAT/MMPM,100\nGOTO/0,0,0\nGOTO/1,0,0\n")
+    assert result.kind.tolist() == [1, 2]
+    assert result.feed.tolist() == [100, 100]
+    assert codes(result) == {"CS135": 1}
+
+
+@pytest.mark.parametrize(
+    ("feed", "units", "value", "mode"),
+    [
+        ("MMPM,250.0000", "MM", 250.0, FeedMode.PER_MINUTE),
+        ("  300.0000,MMPM", "INCHES", 300.0, FeedMode.PER_MINUTE),
+        ("10.000000,  IPM", "MM", 254.0, FeedMode.PER_MINUTE),
+        ("PERMIN,141", "MM", 141.0, FeedMode.PER_MINUTE),
+        ("PERMIN,10", "INCHES", 254.0, FeedMode.PER_MINUTE),
+        ("10", "INCH", 254.0, FeedMode.PER_MINUTE),
+        ("0.3,MMPR", "MM", 0.3, FeedMode.PER_REVOLUTION),
+        (".01,IPR", "INCHES", 0.254, FeedMode.PER_REVOLUTION),
+        (".01,PERREV", "INCHES", 0.254, FeedMode.PER_REVOLUTION),
+        ("1.,FPM", "MM", 304.8, FeedMode.PER_MINUTE),
+    ],
+)
+def test_feed_units(feed: str, units: str, value: float, mode: FeedMode) -> None:
+    result = program(f"UNITS/{units}\nFEDRAT/{feed}\nGOTO/1,0,0\n")
+    assert result.feed[0] == pytest.approx(value, rel=1e-15)
+    assert result.feed_mode[0] == mode
+
+
+def test_feed_without_a_unit_keeps_the_mode() -> None:
+    result = program("UNITS/MM\nFEDRAT/.2,MMPR\nGOTO/0,0,0\nFEDRAT/.3\nGOTO/1,0,0\nFEDRAT/100,MMPM\nGOTO/2,0,0\n")
+    assert result.feed.tolist() == [0.2, 0.3, 100]
+    assert result.feed_mode.tolist() == [1, 1, 0]
+
+
+def test_feed_options_stay_statements() -> None:
+    result = program("FEDRAT/INVERS,AUTO\nFEDRAT/MMPM,5\nGOTO/0,0,0\nFEDRAT/LOCK,ON\nGOTO/1,0,0\n")
+    assert [word for _, _, word in words(result)] == ["FEDRAT", "FEDRAT"]
+    assert result.feed.tolist() == [5, 5]
+    assert [(f.code, f.count) for f in result.findings if f.code == "CS136"] == [("CS136", 1), ("CS136", 1)]
+
+
+# --- units -------------------------------------------------------------------------------------------------------
+
+
+def test_inch_files_are_converted_exactly() -> None:
+    result = program("UNITS / INCHES\nFEDRAT/1.,IPM\nGOTO/0.1,1.,-3.3333\n")
+    assert result.units == "inch"
+    assert result.tip[0].tolist() == [0.1 * 25.4, 25.4, -3.3333 * 25.4]
+    assert result.mm_per_unit == 25.4
+
+
+@pytest.mark.parametrize(
+    ("text", "units"),
+    [("FEDRAT/10.,IPM\n", "inch"), ("FEDRAT/10.,MMPM\n", "mm"), ("", "mm"), ("REMARK a.as  NCLCAM\n", "inch")],
+)
+def test_units_that_are_not_stated(text: str, units: str) -> None:
+    result = program(text + "GOTO/1,0,0\n")
+    assert result.units == units
+    assert [finding.severity for finding in result.findings if finding.code == "CS132"] == ["note"]
+
+
+def test_units_asked_for_win() -> None:
+    result = program("UNITS/INCHES\nGOTO/1,0,0\n", units="mm")
+    assert result.tip[0, 0] == 1
+    assert codes(result) == {"CS133": 1}
+
+
+# --- statements --------------------------------------------------------------------------------------------------
+
+
+def test_statements_keep_place_order_and_text() -> None:
+    text = (
+        "$$ head\nPARTNO/ A/B, $$ 'C'\nLOADTL/ 2,LENGTH,  50.5,,adjust\nGOTO/0,0,0\n"
+        "SPINDL/RPM, $ x\n  1000.,CLW $$ on\n"
+        "PPRINT cost 5$, a;b\nGOTO/1,0,0\nCOOLNT/flood;STOP\nFINI\n"
+    )
+    result = program(text)
+    assert [(s.pose, s.line, s.word, s.args, s.text) for s in result.statements] == [
+        (0, 1, "$$", ("head",), "$$ head"),
+        (0, 2, "PARTNO", ("A/B, $$ 'C'",), "PARTNO/ A/B, $$ 'C'"),
+        (0, 3, "LOADTL", (2.0, "LENGTH", 50.5, "", "ADJUST"), "LOADTL/ 2,LENGTH,  50.5,,adjust"),
+        (1, 5, "SPINDL", ("RPM", 1000.0, "CLW"), "SPINDL/RPM, 1000.,CLW"),
+        (1, 5, "$$", ("on",), "$$ on"),
+        (1, 7, "PPRINT", ("cost 5$, a;b",), "PPRINT cost 5$, a;b"),
+        (2, 9, "COOLNT", ("FLOOD",), "COOLNT/flood"),
+        (2, 9, "STOP", (), "STOP"),
+        (2, 10, "FINI", (), "FINI"),
+    ]
+    assert codes(result) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "word", "argument"),
+    [
+        ("PPRINT/'A, B $$ C'", "PPRINT", "'A, B $$ C'"),
+        ("PARTNO Part Operation.1", "PARTNO", "Part Operation.1"),
+        ("PARTNO / MFG0001", "PARTNO", "MFG0001"),
+        ("INSERT/[HOLDER=C40-M06EM2] 6MM CRB 2FL 19 LOC", "INSERT", "[HOLDER=C40-M06EM2] 6MM CRB 2FL 19 LOC"),
+        ("TPRINT/T1 Drill D 10", "TPRINT", "T1 Drill D 10"),
+        ("TOOL  PATH/7_KONTUR,TOOL,FACE_MILL", "TOOL PATH", "7_KONTUR,TOOL,FACE_MILL"),
+        ("PPRINT/ GOTO/1,2,3", "PPRINT", "GOTO/1,2,3"),
+        ("REMARK GOTO/1,2,3 $", "REMARK", "GOTO/1,2,3 $"),
+        ("PPRINT/FIRST $\nSECOND", "PPRINT", "FIRST SECOND"),
+    ],
+)
+def test_text_is_never_taken_apart(text: str, word: str, argument: str) -> None:
+    result = program(f"{text}\nGOTO/0,0,0\n")
+    (statement,) = result.statements
+    assert (statement.word, statement.args) == (word, (argument,))
+    assert len(result) == 1
+
+
+def test_a_text_that_ends_in_a_dollar_swallows_no_motion() -> None:
+    result = program("PPRINT/COST 5$\nGOTO/1,0,0\nREMARK 5$\nGOTO/2,0,0\nPPRINT/5 $\nRAPID\nGOTO/3,0,0\n")
+    assert result.kind.tolist() == [2, 2, 1]
+
+
+def test_creo_tables_in_comments_go_on() -> None:
+    result = program("$$-> CSYS / 1.0, 0.0,  $\n            0.0, 1.0,  $\n   0.0\nGOTO / 1, 2, 3\n")
+    assert [statement.word for statement in result.statements] == ["$$"]
+    assert result.line.tolist() == [4]
+
+
+def test_unknown_words_are_kept_and_counted_once() -> None:
+    result = program("FOOBAR/1\nGOTO/0,0,0\nFOOBAR/2,A\nQUUX\n*** stray\nCSI_SET_X/1\n")
+    assert [statement.word for statement in result.statements] == ["FOOBAR", "FOOBAR", "QUUX", "?", "CSI_SET_X"]
+    assert [(f.code, f.line, f.count) for f in result.findings if f.code != "CS132"] == [
+        ("CS130", 1, 2),
+        ("CS130", 4, 1),
+        ("CS131", 5, 1),
+    ]
+    assert all(f.severity == "warning" for f in result.findings if f.code != "CS132")
+
+
+def test_synonyms() -> None:
+    result = program("SYN/'TLAXIS','$$*TLAXIS'\nTLAXIS/ 0.0, 1.0, 0.0\nSYN/'MOVETO','GOTO'\nMOVETO/1,2,3\n")
+    assert result.axis.tolist() == [UP]
+    assert result.tip.tolist() == [[1, 2, 3]]
+
+
+def test_cycles_make_holes() -> None:
+    cycle = "CYCLE/INIT\nCYCLE/DEEP2,FEDTO,2.7,1STPECK,5.\nGOTO/1,0,0\nGOTO/2,0,0\nCYCLE/OFF\n"
+    text = f"GOTO/0,0,9\n{cycle}RAPID\nGOTO/2,0,9\n"
+    result = program(text)
+    assert result.kind.tolist() == [Move.LINEAR, Move.HOLE, Move.HOLE, Move.RAPID]
+    assert words(result) == [(1, 2, "CYCLE"), (1, 3, "CYCLE"), (3, 6, "CYCLE")]
+    assert result.statements[1].args == ("DEEP2", "FEDTO", 2.7, "1STPECK", 5.0)
+
+
+def test_cutcom_spans_are_kept() -> None:
+    span = "CUTCOM/LEFT,XYPLAN\nGOTO/1,0,0\nGOTO/2,0,0\nCUTCOM/OFF\n"
+    text = f"GOTO/0,0,0\n{span}GOTO/3,0,0\nCUTCOM/ON,LENGTH,7\nGOTO/4,0,0\n"
+    result = program(text)
+    assert result.keep.tolist() == [0, Keep.CUTTER_COMPENSATION, Keep.CUTTER_COMPENSATION, 0, 0]
+    assert codes(result) == {"CS138": 1}
+
+
+@pytest.mark.parametrize(
+    "text", ["TRANS/0,0,0", "TRACUT/NOMORE", "ROTABL/    0.000000,,TABLE,CLW", "TRNTYP/WORLD,0,0,0"]
+)
+def test_coordinate_changes_that_change_nothing(text: str) -> None:
+    result = program(f"{text}\nGOTO/1,0,0\n")
+    assert len(result.statements) == 1
+
+
+@pytest.mark.parametrize("text", ["TRANS/1,0,0", "TRACUT/M1", "ROTABL/90,CLW", "COPY/1,TRANSL,1,0,0,5", "ORIGIN/1,2,3"])
+def test_coordinate_changes_are_refused(text: str) -> None:
+    with pytest.raises(InputError, match="changes the coordinates"):
+        program(f"{text}\nGOTO/1,0,0\n")
+    assert codes(program(f"{text}\nGOTO/1,0,0\n", lenient=True)) == {"CS143": 1}
+
+
+def test_several_systems_are_pointed_out() -> None:
+    text = (
+        "MSYS/0,0,0,1,0,0,0,1,0\nGOTO/0,0,0\nMSYS/0,0,0,1,0,0,0,1,0\nGOTO/1,0,0\nMSYS/0,0,5,1,0,0,0,1,0\nGOTO/2,0,0\n"
+    )
+    assert codes(program(text)) == {"CS146": 1}
+
+
+def test_fini_ends_the_file() -> None:
+    assert codes(program("GOTO/1,0,0\nFINI\n$$ bye\nSPINDL/OFF\n")) == {"CS144": 1}
+    assert len(program("GOTO/1,0,0\nEND\nGOTO/2,0,0\nFINI\n")) == 2
+    with pytest.raises(InputError, match=r"x\.cls:3: error: GOTO after FINI"):
+        program("GOTO/1,0,0\nFINI\nGOTO/2,0,0\n")
+    assert len(program("GOTO/1,0,0\nFINI\nGOTO/2,0,0\nGOTO/3,0,0,0,1,0\n", lenient=True)) == 1
+
+
+# --- the file ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"GOTO/1,2,3\r\nGOTO/4,5,6\r\n",
+        b"GOTO/1,2,3\rGOTO/4,5,6",
+        b"GOTO/1,2,3\nGOTO/4,5,6\r\n\x1a",
+        b"\xef\xbb\xbfGOTO/1,2,3\n\n\nGOTO/4,5,6",
+        "GOTO/1,2,3\nGOTO/4,5,6\n".encode("utf-16"),
+        gzip.compress(b"GOTO/1,2,3\nGOTO/4,5,6\n"),
+    ],
+)
+def test_line_ends_and_encodings(data: bytes) -> None:
+    assert read(data).tip.tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_text_is_utf8_or_else_windows_1252() -> None:
+    for text in ("PPRINT Généré".encode(), "PPRINT Généré".encode("cp1252")):
+        assert read(text + b"\nGOTO/1,2,3\n").statements[0].args == ("Généré",)
+
+
+def test_files_and_names(tmp_path: Path) -> None:
+    path = tmp_path / "part.cls.gz"
+    path.write_bytes(gzip.compress(b"GOTO/1,2,3\nGOTO/1,2\n"))
+    with pytest.raises(InputError) as caught:
+        read(path)
+    assert (caught.value.file, caught.value.line, caught.value.code) == (str(path), 2, "CS110")
+    path.write_bytes(b"GOTO/1,2,3\n")
+    assert read(path).source.name == "part.cls.gz"
+    assert read(b"GOTO/1,2,3\n", name="<stdin>").source.name == "<stdin>"
+    with pytest.raises(InputError, match="cannot be read"):
+        read(tmp_path / "none.cls")
+    path.write_bytes(gzip.compress(b"GOTO/1,2,3\n")[:-5])
+    with pytest.raises(InputError, match="gzip"):
+        read(path)
+
+
+@pytest.mark.parametrize("options", [{"dialect": "foo"}, {"units": "cm"}, {"format": "x"}, {"arc_rule": "up"}])
+def test_unknown_options(options: dict[str, str]) -> None:
+    with pytest.raises(SettingsError, match="use one of"):
+        program("GOTO/1,2,3\n", **options)
+
+
+@pytest.mark.parametrize(
+    ("head", "dialect"),
+    [
+        ("TOOL PATH/A,TOOL,B", "nx"),
+        ("$$     CATIA APT VERSION 1.0", "catia"),
+        ("$$*         Pro/CLfile  Version 11.0", "creo"),
+        ("PARTNO/1\nUNIT/MM\nCSI_SET_FLUTE_LENGTH/3.2", "solidworks"),
+        ("MODE/MILL\nPARTNO/'x'", "hsm"),
+        ("REMARK a.as  27-APR-2021  NCLCAM     2020.00", "ncl"),
+        ("PPRINT/APTCL-SPEC,MAKINO-FF,1", "makino"),
+        ("PARTNO X", "plain"),
+    ],
+)
+def test_dialects_are_recognised(head: str, dialect: str) -> None:
+    assert program(f"{head}\nGOTO/1,2,3\n").source.dialect == dialect
+
+
+def test_points_go_to_their_own_reader() -> None:
+    assert read(b"x,y,z,i,j,k\n1,2,3,0,0,1\n").source.format == "points"
+    assert read(b"1,2,3,0,0,1\n4,5,6,0,0,1\n").source.format == "points"
+    with pytest.raises(InputError):
+        read(b"1,2,3,0,0,1\n", format="apt")
+
+
+def test_import_is_light() -> None:
+    code = "import sys, cornersmooth.cl; sys.exit('scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
