@@ -229,6 +229,19 @@ def test_rewinds_happen_in_rapids_where_nothing_else_helps():
     assert re.match(r"C turns back by \d+ deg in a rapid", finding.text)
 
 
+def test_change_of_solution_in_a_rapid_is_said():
+    """The limits of C let the first cut use one solution only, the second the other one only."""
+    machine = limited("table-ac", (60, 200), (-40, 40))
+    azimuth = np.concatenate((np.linspace(60, 100, 10), np.linspace(160, 200, 10)))  # C = 150 or -30, then 250 or 70
+    rapid = np.arange(20) % 10 == 0
+    lines = np.arange(20) + 1
+    path = rotary_angles(machine, line_of(20), tilted(30.0, azimuth), tolerance=TOLERANCE, rapid=rapid, line=lines)
+    assert path.angles[0, 1] * path.angles[-1, 1] < 0
+    (finding,) = path.findings
+    assert (finding.code, finding.line, finding.count) == ("CS365", 11, 1)
+    assert finding.text.startswith("C and A go over to their other solution in a rapid")
+
+
 def test_no_rewind_within_a_cut():
     machine = limited("table-ac", (-360, 360), (0, 100))
     axis = tilted(30.0, np.linspace(0, 800, 801))

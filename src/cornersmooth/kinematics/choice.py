@@ -17,12 +17,18 @@ from cornersmooth.model import Bools, Floats, Ints
 REWIND_COST = 1e9
 #: What a start on the solution that is not preferred costs, in degrees of rotation: more than any start turn.
 PREFERENCE_COST = 1e3
+#: What each turn costs by which a path starts away from zero: it only breaks ties.
+START_TURN_COST = 1e-3
 #: What a piece costs that leaves the limits in every turn.
 OUTSIDE_COST = 1e12
 #: Words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
 LIMIT_SLACK = 1e-9
 #: An axis with room for more turns than this is taken as endless first; only where that fails its turns are searched.
 MANY_TURNS = 8
+#: More states than these are not searched: axes with many turns are then kept within `MANY_TURNS` of zero.
+MOST_STATES = 1000
+#: Numbers that the costs of the steps between states may take up at a time.
+BLOCK = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -90,14 +96,14 @@ def choose(pieces: Pieces, limits: Floats) -> tuple[Ints, Floats]:
     """
     branch = _cheapest_branches(pieces, limits)
     turns = _nearest_turns(pieces, branch)
-    if _inside(pieces, branch, turns, limits):
+    if _start_inside(pieces, branch, turns, limits):
         return branch, turns
     finite = np.isfinite(limits[:, 0]) & np.isfinite(limits[:, 1])
     narrow = finite & (limits[:, 1] - limits[:, 0] <= 360 * MANY_TURNS)
     if narrow.any() and (narrow != finite).any():
         branch, fixed = search(pieces, np.where(narrow[:, None], limits, [[-np.inf, np.inf]]))
         turns = _nearest_turns(pieces, branch, fixed, narrow)
-        if _inside(pieces, branch, turns, limits):
+        if _start_inside(pieces, branch, turns, limits):
             return branch, turns
     branch, fixed = search(pieces, limits)
     return branch, _nearest_turns(pieces, branch, fixed, finite)
@@ -131,11 +137,17 @@ def _nearest_turns(pieces: Pieces, branch: Ints, fixed: Floats | None = None, kn
     return turns if fixed is None or known is None else np.where(known, fixed, turns)
 
 
-def _inside(pieces: Pieces, branch: Ints, turns: Floats, limits: Floats) -> bool:
+def _start_inside(pieces: Pieces, branch: Ints, turns: Floats, limits: Floats) -> bool:
+    """Shift the whole path by the fewest turns that bring it inside the limits, in place; false if none do."""
     index = np.arange(len(pieces))
-    low = pieces.low[index, branch] + 360 * turns
-    high = pieces.high[index, branch] + 360 * turns
-    return bool((low >= limits[:, 0] - LIMIT_SLACK).all() and (high <= limits[:, 1] + LIMIT_SLACK).all())
+    low = (pieces.low[index, branch] + 360 * turns).min(axis=0)
+    high = (pieces.high[index, branch] + 360 * turns).max(axis=0)
+    fewest = np.ceil((limits[:, 0] - LIMIT_SLACK - low) / 360)
+    most = np.floor((limits[:, 1] + LIMIT_SLACK - high) / 360)
+    if (fewest > most).any():
+        return False
+    turns += np.clip(0, fewest, most)
+    return True
 
 
 def search(pieces: Pieces, limits: Floats) -> tuple[Ints, Floats]:
@@ -144,85 +156,73 @@ def search(pieces: Pieces, limits: Floats) -> tuple[Ints, Floats]:
     Returns and raises as `choose`, with turns 0 for axes without limits.
     """
     finite = np.isfinite(limits[:, 0]) & np.isfinite(limits[:, 1])
-    ranges = [
-        _turn_range(low, high) if known else np.zeros(1) for (low, high), known in zip(limits, finite, strict=True)
-    ]
-    best = np.stack(
-        [
-            pieces.dislike[b]
-            + np.abs(pieces.first[0, b, 0] + 360 * ranges[0])[:, None]
-            + np.abs(pieces.first[0, b, 1] + 360 * ranges[1])[None, :]
-            for b in (0, 1)
-        ]
+    ranges = _turn_ranges(limits, finite)
+    start = (
+        (pieces.dislike + np.abs(pieces.first[0]).sum(axis=1))[:, None, None]
+        + START_TURN_COST * np.abs(ranges[0])[:, None]
+        + START_TURN_COST * np.abs(ranges[1])
     )
-    shape = best.shape
+    shape = start.shape
+    size = max(1, BLOCK // start.size**2)
     origins: list[Ints] = []
-    for p in range(len(pieces)):
-        if p:
-            best, origin = _step(best, pieces, p, ranges, finite)
-            origins.append(origin)
-        allowed = np.ones(shape, np.bool_)
-        for b in (0, 1):
-            for axis in (0, 1):
-                low = pieces.low[p, b, axis] + 360 * ranges[axis] >= limits[axis, 0] - LIMIT_SLACK
-                high = pieces.high[p, b, axis] + 360 * ranges[axis] <= limits[axis, 1] + LIMIT_SLACK
-                fits = (low & high) | ~finite[axis]
-                allowed[b] &= fits[:, None] if axis == 0 else fits[None, :]
-        entered = best
-        best = np.where(allowed, best, np.inf)
-        if not np.isfinite(best).any():
-            states = np.argwhere(np.isfinite(entered))
-            states[:, 1] = ranges[0][states[:, 1]]
-            states[:, 2] = ranges[1][states[:, 2]]
-            raise NoChoiceError(p, states)
-    state = int(np.argmin(best))
-    path = [state]
+    best = entered = start.ravel()
+    for begin in range(0, len(pieces), size):
+        end = min(begin + size, len(pieces))
+        allowed = _allowed(pieces, begin, end, ranges, limits)
+        steps = _steps(pieces, begin, end, ranges, finite)
+        for p in range(begin, end):
+            if p:
+                total = best[:, None] + steps[p - begin]
+                origin = total.argmin(axis=0)
+                entered = total[origin, np.arange(len(origin))]
+                origins.append(origin)
+            best = np.where(allowed[p - begin], entered, np.inf)
+            if best.min() == np.inf:
+                branch, turn0, turn1 = np.unravel_index(np.flatnonzero(np.isfinite(entered)), shape)
+                raise NoChoiceError(p, np.stack((branch, ranges[0][turn0], ranges[1][turn1]), axis=1).astype(np.int64))
+    path = [int(best.argmin())]
     for origin in reversed(origins):
-        state = int(origin.flat[state])
-        path.append(state)
+        path.append(int(origin[path[-1]]))
     branch, turn0, turn1 = np.unravel_index(np.array(path[::-1]), shape)
     return branch.astype(np.int64), np.stack((ranges[0][turn0], ranges[1][turn1]), axis=1)
 
 
-def _turn_range(low: float, high: float) -> Floats:
-    """Whole turns that bring an angle in (-180, 180] inside the limits."""
-    return np.arange(np.ceil((low - 180) / 360), np.floor((high + 180) / 360) + 1)
+def _turn_ranges(limits: Floats, finite: Bools) -> tuple[Floats, Floats]:
+    """Whole turns that bring an angle in (-180, 180] inside the limits, for either axis; 0 for one without."""
+    low = np.where(finite, np.ceil((np.where(finite, limits[:, 0], 0) - 180) / 360), 0)
+    high = np.where(finite, np.floor((np.where(finite, limits[:, 1], 0) + 180) / 360), 0)
+    if 2 * np.prod(high - low + 1) > MOST_STATES:
+        low, high = np.maximum(low, -MANY_TURNS), np.minimum(high, MANY_TURNS)
+    return np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1)
 
 
-def _step(best: Floats, pieces: Pieces, p: int, ranges: list[Floats], finite: Bools) -> tuple[Floats, Ints]:
-    """Costs of all states at piece p, and the state each comes from."""
-    reached = np.full(best.shape, np.inf)
-    origin = np.zeros(best.shape, np.int64)
-    states = np.arange(best.size).reshape(best.shape)
-    for b in (0, 1):
-        for to in (0, 1):
-            step = pieces.first[p, to] - pieces.last[p - 1, b]
-            cost, source = best[b], states[b]
-            for axis in (0, 1):
-                edge = _edge_cost(step[axis], ranges[axis], bool(finite[axis]), bool(pieces.free[p]))
-                # Least sum over the old turn of this axis, for every new turn: [old, new] against [old, other axis].
-                moved = cost if axis == 0 else cost.T
-                names = source if axis == 0 else source.T
-                total = moved[:, None, :] + edge[:, :, None]
-                pick = total.argmin(axis=0)
-                cost = np.take_along_axis(total, pick[None], axis=0)[0]
-                source = np.take_along_axis(names, pick, axis=0)
-                if axis == 1:
-                    cost, source = cost.T, source.T
-            better = cost < reached[to]
-            reached[to] = np.where(better, cost, reached[to])
-            origin[to] = np.where(better, source, origin[to])
-    return reached, origin
+def _allowed(pieces: Pieces, begin: int, end: int, ranges: tuple[Floats, Floats], limits: Floats) -> Bools:
+    """Whether pieces stay inside the limits in each state: (pieces, states)."""
+    fits = []
+    for axis in (0, 1):
+        turned = 360 * ranges[axis]
+        low = pieces.low[begin:end, :, axis, None] + turned >= limits[axis, 0] - LIMIT_SLACK
+        fits.append(low & (pieces.high[begin:end, :, axis, None] + turned <= limits[axis, 1] + LIMIT_SLACK))
+    both: Bools = fits[0][:, :, :, None] & fits[1][:, :, None, :]
+    return both.reshape(end - begin, -1)
 
 
-def _edge_cost(step: float, turns: Floats, finite: bool, free: bool) -> Floats:
-    """Cost of every change of turn of one axis: (old, new)."""
-    nearest = -np.round(step / 360)
-    if not finite:
-        return np.array([[abs(step + 360 * nearest)]])
-    change = turns[None, :] - turns[:, None]
-    natural = change == nearest
-    if free:
-        cost: Floats = np.abs(step + 360 * change) + np.where(natural, 0.0, REWIND_COST)
-        return cost
-    return np.where(natural, np.abs(step + 360 * change), np.inf)
+def _steps(pieces: Pieces, begin: int, end: int, ranges: tuple[Floats, Floats], finite: Bools) -> Floats:
+    """Costs of the steps into pieces from all states before to all states: (pieces, states, states)."""
+    before = np.maximum(np.arange(begin, end) - 1, 0)  # the first piece has none: its row is not used
+    step = pieces.first[begin:end, None, :, :] - pieces.last[before][:, :, None, :]  # [piece, from, to, axis]
+    free = pieces.free[begin:end, None, None, None, None]
+    costs = []
+    for axis in (0, 1):
+        off = step[..., axis, None, None]
+        nearest = -np.round(off / 360)
+        if finite[axis]:
+            change = ranges[axis] - ranges[axis][:, None]
+            other = np.where(free, REWIND_COST, np.inf)
+            costs.append(np.abs(off + 360 * change) + np.where(change == nearest, 0.0, other))
+        else:
+            costs.append(np.abs(off + 360 * nearest))
+    # [piece, from, to, old turn 0, new turn 0, old turn 1, new turn 1], then all of the old before all of the new
+    total: Floats = costs[0][..., None, None] + costs[1][:, :, :, None, None]
+    states = 2 * len(ranges[0]) * len(ranges[1])
+    return total.transpose(0, 1, 3, 5, 2, 4, 6).reshape(end - begin, states, states)

@@ -1,4 +1,4 @@
-"""What is said about rotary axes: poses out of reach, limits, passages near the pole, rewinds."""
+"""What is said about rotary axes: poses out of reach, limits, the pole, rewinds, changes of solution."""
 
 from __future__ import annotations
 
@@ -114,3 +114,11 @@ def rewind_finding(machine: Machine, angles: Floats, rapid: Bools, line: Ints) -
             text = f"{name} turns back by {abs(step[moves[0], axis]):.4g} deg in a rapid, to stay inside its limits"
             findings.append(Finding("CS364", "warning", int(line[moves[0] + 1]), text, len(moves)))
     return tuple(findings)
+
+
+def swap_finding(machine: Machine, swaps: Ints, line: Ints) -> tuple[Finding, ...]:
+    """Rapids in which the rotary axes go over to their other solution."""
+    if not len(swaps):
+        return ()
+    text = f"{' and '.join(machine.names)} go over to their other solution in a rapid: keep clear of the part there"
+    return (Finding("CS365", "note", int(line[swaps[0]]), text, len(swaps)),)

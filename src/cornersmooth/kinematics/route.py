@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.kinematics.choice import LIMIT_SLACK, PREFERENCE_COST, NoChoiceError, Pieces, choose
-from cornersmooth.kinematics.findings import limit_error, pole_finding, reach_error, rewind_finding
+from cornersmooth.kinematics.findings import limit_error, pole_finding, reach_error, rewind_finding, swap_finding
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.orientation import (
     Solutions,
@@ -39,7 +39,7 @@ class RotaryPath:
         Angle between the axis that the angles give and the one asked for: 0 but for poses at the pole, where it stays
         within the tolerance given.
     findings : tuple of Finding
-        Passages near the pole, rewinds.
+        Passages near the pole, rewinds, changes of solution.
     """
 
     angles: Floats
@@ -93,9 +93,10 @@ def rotary_angles(
     cone = found.pole_distance <= tolerance / 2
     run: Ints = np.cumsum(rapid, dtype=np.int64)
     steady = np.flatnonzero(~cone)
+    swaps = np.zeros(0, np.int64)
     if len(steady):
         angles = np.full((n, 2), np.nan)
-        angles[steady] = _steady_angles(machine, axis, found, steady, run, tolerance, line, file)
+        angles[steady], swaps = _steady_angles(machine, axis, found, steady, run, tolerance, line, file)
         _fill_cone(machine, tip, axis, angles, np.flatnonzero(cone), steady, run)
     else:
         angles = np.zeros((n, 2))
@@ -110,7 +111,7 @@ def rotary_angles(
         pose = int(np.argmax(over))
         raise limit_error(machine, found.angles[pose], machine.limits, None, int(line[pose]), 0, file)
     findings = pole_finding(machine, tip, axis, angles, found.pole_distance, rapid, line)
-    findings += rewind_finding(machine, angles, rapid, line)
+    findings += rewind_finding(machine, angles, rapid, line) + swap_finding(machine, swaps, line)
     return RotaryPath(angles, deviation, findings)
 
 
@@ -134,8 +135,8 @@ def _steady_angles(
     tolerance: float,
     line: Ints,
     file: str | None,
-) -> Floats:
-    """Angles of the poses outside the cone: (s, 2)."""
+) -> tuple[Floats, Ints]:
+    """Angles of the poses outside the cone, (s, 2), and the poses before which a rapid changes the solution."""
     start, end = steady[:-1], steady[1:]
     free = run[start] != run[end]
     through = ~free & ((end - start > 1) | passes_pole(machine, axis[start], axis[end], tolerance / 2))
@@ -158,8 +159,9 @@ def _steady_angles(
         branch, extra = choose(pieces, machine.limits)
     except NoChoiceError as stuck:
         raise _stuck_error(machine, stuck, piece, unwrapped, found, steady, run, line, file) from stuck
-    chosen: Floats = unwrapped[np.arange(len(steady)), branch[piece]] + 360 * extra[piece]
-    return chosen
+    solution = branch[piece]
+    swaps = end[free & (solution[1:] != solution[:-1])]
+    return unwrapped[np.arange(len(steady)), solution] + 360 * extra[piece], swaps
 
 
 def _turns_inside(machine: Machine, axis: Floats, steady: Ints, angles: Floats, broken: Bools) -> Floats:
