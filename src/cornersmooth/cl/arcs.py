@@ -15,6 +15,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.cl.builder import FARTHEST
 from cornersmooth.cl.grammar import Record
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.errors import Finding
@@ -80,9 +81,15 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
     Raises
     ------
     InputError
-        CS120, CS124, CS125, CS127
+        CS106, CS113, CS120, CS124, CS125, CS127
     """
     words = [value for value in record.args if isinstance(value, str)]
+    for word in words:
+        if word not in ("TIMES", "ANGLE"):
+            raise error("CS106", file, record.line, word=record.word, token=word)
+    for value in values:
+        if not abs(value) <= FARTHEST:
+            raise error("CS113", file, record.line, value=value, limit=FARTHEST)
     count = len(values)
     turns, sweep = 1.0, math.nan
     if record.word == "MOVARC":
@@ -98,7 +105,7 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
     if not abs(length - 1) <= NORMAL_TOLERANCE:
         raise error("CS124", file, record.line, word=record.word, length=length)
     radius = values[6] if count > 6 else math.nan
-    if radius <= 0 or math.isinf(radius):
+    if radius <= 0:
         raise error("CS125", file, record.line, word=record.word, radius=radius)
     if not (1 <= turns <= MOST_TURNS and turns == int(turns)):
         raise error("CS127", file, record.line, word="CIRCLE", value=turns, limit=MOST_TURNS)
@@ -193,6 +200,8 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
         off = ~(np.abs(distance - radius) <= allowed) | (distance == 0)
         if off.any():
             first = int(off.argmax())
+            if radius[first] == 0:
+                raise error("CS125", file, table.arc[first].line, word=table.arc[first].word, radius=0.0)
             values = {"which": which, "distance": distance[first], "radius": radius[first]}
             raise error("CS123", file, table.arc[first].line, **values)
 

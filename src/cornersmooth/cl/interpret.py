@@ -68,6 +68,8 @@ def obey(machine: Machine, record: Record) -> None:
         raise machine.fail("CS121", machine.arc.line, word=machine.arc.word)
     if record.points and word != "GOTO":
         raise machine.fail("CS105", record.points[0][0], text=state.joined(record.points[0][1]))
+    if word in STRANGE_MOTION_WORDS or (word.startswith(_STRANGE_PREFIXES) and word not in HANDLERS):
+        raise machine.fail("CS108", record.line, word=word)
     handler = HANDLERS.get(word)
     if handler is not None:
         if record.rest:
@@ -88,15 +90,13 @@ def end(machine: Machine) -> None:
 
 
 def _after_end(machine: Machine, record: Record, word: str) -> None:
-    if word in MOTION_WORDS and not machine.lenient:
+    if word in MOTION_WORDS | STRANGE_MOTION_WORDS and not machine.lenient:
         raise machine.fail("CS118", record.line, word=word)
     if word != "$$":
         machine.note("CS144", record.line, what="statements after FINI")
 
 
 def _unknown(machine: Machine, record: Record, word: str) -> None:
-    if word in STRANGE_MOTION_WORDS or word.startswith(_STRANGE_PREFIXES):
-        raise machine.fail("CS108", record.line, word=word)
     near = near_motion_word(word)
     if near is not None and not machine.lenient:
         raise machine.fail("CS109", record.line, word=word, near=near)

@@ -83,8 +83,10 @@ class Machine:
         word = record.word or "?"
         self.statements.append(Statement(self.builder.n, record.line, word, record.args, record.text))
 
-    def numbers(self, record: Record, args: tuple[Argument, ...] | None = None) -> list[float]:
-        """Return arguments that must all be numbers, separated by commas or all by blanks.
+    def numbers(self, record: Record, args: tuple[Argument, ...] | None = None, line: int = 0) -> list[float]:
+        """Return arguments (of the statement, or of a line after it) that must all be numbers.
+
+        They are separated by commas, or all by blanks.
 
         Raises
         ------
@@ -95,11 +97,11 @@ class Machine:
         if len(given) == 1 and isinstance(given[0], str) and len(parts := given[0].split()) > 1:
             values = [number(part) for part in parts]
             if None not in values:
-                self.note("CS134", record.line)
+                self.note("CS134", line or record.line)
                 return [value for value in values if value is not None]
         for value in given:
             if isinstance(value, str):
-                raise self.fail("CS106", record.line, word=record.word, token=value)
+                raise self.fail("CS106", line or record.line, word=record.word, token=value)
         return [float(value) for value in given]
 
     def vector(self, record: Record) -> Vector:

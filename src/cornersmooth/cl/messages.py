@@ -41,7 +41,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS122": ("{word} without a position to start from", "give a GOTO before the arc"),
     "CS123": (
         "{which} of the arc is {distance:.6g} from its centre, not {radius:.6g}",
-        "correct centre, radius or position; units of the file",
+        "correct centre, radius or position",
     ),
     "CS124": ("{word} has a normal of length {length:.6g}", "give the unit vector of the arc's axis"),
     "CS125": ("{word} has a radius of {radius:g}", "give a positive radius"),

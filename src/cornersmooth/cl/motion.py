@@ -16,7 +16,7 @@ from cornersmooth.model import Move
 
 
 def _pose(machine: Machine, record: Record, args: tuple[Argument, ...], line: int) -> tuple[Vector, Vector | None]:
-    values = machine.numbers(record, args)
+    values = machine.numbers(record, args, line)
     if len(values) not in (3, 6, 9):  # 7 to 9 are the surface normal of an expanded record
         raise machine.count(record, len(values), "x,y,z or x,y,z,i,j,k", line)
     return (values[0], values[1], values[2]), (values[3], values[4], values[5]) if len(values) > 3 else None
