@@ -1,0 +1,260 @@
+"""Halves of five-point curves as rational cubics: points, arc length, curvature, and the way back from arc length.
+
+On each half of its parameter range the curve is one rational Bézier cubic (Boehm's knot insertion at u = ½). Written in
+powers of t ∈ [0, 1] it is evaluated by Horner's rule, every curve at parameters of its own. Coordinates are relative to
+the corner, so that short transitions far from the origin keep their digits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.feedrate.limits import Limits
+from cornersmooth.model import Corners, Floats, Ints, Program
+from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.neighbours import norm
+
+#: curves worked on at once: their intermediate arrays fit the processor's cache
+BLOCK = 512
+
+#: Bernstein coefficients of the five basis functions on the first half: Bézier point j is Σ w_i·P_i·_TO_BEZIER[j, i]
+_TO_BEZIER = np.array([[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0.5, 0.5, 0, 0], [0, 0.25, 0.5, 0.25, 0]])
+_TO_POWERS = np.array([[1, 0, 0, 0], [-3, 3, 0, 0], [3, -6, 3, 0], [-1, 3, -3, 1]], np.float64)
+_FIRST = _TO_POWERS @ _TO_BEZIER
+_SECOND = _TO_POWERS @ _TO_BEZIER[::-1, ::-1]
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
+
+#: pieces of a half over which lengths are summed and curvature is bounded; shorter towards u = ½, where it turns most
+PIECES = 12
+_PROGRESS = 1.0 - np.linspace(1.0, 0.0, PIECES + 1) ** 1.7
+_NEWTON_STEPS = 3
+#: samples of the curvature per piece, and rounds of closer sampling where it is largest
+_SAMPLES = 4
+_CLOSER = 3
+
+
+def half_curves(points: Floats, weights: Floats, half: Ints) -> Floats:
+    """Powers of t of w·P and w on one half each.
+
+    Parameters
+    ----------
+    points : (g, 5, 3) float64
+    weights : (g, 2) float64
+    half : (g,) int64
+        0 for u ≤ ½, 1 for u ≥ ½; t runs with u on both.
+
+    Returns
+    -------
+    (g, 4, 4) float64
+        ``[:, k]`` belongs to t^k; the last of the four coordinates is w.
+    """
+    w = nurbs.full_weights(weights)[..., None]
+    weighted = np.concatenate((points * w, w), axis=-1)
+    powers: Floats = np.where(half[:, None, None] == 0, _FIRST @ weighted, _SECOND @ weighted)
+    return powers
+
+
+def corner_halves(
+    program: Program, corners: Corners, rows: Ints, half: Ints, axis_length: float
+) -> tuple[Floats, Floats]:
+    """`half_curves` of the tip and of the axis point of some corners, relative to the corner's tip."""
+    tip_curve, axis_curve = nurbs.control_points(program, corners, rows, axis_length)
+    origin = program.tip[corners.pose[rows]][:, None, :]
+    weights = corners.weights[rows]
+    return half_curves(tip_curve - origin, weights, half), half_curves(axis_curve - origin, weights, half)
+
+
+def evaluate(powers: Floats, t: Floats) -> Floats:
+    """(g, m, 3) points at the parameters t (g, m)."""
+    return np.moveaxis(_derivatives(powers, t, 0)[0], 0, -1)
+
+
+def _derivatives(powers: Floats, t: Floats, order: int) -> list[Floats]:
+    """Point and derivatives by t up to `order`, (3, g, m) each: coordinates first, so that arrays run along t."""
+    by_coordinate = powers.transpose(2, 1, 0)[..., None]  # (4, power, g, 1)
+    factor = np.ones(powers.shape[1])
+    plain = []
+    rational = bool(by_coordinate[3, 1:].any())
+    if not rational:  # w is 1 throughout
+        by_coordinate = by_coordinate[:3]
+    for derivative in range(order + 1):
+        if derivative:
+            factor = factor[1:] * np.arange(1, len(factor))
+            by_coordinate = by_coordinate[:, 1:]
+        value = by_coordinate[:, -1] * factor[-1]
+        for k in range(len(factor) - 2, -1, -1):
+            value = value * t + by_coordinate[:, k] * factor[k]
+        plain.append(np.broadcast_to(value, (len(value), *t.shape)))
+    if not rational:
+        return plain
+    w = plain[0][3]
+    point = plain[0][:3] / w
+    found = [point]
+    if order > 0:
+        found.append((plain[1][:3] - plain[1][3] * point) / w)
+    if order > 1:
+        found.append((plain[2][:3] - 2.0 * plain[1][3] * found[1] - plain[2][3] * point) / w)
+    return found
+
+
+def _size(vectors: Floats) -> Floats:
+    """Length of vectors whose coordinates come first."""
+    size: Floats = np.sqrt(vectors[0] ** 2 + vectors[1] ** 2 + vectors[2] ** 2)
+    return size
+
+
+def pieces(half: Ints) -> Floats:
+    """(g, PIECES + 1) parameters t that divide the halves, dense towards u = ½."""
+    borders: Floats = np.where(half[:, None] == 0, _PROGRESS, 1.0 - _PROGRESS[::-1])
+    return borders
+
+
+def piece_lengths(powers: Floats, borders: Floats) -> Floats:
+    """Arc lengths (g, p) between neighbouring parameters `borders` (g, p + 1), by Gauss-Legendre with 5 points."""
+    g, p = len(powers), borders.shape[1] - 1
+    step = np.diff(borders, axis=1)
+    t = borders[:, :-1, None] + step[..., None] * _NODES
+    speed = _size(_derivatives(powers, t.reshape(g, -1), 1)[1]).reshape(g, p, -1)
+    lengths: Floats = np.einsum("gpn,n->gp", speed, _WEIGHTS) * step
+    return lengths
+
+
+def piece_curvatures(powers: Floats, borders: Floats) -> Floats:
+    """Upper ends of the curvature (g, p) between neighbouring parameters, 1/mm.
+
+    Sampled, and sampled again ever more closely around the largest sample.
+    """
+    g, p = len(powers), borders.shape[1] - 1
+    inner = np.linspace(0.0, 1.0, _SAMPLES + 1)[:-1]
+    step = np.diff(borders, axis=1)
+    t = np.concatenate(((borders[:, :-1, None] + step[..., None] * inner).reshape(g, -1), borders[:, -1:]), axis=1)
+    kappa = curvature(powers, t)
+    of_piece = np.arange(p)[:, None] * _SAMPLES + np.arange(_SAMPLES + 1)
+    largest = kappa[:, of_piece].max(axis=2)
+    rows = np.arange(g)
+    best = kappa.argmax(axis=1)
+    low, high = t[rows, np.maximum(best - 1, 0)], t[rows, np.minimum(best + 1, t.shape[1] - 1)]
+    part = np.linspace(0.0, 1.0, 9)
+    for _ in range(_CLOSER):
+        near = low[:, None] + (high - low)[:, None] * part
+        kappa = curvature(powers, near)
+        at = kappa.argmax(axis=1)
+        piece = np.clip((borders <= near[rows, at][:, None]).sum(axis=1) - 1, 0, p - 1)
+        largest[rows, piece] = np.maximum(largest[rows, piece], kappa[rows, at])
+        low, high = near[rows, np.maximum(at - 1, 0)], near[rows, np.minimum(at + 1, 8)]
+    found: Floats = largest
+    return found
+
+
+def curvature(powers: Floats, t: Floats) -> Floats:
+    """Curvature (g, m) at the parameters t (g, m), 1/mm; 0 where the curve is straight up to rounding."""
+    _, d1, d2 = _derivatives(powers, t, 2)
+    across = _size(np.cross(d1, d2, axis=0))
+    speed = _size(d1)
+    straight = across <= 1e-12 * speed * _size(d2)
+    kappa: Floats = np.where(straight, 0.0, across / np.where(straight, 1.0, speed**3))
+    return kappa
+
+
+def parameters_at(powers: Floats, half: Ints, which: Ints, distance: Floats) -> Floats:
+    """Parameters t (q,) at arc length `distance` (q,) from the start of the halves `which` (q,)."""
+    borders = pieces(half)
+    lengths = np.concatenate((np.zeros((len(powers), 1)), np.cumsum(piece_lengths(powers, borders), axis=1)), axis=1)
+    piece = np.clip((lengths[which] <= distance[:, None]).sum(axis=1) - 1, 0, PIECES - 1)
+    low, high = borders[which, piece], borders[which, piece + 1]
+    missing = distance - lengths[which, piece]
+    whole = np.maximum(lengths[which, piece + 1] - lengths[which, piece], np.finfo(np.float64).tiny)
+    t = low + (high - low) * np.clip(missing / whole, 0.0, 1.0)
+    curves = powers[which]
+    for _ in range(_NEWTON_STEPS):
+        gone = piece_lengths(curves, np.stack((low, t), axis=1))[:, 0]
+        speed = _size(_derivatives(curves, t[:, None], 1)[1])[:, 0]
+        t = np.clip(t + (missing - gone) / np.maximum(speed, np.finfo(np.float64).tiny), low, high)
+    found: Floats = t
+    return found
+
+
+def half_lengths(program: Program, corners: Corners, axis_length: float) -> tuple[Floats, Floats]:
+    """Tip lengths (2, k) of the two halves of every smoothed corner, mm, and angles of the axis over them, rad.
+
+    The angle is only worked out where the tip stands still.
+    """
+    lengths, angles = np.zeros((2, len(corners))), np.zeros((2, len(corners)))
+    for rows in _blocks(np.flatnonzero(corners.smoothed)):
+        for side in range(2):
+            half = np.full(len(rows), side)
+            tip, axis_point = corner_halves(program, corners, rows, half, axis_length)
+            lengths[side, rows] = piece_lengths(tip, pieces(half)).sum(axis=1)
+            still = np.flatnonzero(
+                ~(corners.trim_in[rows] + corners.trim_out[rows] > 0.0) | (lengths[side, rows] < 1e-9)
+            )
+            angles[side, rows[still]] = turned_angle(tip[still], axis_point[still], half[still])
+    return lengths, angles
+
+
+def turned_angle(tip: Floats, axis_point: Floats, half: Ints) -> Floats:
+    """Angle (g,) that the axis sweeps over each half, rad."""
+    axis = axis_vectors(tip, axis_point, pieces(half))
+    step = norm(np.diff(axis, axis=1))
+    swept: Floats = (2.0 * np.arcsin(np.minimum(0.5 * step, 1.0))).sum(axis=1)
+    return swept
+
+
+def axis_vectors(tip: Floats, axis_point: Floats, t: Floats) -> Floats:
+    """Unit vectors (g, m, 3) from the tip curves to the axis-point curves at equal parameters t (g, m)."""
+    lever = evaluate(axis_point, t) - evaluate(tip, t)
+    unit: Floats = lever / norm(lever)[..., None]
+    return unit
+
+
+def speed_caps(
+    program: Program, corners: Corners, rows: Ints, half: Ints, speed: Floats, limits: Limits, axis_length: float
+) -> tuple[Ints, Floats, Floats]:
+    """Where curvature asks for less than the feed.
+
+    Parameters
+    ----------
+    rows, half : (g,) int64
+        Corner and half of each curve.
+    speed : (g,) float64, mm/s
+
+    Returns
+    -------
+    which : (b,) int64
+        The curves that are slowed down, ascending.
+    share : (b, PIECES) float64
+        Parts of their length.
+    cap : (b, PIECES) float64, (mm/s)²
+        v² at most, per part.
+    """
+    which, shares, caps = [], [], []
+    for block in _blocks(np.arange(len(rows))):
+        tip, _ = corner_halves(program, corners, rows[block], half[block], axis_length)
+        borders = pieces(half[block])
+        # a look at the borders alone leaves few curves that need the careful one
+        rough = curvature(tip, borders).max(axis=1)
+        slowed = np.flatnonzero(2.0 * rough * speed[block] ** 2 > limits.centripetal_accel)
+        if not len(slowed):
+            continue
+        tip, borders = tip[slowed], borders[slowed]
+        kappa = piece_curvatures(tip, borders)
+        which.append(block[slowed])
+        shares.append(piece_lengths(tip, borders))
+        fastest = speed[block[slowed], None] ** 2
+        caps.append(limits.centripetal_accel / np.maximum(kappa, limits.centripetal_accel / fastest))
+    if not which:
+        return np.zeros(0, np.int64), np.zeros((0, PIECES)), np.zeros((0, PIECES))
+    return np.concatenate(which), np.concatenate(shares), np.concatenate(caps)
+
+
+def _blocks(rows: Ints) -> list[Ints]:
+    return [rows[at : at + BLOCK] for at in range(0, len(rows), BLOCK)]
+
+
+def _horner(powers: Floats, t: Floats) -> Floats:
+    value = np.broadcast_to(powers[:, None, -1], (*t.shape, powers.shape[-1]))
+    for k in range(powers.shape[1] - 2, -1, -1):
+        value = value * t[..., None] + powers[:, None, k]
+    return value
