@@ -1,0 +1,9 @@
+"""Jerk-limited time laws along the original and the smoothed path."""
+
+from __future__ import annotations
+
+from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.planner import direct, plan
+from cornersmooth.feedrate.timelaw import States, TimeLaw
+
+__all__ = ["Limits", "States", "TimeLaw", "direct", "plan"]

@@ -1,0 +1,85 @@
+"""How fast each stretch of a path may be driven: feed, curvature and joints as one row of intervals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.feedrate import arcs, halves
+from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.path import Kind, Path
+from cornersmooth.model import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Caps:
+    """Speed limits over the path coordinate x, which runs on over all elements.
+
+    Parameters
+    ----------
+    edge : (k + 1,) float64, mm or rad
+        Interval i lies between ``edge[i]`` and ``edge[i + 1]``; a joint has an interval without width.
+    cap : (k,) float64
+        Bound of v² in interval i.
+    run : (r + 1,) int64
+        Intervals ``run[i]`` to ``run[i + 1]`` lie between two stops.
+    element : (r + 1,) int64
+        Elements ``element[i]`` to ``element[i + 1]`` lie between the same stops.
+    """
+
+    edge: Floats
+    cap: Floats
+    run: Ints
+    element: Ints
+
+
+def speed_caps(path: Path, limits: Limits) -> Caps:
+    """Intervals of constant speed limit of a whole path.
+
+    The limit of κ·v² is applied over short pieces of each curve with the largest curvature in the piece.
+    """
+    m = len(path)
+    cap = path.speed**2
+    arc = np.flatnonzero((path.kind == Kind.ARC) & ~path.turning)
+    if len(arc):
+        bound = limits.centripetal_accel / arcs.curvature(path.program, path.move[arc])
+        cap[arc] = np.minimum(cap[arc], bound)
+    curve = np.flatnonzero((path.kind == Kind.CURVE) & ~path.turning)
+    which, share, piece_cap = np.zeros(0, np.int64), np.zeros((0, halves.PIECES)), np.zeros((0, halves.PIECES))
+    if len(curve) and path.corners is not None:
+        half = (path.span[curve, 0] > 0.0).astype(np.int64)
+        which, share, piece_cap = halves.speed_caps(
+            path.program,
+            path.corners,
+            path.corner[curve],
+            half,
+            path.speed[curve],
+            limits,
+            path.settings.axis_length,
+        )
+        which = curve[which]
+
+    # one slot for the joint before each element, then its pieces
+    count = np.ones(m, np.int64)
+    count[which] = halves.PIECES
+    joined = np.isfinite(path.joint[:-1]) & (path.joint[:-1] > 0.0)
+    begin = np.concatenate(([0], np.cumsum(count + joined)))
+    total = int(begin[-1])
+    width, caps = np.zeros(total), np.zeros(total)
+    first = begin[:-1] + joined
+    single = count == 1
+    width[first[single]] = path.length[single]
+    caps[first[single]] = cap[single]
+    inside = first[which][:, None] + np.arange(halves.PIECES)
+    width[inside] = share * (path.length[which] / share.sum(axis=1))[:, None]
+    caps[inside] = piece_cap
+    caps[begin[:-1][joined]] = path.joint[:-1][joined] ** 2
+
+    stops = np.flatnonzero(path.joint == 0.0)
+    return Caps(
+        edge=np.concatenate(([0.0], np.cumsum(width))),
+        cap=caps,
+        run=begin[stops] if m else np.zeros(1, np.int64),
+        element=stops,
+    )

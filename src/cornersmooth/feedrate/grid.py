@@ -1,0 +1,167 @@
+"""Cells over the path coordinate: fine where the speed has to change quickly, coarse where it does not.
+
+Near a place that is passed with speed v the speed changes over lengths of about v·√(v/J), the way covered while the
+jerk changes it by as much as itself. Cells start with a part of that length at every change of the speed limit and
+grow in proportion to the distance from it, whatever the elements of the path are: a thousand short lines at one feed
+are one long cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.feedrate.caps import Caps
+from cornersmooth.model import Bools, Floats, Ints
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """How fine the cells are.
+
+    Parameters
+    ----------
+    part : float
+        Length of a cell at a change of the speed limit, over v·√(v/J).
+    growth : float
+        Growth of the cells per length.
+    end : float
+        Length of the cell next to a stop, over the way covered while the jerk is constant there.
+    fewest : int
+        Cells in a run at least.
+    """
+
+    part: float = 0.1
+    growth: float = 0.06
+    end: float = 0.7
+    fewest: int = 40
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells of some runs, in order.
+
+    Parameters
+    ----------
+    start, width : (n,) float64, mm
+    cap : (n,) float64
+        Bound of v² over the whole cell.
+    first : (r,) int64
+        First cell of each run.
+    """
+
+    start: Floats
+    width: Floats
+    cap: Floats
+    first: Ints
+
+    @property
+    def last(self) -> Ints:
+        """(r,) last cell of each run."""
+        return np.append(self.first[1:], len(self.start)) - 1
+
+
+def make_grid(caps: Caps, runs: Ints, accel: Floats, jerk: Floats, resolution: Resolution | None = None) -> Grid:
+    """Cells for the given runs.
+
+    Parameters
+    ----------
+    caps : Caps
+    runs : (r,) int64
+        Which runs, ascending.
+    accel, jerk : (r,) float64
+    """
+    resolution = Resolution() if resolution is None else resolution
+    counts = caps.run[runs + 1] - caps.run[runs]
+    of_interval = np.repeat(np.arange(len(runs)), counts)
+    interval = np.arange(len(of_interval)) + np.repeat(caps.run[runs] - (np.cumsum(counts) - counts), counts)
+    cap = caps.cap[interval]
+    low = caps.edge[interval]
+    is_first = np.concatenate(([True], of_interval[1:] != of_interval[:-1]))
+
+    # the cells next to the stops
+    begin, end = caps.edge[caps.run[runs]], caps.edge[caps.run[runs + 1]]
+    change = ~is_first & (cap != np.concatenate((cap[:1], cap[:-1])))
+    front, back = _end_cells(cap, of_interval, low - begin[of_interval], end[of_interval] - low, change, accel, jerk)
+    front, back = resolution.end * front, resolution.end * back
+
+    # places where the size of the cells is given: where the limit changes, and next to the end cells
+    slow = np.sqrt(np.minimum(cap, np.concatenate((cap[:1], cap[:-1]))))
+    size = resolution.part * slow**1.5 / np.sqrt(jerk[of_interval])
+    inner = np.clip(low, (begin + front)[of_interval], (end - back)[of_interval])[change]
+    place = np.concatenate((begin + front, inner, end - back))
+    size = np.concatenate((resolution.growth * front, size[change], resolution.growth * back))
+    run = np.concatenate((np.arange(len(runs)), of_interval[change], np.arange(len(runs))))
+    order = np.argsort(run, kind="stable")
+    place, size, run = place[order], size[order], run[order]
+
+    g = resolution.growth
+    size = g * place + np.minimum.accumulate(size - g * place)
+    size = -g * place + np.minimum.accumulate((size + g * place)[::-1])[::-1]
+    left, right = np.flatnonzero(run[1:] == run[:-1]), np.flatnonzero(run[1:] == run[:-1]) + 1
+    gap = place[right] - place[left]
+    peak = 0.5 * (size[left] + size[right] + g * gap)
+    up, down = (np.log(np.maximum(peak / size[side], 1.0)) / g for side in (left, right))
+    summed = np.concatenate(([0.0], np.cumsum(up + down)))
+    stretch = run[left]
+    low_at = np.searchsorted(stretch, np.arange(len(runs)), side="left")
+    high_at = np.searchsorted(stretch, np.arange(len(runs)), side="right")
+    amount = summed[high_at] - summed[low_at]
+    cells = np.maximum(np.ceil(amount).astype(np.int64), resolution.fewest)
+
+    # borders at equal parts of ∫ds/size, found in closed form between two places
+    borders = cells + 1
+    of_border = np.repeat(np.arange(len(runs)), borders)
+    number = np.arange(len(of_border)) - np.repeat(np.cumsum(borders) - borders, borders)
+    target = summed[low_at][of_border] + amount[of_border] * number / cells[of_border]
+    at = np.clip(np.searchsorted(summed, target, side="right") - 1, low_at[of_border], high_at[of_border] - 1)
+    rest = target - summed[at]
+    forth = size[left][at] * np.expm1(g * np.minimum(rest, up[at])) / g
+    back_way = size[right][at] * np.expm1(g * np.clip(up[at] + down[at] - rest, 0.0, down[at])) / g
+    border = np.where(rest <= up[at], place[left][at] + forth, place[right][at] - back_way)
+
+    # two more cells per run, next to the stops
+    first = np.cumsum(cells + 2) - (cells + 2)
+    edge = np.insert(border, np.cumsum(borders) - borders, begin)
+    edge = np.insert(edge, np.cumsum(borders + 1), end)
+    starts = np.ones(len(edge), np.bool_)
+    starts[np.cumsum(borders + 2) - 1] = False
+    at_start = np.flatnonzero(starts)
+    start, stop = edge[at_start], edge[at_start + 1]
+    owner = np.repeat(runs, cells + 2)
+    return Grid(start, stop - start, _smallest_cap(caps, start, stop, caps.run[owner], caps.run[owner + 1]), first)
+
+
+def _end_cells(
+    cap: Floats, run: Ints, from_begin: Floats, to_end: Floats, change: Bools, accel: Floats, jerk: Floats
+) -> tuple[Floats, Floats]:
+    """Longest cells at the start and at the end of each run in which constant jerk loses no time.
+
+    That is the way from rest until the acceleration limit is reached, or half of a speed limit, or a quarter of the
+    time of the fastest motion from rest to rest; a speed limit further on matters when it is lower and near.
+    """
+    at_accel = accel**3 / (6.0 * jerk**2)
+    half_speed = cap**0.75 / (6.0 * np.sqrt(jerk[run]))
+    cells = []
+    for distance in (from_begin, to_end):
+        cell = at_accel.copy()
+        near = np.maximum(half_speed, distance / 12.0)
+        np.minimum.at(cell, run[change], near[change])
+        cells.append(cell)
+    first = np.concatenate(([True], run[1:] != run[:-1]))
+    last = np.append(first[1:], True)
+    length = (from_begin + to_end)[first] / 12.0
+    front = np.minimum(np.minimum(cells[0], half_speed[first]), length)
+    back = np.minimum(np.minimum(cells[1], half_speed[last]), length)
+    return front, back
+
+
+def _smallest_cap(caps: Caps, start: Floats, stop: Floats, begin: Ints, end: Ints) -> Floats:
+    """Smallest limit met in each cell among the intervals `begin` to `end` of its run."""
+    slack = 1e-9 * (stop - start)  # so that a joint on a border counts for both cells
+    low = np.maximum(np.searchsorted(caps.edge, start - slack, side="right") - 1, begin)
+    high = np.minimum(np.searchsorted(caps.edge, stop + slack, side="left"), end)
+    pairs = np.stack((low, np.maximum(high, low + 1)), axis=1).ravel()
+    smallest: Floats = np.minimum.reduceat(np.append(caps.cap, np.inf), pairs)[::2]
+    return smallest

@@ -1,0 +1,271 @@
+"""The motion of a program as a row of elements: lines, halves of transitions, arcs and pure rotations.
+
+The order is that of the motion. A move gives up to three elements: the second half of the transition that it leaves,
+what is left of its segment, and the first half of the transition that it runs into; so an element belongs to one move,
+with one feed and one CL line. Every element is measured along its own coordinate: the path length of the tip in mm, or
+the angle of the axis in rad where the tip stands still.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.feedrate import arcs, halves
+from cornersmooth.feedrate.limits import Limits
+from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Status
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.neighbours import find_neighbours, norm
+from cornersmooth.smoothing.synchronise import angle_between
+
+#: tip lengths below this are no motion of the tip, mm
+STANDSTILL = 1e-9
+#: angles below this are no motion of the axis, rad
+NO_TURN = 1e-9
+
+
+class Kind(IntEnum):
+    """Geometry of an element."""
+
+    LINE = 0
+    CURVE = 1
+    ARC = 2
+
+
+@dataclass(frozen=True)
+class Path:
+    """Elements of a motion, m rows in order.
+
+    Parameters
+    ----------
+    program : Program
+    corners : Corners or None
+        The transitions that the curves are halves of; None for the direct path.
+    settings : Settings
+    kind : (m,) uint8
+        `Kind`.
+    turning : (m,) bool
+        The tip stands still; the coordinate is the angle of the axis, rad.
+    start : (m,) int64
+        Pose that the move starts from.
+    move : (m,) int64
+        Pose that the move ends in; with it go feed and CL line.
+    corner : (m,) int64
+        Row of `corners` for curves, else -1.
+    span : (m, 2) float64
+        Part of the segment (fractions of the move) or of the curve (parameter u).
+    axis_span : (m, 2) float64
+        The same for the axis-point segment of a line.
+    length : (m,) float64, mm or rad
+    speed : (m,) float64, mm/s or rad/s
+        Feed, rapid speed or angular speed.
+    rapid : (m,) bool
+    joint : (m + 1,) float64
+        Largest speed at the start of element i, and at the end of the last: 0 for a stop, inf for none.
+    """
+
+    program: Program
+    corners: Corners | None
+    settings: Settings
+    kind: NDArray[np.uint8]
+    turning: Bools
+    start: Ints
+    move: Ints
+    corner: Ints
+    span: Floats
+    axis_span: Floats
+    length: Floats
+    speed: Floats
+    rapid: Bools
+    joint: Floats
+
+    def __len__(self) -> int:
+        return len(self.length)
+
+
+def build_path(
+    program: Program, corners: Corners | None, settings: Settings, limits: Limits, *, stop_everywhere: bool = False
+) -> Path:
+    """Elements of the direct path (`corners` None) or of the smoothed one.
+
+    Corners that stay sharp are passed with a change of velocity of at most ``accel · period``, reversals with a stop;
+    with `stop_everywhere` every move ends with a stop.
+
+    Raises
+    ------
+    SettingsError
+        A feed move has no usable feed.
+    """
+    moves, start = _moves(program, settings)
+    n = len(program)
+    entry = np.full(n, -1, np.int64)  # smoothed corner at a pose
+    if corners is not None:
+        rows = np.flatnonzero(corners.smoothed)
+        entry[corners.pose[rows]] = rows
+    leaving = np.where(program.kind[moves] == Move.LINEAR, entry[start], -1)
+    reaching = np.where(program.kind[moves] == Move.LINEAR, entry[moves], -1)
+    trims = np.zeros((4, len(moves)))  # tip out, tip in, axis out, axis in
+    if corners is not None:
+        out, into = leaving >= 0, reaching >= 0
+        trims[0, out], trims[1, into] = corners.trim_out[leaving[out]], corners.trim_in[reaching[into]]
+        trims[2, out], trims[3, into] = corners.axis_trim_out[leaving[out]], corners.axis_trim_in[reaching[into]]
+
+    tip_step = program.tip[moves] - program.tip[start]
+    chord = norm(tip_step)
+    arc = program.kind[moves] == Move.ARC
+    along = chord * np.maximum(1.0 - trims[0] - trims[1], 0.0)
+    ends = (
+        line_axes(program, settings.axis_length, start, moves, tip, axis)
+        for tip, axis in ((trims[0], trims[2]), (1.0 - trims[1], 1.0 - trims[3]))
+    )
+    turned = np.where(trims[2] + trims[3] < 1.0, angle_between(*ends), 0.0)
+    tangents = np.zeros((2, len(moves), 3))
+    tangents[:] = tip_step / np.maximum(chord, STANDSTILL)[:, None]
+    if arc.any():
+        along[arc], tangents[0, arc], tangents[1, arc] = arcs.shape(program, moves[arc])
+
+    # three slots per move: out of the corner behind, straight on, into the corner ahead
+    m = 3 * len(moves)
+    half_length, half_turn = np.zeros((2, 0)), np.zeros((2, 0))
+    if corners is not None:
+        half_length, half_turn = halves.half_lengths(program, corners, settings.axis_length)
+    tip_length, axis_angle = np.zeros((len(moves), 3)), np.zeros((len(moves), 3))
+    tip_length[:, 1], axis_angle[:, 1] = along, turned
+    for slot, at, half in ((0, leaving, 1), (2, reaching, 0)):
+        has = at >= 0
+        tip_length[has, slot] = half_length[half, at[has]]
+        axis_angle[has, slot] = half_turn[half, at[has]]
+    lengths, angles = tip_length.reshape(m), axis_angle.reshape(m)
+    present = (lengths > STANDSTILL) | (angles > NO_TURN)
+    turning = lengths <= STANDSTILL
+
+    kind = np.tile(np.array([Kind.CURVE, Kind.LINE, Kind.CURVE], np.uint8), len(moves))
+    kind[1::3][arc] = Kind.ARC
+    corner = np.full((len(moves), 3), -1, np.int64)
+    corner[:, 0], corner[:, 2] = leaving, reaching
+    span = np.zeros((len(moves), 3, 2))
+    span[:, 0] = (0.5, 1.0)
+    span[:, 2] = (0.0, 0.5)
+    axis_span = span.copy()
+    span[:, 1] = np.stack((trims[0], 1.0 - trims[1]), axis=-1)
+    axis_span[:, 1] = np.stack((trims[2], 1.0 - trims[3]), axis=-1)
+
+    rapid = (program.kind[moves] == Move.RAPID) | (program.kind[moves] == Move.HOLE)
+    speed = np.repeat(np.where(rapid, limits.rapid_limits[0], 0.0), 3)
+    cutting = np.repeat(~rapid, 3) & present & ~turning
+    owners = np.repeat(moves, 3)
+    speed[cutting] = _feeds(program, owners[cutting], limits)
+    speed[turning] = limits.angular_limits[0]
+
+    joint = np.full((len(moves), 3), np.inf)
+    joint[:, 0] = _joint_speeds(program, corners, moves, start, leaving, tangents, limits, stop_everywhere)
+    joint_before = joint.reshape(m)
+
+    keep = np.flatnonzero(present)
+    # the joint before an element that is kept is the slowest of those since the element kept before it
+    begin = np.concatenate(([0], keep[:-1] + 1)) if len(keep) else keep
+    slowest = np.minimum.reduceat(joint_before[: keep[-1] + 1], begin) if len(keep) else np.zeros(0)
+    changes = turning[keep]
+    slowest[1:][changes[1:] != changes[:-1]] = 0.0
+    slowest[:1] = 0.0
+    return Path(
+        program=program,
+        corners=corners,
+        settings=settings,
+        kind=kind[keep],
+        turning=changes,
+        start=np.repeat(start, 3)[keep],
+        move=owners[keep],
+        corner=corner.reshape(m)[keep],
+        span=span.reshape(m, 2)[keep],
+        axis_span=axis_span.reshape(m, 2)[keep],
+        length=np.where(turning, angles, lengths)[keep],
+        speed=speed[keep],
+        rapid=np.repeat(rapid, 3)[keep],
+        joint=np.concatenate((slowest, [0.0])),
+    )
+
+
+def line_axes(
+    program: Program, axis_length: float, start: Ints, end: Ints, fraction: Floats, axis_fraction: Floats
+) -> Floats:
+    """Axis (m, 3) on the ruled motion: from a point of the tip segment to a point of the axis-point segment.
+
+    The fractions differ on lines between transitions of the paper's method, which trims the two segments differently.
+    """
+    axis, tip = program.axis, program.tip
+    turned = (1.0 - axis_fraction)[:, None] * axis[start] + axis_fraction[:, None] * axis[end]
+    ahead = (axis_fraction - fraction)[:, None] * (tip[end] - tip[start])
+    lever = axis_length * turned + ahead
+    unit: Floats = lever / norm(lever)[:, None]
+    return unit
+
+
+def _moves(program: Program, settings: Settings) -> tuple[Ints, Ints]:
+    """Poses that are moved to, in order, and the poses they are reached from; repeated poses are one."""
+    n = len(program)
+    near = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
+    start = np.where(near.previous >= 0, near.previous, np.arange(n) - 1)
+    moved = ~near.duplicate & (start >= 0) & (program.kind != Move.FROM)
+    moved[1:] &= program.kind[:-1] != Move.FROM  # a FROM is stated, not passed
+    still = moved & (program.kind != Move.ARC)
+    still[still] = (program.tip[still] == program.tip[start[still]]).all(axis=1) & (
+        program.axis[still] == program.axis[start[still]]
+    ).all(axis=1)
+    moves = np.flatnonzero(moved & ~still)
+    return moves, start[moves]
+
+
+def _feeds(program: Program, moves: Ints, limits: Limits) -> Floats:
+    """Feed of the moves into these poses, mm/s."""
+    if limits.feed is not None:
+        return np.full(len(moves), limits.feed / 60.0)
+    feed = program.feed[moves]
+    unusable = ~(feed > 0.0) | (program.feed_mode[moves] != FeedMode.PER_MINUTE)
+    if unusable.any():
+        first = moves[np.argmax(unusable)]
+        per_revolution = program.feed_mode[first] == FeedMode.PER_REVOLUTION
+        raise SettingsError(
+            "CS261",
+            "the feed is per revolution here" if per_revolution else "no feed is programmed for this move",
+            "give a feed in mm/min for the whole program (--feed)",
+            file=program.source.name,
+            line=int(program.line[first]),
+        )
+    feeds: Floats = feed / 60.0
+    return feeds
+
+
+def _joint_speeds(
+    program: Program,
+    corners: Corners | None,
+    moves: Ints,
+    start: Ints,
+    leaving: Ints,
+    tangents: Floats,
+    limits: Limits,
+    stop_everywhere: bool,
+) -> Floats:
+    """Largest speed at the start of every move."""
+    speeds = np.zeros(len(moves))
+    if stop_everywhere or len(moves) < 2:
+        return speeds
+    feeding = (program.kind[moves] == Move.LINEAR) | (program.kind[moves] == Move.ARC)
+    # an interrupting statement may stand anywhere between the end of the last move and the end of this one
+    told = np.concatenate(([0], np.cumsum(program.interrupted)))
+    quiet = told[moves[1:] + 1] == told[moves[:-1] + 1]
+    joined = feeding[1:] & feeding[:-1] & quiet
+    if corners is not None:
+        reversal = np.zeros(len(program), np.bool_)
+        reversal[corners.pose[corners.status == Status.REVERSAL]] = True
+        joined &= ~reversal[start[1:]]
+    turn = norm(tangents[0, 1:] - tangents[1, :-1])  # 2·sin(α/2)
+    with np.errstate(divide="ignore"):
+        jump = limits.accel * limits.period / turn
+    speeds[1:] = np.where(joined, jump, 0.0)
+    speeds[leaving >= 0] = np.inf
+    return speeds

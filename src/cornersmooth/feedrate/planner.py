@@ -1,0 +1,182 @@
+"""From a program and limits to a time law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from cornersmooth.feedrate import lookahead, scurve
+from cornersmooth.feedrate.caps import Caps, speed_caps
+from cornersmooth.feedrate.grid import Grid, Resolution, make_grid
+from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
+from cornersmooth.model import Floats, Ints, Program, SmoothProgram
+from cornersmooth.settings import Settings
+
+Baseline = Literal["exact_stop", "velocity_jump"]
+Progress = Callable[[int, int], None]
+
+
+def plan(
+    smooth_program: SmoothProgram,
+    limits: Limits | None = None,
+    *,
+    resolution: Resolution | None = None,
+    progress: Progress | None = None,
+) -> TimeLaw:
+    """Plan the motion along the smoothed path.
+
+    Path speed, tangential acceleration, centripetal acceleration and tangential jerk of the tip stay within the
+    limits at every moment; the motion stops where a run of feed moves is interrupted, at reversals, and where the tip
+    stands still while the axis turns. Other sharp corners are passed with a jump of velocity of at most
+    ``accel · period``.
+
+    Parameters
+    ----------
+    smooth_program : SmoothProgram
+    limits : Limits, optional
+    resolution : Resolution, optional
+        How fine the cells are that the speed is planned in.
+    progress : callable, optional
+        Called with (work done, work in all).
+
+    Raises
+    ------
+    SettingsError
+        A feed move has no feed in mm/min and `Limits.feed` is not given.
+    """
+    limits = Limits() if limits is None else limits
+    path = build_path(smooth_program.program, smooth_program.corners, smooth_program.settings, limits)
+    return plan_path(path, limits, resolution, progress)
+
+
+def direct(
+    program: Program,
+    limits: Limits | None = None,
+    baseline: Baseline = "exact_stop",
+    *,
+    settings: Settings | None = None,
+    resolution: Resolution | None = None,
+    progress: Progress | None = None,
+) -> TimeLaw:
+    """Plan the motion along the original path.
+
+    Parameters
+    ----------
+    program : Program
+    limits : Limits, optional
+    baseline : {"exact_stop", "velocity_jump"}
+        What happens at corners: a stop at the end of every move, or a jump of velocity of at most ``accel · period``,
+        that is a speed of at most ``accel · period / (2·sin(α/2))``.
+    settings : Settings, optional
+        Says which repeated poses are one.
+
+    Raises
+    ------
+    SettingsError
+        A feed move has no feed in mm/min and `Limits.feed` is not given.
+    """
+    limits = Limits() if limits is None else limits
+    settings = Settings() if settings is None else settings
+    path = build_path(program, None, settings, limits, stop_everywhere=baseline == "exact_stop")
+    return plan_path(path, limits, resolution, progress)
+
+
+def plan_path(
+    path: Path, limits: Limits, resolution: Resolution | None = None, progress: Progress | None = None
+) -> TimeLaw:
+    """Plan the motion along any path."""
+    caps = speed_caps(path, limits)
+    runs = len(caps.run) - 1
+    lead = caps.element[:-1]  # first element of each run
+    accel = np.where(path.rapid[lead], limits.rapid_limits[1], limits.accel)
+    jerk = np.where(path.rapid[lead], limits.rapid_limits[2], limits.jerk)
+    accel = np.where(path.turning[lead], limits.angular_limits[1], accel)
+    jerk = np.where(path.turning[lead], limits.angular_limits[2], jerk)
+
+    if runs:
+        lowest = np.minimum.reduceat(caps.cap, caps.run[:-1])
+        highest = np.maximum.reduceat(caps.cap, caps.run[:-1])
+        level = lowest == highest
+    else:
+        level = np.zeros(0, np.bool_)
+    parts = [_level_runs(caps, np.flatnonzero(level), accel, jerk)]
+    uneven = np.flatnonzero(~level)
+    if len(uneven):
+        parts.append(_uneven_runs(caps, uneven, accel, jerk, resolution, progress))
+
+    run, duration, way, speed, begin, rate, constant = (np.concatenate([part[i] for part in parts]) for i in range(7))
+    order = np.argsort(run, kind="stable")
+    order = order[duration[order] > 0.0]
+    end = caps.edge[-1]
+    return TimeLaw(
+        time=np.concatenate(([0.0], np.cumsum(duration[order]))),
+        way=np.append(way[order], end),
+        speed=speed[order],
+        accel=begin[order],
+        jerk=constant[order],
+        rate=rate[order],
+        path=path,
+        limits=limits,
+        edge=np.concatenate(([0.0], np.cumsum(path.length))),
+    )
+
+
+def _level_runs(caps: Caps, runs: Ints, accel: Floats, jerk: Floats) -> tuple[Floats | Ints, ...]:
+    """Pieces of runs with one speed limit: S-curves in closed form."""
+    begin, end = caps.edge[caps.run[runs]], caps.edge[caps.run[runs + 1]]
+    limit = np.sqrt(caps.cap[caps.run[runs]])
+    duration, signed, _ = scurve.rest_to_rest(end - begin, limit, accel[runs], jerk[runs])
+    way, speed, rising = np.empty_like(duration), np.empty_like(duration), np.empty_like(duration)
+    x, v, a = begin, np.zeros(len(runs)), np.zeros(len(runs))
+    for phase in range(duration.shape[1]):
+        way[:, phase], speed[:, phase], rising[:, phase] = x, v, a
+        t, j = duration[:, phase], signed[:, phase]
+        x = x + t * (v + t * (a / 2.0 + t * j / 6.0))
+        v = np.maximum(v + t * (a + t * j / 2.0), 0.0)
+        a = a + t * j
+    zero = np.zeros(duration.size)
+    return (
+        np.repeat(runs, duration.shape[1]),
+        duration.ravel(),
+        way.ravel(),
+        speed.ravel(),
+        rising.ravel(),
+        zero,
+        signed.ravel(),
+    )
+
+
+def _uneven_runs(
+    caps: Caps,
+    runs: Ints,
+    accel: Floats,
+    jerk: Floats,
+    resolution: Resolution | None,
+    progress: Progress | None,
+) -> tuple[Floats | Ints, ...]:
+    """Pieces of runs whose speed limit changes on the way: one per cell."""
+    grid: Grid = make_grid(caps, runs, accel[runs], jerk[runs], resolution)
+    of_cell = lookahead.run_of_cells(grid)
+    batch = lookahead.batch_of(grid, accel[runs][of_cell], jerk[runs][of_cell])
+    c = lookahead.solve_runs(batch, grid, progress)
+    z, slope, bend = lookahead.node_values(batch, c)
+    v, a = np.sqrt(z), 0.5 * slope  # at the end of each cell
+    before_v = np.concatenate(([0.0], v[:-1]))
+    before_a = np.concatenate(([0.0], a[:-1]))
+    rate = np.concatenate(([0.0], bend[:-1]))  # of the cell itself
+    first, last = grid.first, grid.last
+    moving = np.where(np.isin(np.arange(len(v)), np.concatenate((first, last))), 1.0, before_v + v)
+    duration = crossing_time(grid.width, moving, 0.0 * moving, rate)
+    constant = np.zeros(len(v))
+    duration[first] = 3.0 * grid.width[first] / v[first]
+    duration[last] = 3.0 * grid.width[last] / before_v[last]
+    for end in (first, last):
+        constant[end] = 6.0 * grid.width[end] / duration[end] ** 3
+        rate[end] = 0.0
+    before_v[first] = 0.0
+    before_a[first] = 0.0
+    return runs[of_cell], duration, grid.start, before_v, before_a, rate, constant

@@ -1,0 +1,231 @@
+"""Where the tool is at any time: a time law in pieces of closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.feedrate import arcs, halves
+from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.path import Kind, Path, line_axes
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.smoothing import nurbs, synchronise
+from cornersmooth.smoothing.neighbours import norm
+
+
+@dataclass(frozen=True)
+class States:
+    """The motion at some times, m rows.
+
+    Parameters
+    ----------
+    t : (m,) float64, s
+    s : (m,) float64, mm
+        Way of the tip since the start.
+    v, a, j : (m,) float64, mm/s, mm/s², mm/s³
+        Path speed, tangential acceleration and jerk; in rad where `turning`.
+    turning : (m,) bool
+        The tip stands still and the axis turns: `v`, `a`, `j` are angular.
+    line : (m,) int64
+        CL line of the move under way.
+    tip : (m, 3) float64, mm
+    axis : (m, 3) float64
+    """
+
+    t: Floats
+    s: Floats
+    v: Floats
+    a: Floats
+    j: Floats
+    turning: Bools
+    line: Ints
+    tip: Floats
+    axis: Floats
+
+
+@dataclass(frozen=True)
+class TimeLaw:
+    """A motion over time, p pieces.
+
+    In a piece either the jerk is constant (`rate` 0), or the acceleration is linear in the way x, a = a₀ + rate·(x−x₀),
+    so that the motion is the solution of x″ = a: hyperbolic or circular functions of √|rate|·t, with jerk rate·v.
+
+    Parameters
+    ----------
+    time : (p + 1,) float64, s
+        Starts of the pieces, and the end.
+    way : (p + 1,) float64
+        Path coordinate, mm (rad where the tip stands still), running on over all elements.
+    speed, accel, jerk, rate : (p,) float64
+        At the start of each piece; `jerk` is that of pieces with constant jerk.
+    path : Path
+    limits : Limits
+    edge : (m + 1,) float64
+        Path coordinate of the elements' ends.
+    """
+
+    time: Floats
+    way: Floats
+    speed: Floats
+    accel: Floats
+    jerk: Floats
+    rate: Floats
+    path: Path
+    limits: Limits
+    edge: Floats
+
+    @property
+    def total(self) -> float:
+        """Duration, s; without delays, tool changes and the strokes of hole cycles."""
+        return float(self.time[-1])
+
+    @property
+    def length(self) -> float:
+        """Way of the tip, mm."""
+        return float(self.path.length[~self.path.turning].sum())
+
+    def kinematics(self, t: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Path coordinate, speed, acceleration and jerk at times t (m,)."""
+        t = np.clip(np.atleast_1d(np.asarray(t, np.float64)), 0.0, self.total)
+        if not len(self.speed):
+            return (np.zeros_like(t),) * 4
+        piece = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.speed) - 1)
+        return self._inside(piece, t - self.time[piece])
+
+    def _inside(self, piece: Ints, tau: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        v, a, j, rate = self.speed[piece], self.accel[piece], self.jerk[piece], self.rate[piece]
+        c, s1, s2 = _solution(rate, tau)
+        x = self.way[piece] + v * s1 + a * s2 + j * tau**3 / 6.0
+        speed = v * c + a * s1 + 0.5 * j * tau**2
+        accel = a * c + rate * v * s1 + j * tau
+        x = np.clip(x, self.way[piece], self.way[piece + 1])
+        return x, np.maximum(speed, 0.0), accel, j + rate * speed
+
+    def times_at(self, way: Floats) -> Floats:
+        """Times at which path coordinates (m,) are reached, s."""
+        way = np.clip(np.asarray(way, np.float64), self.way[0], self.way[-1])
+        piece = np.clip(np.searchsorted(self.way, way, side="right") - 1, 0, len(self.speed) - 1)
+        low, high = np.zeros(len(way)), self.time[piece + 1] - self.time[piece]
+        for _ in range(60):  # halvings: the way never runs backwards
+            middle = 0.5 * (low + high)
+            before = self._inside(piece, middle)[0] < way
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        return self.time[piece] + 0.5 * (low + high)
+
+    def at(self, t: Floats) -> States:
+        """State at times t (m,), clipped to the duration."""
+        t = np.clip(np.atleast_1d(np.asarray(t, np.float64)), 0.0, self.total)
+        x, v, a, j = self.kinematics(t)
+        path = self.path
+        if not len(path):
+            nothing = np.zeros((len(t), 3))
+            return States(t, x, v, a, j, x > 0.0, x.astype(np.int64), nothing, nothing)
+        element = np.clip(np.searchsorted(self.edge, x, side="right") - 1, 0, len(path) - 1)
+        local = np.clip(x - self.edge[element], 0.0, path.length[element])
+        travel = np.concatenate(([0.0], np.cumsum(np.where(path.turning, 0.0, path.length))))
+        s = travel[element] + np.where(path.turning[element], 0.0, local)
+        tip, axis = poses(path, element, local)
+        return States(t, s, v, a, j, path.turning[element], path.program.line[path.move[element]], tip, axis)
+
+    def every_period(self) -> Floats:
+        """Times at the multiples of the interpolation period, and the end, s."""
+        period = self.limits.period
+        steps = int(np.floor(self.total / period * (1.0 - 1e-12)))
+        return np.append(np.arange(steps + 1) * period, self.total)
+
+
+def _solution(rate: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
+    """cosh(ωτ), sinh(ωτ)/ω and (cosh(ωτ) − 1)/ω² for ω² = rate, continued to rates of zero and below."""
+    y = rate * tau * tau
+    root = np.sqrt(np.abs(y))
+    small = np.abs(y) < 1e-3
+    safe = np.where(small, 1.0, root)
+    square = np.where(small, 1.0, y)
+    up = y > 0.0
+    grown = np.where(up, root, 0.0)
+    c = np.where(up, np.cosh(grown), np.cos(root))
+    s1 = np.where(small, 1.0 + y / 6.0 + y * y / 120.0, np.where(up, np.sinh(grown), np.sin(root)) / safe)
+    s2 = np.where(small, 0.5 + y / 24.0 + y * y / 720.0, (c - 1.0) / square)
+    return c, tau * s1, tau * tau * s2
+
+
+def crossing_time(width: Floats, speed_in: Floats, speed_out: Floats, rate: Floats) -> Floats:
+    """Time to cross cells of linear acceleration: tanh(ωτ/2)/ω = width/(v₀ + v₁) with ω² = rate.
+
+    Follows from v″ = rate·v by integrating over the cell.
+    """
+    half = width / (speed_in + speed_out)
+    y = rate * half * half
+    root = np.sqrt(np.abs(y))
+    small = np.abs(y) < 1e-4
+    safe = np.where(small, 1.0, root)
+    up = np.arctanh(np.where(y > 0.0, np.minimum(root, 1.0 - 1e-15), 0.0)) / safe
+    factor = np.where(small, 1.0 + y / 3.0 + y * y / 5.0, np.where(y > 0.0, up, np.arctan(root) / safe))
+    time: Floats = 2.0 * half * factor
+    return time
+
+
+def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats]:
+    """Tip and axis (m, 3) at a coordinate `local` (m,) from the start of each element."""
+    program = path.program
+    tip, axis = np.empty((len(element), 3)), np.empty((len(element), 3))
+    kind = path.kind[element]
+    share = local / np.maximum(path.length[element], np.finfo(np.float64).tiny)
+    rows = np.flatnonzero(kind == Kind.CURVE)
+    if len(rows):
+        tip[rows], axis[rows] = _curve_poses(path, element[rows], local[rows], share[rows])
+    rows = np.flatnonzero(kind != Kind.CURVE)
+    which, share = element[rows], share[rows]
+    start, end = path.start[which], path.move[which]
+    span, axis_span = path.span[which], path.axis_span[which]
+    fraction, axis_fraction = (limit[:, 0] + (limit[:, 1] - limit[:, 0]) * share for limit in (span, axis_span))
+    step = program.tip[end] - program.tip[start]
+    tip[rows] = program.tip[start] + fraction[:, None] * step
+    bow = np.flatnonzero(kind[rows] == Kind.ARC)
+    if len(bow):
+        tip[rows[bow]] = arcs.points(program, end[bow], share[bow])
+    axis[rows] = line_axes(program, path.settings.axis_length, start, end, fraction, axis_fraction)
+    return tip, axis
+
+
+def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tuple[Floats, Floats]:
+    corners = path.corners
+    if corners is None:
+        raise ValueError("a direct path has no curves")
+    program, height = path.program, path.settings.axis_length
+    distinct, which = np.unique(element, return_inverse=True)
+    half = (path.span[distinct, 0] > 0.0).astype(np.int64)
+    tip_half, axis_half = halves.corner_halves(program, corners, path.corner[distinct], half, height)
+    t = np.where(path.turning[element], share, 0.0)
+    moving = np.flatnonzero(~path.turning[element])
+    t[moving] = halves.parameters_at(tip_half, half, which[moving], local[moving])
+    tip = halves.evaluate(tip_half[which], t[:, None])[:, 0]
+    axis = halves.axis_vectors(tip_half[which], axis_half[which], t[:, None])[:, 0]
+    row, half = path.corner[element], half[which]
+    paper = np.flatnonzero(np.isfinite(corners.sync_residual[row]))
+    if len(paper):
+        axis[paper] = _paper_axes(path, row[paper], 0.5 * (half[paper] + t[paper]))
+    return tip + program.tip[corners.pose[row]], axis
+
+
+def _paper_axes(path: Path, row: Ints, u: Floats) -> Floats:
+    """Axis on transitions of `zhang2016`, whose axis-point curve has a parameter v(u) of its own (equations 20 to 22).
+
+    v(u) is followed from u = 0 over a common set of parameters and interpolated in between.
+    """
+    corners = path.corners
+    if corners is None:
+        raise ValueError("a direct path has no curves")
+    rows, which = np.unique(row, return_inverse=True)
+    tip_curve, axis_curve = nurbs.control_points(path.program, corners, rows, path.settings.axis_length)
+    weights = corners.weights[rows]
+    grid = synchronise.REPORT_PARAMETERS
+    v, _ = synchronise.matching_parameters(tip_curve, axis_curve, weights, grid, path.settings.axis_length)
+    cell = np.clip(np.searchsorted(grid, u, side="right") - 1, 0, len(grid) - 2)
+    part = (u - grid[cell]) / (grid[cell + 1] - grid[cell])
+    at = v[which, cell] + part * (v[which, cell + 1] - v[which, cell])
+    tips = nurbs.evaluate(tip_curve[which], weights[which], u[:, None])[:, 0]
+    points = nurbs.evaluate(axis_curve[which], weights[which], at[:, None])[:, 0]
+    unit: Floats = (points - tips) / norm(points - tips)[:, None]
+    return unit
