@@ -1,0 +1,163 @@
+"""A block of the two motions with its correspondence: what all measurements start from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.verify.ncprogram import NcProgram
+from cornersmooth.verify.stops import Stretches
+from cornersmooth.verify.trails import Original, Written, written_motion
+from cornersmooth.verify.walking import Lanes, Track, cut_lane, walk
+
+#: path elements in a block
+BLOCK = 1 << 18
+
+#: written vertices between anchors
+LANE = 700
+
+#: last printed digits by which the next segment must be nearer to be taken
+MARGIN_STEPS = 4.0
+
+Lane = tuple[int, int, int, int, float]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Part of the written motion and where its vertices are on the original.
+
+    Parameters
+    ----------
+    written : Written
+    six : (v, 6) float64
+        Its vertices: tip and axis point.
+    on : (v,) bool
+        Whether a vertex belongs to a stretch of feed moves.
+    piece : (v,) int64
+        Number of the stretch in this block.
+    segment : (v,) int64
+        Segment of the original trail.
+    fraction : (v,) float64
+        On that segment.
+    backward : (v,) bool
+        See `walking.walk`.
+    low, high : (v,) int64
+        First and last original segment of the stretch a vertex belongs to.
+    closed : bool
+        Whether the last stretch ends in this block.
+    """
+
+    written: Written
+    six: Floats
+    on: Bools
+    piece: Ints
+    segment: Ints
+    fraction: Floats
+    backward: Bools
+    low: Ints
+    high: Ints
+    closed: bool
+
+    @cached_property
+    def place(self) -> Floats:
+        """(v,) segment plus fraction, where `on`."""
+        where: Floats = self.segment + self.fraction
+        return where
+
+
+@dataclass(frozen=True)
+class Matcher:
+    """The two motions and the lengths that decide what counts as near.
+
+    Parameters
+    ----------
+    original : Original
+    nc : NcProgram
+    track : Track
+        Of the original trail.
+    tolerance, axis_length : float, mm
+    """
+
+    original: Original
+    nc: NcProgram
+    track: Track
+    tolerance: float
+    axis_length: float
+
+    @property
+    def margin(self) -> float:
+        """Distance that printed digits may account for, mm."""
+        axis_step = self.nc.second_step * (self.axis_length if self.nc.second_is == "vector" else 1.0)
+        return MARGIN_STEPS * max(self.nc.tip_step, axis_step)
+
+    @property
+    def near(self) -> float:
+        """Distance within which a written vertex is taken to be on its way, mm."""
+        return 2.0 * self.tolerance + self.margin
+
+    def blocks(self, stretches: Stretches) -> Iterator[Block]:
+        """Give out all stretches, in blocks of about `BLOCK` elements, each vertex with its place."""
+        last_vertex = self.original.trail.last
+        pending: list[tuple[int, int, int, int, float]] = []
+        columns = (stretches.move_first, stretches.move_last, stretches.element_first, stretches.element_last)
+        for move_first, move_last, first, last in zip(*(column.tolist() for column in columns), strict=True):
+            if move_first == move_last or first == last:
+                continue
+            start, stop, fraction = int(last_vertex[move_first]), int(last_vertex[move_last]), 0.0
+            while True:
+                if pending and last - pending[0][0] > BLOCK:
+                    done, _ = self._match(pending, open_end=False)
+                    pending = []
+                    yield done
+                if last - first <= BLOCK + BLOCK // 2:
+                    pending.append((first, last, start, stop, fraction))
+                    break
+                done, rest = self._match([(first, first + BLOCK, start, stop, fraction)], open_end=True)
+                yield done
+                first, start, fraction = rest
+        if pending:
+            done, _ = self._match(pending, open_end=False)
+            yield done
+
+    def _match(
+        self, pieces: list[tuple[int, int, int, int, float]], *, open_end: bool
+    ) -> tuple[Block, tuple[int, int, float]]:
+        """Make one block; with an open end only up to the last anchor, and say where the rest begins."""
+        first, last = pieces[0][0], pieces[-1][1]
+        written = written_motion(self.nc, first, last, self.tolerance, self.axis_length)
+        six = written.trail.six(self.axis_length)
+        difference = six[1:] - six[:-1]
+        length = np.concatenate(([0.0], np.cumsum(np.sqrt(np.einsum("ij,ij->i", difference, difference)))))
+        ends = written.trail.last
+        lanes: list[Lane] = []
+        spans = []
+        for piece in pieces:
+            lane = (int(ends[piece[0] - first]), int(ends[piece[1] - first]), piece[2], piece[3], piece[4])
+            cut = [lane]
+            if lane[1] - lane[0] > 2 * LANE:
+                cut = cut_lane(six, length, self.track, lane, LANE, self.near, ends if open_end else None)
+            if open_end and len(cut) > 1:
+                cut.pop()
+            lanes += cut
+            spans.append((lane[0], cut[-1][1], lane[2], cut[-1][3]))
+        table = Lanes(*(np.array(column) for column in zip(*lanes, strict=True)))
+        segment, fraction, backward = walk(six, self.track, table, self.margin, self.near)
+        on = fraction >= 0
+        number = np.full(len(six), -1, np.int64)
+        low, high = np.zeros(len(six), np.int64), np.zeros(len(six), np.int64)
+        if len(spans) == 1:
+            a, b, start, stop = spans[0]
+            number[a : b + 1], low[a : b + 1], high[a : b + 1] = 0, start, stop - 1
+        else:
+            a, b, start, stop = np.array(spans).T
+            index = np.repeat(np.arange(len(spans)), b - a + 1)
+            vertex = np.repeat(a - np.cumsum(b - a + 1) + (b - a + 1), b - a + 1) + np.arange(len(index))
+            number[vertex], low[vertex], high[vertex] = index, start[index], stop[index] - 1
+        tail = spans[-1][1]
+        block = Block(written, six, on, number, segment, fraction, backward, low, high, not open_end)
+        rest = (int(written.trail.owner[tail]), int(segment[tail]), float(fraction[tail]))
+        return block, rest

@@ -1,0 +1,330 @@
+"""Measures the deviation of a whole text and keeps what a user wants to know: how much, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Keep
+from cornersmooth.verify.blocks import Block, Matcher
+from cornersmooth.verify.gaps import (
+    Reached,
+    from_original,
+    from_written,
+    own_gaps_of_original,
+    own_gaps_of_written,
+)
+from cornersmooth.verify.hulls import hull_gaps
+from cornersmooth.verify.ncprogram import Problem
+from cornersmooth.verify.nearest import gap_between, nearest_segments
+from cornersmooth.verify.stops import ARITHMETIC, digit_errors
+
+#: rows of a block for which tip and axis point are looked at each on its own: at a time, and at most
+_OWN_ROWS, _MOST_OWN_ROWS = 128, 4096
+
+#: neighbouring violations no farther apart on the original than this many segments are one problem
+_SAME_PROBLEM = 3.0
+
+#: segments looked at on either side for a vertex that seems to go backwards
+_BACK_REACH = 3
+
+
+@dataclass
+class Worst:
+    """Largest value met, and where: CL line and NC line."""
+
+    value: float = 0.0
+    cl_line: int = 0
+    nc_line: int = 0
+
+    def update(self, values: Floats, cl_line: Ints, nc_line: Ints) -> None:
+        """Take the largest of (k,) values, if it is larger than what was met."""
+        if len(values):
+            k = int(np.argmax(values))
+            if values[k] > self.value:
+                self.value, self.cl_line, self.nc_line = float(values[k]), int(cl_line[k]), int(nc_line[k])
+
+
+@dataclass
+class Violations:
+    """Places where a promise is broken, in columns."""
+
+    place: list[Floats] = field(default_factory=list)
+    cl_line: list[Ints] = field(default_factory=list)
+    nc_line: list[Ints] = field(default_factory=list)
+    amount: list[Floats] = field(default_factory=list)
+    code: list[Ints] = field(default_factory=list)
+
+    def add(self, code: int, place: Floats, cl_line: Ints, nc_line: Ints, amount: Floats) -> None:
+        """Add k places."""
+        self.place.append(place)
+        self.cl_line.append(cl_line)
+        self.nc_line.append(nc_line)
+        self.amount.append(amount)
+        self.code.append(np.full(len(place), code))
+
+    def problems(self, text: dict[int, str]) -> list[Problem]:
+        """One problem for each group of neighbouring places with the same code, at its worst place."""
+        if not self.place:
+            return []
+        place, code = np.concatenate(self.place), np.concatenate(self.code)
+        cl_line, nc_line = np.concatenate(self.cl_line), np.concatenate(self.nc_line)
+        amount = np.concatenate(self.amount)
+        order = np.lexsort((place, code))
+        place, code, amount = place[order], code[order], amount[order]
+        cl_line, nc_line = cl_line[order], nc_line[order]
+        new = np.append(True, (np.diff(place) > _SAME_PROBLEM) | (np.diff(code) != 0))
+        found = []
+        for rows in np.split(np.arange(len(place)), np.flatnonzero(new)[1:]):
+            k = int(rows[np.argmax(amount[rows])])
+            value = float(amount[k])
+            found.append(
+                Problem(f"CS{code[k]}", int(cl_line[k]), int(nc_line[k]), text[int(code[k])].format(value), value)
+            )
+        return found
+
+
+@dataclass
+class Deviation:
+    """What was measured.
+
+    Parameters
+    ----------
+    tip, axis_point : Worst, mm
+        Distance of the two tip paths, and of the two axis-point paths, in order along the path.
+    together_tip, together_axis_point : Worst, mm
+        The same at one common pose of the tool line.
+    orientation : Worst, rad
+        At the common pose.
+    pose_tip, pose_axis_point : (n,) float64, mm
+        Distance of every original pose from the nearest written pose; NaN where the tool does not pass at feed.
+    pose_angle : (n,) float64, rad
+    pose_nc_line : (n,) int64
+    """
+
+    tip: Worst
+    axis_point: Worst
+    together_tip: Worst
+    together_axis_point: Worst
+    orientation: Worst
+    pose_tip: Floats
+    pose_axis_point: Floats
+    pose_angle: Floats
+    pose_nc_line: Ints
+    violations: Violations
+
+
+class Meter:
+    """Measures block after block."""
+
+    def __init__(self, matcher: Matcher, tolerance: float) -> None:
+        n = len(matcher.original.program)
+        self.matcher = matcher
+        self.limit = tolerance + ARITHMETIC
+        self.exact = exact_poses(matcher)
+        nan = np.full(n, np.nan)
+        self.result = Deviation(
+            Worst(),
+            Worst(),
+            Worst(),
+            Worst(),
+            Worst(),
+            nan,
+            nan.copy(),
+            nan.copy(),
+            np.zeros(n, np.int64),
+            Violations(),
+        )
+
+    def measure(self, block: Block) -> Reached:
+        """Measure one block; return what its written vertices found."""
+        matcher = self.matcher
+        written = from_written(matcher, block)
+        theirs = from_original(matcher, block)
+        original = matcher.original
+        rows = np.minimum(written.place.astype(np.int64) + 1, len(original.trail) - 1)
+        cl_line = original.program.line[original.pose[original.trail.owner[rows]]]
+        nc_line = matcher.nc.line[block.written.trail.owner[written.vertex]]
+        self._take(block, written, cl_line, nc_line, written.place, mine=True)
+        self._take_hulls(block)
+
+        pose = original.pose[original.trail.owner[theirs.vertex]]
+        cl_line = original.program.line[pose]
+        segment = np.minimum(theirs.place.astype(np.int64) + 1, len(block.six) - 1)
+        nc_line = matcher.nc.line[block.written.trail.owner[segment]]
+        self._take(block, theirs, cl_line, nc_line, theirs.vertex.astype(np.float64), mine=False)
+        whole = original.trail.fraction[theirs.vertex] == 1
+        result, pose = self.result, pose[whole]
+        result.pose_tip[pose], result.pose_axis_point[pose] = theirs.gap.tip[whole], theirs.gap.axis_point[whole]
+        result.pose_angle[pose], result.pose_nc_line[pose] = theirs.gap.angle[whole], nc_line[whole]
+
+        self._check_exact(block, theirs, whole)
+        self._check_order(block, written)
+        self._check_their_order(block, theirs)
+        return written
+
+    def problems(self) -> list[Problem]:
+        """What is wrong, neighbouring places taken together."""
+        return self.result.violations.problems(_TEXT)
+
+    def _take(self, block: Block, reached: Reached, cl_line: Ints, nc_line: Ints, place: Floats, *, mine: bool) -> None:
+        result, gap = self.result, reached.gap
+        result.together_tip.update(gap.tip, cl_line, nc_line)
+        result.together_axis_point.update(gap.axis_point, cl_line, nc_line)
+        result.orientation.update(gap.angle, cl_line, nc_line)
+        own_gaps = own_gaps_of_written if mine else own_gaps_of_original
+        known = np.zeros(len(gap.tip), np.bool_)
+        tip, axis = gap.tip.copy(), gap.axis_point.copy()
+
+        def look(rows: Ints) -> None:
+            tip[rows], axis[rows] = own_gaps(self.matcher, block, reached, rows)
+            known[rows] = True
+
+        over = np.flatnonzero(gap.larger > self.limit)
+        if len(over):
+            look(over[np.argsort(-gap.larger[over])[:_MOST_OWN_ROWS]])
+        for values, worst in ((tip, result.tip), (axis, result.axis_point)):
+            looked = 0
+            while looked < _MOST_OWN_ROWS:
+                best = max(worst.value, float(values[known].max(initial=0.0)))
+                rows = np.flatnonzero(~known & (values > best))
+                if not len(rows):
+                    break
+                if len(rows) > _OWN_ROWS:
+                    rows = rows[np.argpartition(-values[rows], _OWN_ROWS)[:_OWN_ROWS]]
+                look(rows)
+                looked += len(rows)
+            rows = np.flatnonzero(known)
+            worst.update(values[rows], cl_line[rows], nc_line[rows])
+        over = over[known[over]]
+        for code, values in ((521, tip), (522, axis)):
+            broken = over[values[over] > self.limit]
+            if len(broken):
+                result.violations.add(code, place[broken], cl_line[broken], nc_line[broken], values[broken])
+
+    def _take_hulls(self, block: Block) -> None:
+        """Deviations of curves between their knots, where they may be larger than at the knots."""
+        found = hull_gaps(self.matcher, block, self.limit)
+        if found is None:
+            return
+        place, element, tip, axis = found
+        original = self.matcher.original
+        rows = np.minimum(place.astype(np.int64) + 1, len(original.trail) - 1)
+        cl_line = original.program.line[original.pose[original.trail.owner[rows]]]
+        nc_line = self.matcher.nc.line[element]
+        for code, values, worst in ((521, tip, self.result.tip), (522, axis, self.result.axis_point)):
+            worst.update(values, cl_line, nc_line)
+            broken = np.flatnonzero(values > self.limit)
+            if len(broken):
+                self.result.violations.add(code, place[broken], cl_line[broken], nc_line[broken], values[broken])
+
+    def _check_exact(self, block: Block, theirs: Reached, whole: Bools) -> None:
+        """Poses that may not be rounded must be ends of elements, to the printed digits."""
+        matcher, original = self.matcher, self.matcher.original
+        rows = np.flatnonzero(whole)
+        move = original.trail.owner[theirs.vertex[rows]]
+        rows = rows[self.exact[move]]
+        if not len(rows):
+            return
+        move = original.trail.owner[theirs.vertex[rows]]
+        pose = original.pose[move]
+        tip, axis = original.program.tip[pose], original.program.axis[pose]
+        trail, first = block.written.trail, block.written.first
+        owner = trail.owner[np.minimum(theirs.place[rows].astype(np.int64) + 1, len(trail) - 1)]
+        exact = np.zeros(len(rows), np.bool_)
+        amount = np.full(len(rows), np.inf)
+        for step in range(-2, 2):
+            element = np.clip(owner + step, first, first + len(trail.last) - 1)
+            same, off = digit_errors(matcher.nc, element, tip, axis, matcher.axis_length)
+            exact |= same
+            amount = np.minimum(amount, off)
+        missed = np.flatnonzero(~exact)
+        if len(missed):
+            self.result.violations.add(
+                524,
+                theirs.vertex[rows[missed]].astype(np.float64),
+                original.program.line[pose[missed]],
+                matcher.nc.line[owner[missed]],
+                amount[missed],
+            )
+
+    def _check_order(self, block: Block, written: Reached) -> None:
+        """Written vertices that would fit clearly better before the one in front of them."""
+        matcher, margin = self.matcher, self.matcher.margin
+        rows = np.flatnonzero(block.backward[written.vertex])
+        if not len(rows):
+            return
+        vertex = written.vertex[rows]
+        six, theirs = block.six[vertex], matcher.track.six
+        segment, at = nearest_segments(
+            six, theirs, block.segment[vertex], _BACK_REACH, block.low[vertex], block.high[vertex]
+        )
+        free = theirs[segment] + at[:, None] * (theirs[segment + 1] - theirs[segment])
+        held_segment, held_at = block.segment[vertex], block.fraction[vertex]
+        held = theirs[held_segment] + held_at[:, None] * (theirs[held_segment + 1] - theirs[held_segment])
+        gain = np.linalg.norm(six - held, axis=1) - np.linalg.norm(six - free, axis=1)
+        wrong = np.flatnonzero((gain > margin) & (segment + at < held_segment + held_at))
+        if len(wrong):
+            move = matcher.original.trail.owner[held_segment[wrong] + 1]
+            self.result.violations.add(
+                523,
+                (held_segment + held_at)[wrong],
+                matcher.original.program.line[matcher.original.pose[move]],
+                matcher.nc.line[block.written.trail.owner[vertex[wrong]]],
+                gain[wrong],
+            )
+
+    def _check_their_order(self, block: Block, theirs: Reached) -> None:
+        """Original vertices that are passed clearly nearer before the one in front of them."""
+        matcher, margin = self.matcher, self.matcher.margin
+        falls = np.flatnonzero((np.diff(theirs.place) < 0) & (np.diff(theirs.vertex) == 1)) + 1
+        if not len(falls):
+            return
+        before, here = theirs.place[falls - 1], theirs.place[falls]
+        trail = block.written.trail
+
+        def pose(place: Floats) -> tuple[Floats, Floats]:
+            segment = np.minimum(place.astype(np.int64), len(trail) - 2)
+            at = (place - segment)[:, None]
+            tip = trail.tip[segment] + at * (trail.tip[segment + 1] - trail.tip[segment])
+            return tip, trail.axis[segment] + at * (trail.axis[segment + 1] - trail.axis[segment])
+
+        back = gap_between(*pose(before), *pose(here), matcher.axis_length).larger
+        point = matcher.original.trail
+        vertex = theirs.vertex[falls]
+        held = gap_between(*pose(before), point.tip[vertex], point.axis[vertex], matcher.axis_length).larger
+        gain = np.minimum(back, held - theirs.gap.larger[falls])
+        wrong = np.flatnonzero(gain > margin)
+        if len(wrong):
+            segment = np.minimum(before[wrong].astype(np.int64) + 1, len(trail) - 1)
+            self.result.violations.add(
+                523,
+                vertex[wrong].astype(np.float64),
+                matcher.original.program.line[matcher.original.pose[point.owner[vertex[wrong]]]],
+                matcher.nc.line[trail.owner[segment]],
+                gain[wrong],
+            )
+
+
+def exact_poses(matcher: Matcher) -> Bools:
+    """(m,) whether the end of every original move must be passed exactly: all but the inner poses of chains."""
+    program = matcher.original.program
+    exact = np.ones(len(program), np.bool_)
+    chains = program.chains
+    if len(chains):
+        steps = np.zeros(len(program) + 1, np.int64)
+        np.add.at(steps, chains[:, 0] + 1, 1)
+        np.add.at(steps, chains[:, 1], -1)
+        exact = np.cumsum(steps[:-1]) == 0
+    exact |= program.keep != Keep.NO
+    chosen: Bools = exact[matcher.original.pose]
+    return chosen
+
+
+_TEXT = {
+    521: "the tip leaves its path by {:.6f} mm",
+    522: "the axis point leaves its path by {:.6f} mm",
+    523: "the path is not run in order: {:.6f} mm backwards",
+    524: "a pose that must be passed exactly is missed by {:.6f} mm",
+}

@@ -1,0 +1,147 @@
+"""Feeds: every written element must carry the feed of the original move it replaces.
+
+Where a rounded pose changes the feed, the change may lie anywhere inside the rounding.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
+from cornersmooth.verify.blocks import Block, Matcher
+from cornersmooth.verify.ncprogram import Element, NcProgram, Problem
+from cornersmooth.verify.stops import ARITHMETIC
+
+#: F words may be rounded to so many decimals in units of the text
+FEED_STEP = 1e-4
+
+#: a rounding reaches at most so many times as far as its first vertex that is visibly off the line
+_BEYOND_VISIBLE = 3.0
+
+#: roundings that are looked at one by one in a block
+_MOST_SINGLE = 5000
+
+
+def check_feeds(matcher: Matcher, block: Block, off: Floats) -> list[tuple[float, Problem]]:
+    """Compare the feeds of one block.
+
+    Parameters
+    ----------
+    matcher : Matcher
+    block : Block
+    off : (v,) float64, mm
+        Distance of every written vertex from the original.
+
+    Returns
+    -------
+    list of (place, Problem)
+        CS541 a wrong feed, CS542 no feed, CS543 the wrong feed mode; one for each run of elements.
+    """
+    nc, original = matcher.nc, matcher.original
+    program = original.program
+    trail, first = block.written.trail, block.written.first
+    end = trail.last[1:]
+    start = trail.last[:-1]
+    feeding = block.on[start] & block.on[end] & (block.piece[start] == block.piece[end])
+    element = np.flatnonzero(feeding) + first + 1
+    if not len(element):
+        return []
+    start, end = start[feeding], end[feeding]
+    low, high = _touched(matcher, block, start, end)
+    feed, mode = program.feed[original.pose], program.feed_mode[original.pose] == FeedMode.PER_REVOLUTION
+    said, per_revolution = nc.feed[element], nc.per_revolution[element]
+    rapid = nc.kind[element] == Element.RAPID
+    good = _same(said, per_revolution, feed, mode, low, nc.mm_per_unit) | rapid
+    other = np.flatnonzero(~good)
+    if len(other):
+        good[other] = _same(said[other], per_revolution[other], feed, mode, high[other], nc.mm_per_unit)
+        several = np.flatnonzero(~good & (high > low + 1))
+        for k in several.tolist():
+            among = np.arange(low[k], high[k] + 1)
+            count = np.full(len(among), said[k]), np.full(len(among), per_revolution[k])
+            good[k] = bool(_same(*count, feed, mode, among, nc.mm_per_unit).any())
+    wrong = np.flatnonzero(~good)
+    for k in wrong[:_MOST_SINGLE].tolist():
+        good[k] = _inside_rounding(matcher, block, off, int(start[k]), int(end[k]), int(low[k]), float(said[k]), feed)
+    wrong = np.flatnonzero(~good)
+    if not len(wrong):
+        return []
+    runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
+    return [
+        (float(block.place[start[run[0]]]), _problem(program, nc, original.pose, element, low, run[0])) for run in runs
+    ]
+
+
+def _touched(matcher: Matcher, block: Block, start: Ints, end: Ints) -> tuple[Ints, Ints]:
+    """First and last original move that an element runs along."""
+    length = matcher.track.length
+    owner = matcher.original.trail.owner
+    segment, at = block.segment[start], block.fraction[start]
+    rest = (1 - at) * (length[segment + 1] - length[segment])
+    segment = np.where((rest <= matcher.margin) & (segment < block.high[start]), segment + 1, segment)
+    last, at = block.segment[end], block.fraction[end]
+    gone = at * (length[last + 1] - length[last])
+    last = np.where((gone <= matcher.margin) & (last > segment), last - 1, last)
+    last = np.maximum(last, segment)
+    return owner[segment + 1], owner[last + 1]
+
+
+def _same(said: Floats, per_revolution: Bools, feed: Floats, mode: Bools, move: Ints, unit: float) -> Bools:
+    asked = feed[move]
+    room = FEED_STEP / 2 * unit + ARITHMETIC * np.maximum(np.abs(asked), 1.0)
+    same: Bools = np.isnan(asked) | ((np.abs(said - asked) <= room) & (per_revolution == mode[move]))
+    return same
+
+
+def _inside_rounding(
+    matcher: Matcher, block: Block, off: Floats, start: int, end: int, move: int, said: float, feed: Floats
+) -> bool:
+    """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
+    length, trail = matcher.track.length, matcher.original.trail
+    room = FEED_STEP / 2 * matcher.nc.mm_per_unit + ARITHMETIC * max(abs(said), 1.0)
+    visible = matcher.margin / 2
+    low, high = int(block.low[start]), int(block.high[start])
+
+    def at(vertex: int) -> float:
+        segment = int(block.segment[vertex])
+        here: float = length[segment] + block.fraction[vertex] * (length[segment + 1] - length[segment])
+        return here
+
+    for neighbour, pose_vertex, vertex, step in (
+        (move + 1, int(trail.last[move]), start, 1),
+        (move - 1, int(trail.last[move - 1]) if move else -1, end, -1),
+    ):
+        if not low < pose_vertex <= high or not 0 <= neighbour < len(feed):
+            continue
+        if not abs(feed[neighbour] - said) <= room:
+            continue
+        pose = length[pose_vertex]
+        begin, other = length[trail.last[move - 1]], length[trail.last[move]]
+        far = abs(at(vertex) - pose)
+        if far > (other - begin) / 2 + matcher.margin:
+            continue
+        reach = largest = 0.0
+        walker = vertex
+        while 0 <= walker < len(off) and block.on[walker] and step * (at(walker) - pose) <= 0:
+            if off[walker] > visible:
+                reach = max(reach, abs(at(walker) - pose))
+                largest = max(largest, float(off[walker]))
+            walker += step
+        if 0 <= walker < len(off):
+            largest = max(largest, float(off[walker]))
+        if far <= _BEYOND_VISIBLE * reach + matcher.margin or 0 < largest <= 8 * visible:
+            return True
+    return False
+
+
+def _problem(program: Program, nc: NcProgram, pose: Ints, element: Ints, low: Ints, k: int) -> Problem:
+    own, move = int(element[k]), int(pose[low[k]])
+    cl_line, nc_line = int(program.line[move]), int(nc.line[own])
+    unit = "rev" if program.feed_mode[move] == FeedMode.PER_REVOLUTION else "min"
+    said = "rev" if nc.per_revolution[own] else "min"
+    if np.isnan(nc.feed[own]):
+        return Problem("CS542", cl_line, nc_line, "a feed move before any F")
+    if unit != said:
+        return Problem("CS543", cl_line, nc_line, f"the feed is per {said}, the CL file says per {unit}")
+    text = f"the feed is {nc.feed[own]:g} mm/{said}, the CL file says {program.feed[move]:g}"
+    return Problem("CS541", cl_line, nc_line, text)

@@ -1,0 +1,286 @@
+"""Deviations of one block, in both directions: written vertices from the original, original vertices from the written.
+
+Where both motions run straight between neighbouring vertices of either, their distance is largest at a vertex; so the
+vertices of both are all that needs to be looked at. Curves are looked at where they come nearest to a vertex, and
+between their knots by `hull_gaps`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.blocks import Block, Matcher
+from cornersmooth.verify.curves import CurveGroup
+from cornersmooth.verify.ncprogram import Element
+from cornersmooth.verify.nearest import Gap, gap_between, nearest_segments
+from cornersmooth.verify.trails import directions, written_at
+
+#: a Newton step from a knot longer than this part of the parameter range is followed up
+_SHORT_STEP = 0.02
+
+#: samples and rounds of the search on single elements
+_SAMPLES, _ROUNDS, _ZOOM = 33, 6, 9
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What the vertices of one motion find on the other, k rows.
+
+    Parameters
+    ----------
+    vertex : (k,) int64
+        Vertex of the trail they are taken from.
+    gap : Gap
+    place : (k,) float64
+        Where on the other trail: segment plus fraction.
+    """
+
+    vertex: Ints
+    gap: Gap
+    place: Floats
+
+
+def owner_fraction(trail_owner: Ints, trail_fraction: Floats, segment: Ints, at: Floats) -> tuple[Ints, Floats]:
+    """Owner of trail segments, and the fraction of the owner that a fraction of the segment is."""
+    owner = trail_owner[segment + 1]
+    end = trail_fraction[segment + 1]
+    start = np.where(trail_owner[segment] == owner, trail_fraction[segment], 0.0)
+    return owner, start + at * (end - start)
+
+
+def from_written(matcher: Matcher, block: Block) -> Reached:
+    """Deviation of every written vertex from the pose of the original it was assigned to."""
+    vertex = np.flatnonzero(block.on)
+    segment, at = block.segment[vertex], block.fraction[vertex]
+    gap = _gap_to_original(matcher, block, vertex, segment, at)
+    # the walker stays on a segment until the next is nearer by a margin
+    loose = np.flatnonzero(gap.larger > matcher.margin)
+    rows = vertex[loose]
+    segment[loose], at[loose] = nearest_segments(
+        block.six[rows], matcher.track.six, segment[loose], 1, block.low[rows], block.high[rows]
+    )
+    better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
+    for name in ("tip", "axis_point", "angle"):
+        getattr(gap, name)[loose] = getattr(better, name)
+    return Reached(vertex, gap, segment + at)
+
+
+def _gap_to_original(matcher: Matcher, block: Block, vertex: Ints, segment: Ints, at: Floats) -> Gap:
+    original, trail = matcher.original, block.written.trail
+    tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, segment, at))
+    return gap_between(trail.tip[vertex], trail.axis[vertex], tip, axis, matcher.axis_length)
+
+
+def from_original(matcher: Matcher, block: Block) -> Reached:
+    """Deviation of every vertex of the original in this block from the written motion."""
+    vertex, middle, low, high = _brackets(block)
+    trail, six = matcher.original.trail, matcher.track.six
+    segment, at = nearest_segments(six[vertex], block.six, middle, 1, low, high)
+    tip = _on(block.written.trail.tip, segment, at)
+    axis = _unit_on(block.written.trail.axis, segment, at)
+    owner = block.written.trail.owner[segment + 1]
+    bent = np.flatnonzero(~block.written.straight[owner - block.written.first])
+    if len(bent):
+        tip[bent], axis[bent], at[bent] = _on_bent(matcher, block, six[vertex[bent]], segment[bent], at[bent])
+    gap = gap_between(tip, axis, trail.tip[vertex], trail.axis[vertex], matcher.axis_length)
+    return Reached(vertex, gap, segment + at)
+
+
+def _brackets(block: Block) -> tuple[Ints, Ints, Ints, Ints]:
+    """Original vertices of the block's stretches, the written segment each lies at, and the segments allowed."""
+    on = np.flatnonzero(block.on)
+    place, piece = block.place[on], block.piece[on]
+    first = np.flatnonzero(np.diff(piece, prepend=-1))
+    last = np.append(first[1:], len(on)) - 1
+    start = np.ceil(place[first]).astype(np.int64)
+    stop = np.where(np.arange(len(last)) < len(last) - 1, block.high[on[last]] + 1, np.floor(place[last])).astype(
+        np.int64
+    )
+    if block.closed:
+        stop[-1] = block.high[on[last[-1]]] + 1
+    count = np.maximum(stop - start + 1, 0)
+    number = np.repeat(np.arange(len(first)), count)
+    vertex = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count) + start[number]
+    k = np.clip(np.searchsorted(place, vertex, side="right") - 1, first[number], last[number])
+    low, high = on[first[number]], on[last[number]] - 1
+    return vertex, np.clip(on[k], low, high), low, high
+
+
+def _on(values: Floats, segment: Ints, at: Floats) -> Floats:
+    start = values.take(segment, axis=0)
+    between: Floats = values.take(segment + 1, axis=0)
+    between -= start
+    between *= at[:, None]
+    between += start
+    return between
+
+
+def _unit_on(values: Floats, segment: Ints, at: Floats) -> Floats:
+    between = _on(values, segment, at)
+    between /= np.sqrt(np.einsum("ij,ij->i", between, between))[:, None]
+    return between
+
+
+def _on_bent(matcher: Matcher, block: Block, point: Floats, segment: Ints, at: Floats) -> tuple[Floats, Floats, Floats]:
+    """Nearest poses (k, 3) and (k, 3) on curves and arcs, from the nearest place on the trail, and that place."""
+    nc, trail = matcher.nc, block.written.trail
+    owner = trail.owner[segment + 1]
+    vertex = segment + (at > 0.5)
+    tip, axis, place = np.empty((len(point), 3)), np.empty((len(point), 3)), at.copy()
+    open_rows = np.ones(len(point), np.bool_)
+    for group in block.written.curves:
+        element = nc.curves.element[group.index]
+        for u in group.spans[1:-1]:
+            rows = np.flatnonzero(
+                open_rows & (trail.fraction[vertex] == u) & (trail.owner[vertex] == owner) & np.isin(owner, element)
+            )
+            if not len(rows):
+                continue
+            curve = np.searchsorted(element, owner[rows])
+            found, good = _newton_from_knot(matcher, group, float(u), curve, point[rows])
+            rows = rows[good]
+            tip[rows] = found[good, :3]
+            axis[rows] = directions(nc, found[good, :3], found[good, 3:])
+            open_rows[rows] = False
+    rest = np.flatnonzero(open_rows)
+    if len(rest):
+        spread = owner_fraction(trail.owner, _shares(block), segment[rest], at[rest])
+        tip[rest], axis[rest], _ = search_elements(matcher, spread[0][:, None], point[rest], spread[1])
+    return tip, axis, place
+
+
+def _shares(block: Block) -> Floats:
+    """(v,) fraction of the parameter range at curve vertices, the fraction elsewhere."""
+    share = block.written.trail.fraction.copy()
+    first = block.written.first
+    for group in block.written.curves:
+        spans = group.spans
+        if spans[0] == 0.0 and spans[-1] == 1.0:
+            continue
+        rows = np.isin(block.written.trail.owner, group.index + first)
+        share[rows] = (share[rows] - spans[0]) / (spans[-1] - spans[0])
+    return share
+
+
+def _newton_from_knot(
+    matcher: Matcher, group: CurveGroup, u: float, curve: Ints, point: Floats
+) -> tuple[Floats, np.ndarray]:
+    """Nearest points (k, 6) of curves to poses near the knot u, by one step; and whether the step was short enough.
+
+    Distances are taken between control-point curves and a pose whose axis point is as far from its tip as theirs.
+    """
+    value, slope, bend = (part[curve] for part in group.jet(u))
+    target = point.copy()
+    if matcher.nc.second_is == "point":
+        reach = np.linalg.norm(value[:, 3:] - value[:, :3], axis=1) / matcher.axis_length
+        target[:, 3:] = target[:, :3] + reach[:, None] * (target[:, 3:] - target[:, :3])
+    rest = target - value
+    size = np.einsum("ij,ij->i", slope, slope) - np.einsum("ij,ij->i", rest, bend)
+    step = np.divide(np.einsum("ij,ij->i", rest, slope), size, out=np.full(len(size), np.inf), where=size > 0)
+    good = np.abs(step) <= _SHORT_STEP * (group.spans[-1] - group.spans[0])
+    step = np.where(good, step, 0.0)[:, None]
+    return value + step * slope + step * step / 2 * bend, good
+
+
+def search_elements(
+    matcher: Matcher, elements: Ints, point: Floats, guess: Floats | None = None, column: slice = slice(0, 6)
+) -> tuple[Floats, Floats, Floats]:
+    """Nearest poses on single path elements by sampling and zooming in; for few rows.
+
+    Parameters
+    ----------
+    matcher : Matcher
+    elements : (k, e) int64
+        Elements to look at for each row.
+    point : (k, 6) float64
+    guess : unused for now
+    column : slice
+        Which of tip and axis point count.
+
+    Returns
+    -------
+    tip, axis : (k, 3) float64
+    distance : (k,) float64
+    """
+    nc, length = matcher.nc, matcher.axis_length
+    rows, width = elements.shape
+
+    def look(element: Ints, fraction: Floats) -> tuple[Floats, Floats, Floats]:
+        shape = element.shape
+        tip, axis = written_at(nc, element.ravel(), fraction.ravel())
+        six = np.hstack((tip, tip + length * axis)).reshape(*shape, 6)
+        off = six[..., column] - point[:, None, column]
+        return tip.reshape(*shape, 3), axis.reshape(*shape, 3), np.sqrt(np.einsum("...i,...i->...", off, off))
+
+    grid = np.linspace(0.0, 1.0, _SAMPLES)
+    element = np.repeat(elements, _SAMPLES, axis=1)
+    fraction = np.tile(grid, (rows, width))
+    tip, axis, distance = look(element, fraction)
+    here = np.arange(rows)
+    best = np.argmin(distance, axis=1)
+    chosen, at = element[here, best], fraction[here, best]
+    step = grid[1]
+    for _ in range(_ROUNDS):
+        fraction = np.clip(at[:, None] + np.linspace(-step, step, _ZOOM), 0.0, 1.0)
+        tip, axis, distance = look(np.repeat(chosen[:, None], _ZOOM, axis=1), fraction)
+        best = np.argmin(distance, axis=1)
+        at = fraction[here, best]
+        step *= 2.0 / (_ZOOM - 1)
+    return tip[here, best], axis[here, best], distance[here, best]
+
+
+def written_kind(matcher: Matcher, block: Block) -> Ints:
+    """(v,) kind of the element each vertex ends or lies in."""
+    kinds: Ints = matcher.nc.kind[block.written.trail.owner].astype(np.int64)
+    return kinds
+
+
+def own_gaps_of_written(matcher: Matcher, block: Block, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
+    """Distance of chosen written vertices from the original tip path, and from its axis-point path, each on its own."""
+    vertex = reached.vertex[rows]
+    trail, original, length = block.written.trail, matcher.original, matcher.axis_length
+    result = []
+    for metric in ("tip", "axis point"):
+        segment, at = nearest_segments(
+            block.six[vertex],
+            matcher.track.six,
+            block.segment[vertex],
+            _REACH,
+            block.low[vertex],
+            block.high[vertex],
+            metric,
+        )
+        tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, segment, at))
+        gap = gap_between(trail.tip[vertex], trail.axis[vertex], tip, axis, length)
+        result.append(
+            np.minimum(
+                *(
+                    (gap.tip, reached.gap.tip[rows])
+                    if metric == "tip"
+                    else (gap.axis_point, reached.gap.axis_point[rows])
+                )
+            )
+        )
+    return result[0], result[1]
+
+
+#: segments looked at on either side for the distance of tip or axis point alone
+_REACH = 4
+
+
+def own_gaps_of_original(matcher: Matcher, block: Block, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
+    """Distance of chosen original vertices from the written tip path and axis-point path, each on its own."""
+    nc = matcher.nc
+    segment = np.minimum(reached.place[rows].astype(np.int64), len(block.six) - 2)
+    owner = block.written.trail.owner[segment + 1]
+    low, high = block.written.first + 1, block.written.first + len(block.written.trail.last) - 1
+    elements = np.clip(owner[:, None] + np.arange(-_REACH, _REACH + 1), low, high)
+    rapid = nc.kind[elements] == Element.RAPID
+    elements = np.where(rapid, owner[:, None], elements)
+    point = matcher.track.six[reached.vertex[rows]]
+    tip = search_elements(matcher, elements, point, column=slice(0, 3))[2]
+    axis = search_elements(matcher, elements, point, column=slice(3, 6))[2]
+    return np.minimum(tip, reached.gap.tip[rows]), np.minimum(axis, reached.gap.axis_point[rows])

@@ -1,0 +1,103 @@
+"""Curves between their knots: bounds by control points, and a search where the bounds do not settle it.
+
+The part of a curve between two knots lies in the hull of its own control points, and the distance from a straight
+segment is a convex function; so no point of it is farther from a segment than the farthest control point.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.blocks import Block, Matcher
+from cornersmooth.verify.curves import CurveGroup
+from cornersmooth.verify.nearest import gap_between, nearest_segments
+from cornersmooth.verify.trails import directions, unit, written_at
+
+#: samples between two knots where the hull alone does not settle it
+_SAMPLES = 32
+
+#: curves searched in one block at most
+_MOST_CURVES = 20000
+
+#: part of the largest deviation of a curve's ends by which its hull may exceed it unsearched
+_HULL_SLACK = 1e-3
+
+
+def hull_gaps(matcher: Matcher, block: Block, limit: float) -> tuple[Floats, Ints, Floats, Floats] | None:
+    """Deviations from the original of those curves whose hull reaches beyond the tolerance between two knots.
+
+    Returns
+    -------
+    place : (k,) float64
+        On the original trail.
+    element : (k,) int64
+    tip, axis_point : (k,) float64, mm
+        None where there is no such curve.
+    """
+    suspects = [_suspects(matcher, block, group, limit) for group in block.written.curves]
+    element = np.concatenate([np.zeros(0, np.int64), *suspects])[:_MOST_CURVES]
+    if not len(element):
+        return None
+    grid = np.linspace(0.0, 1.0, 2 * _SAMPLES + 1)
+    owner = np.repeat(element, len(grid))
+    tip, axis = written_at(matcher.nc, owner, np.tile(grid, len(element)))
+    six = np.hstack((tip, tip + matcher.axis_length * axis))
+    trail = block.written.trail
+    middle = np.repeat(block.segment[trail.last[element - block.written.first] - 1], len(grid))
+    vertex = np.repeat(trail.last[element - block.written.first], len(grid))
+    result = []
+    for metric in ("tip", "axis point"):
+        segment, at = nearest_segments(
+            six,
+            matcher.track.six,
+            middle,
+            3,
+            block.low[vertex],
+            block.high[vertex],
+            metric,
+        )
+        theirs = matcher.original.trail
+        their_tip = theirs.tip[segment] + at[:, None] * (theirs.tip[segment + 1] - theirs.tip[segment])
+        their_axis = unit(theirs.axis[segment] + at[:, None] * (theirs.axis[segment + 1] - theirs.axis[segment]))
+        gap = gap_between(tip, axis, their_tip, their_axis, matcher.axis_length)
+        result.append((gap.tip if metric == "tip" else gap.axis_point).reshape(len(element), len(grid)))
+    place = block.place[trail.last[element - block.written.first] - 1]
+    return place, element, result[0].max(axis=1), result[1].max(axis=1)
+
+
+def _suspects(matcher: Matcher, block: Block, group: CurveGroup, limit: float) -> Ints:
+    """Elements of curves with a control point between knots farther than the tolerance and than the knots."""
+    trail, first = block.written.trail, block.written.first
+    element = matcher.nc.curves.element[group.index]
+    end = trail.last[element - first]
+    keep = block.on[end]
+    element, end = element[keep], end[keep]
+    spans = len(group.spans) - 1
+    doubtful = np.zeros(len(element), np.bool_)
+    for k in range(spans):
+        inner, _ = group.bezier(k)
+        inner = inner[keep]
+        before, after = end - (spans - k), end - (spans - k) + 1
+        ends = np.maximum(
+            _off(matcher, block, block.six[before], before), _off(matcher, block, block.six[after], before)
+        )
+        for point in range(1, inner.shape[1] - 1):
+            tip = inner[:, point, :3]
+            axis = directions(matcher.nc, tip, inner[:, point, 3:])
+            six = np.hstack((tip, tip + matcher.axis_length * axis))
+            off = np.minimum(_off(matcher, block, six, before), _off(matcher, block, six, after))
+            doubtful |= (off > limit) & (off > ends * (1 + _HULL_SLACK))
+    return element[doubtful]
+
+
+def _off(matcher: Matcher, block: Block, six: Floats, vertex: Ints) -> Floats:
+    """Larger distance, of tip or axis point, from the original segment that a vertex lies on."""
+    row = matcher.track.row[block.segment[vertex]]
+    away = six - row[:, :6]
+    t = np.clip(np.einsum("ij,ij->i", away, row[:, 6:12]) * row[:, 12], 0.0, 1.0)
+    away -= t[:, None] * row[:, 6:12]
+    off: Floats = np.sqrt(
+        np.maximum(np.einsum("ij,ij->i", away[:, :3], away[:, :3]), np.einsum("ij,ij->i", away[:, 3:], away[:, 3:]))
+    )
+    return off

@@ -1,0 +1,186 @@
+"""What an NC text says, as arrays: the elements of its path, its curves and arcs, and the words between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Units
+
+#: what the second triple of a motion block is: the tool vector, or a point on the tool axis
+Second = Literal["vector", "point"]
+
+
+class Element(IntEnum):
+    """What a motion block does (`NcProgram.kind`)."""
+
+    RAPID = 0
+    LINE = 1
+    ARC = 2
+    CURVE = 3
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Control points and knots of the curves, c of them, one after another.
+
+    Parameters
+    ----------
+    element : (c,) int64
+        Index of the path element each curve is.
+    order : (c,) int64
+        Degree plus one.
+    first_point, points : (c,) int64
+        Where a curve's control points start in the tables below, and how many there are.
+    first_knot : (c,) int64
+        Where its ``points + order`` knots start.
+    tip, second : (p, 3) float64
+        Control points of tip and of tool vector or axis point, mm (vectors: 1).
+    weight : (p,) float64
+    knot : (q,) float64
+    """
+
+    element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    order: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    first_point: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    points: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    first_knot: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    tip: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    second: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    weight: Floats = field(default_factory=lambda: np.zeros(0))
+    knot: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.element)
+
+
+@dataclass(frozen=True)
+class NcArcs:
+    """The circular elements, k of them.
+
+    Parameters
+    ----------
+    element : (k,) int64
+    centre : (k, 3) float64, mm
+        A point of the arc's axis.
+    normal : (k, 3) float64
+        Unit vector; the rotation is right-handed about it.
+    sweep : (k,) float64, rad
+        Always positive.
+    """
+
+    element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    normal: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    sweep: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.element)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A word that neither moves the tool nor tells how.
+
+    Parameters
+    ----------
+    element : int
+        Index of the path element it stands before (the number of elements after the last one).
+    line : int
+        NC line, from 1.
+    letter : str
+        ``"T"``, ``"S"``, ``"M"``, ``"G"``, ``"H"``, ``"D"``, or ``"("`` for a comment.
+    value : float
+        The number of the word; for ``G4`` the dwell in milliseconds is in `text`.
+    text : str
+        The word as written; the comment's text.
+    """
+
+    element: int
+    line: int
+    letter: str
+    value: float
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something wrong in the NC text, or between it and the CL data.
+
+    Parameters
+    ----------
+    code : str
+        ``"CS5xx"``.
+    cl_line, nc_line : int
+        Where, from 1; 0 where no line applies.
+    text : str
+        One sentence in the user's words.
+    amount : float
+        How much, mm, where that says something; else NaN.
+    """
+
+    code: str
+    cl_line: int
+    nc_line: int
+    text: str
+    amount: float = float("nan")
+
+
+@dataclass(frozen=True)
+class NcProgram:
+    """An NC text as a control understands it: m path elements and what stands between them.
+
+    Parameters
+    ----------
+    kind : (m,) uint8
+        `Element`.
+    tip : (m, 3) float64, mm
+        Tip at the end of each element.
+    second : (m, 3) float64
+        Tool vector or axis point (mm) at the end of each element; always full.
+    line : (m,) int64
+        NC line of each element (curves: of their first block).
+    feed : (m,) float64
+        mm/min or mm/rev; NaN for rapids and where none was given.
+    per_revolution : (m,) bool
+    curves : Curves
+    arcs : NcArcs
+    events : tuple of Event
+        In the order of the text.
+    problems : tuple of Problem
+        What breaks the rules of the control.
+    units : {"mm", "inch"}
+    second_is : {"vector", "point"}
+    tip_step, second_step : float
+        Value of the last printed digit of tip (mm) and of vector (1) or axis point (mm).
+    blocks : int
+        Number of blocks that are not empty, ``%`` and comments left out.
+    """
+
+    kind: NDArray[np.uint8]
+    tip: Floats
+    second: Floats
+    line: Ints
+    feed: Floats
+    per_revolution: NDArray[np.bool_]
+    curves: Curves
+    arcs: NcArcs
+    events: tuple[Event, ...]
+    problems: tuple[Problem, ...]
+    units: Units
+    second_is: Second
+    tip_step: float
+    second_step: float
+    blocks: int
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    @property
+    def mm_per_unit(self) -> float:
+        """Millimetres per unit of the text."""
+        return MM_PER_UNIT[self.units]

@@ -1,0 +1,104 @@
+"""Distances between poses and motions: at one common pose, and for tip and axis point each on its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+
+#: which distance is made smallest: tip and axis point together, or one of them
+Metric = Literal["both", "tip", "axis point"]
+
+#: rows taken at a time, so that the work arrays stay in the cache
+_BLOCK = 16384
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How far poses are from a motion, k rows.
+
+    Parameters
+    ----------
+    tip, axis_point : (k,) float64, mm
+    angle : (k,) float64, rad
+        Between the tool axes.
+    """
+
+    tip: Floats
+    axis_point: Floats
+    angle: Floats
+
+    @property
+    def larger(self) -> Floats:
+        """(k,) the larger of the two distances."""
+        return np.maximum(self.tip, self.axis_point)
+
+
+def gap_between(tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats, axis_length: float) -> Gap:
+    """Distances between poses taken pairwise."""
+    off, turned = tip - other_tip, axis - other_axis
+    apart = off + axis_length * turned
+    chord = np.sqrt(np.einsum("ij,ij->i", turned, turned))
+    return Gap(
+        np.sqrt(np.einsum("ij,ij->i", off, off)),
+        np.sqrt(np.einsum("ij,ij->i", apart, apart)),
+        2 * np.arcsin(np.minimum(chord / 2, 1.0)),
+    )
+
+
+def nearest_segments(
+    point: Floats, vertices: Floats, middle: Ints, reach: int, low: Ints, high: Ints, metric: Metric = "both"
+) -> tuple[Ints, Floats]:
+    """Nearest place on a trail among the segments around a given one.
+
+    Parameters
+    ----------
+    point : (k, 6) float64
+        Tip and axis point.
+    vertices : (v, 6) float64
+        Of the trail, contiguous; segment j runs from vertex j to j+1.
+    middle : (k,) int64
+        Segment around which to look.
+    reach : int
+        Segments on either side.
+    low, high : (k,) int64
+        First and last segment allowed; where there is none the result is `middle`.
+    metric : Metric
+
+    Returns
+    -------
+    segment : (k,) int64
+    fraction : (k,) float64
+    """
+    columns = {"both": slice(0, 6), "tip": slice(0, 3), "axis point": slice(3, 6)}[metric]
+    segment, fraction = np.empty(len(point), np.int64), np.empty(len(point))
+    for begin in range(0, len(point), _BLOCK):
+        part = slice(begin, begin + _BLOCK)
+        own = point[part, columns]
+        whole = columns == slice(0, 6)
+        best = np.full(len(own), np.inf)
+        for step in (0, *(sign * k for k in range(1, reach + 1) for sign in (-1, 1))):
+            j = np.clip(middle[part] + step, low[part], high[part])
+            start, difference = vertices.take(j, axis=0), vertices.take(j + 1, axis=0)
+            if not whole:
+                start, difference = start[:, columns], difference[:, columns]
+            difference -= start
+            away = own - start
+            size = np.einsum("ij,ij->i", difference, difference)
+            t = np.einsum("ij,ij->i", away, difference)
+            np.divide(t, size, out=t, where=size > 0)
+            np.clip(t, 0.0, 1.0, out=t)
+            difference *= t[:, None]
+            away -= difference
+            d = np.einsum("ij,ij->i", away, away)
+            if step == 0:
+                best, segment[part], fraction[part] = d, j, t
+            else:
+                nearer = d < best
+                best = np.where(nearer, d, best)
+                segment[part] = np.where(nearer, j, segment[part])
+                fraction[part] = np.where(nearer, t, fraction[part])
+    return segment, fraction

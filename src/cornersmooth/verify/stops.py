@@ -1,0 +1,189 @@
+"""Rapids and what lies between them: the first, coarse correspondence of the two motions.
+
+A *stop* is a pose that the text must name exactly and that divides the motion: the end of a rapid, a hole, the very
+first pose. A *stretch* is the run of feed moves between two stops.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Move
+from cornersmooth.verify.ncprogram import Element, NcProgram, Problem
+from cornersmooth.verify.trails import Original, directions
+
+#: slack of arithmetic on coordinates that are a million times larger, mm
+ARITHMETIC = 1e-9
+
+#: longer runs of stops that do not fit are not searched for their best correspondence
+_LONGEST_SEARCH = 2000
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """Feed moves between stops, k rows.
+
+    Parameters
+    ----------
+    move_first, move_last : (k,) int64
+        The stretch starts at the end of one original move and ends with another.
+    element_first, element_last : (k,) int64
+        The same for the path elements.
+    """
+
+    move_first: Ints
+    move_last: Ints
+    element_first: Ints
+    element_last: Ints
+
+    def __len__(self) -> int:
+        return len(self.move_first)
+
+
+def digit_errors(nc: NcProgram, element: Ints, tip: Floats, axis: Floats, axis_length: float) -> tuple[Bools, Floats]:
+    """Compare ends of elements with poses they should name exactly.
+
+    Parameters
+    ----------
+    nc : NcProgram
+    element : (k,) int64
+    tip, axis : (k, 3) float64
+    axis_length : float, mm
+
+    Returns
+    -------
+    exact : (k,) bool
+        Every printed number is the pose's, rounded to the printed digits.
+    amount : (k,) float64, mm
+        The larger distance, of tips or of axis points.
+    """
+    off = nc.tip[element] - tip
+    second = nc.second[element]
+    exact: Bools = np.logical_and.reduce(np.abs(off) <= nc.tip_step / 2 + ARITHMETIC, axis=1)
+    if nc.second_is == "vector":
+        side = second - axis
+        room = nc.second_step / 2 + ARITHMETIC
+    else:  # only the direction of the axis point counts, and the tip's own rounding turns it too
+        side = second - nc.tip[element]
+        side -= np.linalg.norm(side, axis=1)[:, None] * axis
+        room = (nc.second_step + nc.tip_step) / 2 + ARITHMETIC
+    exact &= (np.abs(side) <= room).all(axis=1)
+    turned = off + axis_length * (directions(nc, nc.tip[element], second) - axis)
+    return exact, np.maximum(np.linalg.norm(off, axis=1), np.linalg.norm(turned, axis=1))
+
+
+def find_stretches(original: Original, nc: NcProgram, axis_length: float) -> tuple[Stretches, list[Problem]]:
+    """Match the stops of both motions in order.
+
+    Returns
+    -------
+    Stretches
+        Everything between matched stops; a rapid that is missing on one side is taken as a straight move.
+    list of Problem
+        CS531 a rapid goes elsewhere, CS532 a rapid is missing, CS533 a rapid too many, CS534 no motion at all.
+    """
+    moves, elements = len(original.pose), len(nc)
+    if not moves or not elements:
+        problems = []
+        if moves or elements:
+            side = "the NC text has no motion" if moves else "the CL file has no motion, the NC text has"
+            problems = [Problem("CS534", 0, 0, side)]
+        return Stretches(*(np.zeros(0, np.int64),) * 4), problems
+    program = original.program
+    kind = program.kind[original.pose]
+    tip, axis = program.tip[original.pose], program.axis[original.pose]
+    theirs = _stops(
+        (kind == Move.RAPID) | (kind == Move.HOLE),
+        np.hstack((np.round(tip / nc.tip_step), np.round(axis * axis_length / nc.tip_step))),
+    )
+    ours = _stops(nc.kind == Element.RAPID, np.hstack((nc.tip, nc.second)))
+    pairs, problems = _match(original, nc, theirs, ours, axis_length)
+    if kind[0] == Move.RAPID and nc.kind[0] != Element.RAPID:
+        problems.insert(0, _problem("CS532", original, 0, nc, 0, "the first rapid is written as a feed move"))
+    move, element = pairs
+    return (
+        Stretches(
+            move_first=move,
+            move_last=np.append(move[1:] - 1, moves - 1),
+            element_first=element,
+            element_last=np.append(element[1:] - 1, elements - 1),
+        ),
+        problems,
+    )
+
+
+def _stops(is_stop: Bools, place: Floats) -> Ints:
+    """Indices of the stops that move the tool, and of the very first move."""
+    index = np.flatnonzero(is_stop)
+    index = index[index > 0]
+    moved = (place[index] != place[index - 1]).any(axis=1)
+    return np.concatenate(([0], index[moved]))
+
+
+def _match(
+    original: Original, nc: NcProgram, theirs: Ints, ours: Ints, axis_length: float
+) -> tuple[tuple[Ints, Ints], list[Problem]]:
+    program = original.program
+    tip, axis = program.tip[original.pose[theirs]], program.axis[original.pose[theirs]]
+    count = min(len(theirs), len(ours))
+    exact, _ = digit_errors(nc, ours[:count], tip[:count], axis[:count], axis_length)
+    if len(theirs) == len(ours) and exact.all():
+        return (theirs, ours), []
+    head = count if exact.all() else int(np.argmin(exact))
+    tail_exact, _ = digit_errors(nc, ours[len(ours) - count :], tip[-count:], axis[-count:], axis_length)
+    tail = count if tail_exact.all() else int(np.argmin(tail_exact[::-1]))
+    tail = min(tail, count - head)
+    mid_theirs, mid_ours = slice(head, len(theirs) - tail), slice(head, len(ours) - tail)
+    pairs = [(k, k) for k in range(head)]
+    problems: list[Problem] = []
+    for tag, i0, i1, j0, j1 in _opcodes(tip[mid_theirs], nc.tip[ours[mid_ours]], nc.tip_step):
+        both = min(i1 - i0, j1 - j0)
+        for step in range(both):
+            i, j = head + i0 + step, head + j0 + step
+            pairs.append((i, j))
+            if tag == "equal":
+                fine, how_much = digit_errors(nc, ours[j : j + 1], tip[i : i + 1], axis[i : i + 1], axis_length)
+                if fine[0]:
+                    continue
+            else:
+                _, how_much = digit_errors(nc, ours[j : j + 1], tip[i : i + 1], axis[i : i + 1], axis_length)
+            problems.append(
+                _problem(
+                    "CS531", original, theirs[i], nc, ours[j], "a rapid does not end at its pose", float(how_much[0])
+                )
+            )
+        for k in range(head + i0 + both, head + i1):
+            if not _negligible(program.tip[original.pose], theirs[k], nc.tip_step):
+                element = ours[min(head + j1, len(ours)) - 1] if len(ours) else 0
+                text = "a rapid of the CL file is missing, or is written as a feed move"
+                problems.append(_problem("CS532", original, theirs[k], nc, int(element), text))
+        for k in range(head + j0 + both, head + j1):
+            if not _negligible(nc.tip, ours[k], nc.tip_step):
+                pose = theirs[min(head + i1, len(theirs)) - 1] if len(theirs) else 0
+                text = "a rapid that the CL file does not have, or a feed move written as one"
+                problems.append(_problem("CS533", original, int(pose), nc, ours[k], text))
+    pairs += [(len(theirs) - tail + k, len(ours) - tail + k) for k in range(tail)]
+    i, j = np.array(pairs).T
+    return (theirs[i], ours[j]), problems
+
+
+def _opcodes(theirs: Floats, ours: Floats, step: float) -> list[tuple[str, int, int, int, int]]:
+    if max(len(theirs), len(ours)) > _LONGEST_SEARCH:
+        return [("replace", 0, len(theirs), 0, len(ours))]
+    left = [tuple(row) for row in np.round(theirs / step).astype(np.int64).tolist()]
+    right = [tuple(row) for row in np.round(ours / step).astype(np.int64).tolist()]
+    return list(difflib.SequenceMatcher(None, left, right, autojunk=False).get_opcodes())
+
+
+def _negligible(tip: Floats, index: int, step: float) -> bool:
+    """Whether a stop moves the tip by no more than the printed digits show."""
+    return bool(index > 0 and np.abs(tip[index] - tip[index - 1]).max() <= 1.01 * step)
+
+
+def _problem(
+    code: str, original: Original, move: int, nc: NcProgram, element: int, text: str, amount: float = float("nan")
+) -> Problem:
+    return Problem(code, int(original.program.line[original.pose[move]]), int(nc.line[element]), text, amount)

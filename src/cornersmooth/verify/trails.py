@@ -1,0 +1,258 @@
+"""The two motions as trails: vertices in order, each with what it belongs to.
+
+A *trail* is a polyline through points of a motion, dense enough that its segments stay close to the motion: nothing is
+inserted in straight moves with little change of axis, which are nearly all; arcs, curves and large turns get inner
+vertices. Trails only serve to find what corresponds to what; deviations are measured on the motion itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Move, Program
+from cornersmooth.verify.arcs import arc_points
+from cornersmooth.verify.curves import CurveGroup, groups
+from cornersmooth.verify.ncprogram import Element, NcProgram
+
+#: how far, relative to the tolerance, a trail may stay off the motion it stands for
+CHORD_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Trail:
+    """Vertices of a motion, v of them.
+
+    Parameters
+    ----------
+    tip, axis : (v, 3) float64
+        mm, unit vectors.
+    owner : (v,) int64
+        What each vertex is reached by: index of the original move or of the path element.
+    fraction : (v,) float64
+        Where on it, 1 at its end; for curves the parameter is `parameter`.
+    last : (m,) int64
+        Vertex at the end of each owner, counted from the trail's first owner.
+    """
+
+    tip: Floats
+    axis: Floats
+    owner: Ints
+    fraction: Floats
+    last: Ints
+
+    def __len__(self) -> int:
+        return len(self.tip)
+
+    def six(self, axis_length: float) -> Floats:
+        """(v, 6) tip and axis point side by side, mm."""
+        return np.hstack((self.tip, self.tip + axis_length * self.axis))
+
+
+@dataclass(frozen=True)
+class Original:
+    """The CL motion: its poses without those that are only stated, as a trail.
+
+    Parameters
+    ----------
+    program : Program
+    pose : (m,) int64
+        Pose of every move; the first is where the motion starts.
+    trail : Trail
+        Owners are indices into `pose`.
+    arc : (m,) int64
+        Row of the program's arcs, -1 for straight moves.
+    """
+
+    program: Program
+    pose: Ints
+    trail: Trail
+    arc: Ints
+
+    def at(self, owner: Ints, fraction: Floats) -> tuple[Floats, Floats]:
+        """Tip and unit axis (k, 3) at a fraction of moves: the ruled motion, or the true arc."""
+        program = self.program
+        end = self.pose[owner]
+        start = self.pose[np.maximum(owner - 1, 0)]
+        tip = program.tip[start] + fraction[:, None] * (program.tip[end] - program.tip[start])
+        row = self.arc[owner]
+        curved = np.flatnonzero(row >= 0)
+        if len(curved):
+            arcs, r = program.arcs, row[curved]
+            tip[curved] = arc_points(
+                program.tip[start[curved]],
+                program.tip[end[curved]],
+                arcs.centre[r],
+                arcs.normal[r],
+                arcs.sweep[r],
+                fraction[curved],
+            )
+        axis = program.axis[start] + fraction[:, None] * (program.axis[end] - program.axis[start])
+        return tip, unit(axis)
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors (k, 3) at length one; zero stays zero."""
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    result: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    return result
+
+
+def original_motion(program: Program, tolerance: float, axis_length: float) -> Original:
+    """Make the trail of the CL motion."""
+    pose = np.flatnonzero(program.kind != Move.FROM)
+    arc = np.full(len(pose), -1, np.int64)
+    place = np.searchsorted(pose, program.arcs.pose)
+    arc[place] = np.arange(len(place))
+    arc[:1] = -1
+    tip, axis = program.tip[pose], program.axis[pose]
+    cuts = turn_cuts(axis, tolerance, axis_length)
+    curved = np.flatnonzero(arc >= 0)
+    if len(curved):
+        row = arc[curved]
+        start = tip[curved - 1] - program.arcs.centre[row]
+        normal = program.arcs.normal[row]
+        radius = np.linalg.norm(start - np.einsum("ij,ij->i", start, normal)[:, None] * normal, axis=1)
+        sweep = program.arcs.sweep[row]
+        cuts[curved] = np.maximum(cuts[curved], arc_cuts(radius, sweep, tolerance))
+    bare = Original(
+        program, pose, Trail(tip, axis, np.arange(len(pose)), np.ones(len(pose)), np.arange(len(pose))), arc
+    )
+    if not len(pose) or cuts.max() == 1:
+        return bare
+    owner, fraction, last = divided(cuts)
+    tip, axis = bare.at(owner, fraction)
+    whole = fraction == 1
+    tip[whole], axis[whole] = program.tip[pose[owner[whole]]], program.axis[pose[owner[whole]]]
+    return Original(program, pose, Trail(tip, axis, owner, fraction, last), arc)
+
+
+def turn_cuts(axis: Floats, tolerance: float, axis_length: float) -> Ints:
+    """(m,) number of parts of every straight move, so that the axis point runs straight enough within a part."""
+    cuts = np.ones(len(axis), np.int64)
+    if len(axis) > 1:
+        step = axis[1:] - axis[:-1]
+        turn = np.sqrt(np.einsum("ij,ij->i", step, step))
+        largest = np.sqrt(8 * CHORD_SHARE * tolerance / axis_length)
+        many = np.flatnonzero(turn > largest)
+        angle = 2 * np.arcsin(np.minimum(turn[many] / 2, 1))
+        cuts[many + 1] = np.ceil(angle / largest)
+    return cuts
+
+
+def arc_cuts(radius: Floats, sweep: Floats, tolerance: float) -> Ints:
+    """(k,) number of chords of every arc."""
+    largest = np.sqrt(8 * CHORD_SHARE * tolerance / np.maximum(radius, tolerance))
+    return np.maximum(np.ceil(sweep / np.minimum(largest, 1.0)), 1).astype(np.int64)
+
+
+def divided(cuts: Ints) -> tuple[Ints, Floats, Ints]:
+    """Owner and fraction of every vertex, and each owner's last vertex, for given numbers of parts."""
+    last = np.cumsum(cuts) - 1
+    owner = np.repeat(np.arange(len(cuts)), cuts)
+    part = np.arange(len(owner)) - np.repeat(last + 1 - cuts, cuts) + 1
+    return owner, part / np.repeat(cuts, cuts), last
+
+
+@dataclass(frozen=True)
+class Written:
+    """A stretch of the written motion: elements ``first`` to ``last``, both included, as a trail.
+
+    Parameters
+    ----------
+    nc : NcProgram
+    first : int
+        The trail starts with the end of this element.
+    trail : Trail
+        Owners are element indices.
+    curves : tuple of CurveGroup
+        Those of the stretch.
+    straight : (m,) bool
+        Whether each element is a line.
+    """
+
+    nc: NcProgram
+    first: int
+    trail: Trail
+    curves: tuple[CurveGroup, ...]
+    straight: Bools
+
+
+def directions(nc: NcProgram, tip: Floats, second: Floats) -> Floats:
+    """Unit tool vectors (k, 3) of written poses."""
+    return unit(second - tip if nc.second_is == "point" else second)
+
+
+def written_motion(nc: NcProgram, first: int, last: int, tolerance: float, axis_length: float) -> Written:
+    """Make the trail of a stretch of the written motion."""
+    part = slice(first, last + 1)
+    tip, second, kind = nc.tip[part], nc.second[part], nc.kind[part]
+    axis = directions(nc, tip, second)
+    count = len(tip)
+    cuts = turn_cuts(axis, tolerance, axis_length)
+    cuts[kind == Element.RAPID] = 1
+    a0, a1 = np.searchsorted(nc.arcs.element, (first + 1, last + 1))
+    c0, c1 = np.searchsorted(nc.curves.element, (first + 1, last + 1))
+    arc_at = nc.arcs.element[a0:a1] - first
+    if len(arc_at):
+        radius = np.linalg.norm(tip[arc_at - 1] - nc.arcs.centre[a0:a1], axis=1)
+        cuts[arc_at] = np.maximum(cuts[arc_at], arc_cuts(radius, nc.arcs.sweep[a0:a1], tolerance))
+    curve_groups = tuple(groups(nc.curves, np.arange(c0, c1)))
+    for group in curve_groups:
+        cuts[nc.curves.element[group.index] - first] = max(len(group.spans) - 1, 1)
+    straight = kind <= Element.LINE
+    if count == 0 or (cuts.max() == 1 and not len(arc_at) and not curve_groups):
+        index = np.arange(count)
+        return Written(nc, first, Trail(tip, axis, index + first, np.ones(count), index), (), straight)
+    cuts[0] = 1
+    owner, fraction, ends = divided(cuts)
+    before = np.maximum(owner - 1, 0)
+    lerp = fraction[:, None]
+    new_tip = tip[before] + lerp * (tip[owner] - tip[before])
+    new_second = second[before] + lerp * (second[owner] - second[before])
+    if len(arc_at):
+        row = np.full(count, -1)
+        row[arc_at] = np.arange(a0, a1)
+        on = np.flatnonzero(row[owner] >= 0)
+        r = row[owner[on]]
+        arcs = nc.arcs
+        new_tip[on] = arc_points(
+            tip[before[on]], tip[owner[on]], arcs.centre[r], arcs.normal[r], arcs.sweep[r], fraction[on]
+        )
+    for group in curve_groups:
+        spans = group.spans
+        at = nc.curves.element[group.index] - first
+        inner = spans[1:] if len(spans) > 1 else spans
+        points = group.at(inner)
+        vertex = ends[at][:, None] - np.arange(len(inner) - 1, -1, -1)
+        new_tip[vertex], new_second[vertex] = points[:, :, :3], points[:, :, 3:]
+        fraction[vertex] = inner
+    whole = ends
+    new_tip[whole], new_second[whole] = tip, second
+    trail = Trail(new_tip, directions(nc, new_tip, new_second), owner + first, fraction, ends)
+    return Written(nc, first, trail, curve_groups, straight)
+
+
+def written_at(nc: NcProgram, element: Ints, fraction: Floats) -> tuple[Floats, Floats]:
+    """Tip and unit axis (k, 3) on path elements, at a fraction of each (curves: of the parameter range)."""
+    before = np.maximum(element - 1, 0)
+    tip = nc.tip[before] + fraction[:, None] * (nc.tip[element] - nc.tip[before])
+    second = nc.second[before] + fraction[:, None] * (nc.second[element] - nc.second[before])
+    kind = nc.kind[element]
+    on = np.flatnonzero(kind == Element.ARC)
+    if len(on):
+        arcs, r = nc.arcs, np.searchsorted(nc.arcs.element, element[on])
+        start, end = nc.tip[before[on]], nc.tip[element[on]]
+        tip[on] = arc_points(start, end, arcs.centre[r], arcs.normal[r], arcs.sweep[r], fraction[on])
+    on = np.flatnonzero(kind == Element.CURVE)
+    if len(on):
+        row = np.searchsorted(nc.curves.element, element[on])
+        for group in groups(nc.curves, np.unique(row)):
+            mine = np.flatnonzero(np.isin(row, group.index))
+            spans = group.spans
+            parameter = spans[0] + fraction[on[mine]] * (spans[-1] - spans[0])
+            local = np.searchsorted(group.index, row[mine])
+            point, _ = group.at_own(local, parameter)
+            tip[on[mine]], second[on[mine]] = point[:, :3], point[:, 3:]
+    return tip, directions(nc, tip, second)

@@ -1,0 +1,245 @@
+"""Which original segment every written vertex belongs to, in order.
+
+A walker goes along the written trail and takes the original segment along with it: it stays on a segment until the
+next one is clearly nearer, and never goes back. Many walkers go at once, one per lane, a step of each at a time, so
+that the work is whole-array work. Lanes are the stretches between rapids; long ones are cut at anchors: written
+vertices whose place on the original leaves no doubt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+
+#: segments a walker that has lost its way looks ahead
+LOOK_AHEAD = 12
+
+#: how much longer or shorter than the written path the original may be between two anchors, as a first guess
+_LENGTH_LOW, _LENGTH_HIGH = 0.97, 1.25
+
+#: places tried for an anchor before the lane is made longer, and written vertices between them
+_ANCHOR_TRIALS, _ANCHOR_STRIDE = 5, 7
+
+
+@dataclass(frozen=True)
+class Track:
+    """Original segments, n of them, ready to project on: segment k runs from vertex k to vertex k+1.
+
+    Parameters
+    ----------
+    six : (n + 1, 6) float64
+        The vertices: tip and axis point.
+    row : (n + 1, 13) float64
+        Start (6), difference (6), inverse square of the length (0 where that is 0).
+    length : (n + 1,) float64
+        Path length up to every vertex, mm.
+    """
+
+    six: Floats
+    row: Floats
+    length: Floats
+
+    @classmethod
+    def of(cls, six: Floats) -> Track:
+        """Make it from vertices (n + 1, 6)."""
+        count = max(len(six) - 1, 0)
+        row = np.zeros((count + 1, 13))
+        row[:, :6] = six
+        np.subtract(six[1:], six[:-1], out=row[:-1, 6:12])
+        square = np.einsum("ij,ij->i", row[:, 6:12], row[:, 6:12])
+        np.divide(1.0, square, out=row[:, 12], where=square > 0)
+        length = np.concatenate(([0.0], np.cumsum(np.sqrt(square[:-1]))))
+        return cls(six, row, length)
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """Stretches to walk: written vertices ``first`` to ``last``, original vertices ``start`` to ``stop``.
+
+    Parameters
+    ----------
+    first, last : (k,) int64
+        The walk begins at vertex `first`, which is at `fraction` of segment `start`.
+    start, stop : (k,) int64
+        First segment, and last segment plus one.
+    fraction : (k,) float64
+    """
+
+    first: Ints
+    last: Ints
+    start: Ints
+    stop: Ints
+    fraction: Floats
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) -> tuple[Ints, Floats, Bools]:
+    """Assign the vertices of all lanes.
+
+    Parameters
+    ----------
+    six : (v, 6) float64
+        Written vertices.
+    track : Track
+    lanes : Lanes
+    margin : float, mm
+        The next segment must be nearer by so much to be taken before this one ends.
+    lost : float, mm
+        From this distance on the walker looks further ahead.
+
+    Returns
+    -------
+    segment : (v,) int64
+    fraction : (v,) float64
+        On its segment; -1 for vertices in no lane.
+    backward : (v,) bool
+        Whether the vertex lies more than `margin` behind the one before it, as seen from its segment.
+    """
+    segment = np.zeros(len(six), np.int64)
+    fraction = np.full(len(six), -1.0)
+    backward = np.zeros(len(six), np.bool_)
+    vertex, last = lanes.first.copy(), lanes.last
+    here, least, end = lanes.start.copy(), lanes.fraction.copy(), lanes.stop - 1
+    segment[vertex], fraction[vertex] = here, least
+    vertex += 1
+    square_margin = margin * margin
+    active = vertex <= last
+    while True:
+        if not active.all():
+            keep = np.flatnonzero(active)
+            if not len(keep):
+                return segment, fraction, backward
+            vertex, last, here, least, end = vertex[keep], last[keep], here[keep], least[keep], end[keep]
+        point = six.take(vertex, axis=0)
+        own = track.row.take(here, axis=0)
+        follow = track.row.take(np.minimum(here + 1, end), axis=0)
+        away = point - own[:, :6]
+        t = np.einsum("ij,ij->i", away, own[:, 6:12]) * own[:, 12]
+        on = np.clip(t, least, 1.0)
+        away -= on[:, None] * own[:, 6:12]
+        d = np.sqrt(np.einsum("ij,ij->i", away, away))
+        away = point - follow[:, :6]
+        s = np.clip(np.einsum("ij,ij->i", away, follow[:, 6:12]) * follow[:, 12], 0.0, 1.0)
+        away -= s[:, None] * follow[:, 6:12]
+        d_follow = np.sqrt(np.einsum("ij,ij->i", away, away))
+        more = here < end
+        ended = (t >= 1.0) | (own[:, 12] == 0)
+        advance = more & ((ended & (d_follow <= d)) | (d_follow < d - margin))
+        jump = np.flatnonzero(more & ~advance & (d > lost))
+        if len(jump):
+            ahead = _look_ahead(point[jump], track, here[jump], end[jump], d[jump] - margin)
+            advance[jump] = ahead > here[jump]
+            here[jump] = np.maximum(ahead - 1, here[jump])
+        behind = (least - t) > 0
+        place = ~advance
+        at = vertex[place]
+        segment[at], fraction[at] = here[place], on[place]
+        if behind.any():
+            back = (least - t) ** 2 > square_margin * own[:, 12]
+            backward[at] = (behind & back & (own[:, 12] > 0))[place]
+        least = np.where(place, on, 0.0)
+        here += advance
+        vertex += place
+        active = vertex <= last
+
+
+def _look_ahead(point: Floats, track: Track, here: Ints, end: Ints, beat: Floats) -> Ints:
+    """First of the next segments that begins a stretch nearer than `beat`; `here` where there is none."""
+    best = here.copy()
+    for step in range(2, LOOK_AHEAD + 1):
+        row = track.row[np.minimum(here + step, end)]
+        away = point - row[:, :6]
+        t = np.clip(np.einsum("ij,ij->i", away, row[:, 6:12]) * row[:, 12], 0.0, 1.0)
+        away -= t[:, None] * row[:, 6:12]
+        d = np.sqrt(np.einsum("ij,ij->i", away, away))
+        nearer = (d < beat) & (here + step <= end)
+        best[nearer] = here[nearer] + step
+        beat = np.where(nearer, d, beat)
+    return best
+
+
+def cut_lane(
+    six: Floats,
+    written_length: Floats,
+    track: Track,
+    lane: tuple[int, int, int, int, float],
+    size: int,
+    near: float,
+    candidates: Ints | None = None,
+) -> list[tuple[int, int, int, int, float]]:
+    """Cut one lane at anchors about `size` vertices apart.
+
+    Parameters
+    ----------
+    six : (v, 6) float64
+        Written vertices.
+    written_length : (v,) float64
+        Path length up to every vertex, mm.
+    track : Track
+    lane : (first, last, start, stop, fraction)
+        As in `Lanes`.
+    size : int
+    near : float, mm
+        An anchor lies no farther from the original, and nothing else of the original comes so near to it.
+    candidates : (c,) int64, optional
+        Vertices that may become anchors; all by default.
+
+    Returns
+    -------
+    list of lanes
+        At least one; they join where they are cut.
+    """
+    first, last, start, stop, fraction = lane
+    lanes = []
+    target = first + size
+    while target < last - size // 2:
+        anchor = None
+        for trial in range(_ANCHOR_TRIALS):
+            vertex = target + trial * _ANCHOR_STRIDE
+            if candidates is not None:
+                vertex = int(candidates[min(int(np.searchsorted(candidates, vertex)), len(candidates) - 1)])
+            if vertex < last:
+                anchor = _find_anchor(
+                    six[vertex], written_length[vertex] - written_length[first], track, start, stop, near
+                )
+            if anchor is not None:
+                break
+        if anchor is None:
+            target += size
+            continue
+        segment, at = anchor
+        lanes.append((first, vertex, start, segment + 1, fraction))
+        first, start, fraction = vertex, segment, at
+        target = vertex + size
+    lanes.append((first, last, start, stop, fraction))
+    return lanes
+
+
+def _find_anchor(
+    point: Floats, gone: float, track: Track, start: int, stop: int, near: float
+) -> tuple[int, float] | None:
+    """Place of a written vertex on the original, `gone` mm after segment `start`; None where it is in doubt."""
+    origin = track.length[start]
+    for low, high in ((_LENGTH_LOW, _LENGTH_HIGH), (0.0, 2 * _LENGTH_HIGH)):
+        a, b = np.searchsorted(track.length, (origin + low * gone - near, origin + high * gone + 2 * near))
+        a, b = max(int(a) - 1, start), min(int(b) + 1, stop)
+        if a >= b:
+            continue
+        row = track.row[a:b]
+        away = point - row[:, :6]
+        t = np.clip(np.einsum("ij,ij->i", away, row[:, 6:12]) * row[:, 12], 0.0, 1.0)
+        away -= t[:, None] * row[:, 6:12]
+        d = np.einsum("ij,ij->i", away, away)
+        close = np.flatnonzero(d <= 4 * near * near)
+        best = int(np.argmin(d))
+        if d[best] > near * near:
+            continue
+        if track.length[a + close[-1]] - track.length[a + close[0] + 1] > 8 * near:
+            return None
+        return a + best, float(t[best])
+    return None

@@ -1,0 +1,168 @@
+"""NC text to path elements, as a control understands it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.verify import read_nc
+from cornersmooth.verify.ncprogram import Element
+
+from .writing import simple_text, wavy
+
+HEAD = b"%\nO0001\nG21 G90 G94 G17 G40 G49 G80\n"
+CURVE = b"""G6.2 P4 K0. X0.0000 Y0.0000 Z0.0000 U0.0000 V0.0000 W10.0000 R1.
+K0. X1.0000 Y0.0000 Z0.0000 U1.0000 V0.0000 W10.0000 R1.
+K0. X2.0000 Y0.0000 Z0.0000 U2.0000 V0.0000 W10.0000 R2.
+K0. X2.0000 Y1.0000 Z0.0000 U2.0000 V1.0000 W10.0000 R1.
+K0.5 X2.0000 Y2.0000 Z0.0000 U2.0000 V2.0000 W10.0000 R1.
+K1.
+K1.
+K1.
+K1.
+"""
+START = (
+    b"G0 X0.0000 Y0.0000 Z0.0000 U0.0000 V0.0000 W10.0000\nG1 X0.0000 Y0.0000 Z0.0000 U0.0000 V0.0000 W10.0000 F100.\n"
+)
+
+
+def codes(text):
+    return [(problem.code, problem.nc_line) for problem in read_nc(text).problems]
+
+
+def test_lines_with_vectors():
+    nc = read_nc(HEAD + b"G43.5 H1\nG0 X1. Y2. Z3. I0. J0.6 K0.8\nG1 X1.5 F250.\nY-2.5 I1.\nG0 Z50.\nM30\n%\n")
+    assert nc.kind.tolist() == [Element.RAPID, Element.LINE, Element.LINE, Element.RAPID]
+    assert nc.tip.tolist() == [[1, 2, 3], [1.5, 2, 3], [1.5, -2.5, 3], [1.5, -2.5, 50]]
+    assert nc.second.tolist() == [[0, 0.6, 0.8], [0, 0.6, 0.8], [1, 0, 0], [1, 0, 0]]
+    assert nc.line.tolist() == [5, 6, 7, 8]
+    assert np.isnan(nc.feed[[0, 3]]).all()
+    assert nc.feed[[1, 2]].tolist() == [250, 250]
+    assert [(event.letter, event.value, event.element) for event in nc.events][-1] == ("M", 30.0, 4)
+    assert nc.second_is == "vector"
+    assert nc.problems == ()
+
+
+def test_inches_become_millimetres():
+    nc = read_nc(
+        b"G20 G90\nG43.5 H1\nG0 X1.00000 Y0.00000 Z2.00000 I0.0000000 J0.0000000 K1.0000000\nG1 X1.50000 F10.\n"
+    )
+    assert nc.units == "inch"
+    assert np.allclose(nc.tip, [[25.4, 0, 50.8], [38.1, 0, 50.8]], atol=1e-12)
+    assert nc.feed[1] == pytest.approx(254.0)
+    assert nc.tip_step == pytest.approx(25.4e-5)
+    assert nc.second_step == pytest.approx(1e-7)
+
+
+def test_curve():
+    nc = read_nc(HEAD + START + CURVE + b"G1 X2.0000 Y3.0000 Z0.0000 U2.0000 V3.0000 W10.0000\n")
+    assert nc.problems == ()
+    assert nc.kind.tolist() == [Element.RAPID, Element.LINE, Element.CURVE, Element.LINE]
+    assert nc.line.tolist() == [4, 5, 6, 15]
+    assert nc.curves.knot.tolist() == [0, 0, 0, 0, 0.5, 1, 1, 1, 1]
+    assert nc.curves.weight.tolist() == [1, 1, 2, 1, 1]
+    assert nc.curves.tip[2].tolist() == [2, 0, 0]
+    assert nc.curves.second[3].tolist() == [2, 1, 10]
+    assert nc.tip[2].tolist() == [2, 2, 0]
+    assert nc.second_is == "point"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        (b"K0. X1.0000", b"X1.0000", ("CS512", 7)),
+        (b"K1.\nK1.\nK1.\nK1.\n", b"K1.\nK1.\nK1.\n", ("CS513", 6)),
+        (b"K1.\nK1.\nK1.\nK1.\n", b"K1.\nK1.\nK1.\nK1.\nK1.\n", ("CS513", 6)),
+        (b"K0.5 X2", b"K-0.5 X2", ("CS516", 10)),
+        (b"K1.\nK1.\nK1.\nK1.\n", b"K1.\nK1.\nK1.\nK2.\n", ("CS517", 6)),
+        (b"R2.", b"R0.", ("CS518", 8)),
+        (b"P4 K0. X0.0000", b"P4 K0. X0.0001", ("CS519", 6)),
+        (b"V0.0000 W10.0000 R1.\nK0. X1.", b"V0.0001 W10.0000 R1.\nK0. X1.", ("CS519", 6)),
+        (b"R2.\n", b"R2.\n(COMMENT)\n", ("CS510", 10)),
+    ],
+)
+def test_rules_of_curves(old, new, expected):
+    assert old in CURVE
+    found = codes(HEAD + START + CURVE.replace(old, new))
+    assert expected in found
+
+
+def test_words_inside_a_curve_break_it():
+    found = codes(HEAD + START + CURVE.replace(b"R2.\n", b"R2.\nM8\n"))
+    assert ("CS513", 6) in found
+
+
+def test_arcs_by_radius_and_by_centre():
+    nc = read_nc(
+        HEAD + b"G43 H1\nG0 X10. Y0. Z0.\nG3 X0. Y10. R10. F100.\nG2 X10. Y0. I0. J-10.\nG3 X10. Y0. I-10. J0.\n"
+    )
+    assert np.allclose(nc.arcs.centre, 0, atol=1e-12)
+    assert np.allclose(np.degrees(nc.arcs.sweep), [90, 90, 360])
+    assert nc.arcs.normal[:, 2].tolist() == [1, -1, 1]
+    nc = read_nc(HEAD + b"G43.5 H1\nG18\nG0 X10. Y5. Z0. I0. J1. K0.\nG2 X0. Y6. Z10. R10. F100.\n")
+    # about +Y a clockwise G2 turns from +X towards +Z
+    assert np.allclose(nc.arcs.centre[0][[0, 2]], 0, atol=1e-12)
+    assert np.allclose(np.degrees(nc.arcs.sweep), [90])
+    assert codes(HEAD + b"G43 H1\nG0 X0. Y0. Z0.\nG2 X30. Y0. R10. F100.\n") == [("CS520", 6)]
+
+
+def test_events_stand_where_they_stand():
+    nc = read_nc(
+        HEAD + b"T3 M6\nS1200 M3\nG43.5 H3\nG0 X0. Y0. Z0. I0. J0. K1.\nM8\nG4 P1500\nG1 X1. F10.\nM0\nG1 X2.\nM30\n"
+    )
+    found = [(event.element, event.letter, event.value) for event in nc.events if event.letter in "TSM"]
+    assert found == [(0, "T", 3), (0, "M", 6), (0, "S", 1200), (0, "M", 3), (1, "M", 8), (2, "M", 0), (3, "M", 30)]
+    assert [event.text for event in nc.events if event.letter == "G" and event.value == 4] == ["1500"]
+
+
+def test_feed_modes():
+    nc = read_nc(HEAD + b"G43.5 H1\nG0 X0. Y0. Z0. I0. J0. K1.\nG95\nG1 X1. F0.2\nG94\nG1 X2. F300.\n")
+    assert nc.per_revolution.tolist() == [False, True, False]
+    assert nc.feed[1:].tolist() == [0.2, 300]
+
+
+def test_unreadable_text_says_where():
+    with pytest.raises(InputError) as caught:
+        read_nc(b"%\nG21 G90\nG1 X1.0 ?\n", name="part.nc")
+    assert str(caught.value).startswith("part.nc:3: error: '?' is no NC word")
+    with pytest.raises(InputError, match="G68 is not understood"):
+        read_nc(b"G68\n")
+    with pytest.raises(SettingsError, match="unknown control"):
+        read_nc(b"", control="no such")
+
+
+def test_number_that_is_none_is_refused():
+    with pytest.raises(InputError, match=":2: error"):
+        read_nc(b"G0 X1.0 Y1.0\nG1 X1.0.0 Y2.0\n")
+
+
+@pytest.mark.parametrize("form", ["g1", "g6.2"])
+def test_runs_and_single_lines_give_the_same(form, tmp_path):
+    tip, axis = wavy(60)
+    text = simple_text(tip, axis, 0.02, 10.0, form)
+    fast = read_nc(text)
+    # a block number, a comment or lower case make every line one that is read on its own
+    spoilt = b"\n".join(line.lower() if line[:1] in b"GK" else line for line in text.split(b"\n"))
+    path = tmp_path / "part.nc"
+    path.write_bytes(spoilt)
+    slow = read_nc(path)
+    for name in ("kind", "tip", "second", "line", "feed"):
+        assert np.array_equal(getattr(fast, name), getattr(slow, name), equal_nan=name == "feed"), name
+    for name in ("element", "order", "points", "tip", "second", "weight", "knot"):
+        assert np.array_equal(getattr(fast.curves, name), getattr(slow.curves, name)), name
+    assert fast.problems == slow.problems == ()
+
+
+def test_chunks_make_no_difference(monkeypatch):
+    from cornersmooth.verify import words
+
+    tip, axis = wavy(60)
+    text = simple_text(tip, axis, 0.02, 10.0, "g6.2")
+    whole = read_nc(text)
+    monkeypatch.setattr(words, "CHUNK", 500)
+    pieces = read_nc(text)
+    assert np.array_equal(whole.tip, pieces.tip)
+    assert np.array_equal(whole.curves.knot, pieces.curves.knot)
+    assert np.array_equal(whole.curves.element, pieces.curves.element)
+    assert pieces.problems == ()
