@@ -9,6 +9,8 @@ from typing import Any, Literal
 from cornersmooth.errors import SettingsError
 
 Method = Literal["proportional", "zhang2016"]
+Shape = Literal["paper", "auto"]
+Allocation = Literal["half", "fair"]
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,10 @@ class Settings:
     axis_length : float, mm
         H: distance of the axis point from the tip. Choose the length of the cutting edge.
     method : {"proportional", "zhang2016"}
+    shape : {"paper", "auto"}
+        Weights of the curves: `weights` everywhere, or w2 chosen for every corner by its turn (docs/shape.md).
+    allocation : {"half", "fair"}
+        How far transitions reach: to the middle of the shorter segment, or as neighbours leave room (docs/shape.md).
     weights : (float, float)
         w1 and w2 of the five-point curve, in (0, 3]; rounded to the three decimals that controls accept.
     ratio : float
@@ -51,6 +57,8 @@ class Settings:
     tolerance: float = 0.01
     axis_length: float = 10.0
     method: Method = "proportional"
+    shape: Shape = "paper"
+    allocation: Allocation = "half"
     weights: tuple[float, float] = (1.0, 1.0)
     ratio: float = 2.0 / 3.0
     orientation_tolerance: float | None = None
@@ -67,7 +75,17 @@ class Settings:
     def __post_init__(self) -> None:
         if self.method not in ("proportional", "zhang2016"):
             raise SettingsError("CS201", f"unknown method {self.method!r}", "use proportional or zhang2016")
+        if self.shape not in ("paper", "auto"):
+            raise SettingsError("CS201", f"unknown shape {self.shape!r}", "use paper or auto")
+        if self.allocation not in ("half", "fair"):
+            raise SettingsError("CS201", f"unknown allocation {self.allocation!r}", "use half or fair")
+        if self.method == "zhang2016" and (self.shape != "paper" or self.allocation != "half"):
+            raise SettingsError(
+                "CS207", "the method zhang2016 has its own shape and lengths", "leave out shape and allocation"
+            )
         object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
+        if self.shape == "auto" and self.weights != (1.0, 1.0):
+            raise SettingsError("CS207", "shape auto chooses the weights", "leave out the weights, or use shape paper")
         for name, (low, high) in BOUNDS.items():
             value = getattr(self, name)
             for number in value if isinstance(value, tuple) else (value,):

@@ -1,0 +1,159 @@
+"""`method="proportional"`: tip and axis-point segment are trimmed by the same fraction on each side (design 3.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.model import Floats, LimitedBy, Status
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.deviation import BETWEEN_PROBES, EXACT, Bends, keep
+from cornersmooth.smoothing.legs import Legs, Placed, divide, dot, half_angle_cosine, square
+from cornersmooth.smoothing.neighbours import norm
+
+#: while the lever turns by less than this many times the deviation, relative to it, the deviation is largest at u = ½:
+#: half of what is proven, for all weights 1 at the paper's ratio and for every other shape
+_TILT_PAPER, _TILT_ANY = 1.5, 0.5
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What g corners ask for before anyone says how much room they have.
+
+    Parameters
+    ----------
+    status : (g,) uint8
+        `Status` as far as the geometry of the corner decides it.
+    length_in, length_out : (g,) float64, mm
+        m(D): six-dimensional lengths of the segments.
+    by_tolerance, by_orientation : (g,) float64, mm
+        Transition lengths that the tolerances allow.
+    cosine : (g,) float64
+        Cosine of the six-dimensional turn.
+    """
+
+    status: NDArray[np.uint8]
+    length_in: Floats
+    length_out: Floats
+    by_tolerance: Floats
+    by_orientation: Floats
+    cosine: Floats
+    bends: Bends
+    half_cosine: Floats
+    per_length: tuple[Floats, Floats, Floats]  # deviation over length: tip, axis point, axis point less tip
+
+
+def wanted(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Wanted:
+    """Measure g corners; weights (g, 2) and ratios (g,) are those of their curves."""
+    axis_length = settings.axis_length
+    axis_in, axis_out = legs.tip_in + legs.turn_in, legs.tip_out + legs.turn_out
+    length_in = np.sqrt((square(legs.tip_in) + square(axis_in)) / 2.0)
+    length_out = np.sqrt((square(legs.tip_out) + square(axis_out)) / 2.0)
+    per_in, per_out = 1.0 / length_in[:, None], 1.0 / length_out[:, None]
+    bend_tip = legs.tip_out * per_out - legs.tip_in * per_in  # (U⁺ − U⁻)_A
+    bend_turn = legs.turn_out * per_out - legs.turn_in * per_in  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
+    bend_axis = bend_tip + bend_turn  # (U⁺ − U⁻)_B
+    factor = nurbs.deviation_factor(weights, ratio)
+    per_length_tip, per_length_axis, per_length_turn = (factor * norm(v) for v in (bend_tip, bend_axis, bend_turn))
+    by_tolerance = np.minimum(
+        divide(settings.tip_tolerance, per_length_tip), divide(settings.axis_point_tolerance, per_length_axis)
+    )
+    half_cosine = np.minimum(
+        half_angle_cosine(legs.turn_in, axis_length), half_angle_cosine(legs.turn_out, axis_length)
+    )
+    by_orientation = np.full_like(by_tolerance, np.inf)
+    if settings.orientation_tolerance is not None:
+        reach = axis_length * half_cosine * np.sin(np.radians(settings.orientation_tolerance))
+        by_orientation = divide(reach, per_length_turn)
+
+    status = np.full(len(length_in), Status.SMOOTHED, np.uint8)
+    halves = np.minimum(length_in, length_out) / 2.0
+    flat_tip = per_length_tip * halves <= settings.tip_resolution / 2.0
+    flat_axis = per_length_axis * halves <= max(settings.tip_resolution, settings.axis_point_resolution) / 2.0
+    status[flat_tip & flat_axis] = Status.STRAIGHT
+    cosine = (dot(legs.tip_in, legs.tip_out) + dot(axis_in, axis_out)) / (2.0 * length_in * length_out)
+    status[cosine < np.cos(np.radians(settings.reversal_angle))] = Status.REVERSAL
+    status[half_cosine < np.cos(np.radians(settings.max_axis_step / 2.0)) - 1e-12] = Status.AXIS_STEP
+    bends = Bends(legs, per_in, per_out, bend_tip, bend_turn, weights, ratio, factor, axis_length)
+    return Wanted(
+        status,
+        length_in,
+        length_out,
+        by_tolerance,
+        by_orientation,
+        cosine,
+        bends,
+        half_cosine,
+        (per_length_tip, per_length_axis, per_length_turn),
+    )
+
+
+def place_proportional(asked: Wanted, room: Floats, settings: Settings) -> Placed:
+    """Give g corners the transition lengths they asked for, within their `room` (g,), mm."""
+    status, bends = asked.status, asked.bends
+    per_length_tip, _, per_length_turn = asked.per_length
+    limited_by = np.where(asked.by_tolerance < room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
+    length = np.minimum(room, asked.by_tolerance)
+    limited_by[asked.by_orientation < length] = LimitedBy.ORIENTATION
+    length = np.minimum(length, asked.by_orientation)
+
+    # The construction runs on chords of the sphere, the promise is about b = tip + H·axis at constant H. The bound
+    # |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are evaluated and shortened until they keep it.
+    axis_length = settings.axis_length
+    shortest_lever = axis_length * asked.half_cosine - length * per_length_turn  # below |B−A| of both motions
+    bound = length * (per_length_tip + divide(axis_length * per_length_turn, np.maximum(shortest_lever, 0.0)))
+    doubtful = (status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance * (1.0 + EXACT))
+    peaks = _largest_in_the_middle(bends, length, length * per_length_turn)
+    probed = np.flatnonzero(doubtful & ~peaks)
+    for rows, measure, share in (
+        (np.flatnonzero(doubtful & peaks), bends.middle, 1.0),
+        (probed, bends.probe, 1.0 - BETWEEN_PROBES),
+    ):
+        shortened = keep(length, rows, measure, share * settings.axis_point_tolerance)
+        limited_by[rows[shortened < length[rows]]] = LimitedBy.TOLERANCE
+        length[rows] = shortened
+    shortest = 4.0 * settings.tip_resolution
+    status[(status == Status.SMOOTHED) & (length <= shortest)] = Status.TOO_SHORT
+
+    smoothed = status == Status.SMOOTHED
+    length = np.where(smoothed, length, 0.0)
+    limited_by[~smoothed] = LimitedBy.NOTHING
+    axis_error = bends.middle(length)
+    if len(probed):
+        axis_error[probed] = np.maximum(axis_error[probed], bends.probe(length[probed], probed))
+    trim_in, trim_out = length / asked.length_in, length / asked.length_out
+    nothing = np.full(len(length), np.nan)
+    return Placed(
+        status=status,
+        limited_by=limited_by,
+        trim_in=trim_in,
+        trim_out=trim_out,
+        axis_trim_in=trim_in,
+        axis_trim_out=trim_out,
+        tip_error=per_length_tip * length,
+        axis_error=axis_error,
+        orientation_error=bends.middle_turn(length),
+        sync_residual=nothing,
+        jump_in=nothing,
+        jump_out=nothing,
+    )
+
+
+def _largest_in_the_middle(bends: Bends, length: Floats, turned: Floats) -> NDArray[np.bool_]:
+    """Rows whose deviation at constant H is surely largest at u = ½; `turned` is (Q−P)−(B−A) there, mm.
+
+    The deviation where the original motion is at σ, as in `cornersmooth.smoothing.nurbs`, is at most f(σ)·(E + G·σ),
+    with E the deviation at u = ½, f = β/c, and G the lever's turn over the half times H|O′−O|. So E is the largest
+    while f·(1 + σ·G/E) ≤ 1. With all weights 1 at the ratio 2/3, f is (1−σ)³ and G may be up to 3E; with any other
+    weights f is convex and falls from 1 to 0, so it is at most 1−σ and G may be up to E.
+    """
+    legs = bends.legs
+    turn = np.maximum(norm(legs.turn_in) * bends.per_in[:, 0], norm(legs.turn_out) * bends.per_out[:, 0])
+    turn *= length / bends.axis_length
+    paper = (bends.weights == 1.0).all(axis=1) & (np.abs(bends.ratio - 2.0 / 3.0) < EXACT)
+    tilt = 2.0 * turn * turned
+    largest: NDArray[np.bool_] = (tilt <= np.where(paper, _TILT_PAPER, _TILT_ANY) * bends.middle(length)) & (turn < 0.5)
+    return largest
