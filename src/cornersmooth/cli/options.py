@@ -87,6 +87,20 @@ method = click.option(
     show_default=True,
     help="How the pair of curves is made: the default, or the paper as published.",
 )
+shape = click.option(
+    "--shape",
+    type=click.Choice(["paper", "auto"]),
+    default="paper",
+    show_default=True,
+    help="Weights of the curves: all 1 (or --weights), or chosen for every corner by its turn.",
+)
+allocation = click.option(
+    "--allocation",
+    type=click.Choice(["half", "fair"]),
+    default="half",
+    show_default=True,
+    help="How far curves reach: half of each segment, or as much as their neighbours leave.",
+)
 weights = click.option(
     "--weights", type=Weights(), default=(1.0, 1.0), help="Weights w1,w2 of the curves, up to 3. [default: 1,1]"
 )
@@ -162,7 +176,18 @@ def smoothing(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that smooths."""
     return _apply(
         function,
-        (tolerance, axis_length, method, weights, orientation_tolerance, reversal_angle, chord, axis_step),
+        (
+            tolerance,
+            axis_length,
+            method,
+            shape,
+            allocation,
+            weights,
+            orientation_tolerance,
+            reversal_angle,
+            chord,
+            axis_step,
+        ),
     )
 
 

@@ -14,7 +14,17 @@ from cornersmooth.cli.show import print_line, progress_bar, show_batch, show_fin
 from cornersmooth.errors import CornersmoothError
 
 _READING = ("dialect", "units", "arc_rule", "lenient")
-_SETTINGS = ("tolerance", "axis_length", "method", "weights", "orientation_tolerance", "reversal_angle", "axis_step")
+_SETTINGS = (
+    "tolerance",
+    "axis_length",
+    "method",
+    "shape",
+    "allocation",
+    "weights",
+    "orientation_tolerance",
+    "reversal_angle",
+    "axis_step",
+)
 
 
 @click.command(
@@ -33,6 +43,8 @@ _SETTINGS = ("tolerance", "axis_length", "method", "weights", "orientation_toler
 @options.reports
 @options.control
 @options.method
+@options.shape
+@options.allocation
 @options.weights
 @options.orientation_tolerance
 @options.reversal_angle
