@@ -283,6 +283,7 @@ class Status(IntEnum):
     KEPT = 5  #: `Program.keep` asks for the pose itself
     DUPLICATE = 6  #: repeats the pose before it
     TOO_SHORT = 7  #: no room for a transition, or less than the output can show
+    FEED_PER_REVOLUTION = 8  #: the output form has no curves at a feed per revolution
 
 
 class LimitedBy(IntEnum):

@@ -43,7 +43,8 @@ class Settings:
     axis_step : float or None, degrees
         Largest change of axis in one written line next to a rounded corner; None for what ε and H ask for.
     round_feed_changes : bool
-        Whether a corner where the feed changes may be rounded; false for output that cannot change F inside a curve.
+        Whether a corner where the feed changes may be rounded; false for output that cannot change F inside a curve,
+        and has no curves at a feed per revolution.
     tip_resolution : float, mm
         Step of the written tip coordinates; half of it per axis is taken off ε. 0 for no rounding.
     axis_point_resolution : float, mm

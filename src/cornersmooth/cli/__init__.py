@@ -80,6 +80,7 @@ def main() -> NoReturn:
 
 def run(args: list[str] | None = None) -> int:
     """Run the command line with the given arguments; returns the exit code."""
+    from cornersmooth.cli.files import ClosedPipe
     from cornersmooth.errors import CornersmoothError
 
     try:
@@ -99,7 +100,7 @@ def run(args: list[str] | None = None) -> int:
     except CornersmoothError as failure:
         click.echo(str(failure), err=True)
         return failure.exit_code
-    except BrokenPipeError:
+    except (ClosedPipe, BrokenPipeError):
         _close_quietly()
         return 4
     except (click.exceptions.Abort, KeyboardInterrupt):

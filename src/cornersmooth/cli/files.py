@@ -20,6 +20,10 @@ from cornersmooth.errors import InputError, OutputError, SettingsError
 STANDARD = "-"
 
 
+class ClosedPipe(Exception):  # noqa: N818 - no error of ours: whoever read the output has seen enough
+    """Standard output was closed by its reader, as by ``| head``."""
+
+
 def read_input(path: str) -> tuple[bytes, str]:
     """Contents and display name of an input; ``-`` is standard input.
 
@@ -75,7 +79,9 @@ def open_output(path: str) -> Iterator[BinaryIO]:
     Raises
     ------
     OutputError
-        Anything the operating system refuses, a full disk included. A closed pipe stays a BrokenPipeError.
+        Anything the operating system refuses, a full disk included.
+    ClosedPipe
+        The reader of a pipe has gone.
     """
     if path == STANDARD:
         with _failing_as_output("<stdout>"):
@@ -122,8 +128,8 @@ def _mode_for(target: str) -> int:
 def _failing_as_output(path: str) -> Iterator[None]:
     try:
         yield
-    except BrokenPipeError:
-        raise
+    except BrokenPipeError as closed:
+        raise ClosedPipe from closed
     except OSError as failure:
         raise OutputError(
             "CS404", f"cannot write it: {_reason(failure)}", "the old file, if any, is untouched", file=path

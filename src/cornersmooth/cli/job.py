@@ -72,7 +72,7 @@ def check(job: Job) -> None:
 def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     """Read, smooth, write, report; errors of the input or output become part of the outcome.
 
-    A BrokenPipeError and KeyboardInterrupt pass through.
+    `ClosedPipe` and KeyboardInterrupt pass through.
     """
     outcome = Outcome(job)
     try:

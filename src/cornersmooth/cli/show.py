@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -93,9 +94,12 @@ def show_batch(outcomes: list[Outcome]) -> None:
     """Print one row for every file."""
     from rich.table import Table
 
-    table = Table("file", "result", "corners", "rounded", "tip mm", "axis mm", "blocks", box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False)
+    table.add_column("file", overflow="fold")
+    for heading in ("result", "corners", "rounded", "tip mm", "axis mm", "blocks"):
+        table.add_column(heading, no_wrap=True)
     for outcome in outcomes:
-        name = outcome.job.source
+        name = os.path.basename(outcome.job.source)
         if not outcome.contents:
             table.add_row(name, f"failed ({outcome.exit_code})", "", "", "", "", "")
             continue

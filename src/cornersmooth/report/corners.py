@@ -19,6 +19,7 @@ STATUS_NAMES = {
     Status.KEPT: "kept",
     Status.DUPLICATE: "duplicate",
     Status.TOO_SHORT: "too_short",
+    Status.FEED_PER_REVOLUTION: "feed_per_revolution",
 }
 LIMIT_NAMES = {
     LimitedBy.NOTHING: "",

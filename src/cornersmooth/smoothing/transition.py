@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Corners, Floats, Ints, Program, Status
+from cornersmooth.model import Corners, FeedMode, Floats, Ints, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.allocation import fair_room
 from cornersmooth.smoothing.legs import Legs, Placed, legs_at
@@ -133,6 +133,8 @@ def _what_forbids(
     same = (feed_in == feed_out) | (np.isnan(feed_in) & np.isnan(feed_out))
     same_mode = program.feed_mode[pose] == program.feed_mode[after]
     status[~same_mode | (~same & (not settings.round_feed_changes))] = Status.FEED_CHANGE
+    if not settings.round_feed_changes:
+        status[program.feed_mode[pose] == FeedMode.PER_REVOLUTION] = Status.FEED_PER_REVOLUTION
     status[program.keep[pose] != 0] = Status.KEPT
     status[after == 0] = Status.TOO_SHORT
     status[duplicate] = Status.DUPLICATE
