@@ -60,7 +60,7 @@ class Arc:
     turns: int = 1  #: the arc is the last of them
     sweep: float = math.nan  #: rad, NaN where not written
     resolution: float = 1e-4  #: step of the printed coordinates
-    certain: bool = False  #: the sense of rotation is no matter of dialect
+    certain: bool = False  #: the sense of rotation is written out, and no matter of dialect
 
 
 def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | None, decimals: int) -> Arc:
@@ -123,7 +123,6 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
         int(turns),
         sweep,
         10.0 ** -max(printed, decimals, LEAST_DECIMALS),
-        certain=rule in ("left", "right"),
     )
 
 
@@ -230,7 +229,8 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
         beyond = passed > turn[row] + allowed[row] / radius[row]
         np.add.at(agree, row, clear & ~beyond)
         np.add.at(against, row, clear & beyond)
-    contrary = (against > 0) & (agree == 0) & ~short & np.isnan(stated)
+    certain = table.column(lambda arc: arc.certain) > 0
+    contrary = (against > 0) & (agree == 0) & ~short & np.isnan(stated) & ~certain
     findings = []
     if rule == "tangent":
         turned = contrary & ~closed

@@ -220,12 +220,12 @@ def _convert(text: bytes, spans: Ints, pairs: int) -> Floats | None:
     chosen = text if whole else b"".join([text[a:b] for a, b in spans.tolist()])
     if _has_inner_blank(chosen):
         return None
-    if pairs:
-        chosen = chosen.translate(None, b" \t")
-        if chosen.count(b",$\n") != pairs:
-            return None
-        chosen = chosen.replace(b",$\n", b",")
     chosen = chosen.translate(None, _LETTERS)
+    if pairs:
+        joined = chosen.replace(b",$\n", b",")
+        if len(chosen) - len(joined) != 2 * pairs:
+            return None
+        chosen = joined
     if b",\n" in chosen or chosen.endswith(b","):
         return None
     try:

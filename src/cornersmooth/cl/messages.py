@@ -31,7 +31,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS114": ("{word} is incremental and stands before the first position", "begin with FROM or GOTO"),
     # state
     "CS115": ("{word}/{text} is not understood", "{want}"),
-    "CS116": ("{word} changes to {new} after positions in {old}", "split the file, or convert it to one unit"),
+    "CS116": ("{word} changes to {new} after positions in {old}", "say --units, or split the file"),
     "CS117": ("{word} changes the coordinates of what follows", "export the path in one coordinate system"),
     "CS118": ("{word} after FINI", "split the file at FINI, or remove what follows it"),
     "CS119": ("{word} needs a positive feed, not {value:g}", "correct the feed"),

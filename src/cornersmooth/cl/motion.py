@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Final
 
 from cornersmooth.cl.arcs import LEAST_DECIMALS, read_arc
-from cornersmooth.cl.builder import Vector
+from cornersmooth.cl.builder import FARTHEST, Vector
 from cornersmooth.cl.grammar import Argument, Record
 from cornersmooth.cl.machine import Machine
 from cornersmooth.cl.nurbs import CURVE_DIGITS, Curve, lines_of
@@ -134,8 +134,9 @@ def finish_curve(machine: Machine) -> None:
     why = curve.complaint
     points = None
     if why is None:
-        if not all(map(math.isfinite, sum(curve.points, ()))):
-            raise machine.fail("CS128", curve.line, why="a control point is not finite")
+        wrong = [value for point in curve.points for value in point if not abs(value) <= FARTHEST]
+        if wrong:
+            raise machine.fail("CS113", curve.line, value=wrong[0], limit=FARTHEST)
         tolerance = CURVE_DIGITS * 10.0 ** -max(curve.decimals, LEAST_DECIMALS)
         points = lines_of(curve, machine.builder.last_tip(), tolerance)
         why = "it would need too many lines" if points is None else None

@@ -64,9 +64,10 @@ def clean(data: bytes, name: str) -> bytes:
     data = data.removeprefix(_UTF8_BOM)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    data = data.rstrip(_CTRL_Z + b" \t\n")
-    if not data:
+    if data.endswith(_CTRL_Z):
+        data = data.rstrip(_CTRL_Z)
+    if not data or data.isspace():
         raise error("CS101", name, None)
     if (at := data.find(b"\0")) >= 0:
         raise error("CS102", name, data.count(b"\n", 0, at) + 1)
-    return data + b"\n"
+    return data if data.endswith(b"\n") else data + b"\n"

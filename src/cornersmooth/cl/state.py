@@ -9,7 +9,7 @@ from typing import Final
 from cornersmooth.cl.builder import UNIT_TOLERANCE, UP, Vector
 from cornersmooth.cl.grammar import Argument, Record
 from cornersmooth.cl.machine import Machine
-from cornersmooth.cl.words import FRAME_WORDS
+from cornersmooth.cl.words import FRAME_WORDS, MOTION_WORDS
 from cornersmooth.model import FeedMode, Keep, Units
 
 #: unit words of FEDRAT: millimetres per unit of the value (None: the unit of the file) and what it is per
@@ -41,6 +41,8 @@ def _rapid(machine: Machine, record: Record) -> None:
         machine.set_kind()
     elif option in ("", "MODIFY"):
         machine.rapid = True
+        if machine.hole:
+            machine.note("CS144", record.line, what="RAPID inside CYCLE")
     else:  # FEDTO,LENGTH,n: the last part is at feed; all of it at feed is slow but safe
         machine.note("CS140", record.line, text=joined(record.args))
 
@@ -140,7 +142,7 @@ def _cycle(machine: Machine, record: Record) -> None:
 
 
 def _frame(machine: Machine, record: Record) -> None:
-    if not _changes_nothing(record):
+    if record.word == "TRNTYP" or not _changes_nothing(record):
         if not machine.lenient:
             raise machine.fail("CS117", record.line, word=record.word)
         machine.note("CS143", record.line, word=record.word)
@@ -162,13 +164,17 @@ def _set(machine: Machine, record: Record) -> None:
 
 
 def _trntyp(machine: Machine, record: Record) -> None:
-    if record.args[:1] != ("WORLD",) and not machine.lenient:
-        raise machine.fail("CS117", record.line, word=f"TRNTYP/{joined(record.args)}")
-    machine.keep(record)
+    if record.args[:1] == ("WORLD",):
+        machine.keep(record)
+    else:
+        _frame(machine, record)
 
 
 def _syn(machine: Machine, record: Record) -> None:
     words = [value.strip("'").upper() for value in record.args if isinstance(value, str)]
+    if words[:1] and words[0] in MOTION_WORDS:
+        text, want = joined(record.args), "motion statements keep their names"
+        raise machine.fail("CS115", record.line, word="SYN", text=text, want=want)
     if len(words) == 2:  # ICAM: the first word now means the second, also a comment
         machine.renamed[words[0]] = "$$" if words[1].startswith("$$") else words[1]
     machine.keep(record)
