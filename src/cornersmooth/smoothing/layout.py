@@ -15,11 +15,11 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.bridging import PAPER_ERROR, shape_factors
 from cornersmooth.smoothing.neighbours import norm
 
 #: bend (mm) that one line per half may bridge, over the chord tolerance
-_BEND_PER_CHORD = 15.6
+_BEND_PER_CHORD = 1.0 / PAPER_ERROR
 
 #: poses or corners measured at once: their intermediate arrays fit the processor's cache
 _BLOCK = 16384
@@ -159,9 +159,8 @@ def lines_per_half(smoothed: SmoothProgram) -> Ints:
             (tip_out + turn_out) * corners.axis_trim_out[block][:, None]
             - (tip_in + turn_in) * corners.axis_trim_in[block][:, None],
         )
-        # the deviation of other shapes, in terms of the shape with all weights 1 and ratio 2/3
-        shape = 6.0 * nurbs.deviation_factor(corners.weights[block], corners.ratio[block])
-        bend = np.sqrt(np.maximum(_square(bends[0]), _square(bends[1]))) * np.maximum(shape, 1.0)
+        more_bend, more_turn = shape_factors(corners.weights[block], corners.ratio[block])
+        bend = np.sqrt(np.maximum(_square(bends[0]), _square(bends[1]))) * more_bend
         by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
         number = np.ceil(by_chord - 1e-9)
 
@@ -171,7 +170,7 @@ def lines_per_half(smoothed: SmoothProgram) -> Ints:
             np.maximum(corners.axis_trim_in[block], corners.trim_in[block]),
             np.maximum(corners.axis_trim_out[block], corners.trim_out[block]),
         )
-        by_turn = 2.0 * half_turn * reach / _turn_limit(settings, half_turn)
+        by_turn = 2.0 * half_turn * reach * more_turn / _turn_limit(settings, half_turn)
         graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
         even = np.maximum(np.ceil(1.5 * by_chord), np.ceil(by_turn - 1e-9))
         chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))

@@ -85,17 +85,24 @@ def rational_basis(u: Floats, weights: Floats) -> Floats:
     return weighted / sums
 
 
-def leg_coefficients(u: Floats, weights: Floats, ratio: float) -> Floats:
-    """Coefficients of corner, incoming and outgoing leg in the curve's points, for one pair of weights and one ratio.
+def leg_coefficients(u: Floats, weights: Floats, ratio: Floats | float) -> Floats:
+    """Coefficients of corner, incoming and outgoing leg in the curve's points, for one or many shapes.
+
+    Parameters
+    ----------
+    u : (..., m) float64
+    weights : (..., 2) float64
+    ratio : (...) float64
 
     Returns
     -------
-    (m, 3) float64
+    (..., m, 3) float64
         The first column is 1: the basis sums to it.
     """
     shares = rational_basis(u, weights)
-    incoming = -shares[:, 0] - ratio * shares[:, 1]
-    outgoing = shares[:, 4] + ratio * shares[:, 3]
+    ratio = np.asarray(ratio)[..., None]
+    incoming = -shares[..., 0] - ratio * shares[..., 1]
+    outgoing = shares[..., 4] + ratio * shares[..., 3]
     return np.stack((np.ones_like(incoming), incoming, outgoing), axis=-1)
 
 

@@ -183,12 +183,9 @@ def _fill_transitions(smoothed: SmoothProgram, layout: Layout, block: _Block, ha
 
 def _proportional_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
     """Tips and vectors along the tool, (g, 1 + m, 3) each, of transitions at u = 0 and the given parameters."""
-    program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
+    program, corners = smoothed.program, smoothed.corners
     u = np.concatenate(([0.0], u))
     weights, ratio = corners.weights[rows], corners.ratio[rows]
-    if not ((weights == weights[0]).all() and (ratio == ratio[0]).all()):
-        tip_curve, axis_curve = nurbs.control_points(program, corners, rows, height)
-        return nurbs.evaluate(tip_curve, weights, u), nurbs.evaluate(axis_curve - tip_curve, weights, u)
     pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
     trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
     tips, levers = np.zeros((2, len(rows), 3, 3))
@@ -197,8 +194,18 @@ def _proportional_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tupl
         parts[:, 0] = at
         parts[:, 1] = trim_in * (at - values[before])
         parts[:, 2] = trim_out * (values[after] - at)
-    coefficients = nurbs.leg_coefficients(u, weights[0], float(ratio[0]))
-    return coefficients @ tips, coefficients @ levers
+    # one table of coefficients for all corners with weights 1, the most frequent shape
+    common = (weights == 1.0).all(axis=1) & (ratio == ratio[0])
+    if not common.any():
+        common = (weights == weights[0]).all(axis=1) & (ratio == ratio[0])
+    first = int(np.argmax(common))
+    coefficients = nurbs.leg_coefficients(u, weights[first], ratio[first])
+    points, vectors = coefficients @ tips, coefficients @ levers
+    other = np.flatnonzero(~common)
+    if len(other):
+        coefficients = nurbs.leg_coefficients(u, weights[other], ratio[other])
+        points[other], vectors[other] = coefficients @ tips[other], coefficients @ levers[other]
+    return points, vectors
 
 
 def _paper_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
