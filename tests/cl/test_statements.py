@@ -295,6 +295,12 @@ def test_cycles_make_holes() -> None:
     assert result.statements[1].args == ("DEEP2", "FEDTO", 2.7, "1STPECK", 5.0)
 
 
+def test_rapid_inside_a_cycle_is_pointed_out() -> None:
+    result = program("CYCLE/DRILL,5.\nRAPID\nGOTO/1,0,0\nCYCLE/OFF\nGOTO/2,0,0\n")
+    assert result.kind.tolist() == [Move.HOLE, Move.LINEAR]
+    assert codes(result) == {"CS144": 1}
+
+
 def test_cutcom_spans_are_kept() -> None:
     span = "CUTCOM/LEFT,XYPLAN\nGOTO/1,0,0\nGOTO/2,0,0\nCUTCOM/OFF\n"
     text = f"GOTO/0,0,0\n{span}GOTO/3,0,0\nCUTCOM/ON,LENGTH,7\nGOTO/4,0,0\n"
@@ -311,7 +317,9 @@ def test_coordinate_changes_that_change_nothing(text: str) -> None:
     assert len(result.statements) == 1
 
 
-@pytest.mark.parametrize("text", ["TRANS/1,0,0", "TRACUT/M1", "ROTABL/90,CLW", "COPY/1,TRANSL,1,0,0,5", "ORIGIN/1,2,3"])
+@pytest.mark.parametrize(
+    "text", ["TRANS/1,0,0", "TRACUT/M1", "ROTABL/90,CLW", "COPY/1,TRANSL,1,0,0,5", "TRNTYP/LOCAL,0"]
+)
 def test_coordinate_changes_are_refused(text: str) -> None:
     with pytest.raises(InputError, match="changes the coordinates"):
         program(f"{text}\nGOTO/1,0,0\n")

@@ -15,7 +15,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.cl.builder import FARTHEST
+from cornersmooth.cl.builder import check_range
 from cornersmooth.cl.grammar import Record
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.errors import Finding
@@ -87,9 +87,7 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
     for word in words:
         if word not in ("TIMES", "ANGLE"):
             raise error("CS106", file, record.line, word=record.word, token=word)
-    for value in values:
-        if not abs(value) <= FARTHEST:
-            raise error("CS113", file, record.line, value=value, limit=FARTHEST)
+    check_range(values, file, record.line)
     count = len(values)
     turns, sweep = 1.0, math.nan
     if record.word == "MOVARC":

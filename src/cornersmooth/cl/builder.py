@@ -6,13 +6,14 @@ kind of move, axis, cutter compensation) is a short list of changes, spread over
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.cl.bulk import Block
+from cornersmooth.cl.bulk import FARTHEST, Block
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import Bools, Floats, Ints, Keep, Move
@@ -22,9 +23,6 @@ T = TypeVar("T", np.float64, np.int64, np.bool_)
 
 #: largest ||v|−1| of an axis vector: three printed decimals leave 1e-3
 UNIT_TOLERANCE: Final = 1e-2
-
-#: no machine reaches farther, in units of the file
-FARTHEST: Final = 1e7
 
 UP: Final[Vector] = (0.0, 0.0, 1.0)
 
@@ -105,7 +103,14 @@ class Builder:
         self._last_single = False
 
     def add(self, tip: Vector, axis: Vector | None, line: int) -> None:
-        """Append one pose."""
+        """Append one pose.
+
+        Raises
+        ------
+        InputError
+            CS113
+        """
+        check_range(tip, self.file, line)
         self._single_at.append(self.n)
         self._single_tip.append(tip)
         self._single_axis.append(axis)
@@ -158,20 +163,8 @@ class Builder:
         return self.n - 1 - len(self._single_at) - self._rows_before
 
     def tips(self) -> Floats:
-        """(n, 3) float64: all tips, as written.
-
-        Raises
-        ------
-        InputError
-            CS113 for a coordinate that is not finite or out of all reason.
-        """
-        tip = self._merge([block.tip for block in self._blocks], np.array(self._single_tip).reshape(-1, 3))
-        wrong = ~(np.abs(tip) <= FARTHEST)
-        if wrong.any():
-            row, column = np.argwhere(wrong)[0]
-            value = float(tip[row, column])
-            raise error("CS113", self.file, int(self.lines()[row]), value=value, limit=FARTHEST)
-        return tip
+        """(n, 3) float64: all tips, as written."""
+        return self._merge([block.tip for block in self._blocks], np.array(self._single_tip).reshape(-1, 3))
 
     def lines(self) -> Ints:
         """(n,) int64: line of every pose."""
@@ -237,6 +230,19 @@ class Builder:
 
     def _merge(self, bulk: list[NDArray[T]], single: NDArray[T]) -> NDArray[T]:
         return merge(bulk, single, np.array(self._single_at, np.int64), self.n)
+
+
+def check_range(values: Iterable[float], file: str, line: int) -> None:
+    """Refuse lengths that are not finite or beyond all machines.
+
+    Raises
+    ------
+    InputError
+        CS113
+    """
+    for value in values:
+        if not abs(value) <= FARTHEST:
+            raise error("CS113", file, line, value=value, limit=FARTHEST)
 
 
 def merge(bulk: list[NDArray[T]], single: NDArray[T], at: Ints, n: int) -> NDArray[T]:

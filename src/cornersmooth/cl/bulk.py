@@ -20,6 +20,9 @@ from cornersmooth.text import parse_numbers
 #: bytes of a block: enough to make the fixed cost of a block small, little enough to stay in cache
 BLOCK: Final = 1 << 20
 
+#: no machine reaches farther, in units of the file
+FARTHEST: Final = 1e7
+
 _DIGITS: Final = b"0123456789+-. \t"
 _LETTERS: Final = b"GOT/ \t"
 _PADDING: Final = b"\n" * 16
@@ -161,6 +164,8 @@ def _find_plain(text: bytes, first: int) -> Block | None:
         begin = np.cumsum(count) - count
         tip = values[begin[:, None] + np.arange(3)]
         axis = values[begin[own_axis, None] + np.arange(3, 6)]
+    if not (np.abs(tip) <= FARTHEST).all():
+        return None
     poses = np.concatenate(([0], np.cumsum(taken > 0)))
     return Block(
         [] if plain.all() else text.split(b"\n")[:-1],

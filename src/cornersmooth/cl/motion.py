@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Final
 
 from cornersmooth.cl.arcs import LEAST_DECIMALS, read_arc
-from cornersmooth.cl.builder import FARTHEST, Vector
+from cornersmooth.cl.builder import Vector, check_range
 from cornersmooth.cl.grammar import Argument, Record
 from cornersmooth.cl.machine import Machine
 from cornersmooth.cl.nurbs import CURVE_DIGITS, Curve, lines_of
@@ -77,7 +77,9 @@ def _circle(machine: Machine, record: Record) -> None:
 
 
 def _direction(machine: Machine, record: Record) -> None:
-    machine.direction = (record.word, machine.vector(record))
+    vector = machine.vector(record)
+    check_range(vector, machine.file, record.line)
+    machine.direction = (record.word, vector)
 
 
 def _drive(machine: Machine, record: Record) -> None:
@@ -115,6 +117,7 @@ def _control(machine: Machine, record: Record) -> None:
     values = machine.numbers(record)
     if len(values) != 3:
         raise machine.count(record, len(values), "x,y,z", record.line)
+    check_range(values, machine.file, record.line)
     machine.curve.points.append((values[0], values[1], values[2]))
     machine.curve.lines.append(record.line)
     digits = (len(token.partition(".")[2].strip()) for token in record.text.partition("/")[2].split(","))
@@ -134,9 +137,6 @@ def finish_curve(machine: Machine) -> None:
     why = curve.complaint
     points = None
     if why is None:
-        wrong = [value for point in curve.points for value in point if not abs(value) <= FARTHEST]
-        if wrong:
-            raise machine.fail("CS113", curve.line, value=wrong[0], limit=FARTHEST)
         tolerance = CURVE_DIGITS * 10.0 ** -max(curve.decimals, LEAST_DECIMALS)
         points = lines_of(curve, machine.builder.last_tip(), tolerance)
         why = "it would need too many lines" if points is None else None

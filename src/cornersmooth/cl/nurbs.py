@@ -27,8 +27,8 @@ DEGREE: Final = 3
 #: the lines stay this many printed digits near the curve
 CURVE_DIGITS: Final = 5
 
-#: samples of one curve at most; more would be no tool path
-MOST_SAMPLES: Final = 100_000
+#: lines for every control point at most; more would be no tool path
+MOST_LINES: Final = 1000
 
 
 @dataclass
@@ -71,7 +71,7 @@ def lines_of(curve: Curve, start: tuple[float, float, float], tolerance: float) 
     Returns
     -------
     (m, 3) float64, (m,) int64
-        Points, and the lines of the control points next to them; None if there would be more than `MOST_SAMPLES`.
+        Points, and the lines of the control points next to them; None if there would be more than `MOST_LINES` a point.
     """
     control = np.array([start, *curve.points])
     inner = np.array(curve.knots) / curve.knots[-1]
@@ -84,7 +84,7 @@ def lines_of(curve: Curve, start: tuple[float, float, float], tolerance: float) 
     largest = np.maximum(size[first], size[first + 1])
     with np.errstate(over="ignore"):
         pieces = np.ceil(np.diff(spans) * np.sqrt(largest / (8 * tolerance)))
-    if not pieces.sum() <= MOST_SAMPLES:
+    if not pieces.sum() <= MOST_LINES * len(control):
         return None
     pieces = np.maximum(pieces, 1).astype(np.int64)
     begin = np.cumsum(pieces) - pieces

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.cl.arcs import LEAST_DECIMALS, MOST_TURNS, NORMAL_TOLERANCE, RADIUS_DIGITS, RADIUS_SHARE, Arc
-from cornersmooth.cl.builder import Vector
+from cornersmooth.cl.builder import Vector, check_range
 from cornersmooth.cl.grammar import Record, number
 from cornersmooth.cl.messages import error
 from cornersmooth.errors import InputError
@@ -90,6 +90,7 @@ def read_helix(record: Record, start: Vector, direction: Direction, file: str) -
     if len(values) != len(record.args) or len(values) not in (14, 17):
         want = "centre, tangent, axis, pitch, radius, (angle, height, turns,) end"
         raise error("CS120", file, record.line, word="HELICAL", count=len(values), s="s", want=want)
+    check_range(values, file, record.line)
     centre, tangent, axis = np.array(values[:9]).reshape(3, 3)
     pitch, radius = values[9:11]
     end = np.array(values[-3:])
@@ -178,9 +179,10 @@ def _values(text: str, record: Record, file: str) -> list[float]:
     values = []
     for token in text.split(","):
         value = number(token)
-        if value is None or not math.isfinite(value):
+        if value is None:
             raise error("CS106", file, record.line, word=record.word, token=token)
         values.append(value)
+    check_range(values, file, record.line)
     return values
 
 
