@@ -143,18 +143,21 @@ def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, 
         found = _TEXT.match(text)
         if found is not None:
             yield _text_statement(source, line, text, found)
-        elif _NUMERIC_LINE.match(text):
+        elif _NUMERIC_LINE.match(text) or (text[0] in "+-.0123456789" and "," in text):
             raise error("CS105", file, line, text=text)
         else:
             yield from _statements(source, line, text)
 
 
 def _comment(source: _Lines, line: int, text: str) -> Record:
-    while text.startswith("$$->") and text.endswith("$"):  # Creo's CSYS tables go on in the next line
+    parts = [text]
+    while text.startswith("$$->") and parts[-1].endswith("$"):  # Creo's CSYS tables go on in the next line
         more = source.peek()
         if more is None or not _NUMERIC_LINE.match(more):
             break
-        text = f"{text[:-1].rstrip()} {source.take()[1]}"
+        parts[-1] = parts[-1][:-1].rstrip()
+        parts.append(source.take()[1])
+    text = " ".join(parts)
     return Record(line, "$$", (text[2:].strip(),), text)
 
 

@@ -81,9 +81,15 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
 }
 
 
+#: values that are quoted from a file, and to how many characters they are cut
+QUOTED: Final = frozenset({"next", "text", "token", "word"})
+LONGEST_QUOTE: Final = 60
+
+
 def error(code: str, file: str, line: int | None, **values: object) -> InputError:
     """Return the error of this code at FILE:LINE, ready to be raised."""
     what, hint = ERRORS[code]
+    values = _cut(values)
     return InputError(code, what.format(**values), hint.format(**values), file=file, line=line)
 
 
@@ -96,4 +102,14 @@ def unknown(what: str, value: str, choices: tuple[str, ...]) -> SettingsError:
 def finding(code: str, line: int, count: int = 1, **values: object) -> Finding:
     """Return the finding of this code."""
     severity, text = FINDINGS[code]
-    return Finding(code, severity, line, text.format(**values), count)
+    return Finding(code, severity, line, text.format(**_cut(values)), count)
+
+
+def _cut(values: dict[str, object]) -> dict[str, object]:
+    """Shorten long quotations."""
+    return {
+        name: value[:LONGEST_QUOTE] + "..."
+        if name in QUOTED and isinstance(value, str) and len(value) > LONGEST_QUOTE
+        else value
+        for name, value in values.items()
+    }
