@@ -122,6 +122,17 @@ def test_incremental_positions() -> None:
     assert result.kind.tolist() == [Move.FROM, 2, 2, 2, 2, Move.RAPID]
 
 
+@pytest.mark.parametrize("tail", ["", " $$"])
+def test_incremental_positions_hold_the_axis(tail: str) -> None:
+    """Also in Creo files, where a GOTO without an axis is upright; `tail` keeps GOTO off the fast path."""
+    for head, last in (("", [0, 0.6, 0.8]), ("$$-> FEATNO / 1\n", UP)):
+        tilted, short = f"GOTO/0,0,0,0,.6,.8{tail}\n", f"GOTO/0,0,0{tail}\n"
+        result = program(f"{head}{tilted}GODLTA/1,0\nGODLTA/5\n{short}GODLTA/5\n")
+        assert result.axis.tolist() == [[0, 0.6, 0.8]] * 3 + [last] * 2
+        assert result.tip[2] == pytest.approx(np.array([1, 3, 4]))
+        assert result.tip[4] == pytest.approx(5 * np.array(last))
+
+
 def test_from_and_gohome() -> None:
     result = program("FROM/0,0,9,0,1,0\nRAPID\nGOTO/0,0,5\nGOTO/0,0,0\nGOHOME/0,0,9\nGOHOME\n")
     assert result.kind.tolist() == [Move.FROM, Move.RAPID, Move.LINEAR, Move.RAPID]

@@ -117,8 +117,8 @@ class Builder:
         self._single_line.append(line)
         self.n += 1
         self._last_single = True
-        if axis is not None and not self.axis_locked.now:
-            self._remember(axis)
+        if not self.axis_locked.now and (axis is not None or self.short_axis_up):
+            self._remember(axis or self.axis_set[-1][1])
 
     def last_tip(self) -> Vector:
         """Tip of the last pose."""
@@ -132,17 +132,21 @@ class Builder:
         return x, y, z
 
     def last_axis(self) -> Vector:
-        """Axis that a pose without one of its own would have here."""
-        if self.axis_locked.now or not self._blocks:
-            return self._axis_now
-        block = self._blocks[-1]
+        """Axis of the last pose; where it has none of its own, the one that was set before it, or +Z."""
         rows = self._row() + 1
-        if rows > 0 and self._rows_before + rows > self._axis_row:
-            own = np.flatnonzero(block.own_axis[max(self._axis_row - self._rows_before, 0) : rows])
-            if len(own) and not (self.short_axis_up and not block.own_axis[rows - 1]):
-                x, y, z = block.axis[np.count_nonzero(block.own_axis[:rows]) - 1].tolist()
-                return x, y, z
-        return self._axis_now
+        if self.axis_locked.now or not self._blocks or rows <= 0 or self._rows_before + rows <= self._axis_row:
+            return self._axis_now
+        own = self._blocks[-1].own_axis[:rows]
+        if self.short_axis_up and not own[-1]:
+            return self.axis_set[-1][1]
+        if not own[max(self._axis_row - self._rows_before, 0) :].any():
+            return self._axis_now
+        x, y, z = self._blocks[-1].axis[np.count_nonzero(own) - 1].tolist()
+        return x, y, z
+
+    def held_axis(self) -> Vector | None:
+        """Axis to give to a pose that keeps the last one: None where that is what having none means."""
+        return self.last_axis() if self.short_axis_up else None
 
     def set_axis(self, axis: Vector) -> None:
         """Let poses without an axis of their own have this one from here on."""

@@ -64,7 +64,8 @@ def _godlta(machine: Machine, record: Record) -> None:
     else:
         step = [*values, 0.0][:3]
     x, y, z = (a + b for a, b in zip(machine.builder.last_tip(), step, strict=True))
-    machine.add((x, y, z), (values[3], values[4], values[5]) if len(values) == 6 else None, record.line)
+    own = (values[3], values[4], values[5]) if len(values) == 6 else machine.builder.held_axis()
+    machine.add((x, y, z), own, record.line)
 
 
 def _circle(machine: Machine, record: Record) -> None:
@@ -89,7 +90,7 @@ def _drive(machine: Machine, record: Record) -> None:
     machine.arc, end = read(record, machine.builder.last_tip(), machine.direction, machine.file)
     machine.direction = None
     _at_feed(machine, record)
-    machine.add(end, None, record.line)
+    machine.add(end, machine.builder.held_axis(), record.line)
 
 
 def _nothing(machine: Machine, record: Record) -> None:
@@ -143,8 +144,9 @@ def finish_curve(machine: Machine) -> None:
     if points is None:
         raise machine.fail("CS128", curve.line, why=why)
     machine.note("CS145", curve.line, tolerance=tolerance)
+    axis = machine.builder.held_axis()
     for (x, y, z), line in zip(points[0].tolist(), points[1].tolist(), strict=True):
-        machine.add((x, y, z), None, line)
+        machine.add((x, y, z), axis, line)
 
 
 def _at_feed(machine: Machine, record: Record) -> None:
