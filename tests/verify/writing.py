@@ -147,3 +147,64 @@ def wavy(n, step=0.3, seed=0, tilt=0.3):
     s = np.arange(n) * step
     axis = unit(np.stack((tilt * np.sin(s / 7), tilt * np.cos(s / 5), np.ones(n)), 1))
     return tip.round(4), unit(axis.round(7))
+
+
+def corners(n, seed=0, step=(0.6, 3.0)):
+    """A five-axis path with real corners: (n, 3) tips and unit axes."""
+    rng = np.random.default_rng(seed)
+    turns = np.radians(rng.uniform(10, 60, n)) * rng.choice([-1, 1], n)
+    heading = np.cumsum(turns)
+    length = rng.uniform(*step, n)
+    rise = rng.uniform(-0.3, 0.3, n)
+    tip = np.cumsum(np.stack((np.cos(heading), np.sin(heading), rise), 1) * length[:, None], axis=0)
+    tilt = np.cumsum(rng.uniform(-0.06, 0.06, (n, 2)), axis=0)
+    axis = unit(np.stack((tilt[:, 0], tilt[:, 1], np.ones(n)), 1))
+    return tip.round(4), unit(axis.round(7))
+
+
+def job(form, eps=0.02, h=10.0, seed=0):
+    """A program with everything in it, and its correct text as a list of lines.
+
+    Rapid, chain with a change of feed, optional stop, chain, dwell, chain, rapid out, over and in, second chain.
+    """
+    from cornersmooth.model import Move, Program, Statement
+
+    tip, axis = corners(34, seed)
+    tip[27:] += [0, 0, 2.0]
+    kind = np.full(34, Move.LINEAR, np.uint8)
+    kind[[0, 24, 25, 26]] = Move.RAPID
+    feed = np.full(34, 250.0)
+    feed[8:] = 400.0
+    feed[27:] = 123.5
+    statements = (
+        Statement(0, 1, "LOADTL", (3.0,), "LOADTL/3"),
+        Statement(0, 2, "SPINDL", (12000.0, "RPM", "CLW"), "SPINDL/12000,RPM,CLW"),
+        Statement(0, 3, "COOLNT", ("ON",), "COOLNT/ON"),
+        Statement(14, 40, "OPSTOP", (), "OPSTOP"),
+        Statement(19, 50, "DELAY", (1.5,), "DELAY/1.5"),
+        Statement(24, 60, "COOLNT", ("OFF",), "COOLNT/OFF"),
+        Statement(26, 70, "COOLNT", ("MIST",), "COOLNT/MIST"),
+        Statement(34, 90, "SPINDL", ("OFF",), "SPINDL/OFF"),
+        Statement(34, 91, "FINI", (), "FINI"),
+    )
+    line = np.arange(100, 134)
+    program = Program.from_poses(tip, axis, kind=kind, feed=feed, line=line, statements=statements)
+
+    def chain(first, last, with_feed):
+        feeds = feed[first + 1 : last + 1]
+        lines = chain_lines(tip[first : last + 1], axis[first : last + 1], eps, h, form, feeds)
+        if not with_feed:
+            lines[0] = lines[0].rsplit(" F", 1)[0]
+        return lines
+
+    def go(i):
+        return rapid(tip[i], axis[i], h, form)
+
+    text = [*HEAD, "T3 M6", "S12000 M3", "M8", "G43.5 H3" if form == "g1" else "G43 H3", go(0)]
+    text += [*chain(0, 13, True), "M1", *chain(13, 18, False), "G4 P1500", *chain(18, 23, False), "M9"]
+    text += [go(24), go(25), "M7", go(26), *chain(26, 33, True), "M5", *TAIL]
+    return program, text
+
+
+def encode(lines):
+    return ("\n".join(lines) + "\n").encode()

@@ -29,6 +29,9 @@ _SAME_PROBLEM = 3.0
 #: segments looked at on either side for a vertex that seems to go backwards
 _BACK_REACH = 3
 
+#: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
+TOGETHER = 2.0
+
 
 @dataclass
 class Worst:
@@ -122,6 +125,7 @@ class Meter:
         n = len(matcher.original.program)
         self.matcher = matcher
         self.limit = tolerance + ARITHMETIC
+        self.together = TOGETHER * tolerance + matcher.margin
         self.exact = exact_poses(matcher)
         nan = np.full(n, np.nan)
         self.result = Deviation(
@@ -198,6 +202,9 @@ class Meter:
             rows = np.flatnonzero(known)
             worst.update(values[rows], cl_line[rows], nc_line[rows])
         over = over[known[over]]
+        apart = over[(gap.larger[over] > self.together) & (np.maximum(tip, axis)[over] <= self.limit)]
+        if len(apart):
+            result.violations.add(525, place[apart], cl_line[apart], nc_line[apart], gap.larger[apart])
         for code, values in ((521, tip), (522, axis)):
             broken = over[values[over] > self.limit]
             if len(broken):
@@ -233,11 +240,12 @@ class Meter:
         trail, first = block.written.trail, block.written.first
         owner = trail.owner[np.minimum(theirs.place[rows].astype(np.int64) + 1, len(trail) - 1)]
         exact = np.zeros(len(rows), np.bool_)
-        amount = np.full(len(rows), np.inf)
+        amount, nearest = np.full(len(rows), np.inf), owner
         for step in range(-2, 2):
             element = np.clip(owner + step, first, first + len(trail.last) - 1)
             same, off = digit_errors(matcher.nc, element, tip, axis, matcher.axis_length)
             exact |= same
+            nearest = np.where(off < amount, element, nearest)
             amount = np.minimum(amount, off)
         missed = np.flatnonzero(~exact)
         if len(missed):
@@ -245,7 +253,7 @@ class Meter:
                 524,
                 theirs.vertex[rows[missed]].astype(np.float64),
                 original.program.line[pose[missed]],
-                matcher.nc.line[owner[missed]],
+                matcher.nc.line[nearest[missed]],
                 amount[missed],
             )
 
@@ -326,5 +334,6 @@ _TEXT = {
     521: "the tip leaves its path by {:.6f} mm",
     522: "the axis point leaves its path by {:.6f} mm",
     523: "the path is not run in order: {:.6f} mm backwards",
+    525: "tip and axis point are {:.6f} mm from any common pose",
     524: "a pose that must be passed exactly is missed by {:.6f} mm",
 }

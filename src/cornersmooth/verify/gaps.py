@@ -22,7 +22,7 @@ from cornersmooth.verify.trails import directions, written_at
 _SHORT_STEP = 0.02
 
 #: samples and rounds of the search on single elements
-_SAMPLES, _ROUNDS, _ZOOM = 33, 6, 9
+_SAMPLES, _ROUNDS, _ZOOM = 33, 3, 9
 
 
 @dataclass(frozen=True)
@@ -147,22 +147,8 @@ def _on_bent(matcher: Matcher, block: Block, point: Floats, segment: Ints, at: F
             open_rows[rows] = False
     rest = np.flatnonzero(open_rows)
     if len(rest):
-        spread = owner_fraction(trail.owner, _shares(block), segment[rest], at[rest])
-        tip[rest], axis[rest], _ = search_elements(matcher, spread[0][:, None], point[rest], spread[1])
+        tip[rest], axis[rest], _ = search_elements(matcher, owner[rest][:, None], point[rest])
     return tip, axis, place
-
-
-def _shares(block: Block) -> Floats:
-    """(v,) fraction of the parameter range at curve vertices, the fraction elsewhere."""
-    share = block.written.trail.fraction.copy()
-    first = block.written.first
-    for group in block.written.curves:
-        spans = group.spans
-        if spans[0] == 0.0 and spans[-1] == 1.0:
-            continue
-        rows = np.isin(block.written.trail.owner, group.index + first)
-        share[rows] = (share[rows] - spans[0]) / (spans[-1] - spans[0])
-    return share
 
 
 def _newton_from_knot(
@@ -186,7 +172,7 @@ def _newton_from_knot(
 
 
 def search_elements(
-    matcher: Matcher, elements: Ints, point: Floats, guess: Floats | None = None, column: slice = slice(0, 6)
+    matcher: Matcher, elements: Ints, point: Floats, column: slice = slice(0, 6)
 ) -> tuple[Floats, Floats, Floats]:
     """Nearest poses on single path elements by sampling and zooming in; for few rows.
 
@@ -196,7 +182,6 @@ def search_elements(
     elements : (k, e) int64
         Elements to look at for each row.
     point : (k, 6) float64
-    guess : unused for now
     column : slice
         Which of tip and axis point count.
 
@@ -225,17 +210,20 @@ def search_elements(
     step = grid[1]
     for _ in range(_ROUNDS):
         fraction = np.clip(at[:, None] + np.linspace(-step, step, _ZOOM), 0.0, 1.0)
-        tip, axis, distance = look(np.repeat(chosen[:, None], _ZOOM, axis=1), fraction)
-        best = np.argmin(distance, axis=1)
-        at = fraction[here, best]
+        distance = look(np.repeat(chosen[:, None], _ZOOM, axis=1), fraction)[2]
+        at = fraction[here, np.argmin(distance, axis=1)]
         step *= 2.0 / (_ZOOM - 1)
-    return tip[here, best], axis[here, best], distance[here, best]
-
-
-def written_kind(matcher: Matcher, block: Block) -> Ints:
-    """(v,) kind of the element each vertex ends or lies in."""
-    kinds: Ints = matcher.nc.kind[block.written.trail.owner].astype(np.int64)
-    return kinds
+    # so close together the motion is straight: project on it
+    fraction = np.clip(at[:, None] + np.array([-step, step]), 0.0, 1.0)
+    tip, axis, _ = look(np.repeat(chosen[:, None], 2, axis=1), fraction)
+    six = np.concatenate((tip, tip + length * axis), axis=2)[..., column]
+    way = six[:, 1] - six[:, 0]
+    size = np.einsum("ij,ij->i", way, way)
+    share = np.einsum("ij,ij->i", point[:, column] - six[:, 0], way)
+    share = np.clip(np.divide(share, size, out=np.full(rows, 0.5), where=size > 0), 0.0, 1.0)
+    at = fraction[:, 0] + share * (fraction[:, 1] - fraction[:, 0])
+    tip, axis, distance = look(chosen[:, None], at[:, None])
+    return tip[:, 0], axis[:, 0], distance[:, 0]
 
 
 def own_gaps_of_written(matcher: Matcher, block: Block, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:

@@ -157,9 +157,9 @@ def _match(
             )
         for k in range(head + i0 + both, head + i1):
             if not _negligible(program.tip[original.pose], theirs[k], nc.tip_step):
-                element = ours[min(head + j1, len(ours)) - 1] if len(ours) else 0
+                element = _passing(nc, ours, head + j1, program.tip[original.pose[theirs[k]]])
                 text = "a rapid of the CL file is missing, or is written as a feed move"
-                problems.append(_problem("CS532", original, theirs[k], nc, int(element), text))
+                problems.append(_problem("CS532", original, theirs[k], nc, element, text))
         for k in range(head + j0 + both, head + j1):
             if not _negligible(nc.tip, ours[k], nc.tip_step):
                 pose = theirs[min(head + i1, len(theirs)) - 1] if len(theirs) else 0
@@ -176,6 +176,13 @@ def _opcodes(theirs: Floats, ours: Floats, step: float) -> list[tuple[str, int, 
     left = [tuple(row) for row in np.round(theirs / step).astype(np.int64).tolist()]
     right = [tuple(row) for row in np.round(ours / step).astype(np.int64).tolist()]
     return list(difflib.SequenceMatcher(None, left, right, autojunk=False).get_opcodes())
+
+
+def _passing(nc: NcProgram, ours: Ints, stop: int, tip: Floats) -> int:
+    """Element that ends nearest to a pose, between the stop before `stop` and that one."""
+    first = int(ours[stop - 1]) if stop else 0
+    last = int(ours[stop]) if stop < len(ours) else len(nc) - 1
+    return first + int(np.argmin(np.linalg.norm(nc.tip[first : last + 1] - tip, axis=1)))
 
 
 def _negligible(tip: Floats, index: int, step: float) -> bool:

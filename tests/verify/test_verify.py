@@ -1,0 +1,226 @@
+"""Known deviations, known mistakes, and the numbers that come out."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.model import Arcs, Move, Program
+from cornersmooth.verify import read_nc, verify
+
+from .writing import HEAD, TAIL, corners, encode, job, place_g1, rapid, simple_text, unit
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def corner_program(angle=90.0, leg=10.0):
+    a = math.radians(angle)
+    tip = np.array([[-leg, 0, 0], [0, 0, 0], [leg * math.cos(a), leg * math.sin(a), 0]])
+    return Program.from_poses(tip, np.tile(UP, (3, 1)), feed=100.0)
+
+
+def g1(program, points, axes=None, feed=" F100."):
+    lines = [*HEAD, "G43.5 H1", rapid(program.tip[0], program.axis[0], 10.0, "g1")]
+    axes = np.tile(UP, (len(points), 1)) if axes is None else axes
+    for k, (point, axis) in enumerate(zip(points, axes, strict=True)):
+        lines.append("G1 " + place_g1(np.asarray(point, float), axis) + (feed if k == 0 else ""))
+    return encode([*lines, *TAIL])
+
+
+def codes(found):
+    return sorted({problem.code for problem in found.problems})
+
+
+def test_chamfer_deviates_by_half_its_height_from_one_side_and_all_of_it_from_the_other():
+    program = corner_program()
+    found = verify(program, g1(program, [(-0.1, 0, 0), (0, 0.1, 0), (0, 10, 0)]), tolerance=0.08)
+    # corner to chamfer: 0.1/sqrt(2)
+    assert found.max_tip_deviation_mm == pytest.approx(0.1 / math.sqrt(2), abs=1e-12)
+    assert found.max_axis_point_deviation_mm == pytest.approx(0.1 / math.sqrt(2), abs=1e-12)
+    assert (found.tip.cl_line, found.tip.nc_line) == (2, 8)
+    assert found.passed
+    assert not verify(program, g1(program, [(-0.1, 0, 0), (0, 0.1, 0), (0, 10, 0)]), tolerance=0.07).passed
+
+
+def test_bump_is_measured_where_it_is():
+    program = corner_program()
+    found = verify(program, g1(program, [(-5, 0.03, 0), (0, 0, 0), (0, 10, 0)]), tolerance=0.01)
+    assert found.max_tip_deviation_mm == pytest.approx(0.03, abs=1e-12)
+    assert (found.tip.cl_line, found.tip.nc_line) == (2, 7)
+    assert codes(found) == ["CS521", "CS522"]
+    assert {(problem.cl_line, problem.nc_line) for problem in found.problems} == {(2, 7)}
+    assert found.problems[0].text == "the tip leaves its path by 0.030000 mm"
+
+
+def test_turned_axis_shows_at_the_axis_point_only():
+    program = corner_program()
+    tilt = unit([0.0, 0.002, 1.0])
+    axes = [tilt, UP, UP]
+    found = verify(program, g1(program, [(-5, 0, 0), (0, 0, 0), (0, 10, 0)], axes), tolerance=0.01, axis_length=50.0)
+    assert found.max_tip_deviation_mm < 1e-12
+    assert found.max_axis_point_deviation_mm == pytest.approx(50 * 0.002, rel=1e-4)
+    assert found.max_orientation_deviation_deg == pytest.approx(math.degrees(0.002), rel=1e-4)
+    assert codes(found) == ["CS522"]
+
+
+@pytest.mark.parametrize("w", [1.0, 0.5, 2.0])
+def test_curve_deviates_by_the_closed_form(w):
+    # c = w1/(3 (w1 + w2)); the corner is c L |U+ - U-| from the curve
+    program = corner_program()
+    length = 0.3
+    points = [(-length, 0), (-2 * length / 3, 0), (0, 0), (0, 2 * length / 3), (0, length)]
+    text = [*HEAD, "G43 H1", "G0 X-10.0000 Y0.0000 Z0.0000 U-10.0000 V0.0000 W10.0000"]
+    text.append(f"G1 X{points[0][0]:.4f} Y0.0000 Z0.0000 U{points[0][0]:.4f} V0.0000 W10.0000 F100.")
+    for k, (x, y) in enumerate(points):
+        start = "G6.2 P4 " if k == 0 else ""
+        weight = w if k == 2 else 1.0
+        knot = "0.5" if k == 4 else "0."
+        text.append(f"{start}K{knot} X{x:.4f} Y{y:.4f} Z0.0000 U{x:.4f} V{y:.4f} W10.0000 R{weight:g}")
+    text += ["K1."] * 4 + ["G1 X0.0000 Y10.0000 Z0.0000 U0.0000 V10.0000 W10.0000", *TAIL]
+    found = verify(program, encode(text), tolerance=0.15)
+    expected = length * math.sqrt(2) / (3 * (1 + w))
+    assert found.problems == ()
+    assert found.max_tip_deviation_mm == pytest.approx(expected, abs=1e-10)
+    assert found.max_axis_point_deviation_mm == pytest.approx(expected, abs=1e-10)
+    assert found.pose_tip[1] == pytest.approx(expected, abs=1e-10)
+    assert found.pose_nc_line[1] == 8
+    assert found.tangent_jump.value == pytest.approx(0.0, abs=1e-5)
+    assert found.curves == 1
+
+
+def test_simultaneous_deviation_sees_an_axis_that_lags_along_its_own_path():
+    tip = np.array([[0.0, 0, 0], [10, 0, 0]])
+    program = Program.from_poses(tip, np.tile(UP, (2, 1)), feed=100.0)
+    lagging = unit([-0.02, 0, 1.0])
+    found = verify(program, g1(program, [(5, 0, 0), (10, 0, 0)], [lagging, UP]), tolerance=0.02)
+    # the axis point stays on its own straight path but for the height of the arc it turns on
+    assert found.max_axis_point_deviation_mm < 0.003
+    assert found.together_axis_point.value > 0.09
+    assert codes(found) == ["CS525"]
+
+
+def test_pose_at_a_statement_must_be_exact():
+    program, lines = job("g1")
+    stop = lines.index("M1")
+    x = float(lines[stop - 1].split()[1][1:])
+    wrong = lines[stop - 1].replace(f"X{x:.4f}", f"X{x + 2e-4:.4f}")
+    found = verify(program, encode([*lines[: stop - 1], wrong, *lines[stop:]]), tolerance=0.02)
+    assert codes(found) == ["CS524"]
+    assert found.problems[0].cl_line == 113
+    assert found.problems[0].nc_line == stop
+
+
+def test_loop_that_lies_within_the_tolerance_of_the_rest_must_be_run():
+    turn = np.radians(np.arange(0, 361, 30))
+    circle = np.stack((np.cos(turn), np.sin(turn), 0 * turn), 1).round(4) * 5
+    tip = np.vstack((circle, circle[1:], circle[1:], [[5.0, 9.0, 0.0]]))
+    program = Program.from_poses(tip, np.tile(UP, (len(tip), 1)), feed=100.0)
+    assert verify(program, g1(program, tip[1:]), tolerance=0.01).passed
+    once = np.delete(tip, range(13, 25), axis=0)
+    found = verify(program, g1(program, once[1:]), tolerance=0.01)
+    assert not found.passed
+    twice = np.vstack((tip[:25], tip[13:25], tip[25:]))
+    assert not verify(program, g1(program, twice[1:]), tolerance=0.01).passed
+
+
+def test_reversal_and_repeated_poses_are_no_problem():
+    tip = np.array([[0, 0, 0], [10, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, -5], [0, 0, 5.0], [3, 0, 5]])
+    program = Program.from_poses(tip, np.tile(UP, (len(tip), 1)), feed=100.0)
+    text = g1(program, tip[[1, 2, 4, 5, 6]])
+    found = verify(program, text, tolerance=0.001)
+    assert found.problems == ()
+    assert found.max_tip_deviation_mm == 0
+    # the way down is not run
+    assert not verify(program, g1(program, tip[[1, 2, 5, 6]]), tolerance=0.001).passed
+
+
+def test_pure_rotation():
+    angle = np.radians([0, 20, 45, 80])
+    axes = np.stack((np.sin(angle), 0 * angle, np.cos(angle)), 1)
+    program = Program.from_poses(np.zeros((4, 3)), axes, feed=100.0)
+    lines = g1(program, np.zeros((3, 3)), axes[1:])
+    found = verify(program, lines, tolerance=0.01)
+    assert found.passed
+    assert found.max_axis_point_deviation_mm < 1e-5
+    off = axes[1:].copy()
+    off[1] = unit(off[1] + [0, 0.004, 0])
+    found = verify(program, g1(program, np.zeros((3, 3)), off), tolerance=0.01)
+    assert found.max_axis_point_deviation_mm == pytest.approx(0.04, rel=1e-3)
+
+
+@pytest.mark.parametrize("as_arc", [True, False])
+def test_arc_against_arc_and_against_chords(as_arc):
+    tip = np.array([[10.0, 0, 0], [0, 10, 0], [0, 20, 0]])
+    kind = np.array([Move.RAPID, Move.ARC, Move.LINEAR], np.uint8)
+    arcs = Arcs(np.array([1]), np.zeros((1, 3)), UP[None], np.array([math.pi / 2]))
+    program = Program.from_poses(tip, np.tile(UP, (3, 1)), kind=kind, feed=100.0, arcs=arcs)
+    head = [*HEAD, "G43.5 H1", rapid(tip[0], UP, 10.0, "g1")]
+    if as_arc:
+        lines = ["G3 X0.0000 Y10.0000 Z0.0000 R10.0000 F100."]
+    else:
+        turn = np.linspace(0, np.pi / 2, 65)[1:]
+        lines = ["G1 " + place_g1(10 * np.array([math.cos(t), math.sin(t), 0]), UP) + " F100." for t in turn]
+    text = encode([*head, *lines, "G1 " + place_g1(tip[2], UP), *TAIL])
+    found = verify(program, text, tolerance=0.001)
+    assert found.problems == ()
+    sagitta = 10 * (1 - math.cos(math.pi / 2 / 64 / 2))
+    expected = 0.0 if as_arc else sagitta
+    assert found.max_tip_deviation_mm == pytest.approx(expected, abs=1e-8 if as_arc else 1e-4)
+    other_way = text.replace(b"G3 X", b"G2 X") if as_arc else text.replace(b"X9.9970", b"X9.9920")
+    assert not verify(program, other_way, tolerance=0.001).passed
+
+
+@pytest.mark.parametrize("form", ["g1", "g6.2"])
+def test_one_long_chain_cut_at_anchors_is_the_same_as_whole(form, monkeypatch):
+    from cornersmooth.verify import blocks
+
+    tip, axis = corners(200, seed=4)
+    program = Program.from_poses(tip, axis, feed=250.0)
+    nc = read_nc(simple_text(tip, axis, 0.02, 10.0, form))
+    whole = verify(program, nc, tolerance=0.02)
+    monkeypatch.setattr(blocks, "LANE", 20)
+    monkeypatch.setattr(blocks, "BLOCK", 100)
+    cut = verify(program, nc, tolerance=0.02)
+    assert whole.problems == cut.problems == ()
+    assert cut.max_tip_deviation_mm == pytest.approx(whole.max_tip_deviation_mm, abs=1e-12)
+    assert np.allclose(whole.pose_tip, cut.pose_tip, atol=1e-9)
+    assert np.allclose(whole.pose_axis_point, cut.pose_axis_point, atol=1e-9)
+    assert np.array_equal(whole.pose_nc_line, cut.pose_nc_line)
+
+
+def test_inch_text():
+    tip, axis = corners(30, seed=7)
+    program = Program.from_poses(tip * 25.4, axis, feed=254.0, units="inch")
+    text = simple_text(tip * 25.4, axis, 0.05, 10.0, "g1", feed=10.0, scale=25.4, decimals=5)
+    lines = text.replace(b"G21", b"G20").decode().splitlines()
+    i = next(k for k, line in enumerate(lines) if line.startswith("G0"))
+    lines[i] = rapid(tip[0] * 25.4, axis[0], 10.0, "g1", scale=25.4, decimals=5)
+    found = verify(program, encode(lines), tolerance=0.05)
+    assert found.problems == ()
+    assert 0.03 < found.max_tip_deviation_mm <= 0.05
+    assert "CS505" in codes(verify(program, text, tolerance=0.05))
+
+
+def test_dict_is_json_and_has_no_nan():
+    program, lines = job("g6.2")
+    found = verify(program, encode(lines), tolerance=0.02)
+    back = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert back["passed"] is True
+    assert back["max_tip_deviation_mm"] == found.max_tip_deviation_mm
+    assert back["blocks"] == found.blocks
+    broken = verify(program, encode(lines[:-4] + lines[-3:]), tolerance=0.02)
+    back = json.loads(json.dumps(broken.to_dict(), allow_nan=False))
+    assert back["passed"] is False
+    assert back["problems"]
+
+
+def test_nothing_to_compare():
+    program = corner_program()
+    found = verify(program, b"%\nO1\nG21\nM30\n%\n", tolerance=0.01)
+    assert codes(found) == ["CS534"]
+    with pytest.raises(SettingsError, match="tolerance"):
+        verify(program, b"", tolerance=0.0)
