@@ -15,6 +15,9 @@ import numpy as np
 from cornersmooth.feedrate.caps import Caps
 from cornersmooth.model import Bools, Floats, Ints
 
+#: smallest size of a cell over the length of the path: smaller ones would be lost in the digits of the coordinate
+SMALLEST = 1e-12
+
 
 @dataclass(frozen=True)
 class Resolution:
@@ -97,6 +100,7 @@ def make_grid(caps: Caps, runs: Ints, accel: Floats, jerk: Floats, resolution: R
     place, size, run = place[order], size[order], run[order]
 
     g = resolution.growth
+    size = np.maximum(size, SMALLEST * caps.edge[-1])
     size = g * place + np.minimum.accumulate(size - g * place)
     size = -g * place + np.minimum.accumulate((size + g * place)[::-1])[::-1]
     left, right = np.flatnonzero(run[1:] == run[:-1]), np.flatnonzero(run[1:] == run[:-1]) + 1

@@ -10,9 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.feedrate.limits import Limits
-from cornersmooth.model import Corners, Floats, Ints, Program
+from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.neighbours import norm
+
+#: tip lengths up to this are no motion of the tip, mm
+STANDSTILL = 1e-7
 
 #: curves worked on at once: their intermediate arrays fit the processor's cache
 BLOCK = 512
@@ -30,6 +33,8 @@ _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 PIECES = 12
 _PROGRESS = 1.0 - np.linspace(1.0, 0.0, PIECES + 1) ** 1.7
 _NEWTON_STEPS = 3
+#: a radius of curvature below this is a cusp and is passed with the speed for this radius, mm
+SMALLEST_RADIUS = 1e-6
 #: samples of the curvature per piece, and rounds of closer sampling where it is largest
 _SAMPLES = 4
 _CLOSER = 3
@@ -116,7 +121,7 @@ def piece_lengths(powers: Floats, borders: Floats) -> Floats:
     g, p = len(powers), borders.shape[1] - 1
     step = np.diff(borders, axis=1)
     t = borders[:, :-1, None] + step[..., None] * _NODES
-    speed = _size(_derivatives(powers, t.reshape(g, -1), 1)[1]).reshape(g, p, -1)
+    speed = _size(_derivatives(powers, t.reshape(g, p * len(_NODES)), 1)[1]).reshape(g, p, len(_NODES))
     lengths: Floats = np.einsum("gpn,n->gp", speed, _WEIGHTS) * step
     return lengths
 
@@ -129,7 +134,9 @@ def piece_curvatures(powers: Floats, borders: Floats) -> Floats:
     g, p = len(powers), borders.shape[1] - 1
     inner = np.linspace(0.0, 1.0, _SAMPLES + 1)[:-1]
     step = np.diff(borders, axis=1)
-    t = np.concatenate(((borders[:, :-1, None] + step[..., None] * inner).reshape(g, -1), borders[:, -1:]), axis=1)
+    t = np.concatenate(
+        ((borders[:, :-1, None] + step[..., None] * inner).reshape(g, p * _SAMPLES), borders[:, -1:]), axis=1
+    )
     kappa = curvature(powers, t)
     of_piece = np.arange(p)[:, None] * _SAMPLES + np.arange(_SAMPLES + 1)
     largest = kappa[:, of_piece].max(axis=2)
@@ -156,6 +163,13 @@ def curvature(powers: Floats, t: Floats) -> Floats:
     straight = across <= 1e-12 * speed * _size(d2)
     kappa: Floats = np.where(straight, 0.0, across / np.where(straight, 1.0, speed**3))
     return kappa
+
+
+def _turns_back(powers: Floats, borders: Floats) -> Bools:
+    """(g, p) bool: pieces on which the curve turns by more than a right angle."""
+    _, d1 = _derivatives(powers, borders, 1)
+    back: Bools = (d1[:, :, 1:] * d1[:, :, :-1]).sum(axis=0) < 0.0
+    return back
 
 
 def parameters_at(powers: Floats, half: Ints, which: Ints, distance: Floats) -> Floats:
@@ -188,7 +202,7 @@ def half_lengths(program: Program, corners: Corners, axis_length: float) -> tupl
             tip, axis_point = corner_halves(program, corners, rows, half, axis_length)
             lengths[side, rows] = piece_lengths(tip, pieces(half)).sum(axis=1)
             still = np.flatnonzero(
-                ~(corners.trim_in[rows] + corners.trim_out[rows] > 0.0) | (lengths[side, rows] < 1e-9)
+                ~(corners.trim_in[rows] + corners.trim_out[rows] > 0.0) | (lengths[side, rows] <= STANDSTILL)
             )
             angles[side, rows[still]] = turned_angle(tip[still], axis_point[still], half[still])
     return lengths, angles
@@ -235,15 +249,20 @@ def speed_caps(
         borders = pieces(half[block])
         # a look at the borders alone leaves few curves that need the careful one
         rough = curvature(tip, borders).max(axis=1)
-        slowed = np.flatnonzero(2.0 * rough * speed[block] ** 2 > limits.centripetal_accel)
+        turning_back = _turns_back(tip, borders)
+        slowed = np.flatnonzero((2.0 * rough * speed[block] ** 2 > limits.centripetal_accel) | turning_back.any(axis=1))
         if not len(slowed):
             continue
         tip, borders = tip[slowed], borders[slowed]
-        kappa = piece_curvatures(tip, borders)
-        which.append(block[slowed])
-        shares.append(piece_lengths(tip, borders))
+        kappa, share = piece_curvatures(tip, borders), piece_lengths(tip, borders)
+        # a piece that turns back must be bent by that much; where no sample shows it, it is a cusp
+        cusp = turning_back[slowed] & (kappa * share < 1.0)
+        kappa = np.where(cusp, np.inf, kappa)
         fastest = speed[block[slowed], None] ** 2
-        caps.append(limits.centripetal_accel / np.maximum(kappa, limits.centripetal_accel / fastest))
+        kappa = np.clip(kappa, limits.centripetal_accel / fastest, 1.0 / SMALLEST_RADIUS)
+        which.append(block[slowed])
+        shares.append(share)
+        caps.append(np.minimum(limits.centripetal_accel / kappa, fastest))
     if not which:
         return np.zeros(0, np.int64), np.zeros((0, PIECES)), np.zeros((0, PIECES))
     return np.concatenate(which), np.concatenate(shares), np.concatenate(caps)

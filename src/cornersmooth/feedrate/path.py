@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import arcs, halves
+from cornersmooth.feedrate.halves import STANDSTILL
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.neighbours import find_neighbours, norm
 from cornersmooth.smoothing.synchronise import angle_between
 
-#: tip lengths below this are no motion of the tip, mm
-STANDSTILL = 1e-9
 #: angles below this are no motion of the axis, rad
 NO_TURN = 1e-9
 

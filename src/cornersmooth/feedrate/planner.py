@@ -170,7 +170,7 @@ def _uneven_runs(
     rate = np.concatenate(([0.0], bend[:-1]))  # of the cell itself
     first, last = grid.first, grid.last
     moving = np.where(np.isin(np.arange(len(v)), np.concatenate((first, last))), 1.0, before_v + v)
-    duration = crossing_time(grid.width, moving, 0.0 * moving, rate)
+    duration = crossing_time(grid.width, moving, rate)
     constant = np.zeros(len(v))
     duration[first] = 3.0 * grid.width[first] / v[first]
     duration[last] = 3.0 * grid.width[last] / before_v[last]

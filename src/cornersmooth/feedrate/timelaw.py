@@ -13,6 +13,8 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing import nurbs, synchronise
 from cornersmooth.smoothing.neighbours import norm
 
+_HALVINGS = 60
+
 
 @dataclass(frozen=True)
 class States:
@@ -25,6 +27,8 @@ class States:
         Way of the tip since the start.
     v, a, j : (m,) float64, mm/s, mm/s², mm/s³
         Path speed, tangential acceleration and jerk; in rad where `turning`.
+    centripetal : (m,) float64, mm/s²
+        κ·v² of the tip.
     turning : (m,) bool
         The tip stands still and the axis turns: `v`, `a`, `j` are angular.
     line : (m,) int64
@@ -38,6 +42,7 @@ class States:
     v: Floats
     a: Floats
     j: Floats
+    centripetal: Floats
     turning: Bools
     line: Ints
     tip: Floats
@@ -105,13 +110,29 @@ class TimeLaw:
     def times_at(self, way: Floats) -> Floats:
         """Times at which path coordinates (m,) are reached, s."""
         way = np.clip(np.asarray(way, np.float64), self.way[0], self.way[-1])
+        if not len(self.speed):
+            return np.zeros_like(way)
         piece = np.clip(np.searchsorted(self.way, way, side="right") - 1, 0, len(self.speed) - 1)
+        gone = way - self.way[piece]
+        v, rate = self.speed[piece], self.rate[piece]
+        squared = v * v + gone * (2.0 * self.accel[piece] + rate * gone)
+        both = v + np.sqrt(np.maximum(squared, 0.0))
+        moving = both > 0.0
+        tau = crossing_time(np.where(moving, gone, 0.0), np.where(moving, both, 1.0), rate)
+        hard = np.flatnonzero((self.jerk[piece] != 0.0) & (gone > 0.0))
+        tau[hard] = self._halve(piece[hard], way[hard])
+        # coming to rest, the time hangs on the last digits of the way: the end itself is exact
+        tau = np.where(way >= self.way[-1], np.inf, tau)
+        return np.asarray(self.time[piece] + np.minimum(tau, self.time[piece + 1] - self.time[piece]), np.float64)
+
+    def _halve(self, piece: Ints, way: Floats) -> Floats:
+        """Times inside pieces of constant jerk by halving: the way never runs backwards."""
         low, high = np.zeros(len(way)), self.time[piece + 1] - self.time[piece]
-        for _ in range(60):  # halvings: the way never runs backwards
+        for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             before = self._inside(piece, middle)[0] < way
             low, high = np.where(before, middle, low), np.where(before, high, middle)
-        return self.time[piece] + 0.5 * (low + high)
+        return 0.5 * (low + high)
 
     def at(self, t: Floats) -> States:
         """State at times t (m,), clipped to the duration."""
@@ -120,13 +141,15 @@ class TimeLaw:
         path = self.path
         if not len(path):
             nothing = np.zeros((len(t), 3))
-            return States(t, x, v, a, j, x > 0.0, x.astype(np.int64), nothing, nothing)
+            return States(t, x, v, a, j, x, x > 0.0, x.astype(np.int64), nothing, nothing)
         element = np.clip(np.searchsorted(self.edge, x, side="right") - 1, 0, len(path) - 1)
         local = np.clip(x - self.edge[element], 0.0, path.length[element])
         travel = np.concatenate(([0.0], np.cumsum(np.where(path.turning, 0.0, path.length))))
-        s = travel[element] + np.where(path.turning[element], 0.0, local)
-        tip, axis = poses(path, element, local)
-        return States(t, s, v, a, j, path.turning[element], path.program.line[path.move[element]], tip, axis)
+        turning = path.turning[element]
+        s = travel[element] + np.where(turning, 0.0, local)
+        tip, axis, kappa = poses(path, element, local)
+        line = path.program.line[path.move[element]]
+        return States(t, s, v, a, j, np.where(turning, 0.0, kappa * v * v), turning, line, tip, axis)
 
     def every_period(self) -> Floats:
         """Times at the multiples of the interpolation period, and the end, s."""
@@ -150,12 +173,12 @@ def _solution(rate: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
     return c, tau * s1, tau * tau * s2
 
 
-def crossing_time(width: Floats, speed_in: Floats, speed_out: Floats, rate: Floats) -> Floats:
+def crossing_time(width: Floats, speeds: Floats, rate: Floats) -> Floats:
     """Time to cross cells of linear acceleration: tanh(ωτ/2)/ω = width/(v₀ + v₁) with ω² = rate.
 
-    Follows from v″ = rate·v by integrating over the cell.
+    Follows from v″ = rate·v by integrating over the cell; `speeds` is v₀ + v₁.
     """
-    half = width / (speed_in + speed_out)
+    half = width / speeds
     y = rate * half * half
     root = np.sqrt(np.abs(y))
     small = np.abs(y) < 1e-4
@@ -166,15 +189,15 @@ def crossing_time(width: Floats, speed_in: Floats, speed_out: Floats, rate: Floa
     return time
 
 
-def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats]:
-    """Tip and axis (m, 3) at a coordinate `local` (m,) from the start of each element."""
+def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats, Floats]:
+    """Tip and axis (m, 3) and curvature of the tip path (m,) at a coordinate `local` (m,) from each element's start."""
     program = path.program
-    tip, axis = np.empty((len(element), 3)), np.empty((len(element), 3))
+    tip, axis, kappa = np.empty((len(element), 3)), np.empty((len(element), 3)), np.zeros(len(element))
     kind = path.kind[element]
     share = local / np.maximum(path.length[element], np.finfo(np.float64).tiny)
     rows = np.flatnonzero(kind == Kind.CURVE)
     if len(rows):
-        tip[rows], axis[rows] = _curve_poses(path, element[rows], local[rows], share[rows])
+        tip[rows], axis[rows], kappa[rows] = _curve_poses(path, element[rows], local[rows], share[rows])
     rows = np.flatnonzero(kind != Kind.CURVE)
     which, share = element[rows], share[rows]
     start, end = path.start[which], path.move[which]
@@ -185,11 +208,12 @@ def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats]:
     bow = np.flatnonzero(kind[rows] == Kind.ARC)
     if len(bow):
         tip[rows[bow]] = arcs.points(program, end[bow], share[bow])
+        kappa[rows[bow]] = arcs.curvature(program, end[bow])
     axis[rows] = line_axes(program, path.settings.axis_length, start, end, fraction, axis_fraction)
-    return tip, axis
+    return tip, axis, kappa
 
 
-def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tuple[Floats, Floats]:
+def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
     corners = path.corners
     if corners is None:
         raise ValueError("a direct path has no curves")
@@ -202,11 +226,12 @@ def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tup
     t[moving] = halves.parameters_at(tip_half, half, which[moving], local[moving])
     tip = halves.evaluate(tip_half[which], t[:, None])[:, 0]
     axis = halves.axis_vectors(tip_half[which], axis_half[which], t[:, None])[:, 0]
+    kappa = halves.curvature(tip_half[which], t[:, None])[:, 0]
     row, half = path.corner[element], half[which]
     paper = np.flatnonzero(np.isfinite(corners.sync_residual[row]))
     if len(paper):
         axis[paper] = _paper_axes(path, row[paper], 0.5 * (half[paper] + t[paper]))
-    return tip + program.tip[corners.pose[row]], axis
+    return tip + program.tip[corners.pose[row]], axis, kappa
 
 
 def _paper_axes(path: Path, row: Ints, u: Floats) -> Floats:

@@ -1,0 +1,211 @@
+"""What smoothing is worth: the same program driven directly and smoothed, under the same limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.planner import direct, plan
+from cornersmooth.feedrate.timelaw import TimeLaw
+from cornersmooth.model import Program
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+
+SCHEMA = "cornersmooth-time/1"
+
+#: rows of `Comparison.laws`, in this order
+BASELINES = ("direct_exact_stop", "direct_velocity_jump")
+METHODS = ("zhang2016", "proportional")
+
+#: states looked at together for peaks
+_BLOCK = 65536
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A move that takes longer than its length over its feed.
+
+    Parameters
+    ----------
+    line : int
+        CL line.
+    x, y, z : float, mm
+        Where the move ends.
+    seconds, lost_seconds : float
+        Its time, and what that is more than at the programmed speed.
+    length_mm : float
+    slowest_mm_per_s : float
+        Least speed at the ends of its parts.
+    """
+
+    line: int
+    x: float
+    y: float
+    z: float
+    seconds: float
+    lost_seconds: float
+    length_mm: float
+    slowest_mm_per_s: float
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """Largest values met at the multiples of the period."""
+
+    speed_mm_per_s: float
+    accel_mm_per_s2: float
+    centripetal_mm_per_s2: float
+    jerk_mm_per_s3: float
+    angular_speed_deg_per_s: float
+    angular_accel_deg_per_s2: float
+    angular_jerk_deg_per_s3: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Time laws of one program.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings
+        Of the smoothing; its `method` is replaced by each of the two.
+    limits : Limits
+    laws : mapping of str to TimeLaw
+        ``direct_exact_stop``, ``direct_velocity_jump``, ``zhang2016``, ``proportional``.
+    """
+
+    program: Program
+    settings: Settings
+    limits: Limits
+    laws: Mapping[str, TimeLaw]
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Total times, s."""
+        return {name: law.total for name, law in self.laws.items()}
+
+    @property
+    def saving_percent(self) -> dict[str, dict[str, float]]:
+        """Time saved by each method against each baseline, %."""
+        seconds = self.seconds
+        return {
+            method: {base: 100.0 * (1.0 - seconds[method] / seconds[base]) for base in BASELINES if seconds[base]}
+            for method in METHODS
+        }
+
+    @property
+    def constant_feed_seconds(self) -> float:
+        """Length over programmed speed of the direct path: what no limit could undercut."""
+        path = self.laws[BASELINES[0]].path
+        return float((path.length / path.speed).sum())
+
+    def as_dict(self, places: int = 10) -> dict[str, Any]:
+        """Everything, plain; keys carry their unit."""
+        source = self.program.source
+        return {
+            "schema": SCHEMA,
+            "input": {"name": source.name, "format": source.format, "dialect": source.dialect},
+            "settings": self.settings.as_dict(),
+            "limits": self.limits.as_dict(),
+            "seconds": self.seconds,
+            "saving_percent": self.saving_percent,
+            "constant_feed_seconds": self.constant_feed_seconds,
+            "length_mm": {name: law.length for name, law in self.laws.items()},
+            "peaks": {name: vars(peaks(law)) for name, law in self.laws.items()},
+            "slowest": {name: [vars(place) for place in slowest(law, places)] for name, law in self.laws.items()},
+        }
+
+
+def compare(
+    program: Program,
+    settings: Settings | None = None,
+    limits: Limits | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Plan a program four ways: directly with stops and with jumps of velocity, and smoothed by both methods.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings, optional
+    limits : Limits, optional
+    progress : callable, optional
+        Called with (name of the law, work done, work in all).
+
+    Raises
+    ------
+    SettingsError
+        A feed move has no feed in mm/min and `Limits.feed` is not given.
+    """
+    settings = Settings() if settings is None else settings
+    limits = Limits() if limits is None else limits
+
+    def step(name: str) -> Callable[[int, int], None] | None:
+        return None if progress is None else lambda done, total: progress(name, done, total)
+
+    laws = {
+        "direct_exact_stop": direct(program, limits, "exact_stop", settings=settings),
+        "direct_velocity_jump": direct(
+            program, limits, "velocity_jump", settings=settings, progress=step("direct_velocity_jump")
+        ),
+    }
+    for method in ("zhang2016", "proportional"):
+        smoothed = smooth(program, settings.but(method=method))
+        laws[method] = plan(smoothed, limits, progress=step(method))
+    return Comparison(program, settings, limits, laws)
+
+
+def slowest(law: TimeLaw, count: int = 10) -> list[Place]:
+    """Moves that lose most time against their programmed speed, the worst first."""
+    path = law.path
+    if not len(path):
+        return []
+    times = law.times_at(law.edge)
+    speeds = law.kinematics(times)[1]
+    took = np.diff(times)
+    first = np.flatnonzero(np.concatenate(([True], path.move[1:] != path.move[:-1])))
+    seconds = np.add.reduceat(took, first)
+    lost = np.add.reduceat(took - path.length / path.speed, first)
+    length = np.add.reduceat(np.where(path.turning, 0.0, path.length), first)
+    least = np.minimum.reduceat(np.minimum(speeds[:-1], speeds[1:]), first)
+    places = []
+    for row in np.argsort(-lost, kind="stable")[:count]:
+        pose = int(path.move[first[row]])
+        x, y, z = path.program.tip[pose].tolist()
+        places.append(
+            Place(
+                line=int(path.program.line[pose]),
+                x=x,
+                y=y,
+                z=z,
+                seconds=float(seconds[row]),
+                lost_seconds=float(lost[row]),
+                length_mm=float(length[row]),
+                slowest_mm_per_s=float(least[row]),
+            )
+        )
+    return places
+
+
+def peaks(law: TimeLaw) -> Peaks:
+    """Largest speed, accelerations and jerk of a law at the multiples of the period."""
+    times = law.every_period()
+    largest = np.zeros((2, 4))
+    for begin in range(0, len(times), _BLOCK):
+        states = law.at(times[begin : begin + _BLOCK])
+        rows = np.abs(np.stack((states.v, states.a, states.centripetal, states.j)))
+        for turning in (False, True):
+            chosen = rows[:, states.turning == turning]
+            if chosen.shape[1]:
+                largest[int(turning)] = np.maximum(largest[int(turning)], chosen.max(axis=1))
+    v, a, centripetal, j = largest[0].tolist()
+    angular_v, angular_a, _, angular_j = np.degrees(largest[1]).tolist()
+    return Peaks(v, a, centripetal, j, angular_v, angular_a, angular_j)

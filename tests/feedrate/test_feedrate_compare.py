@@ -1,0 +1,141 @@
+"""The comparison of direct and smoothed motion, and published paths."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.feedrate import Limits, compare, direct, plan
+from cornersmooth.feedrate.compare import peaks, slowest
+from cornersmooth.feedrate.reference import reference_time
+from cornersmooth.model import Program
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+
+TABLE_1 = Path(__file__).resolve().parents[2] / "samples" / "paper_table1.csv"
+
+#: file, units, feed and limits, ε, H, and the published or independently computed times: exact stop, and smoothed with
+#: a standstill of the acceleration at every corner, which ours must not exceed by more than 3 %
+PUBLISHED = {
+    "tulsyan": (
+        "cnclite_tulsyan_altintas.apt",
+        {"feed": 1200.0, "accel": 150.0, "jerk": 3000.0},
+        0.05,
+        10.0,
+        11.892,
+        6.998,
+    ),
+    "fan": (
+        "hust_5x_toolpath_fan.txt",
+        {"feed": 3000.0, "accel": 300.0, "jerk": 3000.0, "period": 0.001},
+        0.02,
+        50.0,
+        13.379,
+        10.55,
+    ),
+    "iso_s": (
+        "cnclite_iso_S_test.apt",
+        {"feed": 3000.0, "accel": 200.0, "jerk": 2000.0, "period": 0.0044},
+        0.04,
+        10.0,
+        8.605,
+        4.671,
+    ),
+}
+
+
+def read_table_1() -> Program:
+    return read(TABLE_1)
+
+
+@pytest.mark.parametrize("tolerance", [0.078, 0.15])
+def test_paper_table_1(tolerance: float) -> None:
+    compared = compare(read_table_1(), Settings(tolerance=tolerance), Limits(feed=1800.0))
+    seconds = compared.seconds
+    assert seconds["direct_exact_stop"] == pytest.approx(0.778, abs=5e-4)
+    assert compared.constant_feed_seconds == pytest.approx(0.278, abs=5e-4)
+    assert compared.constant_feed_seconds < seconds["proportional"] < 0.468
+    assert seconds["zhang2016"] < 0.468
+    assert seconds["proportional"] < seconds["direct_velocity_jump"] < seconds["direct_exact_stop"]
+
+
+@pytest.mark.corpus
+@pytest.mark.parametrize("case", PUBLISHED)
+def test_published_paths(corpus: Path, case: str) -> None:
+    name, given, tolerance, height, stop, smoothed_time = PUBLISHED[case]
+    units = {"units": "mm"} if name.endswith(".txt") else {}
+    program, limits = read(corpus / name, **units), Limits(**given)
+    assert direct(program, limits).total == pytest.approx(stop, abs=1e-3)
+    law = plan(smooth(program, Settings(tolerance=tolerance, axis_length=height)), limits)
+    reference = reference_time(law.path, limits)
+    assert 0.995 * reference <= law.total <= 1.03 * reference
+    assert law.total <= 1.03 * smoothed_time
+    reached = peaks(law)
+    assert reached.speed_mm_per_s <= limits.feed / 60.0 * 1.001
+    assert reached.accel_mm_per_s2 <= limits.accel * 1.001
+    assert reached.centripetal_mm_per_s2 <= limits.accel * 1.001
+    assert reached.jerk_mm_per_s3 <= limits.jerk * 1.001
+
+
+@pytest.mark.corpus
+@pytest.mark.parametrize(
+    "name",
+    [
+        "hust_5x_impeller_yelun.cls",
+        "hecc_flank_nx.cls",
+        "nx_clsf_varcontour5x_ust_a.cls",
+        "nx_clsf_cutcom_arcs.cls",
+        "hust_5x_PathPointsFile.cls",
+    ],
+)
+def test_limits_on_real_files(corpus: Path, name: str) -> None:
+    limits = Limits(feed=1800.0)
+    compared = compare(read(corpus / name), Settings(), limits)
+    for law in compared.laws.values():
+        reached = peaks(law)
+        assert reached.speed_mm_per_s <= limits.rapid / 60.0 * 1.001
+        assert reached.accel_mm_per_s2 <= limits.accel * 1.001
+        assert reached.centripetal_mm_per_s2 <= limits.accel * 1.001
+        assert reached.jerk_mm_per_s3 <= limits.jerk * 1.001
+        assert reached.angular_speed_deg_per_s <= limits.angular_feed * 1.001
+        assert law.total >= compared.constant_feed_seconds * 0.99
+
+
+def test_contents(chain: Callable[[int], Program]) -> None:
+    calls: list[tuple[str, int, int]] = []
+    compared = compare(chain(2), Settings(tolerance=0.05), progress=lambda *call: calls.append(call))
+    assert {name for name, _, _ in calls} == {"direct_velocity_jump", "zhang2016", "proportional"}
+    contents = json.loads(json.dumps(compared.as_dict(), allow_nan=False))
+    assert list(contents["seconds"]) == ["direct_exact_stop", "direct_velocity_jump", "zhang2016", "proportional"]
+    saved = contents["saving_percent"]["proportional"]["direct_exact_stop"]
+    seconds = contents["seconds"]
+    assert saved == pytest.approx(100 * (1 - seconds["proportional"] / seconds["direct_exact_stop"]))
+    assert set(contents["slowest"]) == set(seconds) == set(contents["peaks"])
+    assert len(contents["slowest"]["proportional"]) == 10
+
+
+def test_slowest_places_add_up(chain: Callable[[int], Program]) -> None:
+    law = plan(smooth(chain(2), Settings(tolerance=0.05)))
+    places = slowest(law, 1000)
+    assert sum(place.seconds for place in places) == pytest.approx(law.total, rel=1e-9)
+    lost = [place.lost_seconds for place in places]
+    assert lost == sorted(lost, reverse=True)
+    assert sum(lost) == pytest.approx(law.total - law.length / law.path.speed[0])
+    assert min(lost) > -1e-6
+
+
+def test_slowest_is_the_sharpest() -> None:
+    tip = [[0, 0, 0], [20, 0, 0], [40, 1, 0], [40, 21, 0], [41, 41, 0]]
+    program = Program.from_poses(tip, [[0, 0, 1]] * 5, feed=1800.0, line=[11, 12, 13, 14, 15])
+    found = {place.line: place for place in slowest(direct(program, baseline="velocity_jump"))}
+    jump = 1000.0 * 0.002 / np.sqrt(2.0)  # speed at a corner of nearly 90 degrees
+    for line in (13, 14):
+        assert found[line].slowest_mm_per_s == pytest.approx(jump, rel=0.05)
+        assert found[line].lost_seconds > 0.05
+        assert [found[line].x, found[line].y] == tip[line - 11][:2]
+    assert max(found[12].slowest_mm_per_s, found[15].slowest_mm_per_s) < 1e-9
