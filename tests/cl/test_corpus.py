@@ -56,3 +56,24 @@ def test_counts(corpus: Path, name: str) -> None:
     assert len(np.unique(program.feed[~np.isnan(program.feed)])) == feeds
     assert program.source.name == name
     assert np.allclose(np.linalg.norm(program.axis, axis=1), 1, rtol=0, atol=1e-15)
+
+
+def tilt(program: Program, line: int) -> float:
+    """Angle in degrees from +Z of the axis at the first pose at or after a line."""
+    axis = program.axis[np.searchsorted(program.line, line)]
+    return float(np.degrees(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])))
+
+
+def test_what_three_numbers_mean_for_the_axis(corpus: Path) -> None:
+    shimemcunha = read(corpus / "swcam_shimemcunha.apt")  # the next operation's CSYS sets the axis upright again
+    assert tilt(shimemcunha, 15) == pytest.approx(0.29, abs=0.005)
+    assert tilt(shimemcunha, 48) == 0
+    metrologia = read(corpus / "swcam_teste_metrologia.apt")
+    assert tilt(metrologia, 270) == 0
+    assert (metrologia.axis[metrologia.line > 276] == [1, 0, 0]).all()
+    side = read(corpus / "nx_clsf_facemill_sideaxis.cls")  # said once, then held
+    assert (side.axis == [0, 1, 0]).all()
+    tilted = read(corpus / "nx_clsf_varcontour5x_ust_a.cls")
+    assert len(np.unique(tilted.axis, axis=0)) == 63
+    turning = read(corpus / "catia_demo3.aptsource")  # SYN makes a comment of TLAXIS
+    assert (turning.axis == [0, 0, 1]).all()
