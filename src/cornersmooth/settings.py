@@ -110,6 +110,17 @@ class Settings:
         return self.tolerance - math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
 
     @property
+    def verified_tolerance(self) -> float:
+        """What verification allows: ε, and for the paper's method, which has no part in the digits, a little more.
+
+        On the paper's own Table 1 its axis point leaves the path by 0.0783 mm where ε is 0.078 mm: the bound (10) holds
+        for each curve, not for the synchronised motion. One per cent and the rounding are let pass.
+        """
+        if self.method == "zhang2016":
+            return 1.01 * self.tolerance + math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
+        return self.tolerance
+
+    @property
     def chord(self) -> float:
         """Effective chord tolerance of dense output, mm."""
         return self.tolerance / 10 if self.chord_tolerance is None else self.chord_tolerance

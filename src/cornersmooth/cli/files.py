@@ -8,16 +8,21 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import stat
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import BinaryIO, cast
 
 from cornersmooth.errors import InputError, OutputError, SettingsError
 
 STANDARD = "-"
+
+#: ending of the file beside the output that holds a text which breaks its promise
+REJECTED = ".rejected"
 
 
 class ClosedPipe(Exception):  # noqa: N818 - no error of ours: whoever read the output has seen enough
@@ -72,9 +77,35 @@ def check_output(path: str, inputs: list[str], *, force: bool, ours: bytes | Non
         raise OutputError("CS403", "exists already", "use --force to replace it", file=path)
 
 
+@dataclass
+class Output:
+    """A file that is being written and has not taken its place yet.
+
+    Parameters
+    ----------
+    stream : binary stream
+    path : str
+        Where the text is until then; empty where it goes straight to a stream or device.
+    rejected : bool
+        Set by the writer: the text must not take the place of the output.
+    """
+
+    stream: BinaryIO
+    path: str = ""
+    rejected: bool = False
+
+
 @contextlib.contextmanager
-def open_output(path: str) -> Iterator[BinaryIO]:
-    """Binary stream to the output; a regular file appears under its name only when the block ends without an error.
+def open_output(path: str, *, hold: bool = False) -> Iterator[Output]:
+    """Open an output; a regular file appears under its name only when the block ends without an error.
+
+    A rejected file is moved to ``PATH.rejected`` instead, and nothing of it reaches a stream or device.
+
+    Parameters
+    ----------
+    path : str
+    hold : bool
+        Keep the text in a file until the block ends, also for streams and devices, so that it can be looked at first.
 
     Raises
     ------
@@ -83,32 +114,38 @@ def open_output(path: str) -> Iterator[BinaryIO]:
     ClosedPipe
         The reader of a pipe has gone.
     """
-    if path == STANDARD:
-        with _failing_as_output("<stdout>"):
-            yield sys.stdout.buffer
-            sys.stdout.buffer.flush()
-        return
-    with _failing_as_output(path):
-        if os.path.exists(path) and not stat.S_ISREG(os.stat(path).st_mode):
-            with open(path, "wb") as device:  # a device or a pipe cannot be replaced, only written to
-                yield device
+    standard = path == STANDARD
+    with _failing_as_output("<stdout>" if standard else path):
+        if not standard and not (os.path.exists(path) and not stat.S_ISREG(os.stat(path).st_mode)):
+            with _replacing(os.path.realpath(path)) as output:
+                yield output
             return
-        with _replacing(os.path.realpath(path)) as stream:
-            yield stream
+        # a device or a pipe cannot be replaced, only written to
+        with contextlib.nullcontext(sys.stdout.buffer) if standard else open(path, "wb") as device:
+            if hold:
+                with tempfile.NamedTemporaryFile(prefix="cornersmooth.") as file:
+                    output = Output(cast(BinaryIO, file), file.name)
+                    yield output
+                    file.seek(0)
+                    if not output.rejected:
+                        shutil.copyfileobj(file, device, 1 << 20)
+            else:
+                yield Output(device)
+            device.flush()
 
 
 @contextlib.contextmanager
-def _replacing(target: str) -> Iterator[BinaryIO]:
+def _replacing(target: str) -> Iterator[Output]:
     folder, name = os.path.split(target)
     handle, temporary = tempfile.mkstemp(prefix=f".{name}.", suffix=".part", dir=folder)
     try:
-        stream: IO[bytes]
         with os.fdopen(handle, "wb") as stream:
-            yield stream
+            output = Output(stream, temporary)
+            yield output
             stream.flush()
             os.fchmod(stream.fileno(), _mode_for(target))
             os.fsync(stream.fileno())
-        os.replace(temporary, target)
+        os.replace(temporary, target + REJECTED if output.rejected else target)
     except BaseException:
         with contextlib.suppress(OSError):
             os.unlink(temporary)

@@ -9,12 +9,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from cornersmooth.cli.files import check_output, open_output, read_input
+from cornersmooth.cli.files import REJECTED, STANDARD, check_output, open_output, read_input
 from cornersmooth.errors import CornersmoothError, OutputError, SettingsError
 
 #: how the reports of earlier runs begin; such files are replaced without being asked
 _OUR_JSON = b'{\n "schema": "cornersmooth-report/'
 _OUR_CSV = b"corner,line,x,y,z,tip_angle_deg,"
+
+#: problems of a rejected file that are printed
+_PROBLEMS_SHOWN = 5
 
 Progress = Callable[[str, int, int], None]
 
@@ -43,6 +46,7 @@ class Job:
     form: str | None
     feed: float | None
     force: bool
+    verify: bool = True
 
 
 @dataclass
@@ -78,6 +82,9 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     try:
         check(job)
         outcome.contents = _smooth_file(job, progress)
+        if not outcome.contents.get("verification", {"passed": True})["passed"]:
+            outcome.exit_code = 1
+            outcome.message = _say_rejected(job, outcome.contents["verification"])
     except CornersmoothError as failure:
         outcome.exit_code = failure.exit_code
         outcome.message = str(failure)
@@ -111,15 +118,51 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
     settings = fit_settings(Settings(**job.settings), form, program.units)
     with _timed(seconds, "smooth"):
         smoothed = smooth(program, settings, progress=step("smoothing"))
-    with _timed(seconds, "write"), open_output(job.target) as stream:
-        written = write(smoothed, stream, control=job.control, form=form.name, progress=step("writing"))
-    contents = report(smoothed, blocks_out=written.blocks, seconds=seconds, findings=written.findings)
+    verification: dict[str, Any] | None = None
+    with open_output(job.target, hold=job.verify) as output:
+        with _timed(seconds, "write"):
+            written = write(smoothed, output.stream, control=job.control, form=form.name, progress=step("writing"))
+            output.stream.flush()
+        if job.verify:
+            from cornersmooth.verify import verify
+
+            with _timed(seconds, "verify"):
+                verified = verify(
+                    program,
+                    output.path,
+                    tolerance=settings.verified_tolerance,
+                    axis_length=settings.axis_length,
+                    control=job.control,
+                )
+            verification = verified.to_dict()
+            output.rejected = not verified.passed
+    contents = report(
+        smoothed,
+        blocks_out=written.blocks,
+        seconds=seconds,
+        findings=written.findings,
+        verification=verification,
+    )
     for path in job.reports:
-        with open_output(path) as stream:
+        with open_output(path) as output:
             texts = iter([report_json(contents)]) if path.lower().endswith(".json") else corners_csv(smoothed)
             for text in texts:
-                stream.write(text.encode("utf-8"))
+                output.stream.write(text.encode("utf-8"))
     return contents
+
+
+def _say_rejected(job: Job, verification: dict[str, Any]) -> str:
+    """Say what verification found, and where the text is now."""
+    lines = [
+        f"{job.source}:{problem['cl_line']}: error: {problem['text']} (NC line {problem['nc_line']})"
+        for problem in verification["problems"][:_PROBLEMS_SHOWN]
+    ]
+    more = verification["problem_count"] - len(lines)
+    if more > 0:
+        lines.append(f"{job.source}: {more} more; a JSON report lists them")
+    kept = "nothing was written" if job.target == STANDARD else f"the text is in {job.target}{REJECTED}"
+    lines.append(f"{job.source}: error: the written text breaks its promise; {kept}")
+    return "\n".join(lines)
 
 
 @contextmanager

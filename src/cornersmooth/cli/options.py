@@ -150,6 +150,9 @@ reports = click.option(
     multiple=True,
     help="Write a report; .json or .csv decides the form. May be repeated; {stem} stands for the input's name.",
 )
+no_verify = click.option(
+    "--no-verify", is_flag=True, help="Do not read the written text back and measure it before it takes its place."
+)
 force = click.option("--force", is_flag=True, help="Replace existing files.")
 quiet = click.option("-q", "--quiet", is_flag=True, help="Only errors.")
 verbose = click.option("-v", "--verbose", count=True, help="More: every finding, times of the stages.")

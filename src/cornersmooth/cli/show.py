@@ -83,6 +83,13 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
             f"largest ||Q-P|-H| {summary['max_sync_residual_mm']:.4g} mm, "
             f"largest jump of the axis at a joint {summary['max_joint_jump_deg']:.4g} deg",
         )
+    if "verification" in contents:
+        found = contents["verification"]
+        table.add_row(
+            "verified",
+            f"{'passed' if found['passed'] else 'FAILED'}: tip {found['max_tip_deviation_mm']:.4f} mm, "
+            f"axis point {found['max_axis_point_deviation_mm']:.4f} mm in the written text",
+        )
     table.add_row("blocks", f"{summary['blocks_in']} in, {summary['blocks_out']} out")
     if verbose:
         times = ", ".join(f"{stage} {value:.3f}" for stage, value in summary["seconds"].items())

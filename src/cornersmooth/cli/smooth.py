@@ -52,6 +52,7 @@ _SETTINGS = (
 @options.axis_step
 @options.feed
 @options.reading
+@options.no_verify
 @options.force
 @options.quiet
 @options.verbose
@@ -145,6 +146,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 form=given["form"],
                 feed=given["feed"],
                 force=given["force"],
+                verify=not given["no_verify"],
             )
         )
     by_target: dict[str, str] = {}

@@ -26,6 +26,7 @@ def report(
     blocks_out: int | None = None,
     seconds: Mapping[str, float] | None = None,
     findings: tuple[Finding, ...] = (),
+    verification: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Everything the JSON report says (design section 7); keys carry their unit.
 
@@ -37,6 +38,8 @@ def report(
         Time of each stage.
     findings : tuple of Finding
         Those of the writer, besides those of the program.
+    verification : mapping, optional
+        What `cornersmooth.verify` measured in the written text.
     """
     from cornersmooth import __version__
 
@@ -67,7 +70,7 @@ def report(
         summary["max_joint_jump_deg"] = float(
             np.degrees(max(_largest(corners.jump_in[done]), _largest(corners.jump_out[done])))
         )
-    return {
+    contents: dict[str, Any] = {
         "schema": SCHEMA,
         "tool": {"name": "cornersmooth", "version": __version__},
         "input": {
@@ -94,6 +97,9 @@ def report(
         ],
         "worst": _records(smoothed),
     }
+    if verification is not None:
+        contents["verification"] = dict(verification)
+    return contents
 
 
 def report_json(contents: Mapping[str, Any]) -> str:
