@@ -9,6 +9,7 @@ from scipy.interpolate import BSpline
 from cornersmooth.model import LimitedBy, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
+from smoothing.paths import plane_corner, random_program, simultaneous_deviation
 
 TABLE_1 = (
     np.array(
@@ -28,13 +29,6 @@ TABLE_1 = (
         ]
     ),
 )
-
-
-def plane_corner(turn_deg: float, leg: float = 100.0) -> Program:
-    """Two equal segments in the XY plane that turn by the angle, axis +Z."""
-    turn = np.radians(turn_deg)
-    tips = np.array([[-leg, 0, 0], [0, 0, 0], [leg * np.cos(turn), leg * np.sin(turn), 0]])
-    return Program.from_poses(tips, np.tile([0.0, 0.0, 1.0], (3, 1)))
 
 
 @pytest.mark.parametrize(
@@ -84,13 +78,6 @@ def test_deviation_factor_holds_for_free_weights_and_ratio(weights, ratio):
     curve, _ = nurbs.control_points(smoothed.program, smoothed.corners, slice(None), 10.0)
     points = nurbs.evaluate(curve, smoothed.corners.weights, np.linspace(0, 1, 1001))[0]
     assert np.linalg.norm(points, axis=1).min() == pytest.approx(0.02, rel=1e-9)
-
-
-def random_program(seed: int, count: int, *, step: float = 3.0, wobble: float = 0.15) -> Program:
-    rng = np.random.default_rng(seed)
-    tips = np.cumsum(rng.normal(size=(count, 3)) * step, axis=0)
-    axes = np.array([0.0, 0.0, 2.0]) + np.cumsum(rng.normal(size=(count, 3)) * wobble, axis=0)
-    return Program.from_poses(tips, axes)
 
 
 def axis_by_tip_length(tip_curve, axis_curve, weights, at):
@@ -154,27 +141,6 @@ def test_moving_turning_scaling_and_reversing_the_path_commute_with_smoothing():
     turned = smooth(backwards, settings).corners
     assert turned.trim_in[::-1] == pytest.approx(plain.trim_out, rel=1e-9, abs=1e-12)
     assert turned.status[::-1].tolist() == plain.status.tolist()
-
-
-def simultaneous_deviation(smoothed, rows, u):
-    """Largest tip and axis-point distance at the common parameter, computed from the poses alone."""
-    program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
-    tip_curve, axis_curve = nurbs.control_points(program, corners, rows, height)
-    shares = nurbs.rational_basis(u, corners.weights[rows])
-    ratio = corners.ratio[rows][:, None]
-    first = shares[..., 0] + ratio * (shares[..., 1] - shares[..., 3])
-    second = shares[..., 4] + ratio * (shares[..., 3] - shares[..., 1])
-    towards = np.where(u <= 0.5, corners.before[rows][:, None], corners.after[rows][:, None])
-    trim = np.where(u <= 0.5, corners.trim_in[rows][:, None], corners.trim_out[rows][:, None])
-    fraction = (np.where(u <= 0.5, first, second) * trim)[..., None]
-    pose = corners.pose[rows][:, None]
-    tip = program.tip[pose] + fraction * (program.tip[towards] - program.tip[pose])
-    lever = program.axis[pose] + fraction * (program.axis[towards] - program.axis[pose])
-    top = tip + height * lever / np.linalg.norm(lever, axis=-1, keepdims=True)
-    points = nurbs.evaluate(tip_curve, corners.weights[rows], u)
-    levers = nurbs.evaluate(axis_curve, corners.weights[rows], u) - points
-    tops = points + height * levers / np.linalg.norm(levers, axis=-1, keepdims=True)
-    return np.linalg.norm(points - tip, axis=-1).max(axis=1), np.linalg.norm(tops - top, axis=-1).max(axis=1)
 
 
 @pytest.mark.parametrize("wobble", [0.02, 0.3, 1.0])

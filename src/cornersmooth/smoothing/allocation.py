@@ -22,6 +22,9 @@ _FLOOR = 0.25
 #: rounds of handing on what is left over
 _ROUNDS = 8
 
+#: relative size of what is only arithmetic
+_EXACT = 1e-14
+
 #: smallest sin² β and cos² β told from zero
 _FLAT = 1e-12
 
@@ -71,6 +74,7 @@ def fair_room(pose: Ints, after: Ints, length_in: Floats, length_out: Floats, wa
         room = room + np.minimum(
             more, np.minimum(_portion(free_in, claim_in, theirs_in), _portion(free_out, claim_out, theirs_out))
         )
+    room = np.where(room >= wanted * (1.0 - _EXACT), wanted, room)
     everywhere = np.zeros(len(pose))
     everywhere[rows] = room
     return everywhere

@@ -18,8 +18,8 @@ GRADED = 2.0 / 3.0
 #: of this on graded nodes, and 9/4 of that on even ones
 PAPER_ERROR = 1.0 / (9.0 * np.sqrt(3.0))
 
-#: numbers of lines at which other shapes are measured, and samples in each line
-_NUMBERS, _SAMPLES = (1, 2, 3, 4, 8, 16, 64), 24
+#: numbers of lines at which other shapes are measured, and samples in each line; n²·error settles as n grows
+_NUMBERS, _SAMPLES = (1, 2, 3, 4, 8, 32, 400), 24
 
 #: what may lie between two samples
 _MARGIN = 1.01

@@ -95,10 +95,9 @@ def place_proportional(asked: Wanted, room: Floats, settings: Settings) -> Place
     """Give g corners the transition lengths they asked for, within their `room` (g,), mm."""
     status, bends = asked.status, asked.bends
     per_length_tip, _, per_length_turn = asked.per_length
-    limited_by = np.where(asked.by_tolerance < room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
-    length = np.minimum(room, asked.by_tolerance)
-    limited_by[asked.by_orientation < length] = LimitedBy.ORIENTATION
-    length = np.minimum(length, asked.by_orientation)
+    limited_by = np.where(asked.by_tolerance <= room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
+    limited_by[(asked.by_orientation < asked.by_tolerance) & (asked.by_orientation <= room)] = LimitedBy.ORIENTATION
+    length = np.minimum(np.minimum(room, asked.by_tolerance), asked.by_orientation)
 
     # The construction runs on chords of the sphere, the promise is about b = tip + H·axis at constant H. The bound
     # |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are evaluated and shortened until they keep it.

@@ -1,0 +1,216 @@
+"""`shape="auto"` and free weights: the gain, the promise, the order along the path, the lines that stand for curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.model import Program, Status
+from cornersmooth.settings import BOUNDS, Settings
+from cornersmooth.smoothing import nurbs, smooth
+from cornersmooth.smoothing.bridging import PAPER_ERROR, shape_factors
+from cornersmooth.smoothing.layout import lines_per_half
+from cornersmooth.smoothing.sampling import dense_rows
+from smoothing.paths import grid_program, plane_corner, random_program, simultaneous_deviation
+
+AUTO = Settings(shape="auto")
+ANY_WEIGHTS = ((1.0, 1.0), (1.0, 0.3), (2.5, 0.3), (0.3, 2.5), (1.0, 3.0), (3.0, 0.001), (0.001, 3.0))
+
+
+def weight_of_turn(turn: float, legs: tuple[float, float] = (100.0, 100.0)) -> float:
+    return float(smooth(plane_corner(turn, *legs), AUTO).corners.weights[0, 1])
+
+
+# ---------------------------------------------------------------- the choice
+
+
+def test_small_turns_keep_the_papers_shape():
+    assert [weight_of_turn(turn) for turn in (1e-3, 1.0, 5.0, 10.0)] == [1.0] * 4
+
+
+def test_weight_falls_with_the_turn_and_has_three_decimals():
+    weights = [weight_of_turn(turn) for turn in range(12, 170, 3)]
+    assert (np.diff(weights) < 0.0).all()
+    assert weights[-1] >= 0.05
+    assert [round(weight, 3) for weight in weights] == weights
+
+
+def test_first_weight_and_ratio_stay_the_papers():
+    corners = smooth(random_program(1, 300, wobble=0.5), AUTO).corners
+    assert (corners.weights[:, 0] == 1.0).all()
+    assert (corners.ratio == 2 / 3).all()
+    assert len(np.unique(corners.weights[:, 1])) > 50
+
+
+def test_pure_rotations_keep_the_papers_shape():
+    tips = np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, 0], [5, 0, 0], [5, 5, 0]], float)
+    axes = np.array([[0, 0, 1], [0.5, 0, 1], [0.5, 0.5, 1], [0.5, 0.5, 1], [0.5, 0.5, 1], [0, 0, 1]])
+    with np.errstate(all="raise", under="ignore"):
+        corners = smooth(Program.from_poses(tips, axes), AUTO.but(tolerance=0.1)).corners
+    assert corners.status.tolist() == [Status.SMOOTHED, Status.SMOOTHED, Status.DUPLICATE, Status.SMOOTHED]
+    assert corners.weights[:, 1] == pytest.approx([1.0, 1.0, 1.0, 0.584]), "a leg of the tip curve has no length"
+
+
+def jerk_and_curvature(program: Program, settings: Settings) -> tuple[float, float]:
+    """Largest sqrt(κ'² + κ⁴) and κ of the tip curve at the only corner."""
+    corners = smooth(program, settings).corners
+    curve, _ = nurbs.control_points(program, corners, slice(None), settings.axis_length)
+    point, first, second = (
+        value[0] for value in nurbs.derivatives(curve, corners.weights, np.linspace(0.0, 1.0, 4001))
+    )
+    speed = np.linalg.norm(first, axis=1)
+    curvature = np.linalg.norm(np.cross(first, second), axis=1) / speed**3
+    way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(point, axis=0), axis=1))))
+    rate = np.gradient(curvature, way)[1:-1]
+    return float(np.sqrt(rate**2 + curvature[1:-1] ** 4).max()), float(curvature.max())
+
+
+@pytest.mark.parametrize(("turn", "gain"), [(15, 1.0), (30, 1.02), (60, 1.08), (90, 1.2), (135, 1.5), (165, 2.3)])
+@pytest.mark.parametrize("tolerance", [0.05, 10.0], ids=["tolerance", "segment"])
+def test_auto_passes_corners_faster(turn, gain, tolerance):
+    """Speeds that a jerk limit (cube root) and a limit of acceleration across the path (square root) allow."""
+    program = plane_corner(turn, 10.0, 10.0)
+    paper = jerk_and_curvature(program, Settings(tolerance=tolerance))
+    auto = jerk_and_curvature(program, AUTO.but(tolerance=tolerance))
+    assert (paper[0] / auto[0]) ** (1 / 3) >= gain
+    assert (paper[1] / auto[1]) ** (1 / 2) >= 1.0
+
+
+@pytest.mark.parametrize("turn", [20, 45, 70, 90, 120, 150])
+@pytest.mark.parametrize("change", [0.0, 0.2, 0.5, 1.0, 1.5])
+@pytest.mark.parametrize("tolerance", [0.05, 10.0], ids=["tolerance", "segment"])
+def test_auto_is_nowhere_slower(turn, change, tolerance):
+    """Also where the axis turns on one side only, so that the legs of the tip curve are not equal."""
+    plane = plane_corner(turn, 10.0, 10.0)
+    axes = np.array([[0, 0, 1], [0, 0, 1], [0, np.sin(change), np.cos(change)]])
+    program = Program.from_poses(plane.tip, axes)
+    paper = jerk_and_curvature(program, Settings(tolerance=tolerance))
+    auto = jerk_and_curvature(program, AUTO.but(tolerance=tolerance))
+    assert (paper[0] / auto[0]) ** (1 / 3) >= 0.995
+    assert (paper[1] / auto[1]) ** (1 / 2) >= 0.995
+
+
+def test_auto_goes_with_no_other_choice_of_weights():
+    with pytest.raises(SettingsError, match="chooses the weights"):
+        Settings(shape="auto", weights=(1.0, 0.5))
+    with pytest.raises(SettingsError, match="own shape and lengths"):
+        Settings(shape="auto", method="zhang2016")
+    with pytest.raises(SettingsError, match="unknown shape"):
+        Settings(shape="round")  # type: ignore[arg-type]
+
+
+# ---------------------------------------------------------------- the promise
+
+
+@pytest.mark.parametrize("allocation", ["half", "fair"])
+@pytest.mark.parametrize("wobble", [0.02, 0.3, 1.0, 2.0])
+@pytest.mark.parametrize("axis_length", [10.0, 200.0])
+def test_tip_and_axis_point_keep_the_tolerance(wobble, axis_length, allocation):
+    settings = AUTO.but(tolerance=0.04, axis_length=axis_length, allocation=allocation)
+    smoothed = smooth(random_program(17, 1500, wobble=wobble), settings)
+    corners = smoothed.corners
+    rows = np.flatnonzero(corners.smoothed)
+    tip, top = simultaneous_deviation(smoothed, rows, np.linspace(0, 1, 401))
+    assert tip.max() <= 0.04 + 1e-12
+    assert top.max() <= 0.04 + 1e-10
+    assert top == pytest.approx(corners.axis_error[rows], rel=3e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("weights", ANY_WEIGHTS)
+@pytest.mark.parametrize("ratio", BOUNDS["ratio"])
+@pytest.mark.parametrize("wobble", [0.1, 1.5])
+def test_any_weights_keep_the_tolerance(weights, ratio, wobble):
+    settings = Settings(tolerance=0.1, axis_length=50.0, weights=weights, ratio=ratio)
+    smoothed = smooth(random_program(23, 600, wobble=wobble), settings)
+    rows = np.flatnonzero(smoothed.corners.smoothed)
+    tip, top = simultaneous_deviation(smoothed, rows, np.linspace(0, 1, 401))
+    assert tip.max() <= 0.1 + 1e-12
+    assert top.max() <= 0.1 + 1e-10
+
+
+@given(grid_program(), st.sampled_from(["half", "fair"]), st.sampled_from([0.01, 0.3, 3.0]))
+def test_coarse_grids_keep_the_tolerance(program, allocation, tolerance):
+    """Reversals, collinear and repeated poses, pure rotations: all of them occur on a coarse grid."""
+    settings = AUTO.but(tolerance=tolerance, allocation=allocation)
+    with np.errstate(all="raise", under="ignore"):
+        smoothed = smooth(program, settings)
+    rows = np.flatnonzero(smoothed.corners.smoothed)
+    if len(rows):
+        tip, top = simultaneous_deviation(smoothed, rows, np.linspace(0, 1, 101))
+        assert tip.max() <= tolerance * (1 + 1e-9)
+        assert top.max() <= tolerance * (1 + 1e-9)
+
+
+# ---------------------------------------------------------------- the order along the path
+
+
+@given(
+    st.floats(0.001, 3.0),
+    st.floats(0.001, 3.0),
+    st.floats(*BOUNDS["ratio"]),
+)
+def test_the_pose_of_the_original_motion_only_moves_forward(w1, w2, ratio):
+    """σ falls from 1 to 0 on the first half, and the deviation β is a convex function of it: docs/shape.md."""
+    u = np.linspace(0.0, 0.5, 301)
+    coefficients = nurbs.leg_coefficients(u, np.array([w1, w2]), ratio)
+    beta = coefficients[:, 2]
+    sigma = -coefficients[:, 1] - beta
+    assert sigma[0] == pytest.approx(1.0)
+    assert sigma[-1] == pytest.approx(0.0, abs=1e-15)
+    assert (np.diff(sigma) < 0.0).all()
+    largest = nurbs.deviation_factor(np.array([[w1, w2]]), np.array([ratio]))[0]
+    assert beta[-1] == pytest.approx(largest)
+    assert (beta <= largest * (1.0 - sigma) + 1e-12).all()
+    (x, y), (x_next, y_next) = np.diff((sigma, beta), axis=1)[:, :-1], np.diff((sigma, beta), axis=1)[:, 1:]
+    assert (x * y_next - y * x_next <= 1e-12).all(), "it turns one way"
+
+
+# ---------------------------------------------------------------- the lines that stand for the curve
+
+
+@pytest.mark.parametrize("weights", [*((1.0, w2) for w2 in (0.9, 0.6, 0.3, 0.05)), *ANY_WEIGHTS])
+@pytest.mark.parametrize("ratio", [0.5, 2 / 3, 0.9])
+def test_shape_factors_bound_the_error_of_lines(weights, ratio):
+    bend, turn = shape_factors(np.array([weights]), np.array([ratio]))
+    for number in (1, 2, 3, 5, 7, 12, 40, 100):
+        for exponent, allowed in ((2 / 3, 1.0), (1.0, 2.25)):
+            ends = (np.arange(number + 1) / number) ** exponent
+            s = ends[:-1, None] + np.diff(ends)[:, None] * np.linspace(0, 1, 50)
+            coefficients = nurbs.leg_coefficients(s / 2, np.array(weights), ratio)
+            beta = coefficients[..., 2]
+            sigma = -coefficients[..., 1] - beta
+            slope = (beta[:, -1:] - beta[:, :1]) / (sigma[:, -1:] - sigma[:, :1])
+            error = np.abs(beta[:, :1] + slope * (sigma - sigma[:, :1]) - beta).max()
+            assert error <= bend[0] * PAPER_ERROR * allowed / number**2
+        assert np.abs(np.diff(sigma[:, [0, -1]], axis=1)).max() <= turn[0] / number * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    "options", [{"shape": "auto"}, {"weights": (2.5, 0.3)}, {"weights": (1.0, 3.0)}, {"ratio": 0.85}]
+)
+def test_lines_keep_the_chord_tolerance_and_pass_the_middle(options):
+    """Distance of the curves, at dense parameters, from the lines that were made of them."""
+    settings = Settings(tolerance=0.2, chord_tolerance=0.001, **options)
+    smoothed = smooth(random_program(31, 300, wobble=0.05), settings)
+    corners = smoothed.corners
+    rows = np.flatnonzero(corners.smoothed)
+    tips = np.concatenate([block.tip for block in dense_rows(smoothed)])
+    curves, _ = nurbs.control_points(smoothed.program, corners, rows, settings.axis_length)
+    points = nurbs.evaluate(curves, corners.weights[rows], np.linspace(0.0, 1.0, 201))
+    halves = np.abs(lines_per_half(smoothed)[rows])
+    assert halves.max() > 5
+    for curve, number in zip(points, halves, strict=True):
+        middle = int(np.argmin(np.linalg.norm(tips - curve[100], axis=1)))
+        assert np.linalg.norm(tips[middle] - curve[100]) <= 1e-9
+        line = tips[middle - number : middle + number + 1]
+        assert distance_to_polyline(curve, line) <= 0.001 * (1 + 1e-6)
+
+
+def distance_to_polyline(points: np.ndarray, line: np.ndarray) -> float:
+    start, step = line[:-1], np.diff(line, axis=0)
+    share = np.einsum("pkd,kd->pk", points[:, None] - start, step) / np.einsum("kd,kd->k", step, step)
+    nearest = start + np.clip(share, 0.0, 1.0)[..., None] * step
+    return float(np.linalg.norm(points[:, None] - nearest, axis=-1).min(axis=1).max())
