@@ -64,6 +64,11 @@ def read_apt(
     ------
     InputError
         CS100-CS128, with the line.
+
+    Notes
+    -----
+    Memory while reading: 5 bytes for a byte of a tool path of plain GOTO lines, at most 130 for any statements; the
+    lines of a NURBS record may be `nurbs.MOST_LINES` poses for each control point.
     """
     known = by_name(dialect) if dialect else recognise(data)
     decode = _decoder(data)
