@@ -7,11 +7,17 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.model import SmoothProgram, Units
+from cornersmooth.model import Program, SmoothProgram, Units
 from cornersmooth.nc import fanuc
+from cornersmooth.nc.blocks import BlockWriter
+from cornersmooth.nc.circles import Circles, plan_circles
 from cornersmooth.nc.control import Form
 from cornersmooth.nc.motion import MotionWriter
+from cornersmooth.nc.notes import Notes
+from cornersmooth.nc.statements import StatementWriter
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
 
@@ -97,12 +103,15 @@ def write(
         A number that the form cannot hold.
     """
     chosen = choose_form(control, form)
-    program = smoothed.program
-    statements = fanuc.statement_writer(chosen)
-    motion = MotionWriter(chosen, program, statements)
+    program, notes = smoothed.program, Notes()
+    statements = StatementWriter(fanuc.words(chosen), program, notes)
+    circles = plan_circles(program, smoothed.settings, chosen)
+    _tell_arcs(circles, program, notes)
+    writer = BlockWriter(chosen, program, statements, notes, circles)
+    motion = MotionWriter(program, smoothed.settings.axis_length, writer, statements, notes)
     head = fanuc.head(program)
     stream.write(_text(head))
-    for rows in _one_ahead(curve_rows(smoothed) if chosen.curves else dense_rows(smoothed)):
+    for rows in _one_ahead(curve_rows(smoothed) if chosen.curves else dense_rows(smoothed, circles.pieces)):
         for text in motion.write(rows):
             stream.write(text)
         if progress is not None and len(rows.move):
@@ -111,7 +120,7 @@ def write(
         stream.write(text)
     tail = fanuc.tail(statements)
     stream.write(_text(tail))
-    return Written(len(head) + motion.blocks + len(tail), tuple(_findings(motion, statements.findings())))
+    return Written(len(head) + motion.blocks + writer.blocks + len(tail), notes.findings())
 
 
 def _one_ahead(blocks: Iterator[Rows]) -> Iterator[Rows]:
@@ -127,19 +136,11 @@ def _text(blocks: list[str]) -> bytes:
     return "".join(block + "\n" for block in blocks).encode("ascii")
 
 
-def _findings(motion: MotionWriter, findings: list[Finding]) -> list[Finding]:
-    if motion.without_feed:
-        findings.append(
-            Finding(
-                "CS311",
-                "warning",
-                motion.without_feed_line,
-                "feed move without a feed in the CL file; most controls stop with an alarm, give one with --feed",
-                motion.without_feed,
-            )
-        )
-    if motion.repeated:
-        findings.append(
-            Finding("CS312", "note", 0, "move of zero length in the written digits left out", motion.repeated)
-        )
-    return findings
+def _tell_arcs(circles: Circles, program: Program, notes: Notes) -> None:
+    for chosen, code, text in (
+        (circles.pieces > 0, "CS313", "arc written as G2 or G3"),
+        (circles.pieces == 0, "CS314", "arc written as lines"),
+    ):
+        rows = np.flatnonzero(chosen)
+        if len(rows):
+            notes.add(code, "note", int(program.line[program.arcs.pose[rows[0]]]), text, len(rows))

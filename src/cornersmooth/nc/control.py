@@ -1,10 +1,58 @@
-"""What the writers know about a control: its digits and what it can do."""
+"""What the writers know about a control: its words, its digits and what it can do."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cornersmooth.model import MM_PER_UNIT, Units
+from cornersmooth.model import MM_PER_UNIT, FeedMode, Units
+
+Blocks = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Words:
+    """Blocks by which a control is told what is not motion; each field holds zero or more blocks.
+
+    Parameters
+    ----------
+    tool_change, tool_select : tuple of str
+        With ``{tool}``; the latter only brings the tool near.
+    tip_control_on, tip_control_off : tuple of str
+        Tool tip control; with ``{offset}``, the length register.
+    spindle_speed : tuple of str
+        With ``{speed}`` and ``{direction}``, one of `spindle_on`.
+    spindle_on : mapping
+        Block for ``"clockwise"`` and ``"counterclockwise"``.
+    coolant : mapping
+        Blocks by CL word; other words are not translated.
+    dwell : tuple of str
+        With ``{milliseconds}`` or ``{seconds}``.
+    compensation_left, compensation_right : tuple of str
+        Cutter compensation, with ``{register}``.
+    plane : mapping
+        Block for the planes 17 (XY), 18 (ZX) and 19 (YZ).
+    feed_mode : mapping
+        Block by `FeedMode`.
+    """
+
+    tool_change: Blocks
+    tool_select: Blocks
+    tip_control_on: Blocks
+    tip_control_off: Blocks
+    spindle_speed: Blocks
+    spindle_on: Mapping[str, str]
+    spindle_off: Blocks
+    spindle_orient: Blocks
+    coolant: Mapping[str, Blocks]
+    dwell: Blocks
+    stop: Blocks
+    optional_stop: Blocks
+    compensation_left: Blocks
+    compensation_right: Blocks
+    compensation_off: Blocks
+    plane: Mapping[int, str]
+    feed_mode: Mapping[FeedMode, str]
 
 
 @dataclass(frozen=True)
@@ -26,6 +74,8 @@ class Form:
     vector_decimals : int
     feed_decimals : int
         Most decimals of F; trailing zeros are not written.
+    circles : bool
+        Whether arcs may be written as circular blocks, the tool vector kept.
     """
 
     control: str
@@ -37,6 +87,7 @@ class Form:
     tip_decimals: dict[Units, int]
     vector_decimals: int = 7
     feed_decimals: int = 4
+    circles: bool = False
 
     def decimals(self, units: Units) -> tuple[int, ...]:
         """Decimals of the six numbers of a motion block."""

@@ -6,8 +6,10 @@ control type 2: I J K is the tool direction in the programming frame).
 
 from __future__ import annotations
 
-from cornersmooth.model import Program, Units
-from cornersmooth.nc.control import Form
+from dataclasses import replace
+
+from cornersmooth.model import FeedMode, Program, Units
+from cornersmooth.nc.control import Form, Words
 from cornersmooth.nc.statements import StatementWriter
 
 DECIMALS: dict[Units, int] = {"mm": 4, "inch": 5}
@@ -20,6 +22,7 @@ G1 = Form(
     other_words=(b"I", b"J", b"K"),
     vectors=True,
     tip_decimals=DECIMALS,
+    circles=True,
 )
 G62 = Form(
     control="fanuc",
@@ -32,6 +35,32 @@ G62 = Form(
 )
 
 
+_WORDS = Words(
+    tool_change=("T{tool} M6",),
+    tool_select=("T{tool}",),
+    tip_control_on=("G43.5 H{offset}",),
+    tip_control_off=("G49",),
+    spindle_speed=("S{speed} {direction}",),
+    spindle_on={"clockwise": "M3", "counterclockwise": "M4"},
+    spindle_off=("M5",),
+    spindle_orient=("M19",),
+    coolant={"ON": ("M8",), "FLOOD": ("M8",), "MIST": ("M7",), "OFF": ("M9",)},
+    dwell=("G4 P{milliseconds}",),
+    stop=("M0",),
+    optional_stop=("M1",),
+    compensation_left=("G41 D{register}",),
+    compensation_right=("G42 D{register}",),
+    compensation_off=("G40",),
+    plane={17: "G17", 18: "G18", 19: "G19"},
+    feed_mode={FeedMode.PER_MINUTE: "G94", FeedMode.PER_REVOLUTION: "G95"},
+)
+
+
+def words(form: Form) -> Words:
+    """Words of this control in one of its forms."""
+    return _WORDS if form.vectors else replace(_WORDS, tip_control_on=("G43 H{offset}",))
+
+
 def head(program: Program) -> list[str]:
     """Blocks before everything else."""
     return ["%", "O0001", f"{'G20' if program.units == 'inch' else 'G21'} G90 G94 G17 G40 G49 G80"]
@@ -40,8 +69,3 @@ def head(program: Program) -> list[str]:
 def tail(statements: StatementWriter) -> list[str]:
     """Blocks behind everything else."""
     return [*statements.end_motion(), "M30", "%"]
-
-
-def statement_writer(form: Form) -> StatementWriter:
-    """Translation of statements for this control."""
-    return StatementWriter(tool_words=("G49", "G43.5 H{tool}" if form.vectors else "G43 H{tool}"))

@@ -1,60 +1,60 @@
-"""Rows of the smoothed motion as NC blocks, with the statements in their places.
+"""Rows of the smoothed motion in order, with the statements in their places, holes drilled and positions remembered.
 
-Whole blocks of rows at a time: ticks (the one rounding), words by table, one join. Python runs per statement and per
-block of rows, never per row.
+Python runs per statement, per run of holes and per block of rows, never per row.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
-from cornersmooth.nc.control import Form
+from cornersmooth.model import Bools, Floats, Ints, Move, Program, Statement
+from cornersmooth.nc.blocks import BlockWriter, Run
+from cornersmooth.nc.comments import comment_lines
+from cornersmooth.nc.holes import approaches, hole_moves, travel_height
+from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.statements import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
-from cornersmooth.text import RowFormat, format_number, to_ticks
+from cornersmooth.text import format_number
 
-_FEED_MODE_BLOCK = {FeedMode.PER_MINUTE: b"G94\n", FeedMode.PER_REVOLUTION: b"G95\n"}
-
-#: knot written with each of the five control points: u0 to u4; u5 to u8 have blocks of their own
-_KNOT = (b"K0. ", b"K0. ", b"K0. ", b"K0. ", b"K0.5 ")
-_LAST_KNOTS = b"K1.\n" * 4
+#: a pose that no program has
+_NOWHERE = 1 << 62
 
 
 @dataclass
 class MotionWriter:
-    """Writes rows in order and remembers what a control remembers: position, feed, feed mode.
+    """Writes rows in order and remembers where the tool is.
 
     Parameters
     ----------
-    form : Form
     program : Program
+    axis_length : float, mm
+        H of the axis points, in forms that write them.
+    writer : BlockWriter
     statements : StatementWriter
+    notes : Notes
     """
 
-    form: Form
     program: Program
+    axis_length: float
+    writer: BlockWriter
     statements: StatementWriter
-    blocks: int = 0
-    repeated: int = 0
-    without_feed: int = 0
-    without_feed_line: int = 0
+    notes: Notes
+    blocks: int = 0  #: those that are not `writer`'s
+    _repeated: int = 0
     _position: NDArray[np.int64] | None = None
-    _feed: int = -1  # ticks and feed mode of the last F, as one number
-    _mode: int = FeedMode.PER_MINUTE
+    _return_to: int = _NOWHERE  #: first pose behind a tool change, until it is reached
     _next_statement: int = 0
-    _format: RowFormat = field(init=False)
+    _said: tuple[Statement, ...] = field(init=False)
+    _approach: Ints | None = field(init=False)
 
     def __post_init__(self) -> None:
-        words = (*self.form.coordinate_words, *self.form.other_words)
-        self._format = RowFormat(
-            words=tuple(word if i == 0 else b" " + word for i, word in enumerate(words)),
-            decimals=self.form.decimals(self.program.units),
-        )
+        self._said = _with_starts(self.program)
+        self._approach = approaches(self.program) if (self.program.kind == Move.HOLE).any() else None
 
     def write(self, rows: Rows) -> Iterator[bytes]:
         """Text of a block of rows and of the statements that stand before and between them."""
@@ -64,64 +64,129 @@ class MotionWriter:
         for statement in waiting:
             stop = int(np.searchsorted(moves, statement.pose))
             if stop > start:
-                yield from self._lines(rows, start, stop)
+                yield from self._between(rows, start, stop)
                 start = stop
             yield from self._say(statement)
-        yield from self._lines(rows, start, len(moves))
+        yield from self._between(rows, start, len(moves))
 
     def finish(self) -> Iterator[bytes]:
         """Text of the statements behind the last row."""
-        for statement in self.program.statements[self._next_statement :]:
+        for statement in self._said[self._next_statement :]:
             yield from self._say(statement)
-        self._next_statement = len(self.program.statements)
+        self._next_statement = len(self._said)
+        if self._repeated:
+            text = "move of zero length in the written digits left out"
+            self.notes.add("CS312", "note", 0, text, self._repeated)
 
     def _statements_until(self, pose: int) -> Sequence[Statement]:
         begin = self._next_statement
-        statements = self.program.statements
-        while self._next_statement < len(statements) and statements[self._next_statement].pose <= pose:
+        said = self._said
+        while self._next_statement < len(said) and said[self._next_statement].pose <= pose:
             self._next_statement += 1
-        return statements[begin : self._next_statement]
+        return said[begin : self._next_statement]
 
     def _say(self, statement: Statement) -> Iterator[bytes]:
-        tool = self.statements.tool
         text = self.statements.blocks(statement)
-        if self.statements.tool != tool:
-            self._position = None  # a tool change leaves the machine elsewhere
+        if self.statements.changed:  # a tool change leaves the machine elsewhere
+            self._position, self._return_to, self.statements.changed = None, statement.pose, False
+        yield from self._blocks(text)
+
+    def _blocks(self, text: Sequence[str]) -> Iterator[bytes]:
         self.blocks += len(text)
         if text:
             yield ("\n".join(text) + "\n").encode("ascii")
 
-    def _lines(self, rows: Rows, start: int, stop: int) -> Iterator[bytes]:
+    def _between(self, rows: Rows, start: int, stop: int) -> Iterator[bytes]:
+        """Rows between statements, holes apart from the others."""
         if start >= stop:
             return
-        for block in self.statements.begin_motion():
-            self.blocks += 1
-            yield block.encode("ascii") + b"\n"
-        part = slice(start, stop)
-        move, curve = rows.move[part], rows.curve[part]
-        ticks = self._ticks(rows.tip[part], rows.other[part])
-        self._join(ticks, rows.joined[part])
-        kept = self._new_positions(ticks) | (curve > 0)
-        self.repeated += int(np.count_nonzero(~kept))
-        self._position = ticks[-1]
-        if not kept.all():
-            ticks, move, curve = ticks[kept], move[kept], curve[kept]
-        if not len(ticks):
+        yield from self._blocks(self.statements.begin_motion())
+        if self._approach is None:
+            yield from self._lines(rows, start, stop)
             return
-        weights = rows.weights[part][kept] if rows.weights is not None else None
-        prefix, prefix_id, extra = self._prefixes(move, curve)
-        suffix, suffix_id = self._suffixes(move, curve, weights)
-        text, _ = self._format.rows(ticks, prefix, prefix_id, suffix, suffix_id)
-        self.blocks += len(ticks) + extra + 4 * int(np.count_nonzero(curve == 5))
-        yield text
+        hole = self.program.kind[rows.move[start:stop]] == Move.HOLE
+        edges = [start, *(start + 1 + np.flatnonzero(hole[1:] != hole[:-1])).tolist(), stop]
+        for first, last in pairwise(edges):
+            if hole[first - start]:
+                yield from self._holes(rows.move[first:last], self._approach)
+            else:
+                yield from self._lines(rows, first, last)
 
-    def _ticks(self, tip: Floats, other: Floats) -> Ints:
-        unit = self.program.mm_per_unit
-        numbers = np.concatenate((tip, other), axis=1)
-        if unit != 1.0:
-            numbers[:, : 3 if self.form.vectors else 6] /= unit
-        ticks: Ints = to_ticks(numbers, self._format.decimals)
-        return ticks
+    def _lines(self, rows: Rows, start: int, stop: int) -> Iterator[bytes]:
+        part = slice(start, stop)
+        move, program = rows.move[part], self.program
+        ticks = self.writer.ticks(rows.tip[part], rows.other[part])
+        arc = rows.arc[part] if rows.arc is not None else None
+        yield from self._go_back(int(move[0]))
+        if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
+            yield from self._go_to(int(move[0]) - 1, int(move[0]))
+        self._join(ticks, rows.joined[part])
+        run = Run(
+            ticks=ticks,
+            move=move,
+            rapid=program.kind[move] == Move.RAPID,
+            feed=program.feed[move],
+            mode=program.feed_mode[move].astype(np.int64),
+            curve=rows.curve[part],
+            weights=rows.weights[part] if rows.weights is not None else None,
+            arc=arc,
+        )
+        before = len(run)
+        run = self._moving(run)
+        self._repeated += before - len(run)
+        yield from self._emit(run)
+
+    def _go_back(self, move: int) -> Iterator[bytes]:
+        """Go to the first pose behind a tool change even if it repeats the last one before, and so is no row."""
+        begin, self._return_to = self._return_to, _NOWHERE
+        left_out = np.flatnonzero(self.program.kind[begin:move] != Move.FROM)
+        if begin < move and len(left_out):
+            yield from self._go_to(begin + int(left_out[0]), move)
+
+    def _go_to(self, pose: int, move: int) -> Iterator[bytes]:
+        """Go to a pose at the feed of a move, if the tool is elsewhere."""
+        at = np.array([pose])
+        run = self._run(self.program.tip[at], self.program.axis[at], np.array([move]), np.zeros(1, np.bool_))
+        yield from self._emit(self._moving(run))
+
+    def _holes(self, poses: Ints, approach: Ints) -> Iterator[bytes]:
+        """Holes of one cycle as plain moves; those not understood are only approached."""
+        cycle, program = self.statements.cycle, self.program
+        line = int(program.line[poses[0]])
+        if cycle is None:
+            text = "hole of a cycle that is not understood; it is not drilled, the tool only goes over it"
+            self.notes.add("CS315", "warning", line, text, len(poses))
+            yield from self._over_holes(poses, travel_height(program, poses, approach[poses]))
+            return
+        self.notes.add("CS316", "note", line, "hole of a cycle written as plain moves", len(poses))
+        moves = hole_moves(cycle, program, poses, approach[poses])
+        move = poses[moves.hole]
+        run = replace(self._run(moves.tip, program.axis[move], move, moves.rapid), dwell=moves.dwell)
+        if not np.isnan(cycle.feed):
+            run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
+        yield from self._emit(self._moving(run), cycle.dwell)
+
+    def _over_holes(self, poses: Ints, height: Floats) -> Iterator[bytes]:
+        program = self.program
+        decimals = self.writer.form.tip_decimals[program.units]
+        for pose, over in zip(poses.tolist(), height.tolist(), strict=True):
+            tip = (program.tip[pose] / program.mm_per_unit).tolist()
+            place = " ".join(
+                f"{letter}{format_number(value, decimals)}" for letter, value in zip("XYZ", tip, strict=True)
+            )
+            yield from self._blocks(comment_lines(f"NOT DRILLED: HOLE AT {place}"))
+            move = np.array([pose])
+            axis = program.axis[move]
+            run = self._run(program.tip[move] + over * axis, axis, move, np.ones(1, np.bool_))
+            yield from self._emit(self._moving(run))
+
+    def _run(self, tip: Floats, axis: Floats, move: Ints, rapid: Bools) -> Run:
+        """Straight moves through poses that need not be the program's, with the feeds of its moves."""
+        program = self.program
+        other = axis if self.writer.form.vectors else tip + self.axis_length * axis
+        mode = program.feed_mode[move].astype(np.int64)
+        ticks = self.writer.ticks(tip, other)
+        return Run(ticks, move, rapid, program.feed[move], mode, np.zeros(len(ticks), np.int8))
 
     def _join(self, ticks: Ints, joined: Bools) -> None:
         """Give first control points that follow without a line the digits of the row before."""
@@ -134,76 +199,29 @@ class MotionWriter:
             places = places[1:]
         ticks[places] = ticks[places - 1]
 
-    def _new_positions(self, ticks: Ints) -> Bools:
+    def _moving(self, run: Run) -> Run:
+        """Leave out the rows that do not move the tool in the written digits."""
+        ticks = run.ticks
         new = np.ones(len(ticks), np.bool_)
         new[1:] = (ticks[1:] != ticks[:-1]).any(axis=1)
         if self._position is not None:
             new[0] = bool((ticks[0] != self._position).any())
-        return new
+        kept = new | (run.curve > 0)
+        return run if kept.all() else run.only(kept)
 
-    def _positioning(self, move: Ints) -> Bools:
-        """Rows reached by rapid: rapids, and the positions of holes."""
-        kind = self.program.kind[move]
-        rapid: Bools = (kind == Move.RAPID) | (kind == Move.HOLE)
-        return rapid
+    def _emit(self, run: Run, dwell: int = 0) -> Iterator[bytes]:
+        if len(run):
+            self._position = run.ticks[-1]
+            yield self.writer.text(run, dwell)
 
-    def _prefixes(self, move: Ints, curve: NDArray[np.int8]) -> tuple[list[bytes], Ints, int]:
-        """Table of what stands before the numbers, an entry for each row, and the blocks hidden in the prefixes."""
-        rapid = self._positioning(move)
-        table = [b"G1 ", b"G0 ", b"G6.2 P4 " + _KNOT[0], *_KNOT[1:]]
-        chosen = np.where(curve > 0, curve + 1, rapid).astype(np.int64)
-        extra = 0
-        feeding = np.flatnonzero(~rapid)
-        modes = self.program.feed_mode[move[feeding]].astype(np.int64)
-        for place in np.flatnonzero(np.diff(modes, prepend=self._mode)).tolist():
-            self._mode = FeedMode(int(modes[place]))
-            row = feeding[place]
-            table.append(_FEED_MODE_BLOCK[self._mode] + table[chosen[row]])
-            chosen[row] = len(table) - 1
-            extra += 1
-        return table, chosen, extra
 
-    def _suffixes(self, move: Ints, curve: NDArray[np.int8], weights: Floats | None) -> tuple[list[bytes], Ints]:
-        """Table of what stands behind the numbers, feed or weight, and an entry for each row."""
-        table = [b"\n"]
-        chosen = np.zeros(len(move), np.int64)
-        feeding = np.flatnonzero(~self._positioning(move) & (curve == 0))
-        if len(feeding):
-            feed = self.program.feed[move[feeding]]
-            missing = np.isnan(feed)
-            if missing.any():
-                self._count_missing(move[feeding[missing]])
-            unit = np.where(missing, 0.0, feed) / self.program.mm_per_unit
-            ticks = to_ticks(unit, self.form.feed_decimals)[~missing]
-            given = feeding[~missing]
-            # F is given again with its unit: the same number per minute and per revolution is not the same feed
-            keys = 2 * ticks + self.program.feed_mode[move[given]]
-            changed = np.flatnonzero(np.diff(keys, prepend=self._feed))
-            if len(changed):
-                values, which = np.unique(ticks[changed], return_inverse=True)
-                scale = 10.0**self.form.feed_decimals
-                table += [
-                    b" F" + format_number(value / scale, self.form.feed_decimals, trim=True).encode() + b"\n"
-                    for value in values.tolist()
-                ]
-                chosen[given[changed]] = 1 + which.reshape(-1)
-                self._feed = int(keys[-1])
-        if weights is not None and (curve > 0).any():
-            self._add_weights(table, chosen, curve, weights)
-        return table, chosen
-
-    def _count_missing(self, moves: Ints) -> None:
-        if not self.without_feed:
-            self.without_feed_line = int(self.program.line[moves[0]])
-        self.without_feed += len(moves)
-
-    def _add_weights(self, table: list[bytes], chosen: Ints, curve: NDArray[np.int8], weights: Floats) -> None:
-        column = np.array([0, -1, 0, 1, 0, -1])[curve]
-        on_curve = curve > 0
-        number = np.where(column < 0, 1.0, weights[np.arange(len(curve)), np.maximum(column, 0)])
-        values, which = np.unique(number[on_curve], return_inverse=True)
-        ends = [b" R" + format_number(value, 3, trim=True).encode() + b"\n" for value in values.tolist()]
-        base = len(table)
-        table += ends
-        table += [end + _LAST_KNOTS for end in ends]
-        chosen[on_curve] = base + which.reshape(-1) + np.where(curve[on_curve] == 5, len(ends), 0)
+def _with_starts(program: Program) -> tuple[Statement, ...]:
+    """Statements of the program, and one for every FROM, which is a pose there, behind what stands before it."""
+    starts = np.flatnonzero(program.kind == Move.FROM).tolist()
+    if not starts:
+        return program.statements
+    said = [
+        Statement(pose, int(program.line[pose]), "FROM", tuple((program.tip[pose] / program.mm_per_unit).tolist()))
+        for pose in starts
+    ]
+    return tuple(sorted((*program.statements, *said), key=lambda statement: (statement.pose, statement.word == "FROM")))

@@ -1,81 +1,290 @@
-"""CL statements as NC words: what the program says between its moves."""
+"""CL statements as NC words: what the program says between its moves.
+
+What a machinist reads becomes a comment without its CL word (PPRINT, REMARK, TPRINT and the like); what describes the
+file or the tool becomes a comment as it stands; PAINT only tells the CAM screen what to draw and is left out. Whatever
+is not understood becomes a comment and a counted warning, never an NC word by guess.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from cornersmooth.errors import Finding
-from cornersmooth.model import Statement
+from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
+from cornersmooth.nc.control import Words
+from cornersmooth.nc.holes import Cycle, read_cycle
+from cornersmooth.nc.notes import Notes
+from cornersmooth.nc.revolutions import milliseconds, revolutions
 from cornersmooth.text import format_number
 
-#: words that describe the file, the tool or the display: comments, nothing to warn of
+#: words whose text is for the machinist: comments without the word
+_TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
+
+#: words that describe the file or the tool: comments, nothing to warn of
 _DESCRIBING = frozenset(
-    "$$ PARTNO PPRINT REMARK TPRINT LETTER DISPLY PAINT TLDATA MSYS CSYS CUTTER INTOL OUTTOL MULTAX UNITS UNIT MACHIN "
-    "END-OF-PATH FINI END REWIND SELECT TLAXIS TRNTYP MODE SYN PPFUN ISN TOOLNO".split()
+    "PARTNO TLDATA MSYS CSYS CUTTER INTOL OUTTOL TOLER MULTAX UNITS UNIT MACHIN TLAXIS TRNTYP SYN PPFUN ISN TOOLNO "
+    "CSI_SET_FLUTE_LENGTH CSI_SET_EXTENSION_LENGTH".split()
 ) | {"TOOL PATH"}
 
-_COOLANT = {"ON": "M8", "FLOOD": "M8", "MIST": "M7", "OFF": "M9"}
-_COMPENSATION = {"LEFT": "G41", "RIGHT": "G42", "OFF": "G40"}
+#: words that say nothing beside what the NC text shows anyway
+_SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})
+
+_TOOL_WORDS = frozenset({"LOADTL", "LOAD", "TURRET"})
+
+_NC_WORDS = re.compile(r"\s*(?:[A-Z][+-]?(?:\d+\.?\d*|\.\d+)\s*)+[$%]?\s*", re.IGNORECASE)
 
 
 @dataclass
 class StatementWriter:
-    """Turns statements into NC blocks, remembering tool and spindle.
+    """Turns statements into NC blocks, remembering what the machine would.
 
     Parameters
     ----------
-    tool_words : tuple of (str, str)
-        Blocks that end and start tool tip control around a tool change; ``{tool}`` is the tool number.
+    words : Words
+        Of the control.
+    program : Program
+    notes : Notes
+        Takes what is noticed.
     """
 
-    tool_words: tuple[str, str]
-    tool: int | None = None
-    tip_control: bool = False
-    spindle: str = "M3"
-    not_understood: Counter[str] = field(default_factory=Counter)
-    first_line: dict[str, int] = field(default_factory=dict)
+    words: Words
+    program: Program
+    notes: Notes
+    plane: int = 17  #: the plane selected, kept by who writes the motion
+    changed: bool = False  #: a tool change left the machine elsewhere
+    cycle: Cycle | None = None  #: the hole cycle in force, None where it is not understood
+    _tool: int | None = None
+    _offset: int = 1
+    _tip_control: bool = False
+    _direction: str = "clockwise"
+    _speed: float | None = None
+    _diameter: float = 0.0
+    _last_cycle: Cycle | None = None
+    _toolno_loads: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        said = {statement.word for statement in self.program.statements}
+        self._toolno_loads = not _TOOL_WORDS & said
 
     def blocks(self, statement: Statement) -> list[str]:
         """NC blocks of one statement, without line ends."""
-        handler = _HANDLERS.get(statement.word)
-        written = handler(self, statement) if handler else None
-        if written is None:
-            if handler or statement.word not in _DESCRIBING:
-                self.not_understood[statement.word] += 1
-                self.first_line.setdefault(statement.word, statement.line)
-            text = statement.text.removeprefix("$$").strip() if statement.word == "$$" else statement.text
-            return comment_lines(text or statement.word)
-        return written
+        word = statement.word
+        handler = _HANDLERS.get(word)
+        if handler is not None:
+            written = handler(self, statement)
+            if written is not None:
+                return written
+            self._not_understood(statement)
+        elif word in _TEXT_WORDS:
+            return comment_lines(_spoken(statement))
+        elif word in _SILENT:
+            return []
+        elif word not in _DESCRIBING:
+            self._not_understood(statement)
+        return comment_lines(statement.text or word)
 
     def begin_motion(self) -> list[str]:
         """Blocks needed before the next motion: tool tip control, where it is off."""
-        if self.tip_control:
+        if self._tip_control:
             return []
-        self.tip_control = True
-        return [self.tool_words[1].format(tool=self.tool or 1)]
+        self._tip_control = True
+        return [block.format(offset=self._offset) for block in self.words.tip_control_on]
 
     def end_motion(self) -> list[str]:
         """Blocks that switch tool tip control off, where it is on."""
-        if not self.tip_control:
+        if not self._tip_control:
             return []
-        self.tip_control = False
-        return [self.tool_words[0]]
+        self._tip_control = False
+        return list(self.words.tip_control_off)
 
-    def findings(self) -> list[Finding]:
-        """One counted warning for every word that only became a comment."""
-        return [
-            Finding(
-                "CS310",
-                "warning",
-                self.first_line[word],
-                f"{word} is not translated; written as a comment",
-                count,
-            )
-            for word, count in self.not_understood.items()
-        ]
+    def _not_understood(self, statement: Statement) -> None:
+        text = f"{statement.word} is not translated; written as a comment"
+        self.notes.add("CS310", "warning", statement.line, text)
+
+    def load(self, statement: Statement) -> list[str] | None:
+        """LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]."""
+        words, numbers = _words(statement), _numbers(statement)
+        if statement.word == "LOAD" and words[:1] != ["TOOL"]:
+            return None
+        if not numbers and statement.word == "LOADTL" and words and re.fullmatch(r"T\d+", words[0]):
+            numbers = [float(words[0][1:])]
+        number = _whole(numbers[:1])
+        if number is None:
+            return None
+        offset = _whole(_after(statement, "ADJUST") or _after(statement, "OSETNO"))
+        offset = number if offset is None else offset
+        if (number, offset) == (self._tool, self._offset):  # CATIA loads a tool twice: at the change, in the operation
+            return comment_lines(statement.text)
+        blocks = self.end_motion()
+        if number != self._tool:
+            blocks += [block.format(tool=number) for block in self.words.tool_change]
+            self.changed = True
+        self._tool, self._offset = number, offset
+        return blocks
+
+    def toolno(self, statement: Statement) -> list[str] | None:
+        """TOOLNO/n,...: describes the tool that LOADTL loads; without any such statement it loads itself."""
+        return self.load(statement) if self._toolno_loads else comment_lines(statement.text)
+
+    def select(self, statement: Statement) -> list[str] | None:
+        """SELECT/TOOL,n: brings the next tool near."""
+        number = _whole(_numbers(statement))
+        if number is None or _words(statement) != ["TOOL"]:
+            return None
+        if number == self._tool:
+            return comment_lines(statement.text)
+        return [block.format(tool=number) for block in self.words.tool_select]
+
+    def cutter(self, statement: Statement) -> list[str]:
+        """CUTTER/d,r,e,... and TLDATA/MILL,d,...: the diameter is kept; CUTTER/d alone is the nose of a lathe tool."""
+        numbers = _numbers(statement)
+        mill = {"MILL", "DRILL"} & set(_words(statement)) if statement.word == "TLDATA" else len(numbers) > 2
+        self._diameter = numbers[0] * self.program.mm_per_unit if mill and numbers else 0.0
+        return comment_lines(statement.text)
+
+    def spindle(self, statement: Statement) -> list[str] | None:
+        """SPINDL in every order of its words."""
+        words, numbers = _words(statement), _numbers(statement)
+        for word in ("RANGE", "MAXRPM"):  # gears and limits are the control's own affair
+            if word in words:
+                following = _after(statement, word)
+                words = [other for other in words if other not in (word, "HIGH", "LOW", "MEDIUM")]
+                for number in following:
+                    numbers.remove(number)
+        if not set(words) <= {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}:
+            return None
+        if "LOCK" in words or "ORIENT" in words:
+            return None if numbers else list(self.words.spindle_orient) or None
+        if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
+            return list(self.words.spindle_off)
+        if len(numbers) > 1 or any(number < 0.0 for number in numbers):
+            return None
+        cutting = next((unit for unit in ("SFM", "SMM") if unit in words), None)
+        speed = numbers[0] if numbers else None
+        if cutting is not None and speed is not None:
+            speed = revolutions(speed, cutting, self._diameter)
+            if speed is None:
+                return None
+            speed = float(round(speed))
+            text = f"SPINDL in {cutting} is written as revolutions at the cutter's diameter"
+            self.notes.add("CS322", "note", statement.line, text)
+        if "CLW" in words or "CCLW" in words:
+            self._direction = "counterclockwise" if "CCLW" in words else "clockwise"
+        direction = self.words.spindle_on[self._direction]
+        if speed is None:
+            return [direction]
+        self._speed = speed
+        digits = format_number(speed, 3, trim=True).rstrip(".")
+        return [block.format(speed=digits, direction=direction) for block in self.words.spindle_speed]
+
+    def coolant(self, statement: Statement) -> list[str] | None:
+        """COOLNT/ON, OFF, FLOOD, MIST and what else the control has; a bare COOLNT means ON."""
+        words = _words(statement)
+        if not words and "/" not in statement.text:
+            words = ["ON"]
+        kinds = [word for word in words if word not in ("ON", "OFF")] or words[:1]
+        if _numbers(statement) or len(kinds) != 1:
+            return None
+        if "OFF" in words or kinds == ["NOMORE"]:
+            return list(self.words.coolant["OFF"])
+        blocks = self.words.coolant.get(kinds[0])
+        return None if blocks is None else list(blocks)
+
+    def delay(self, statement: Statement) -> list[str] | None:
+        """DELAY/seconds and DELAY/n,REV."""
+        numbers, words = _numbers(statement), _words(statement)
+        if len(numbers) != 1 or words not in ([], ["REV"]):
+            return None
+        time = milliseconds(numbers[0], "REV" in words, self._speed)
+        if time is None:
+            return None
+        return self.dwell(time)
+
+    def dwell(self, time: int) -> list[str]:
+        """Blocks that wait for so many milliseconds."""
+        seconds = format_number(time / 1000.0, 3, trim=True)
+        return [block.format(milliseconds=time, seconds=seconds) for block in self.words.dwell] if time else []
+
+    def compensation(self, statement: Statement) -> list[str] | None:
+        """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF."""
+        words, numbers = _words(statement), _numbers(statement)
+        if words[:1] in (["OFF"], ["NOMORE"]):
+            return list(self.words.compensation_off)
+        planes = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
+        side = {"LEFT": self.words.compensation_left, "RIGHT": self.words.compensation_right}.get((words or [""])[0])
+        register = _whole(numbers or [float(self._offset)])
+        if side is None or len(words) > 2 or not set(words[1:]) <= planes.keys() or register is None:
+            return None
+        self.notes.add(
+            "CS319",
+            "warning",
+            statement.line,
+            "cutter compensation is left to the control, which offsets the path in the plane and not along the tool; "
+            "see that it may be used with tool tip control, and that the register holds what the CAM system meant",
+        )
+        blocks = []
+        plane = planes[words[1]] if len(words) > 1 else 17
+        if plane != self.plane:
+            self.plane = plane
+            blocks.append(self.words.plane[plane])
+        return [*blocks, *(block.format(register=register) for block in side)]
+
+    def hole_cycle(self, statement: Statement) -> list[str]:
+        """CYCLE: kept for the holes that follow."""
+        words = _words(statement)
+        if words[:1] in (["OFF"], ["NOMORE"]):
+            self.cycle = None
+            return []
+        if words == ["ON"]:
+            self.cycle = self._last_cycle
+        elif words != ["INIT"]:  # SolidWorks announces a cycle by it
+            self.cycle = self._last_cycle = read_cycle(statement.args, self.program, self._speed)
+        if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
+            text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
+            self.notes.add("CS321", "warning", statement.line, text)
+        return comment_lines(statement.text)
+
+    def end(self, statement: Statement) -> list[str]:
+        """END: the end of the text; in the middle of the path a stop."""
+        if not (self.program.kind[statement.pose :] != Move.FROM).any():
+            return []
+        text = "END stands before the last motion; written as a program stop"
+        self.notes.add("CS318", "warning", statement.line, text)
+        return [*comment_lines(statement.text), *self.words.stop]
+
+    def insert(self, statement: Statement) -> list[str]:
+        """INSERT: text for the NC file; as a comment, since nobody has looked at what it does."""
+        text = _spoken(statement)
+        if _NC_WORDS.fullmatch(text):
+            what = "INSERT with NC words is written as a comment; where the machine needs them, put them in by hand"
+            self.notes.add("CS320", "warning", statement.line, what)
+        return comment_lines(text)
+
+    def auxiliary(self, statement: Statement) -> list[str] | None:
+        """AUXFUN/n: M code n, unless it ends the program or calls another."""
+        number = _whole(_numbers(statement))
+        if number is None or _words(statement) or number in (2, 6, 30, 98, 99):
+            return None
+        return [f"M{number}"]
+
+    def paint(self, statement: Statement) -> list[str]:
+        """PAINT: colours and speeds of the CAM system's screen."""
+        text = "PAINT is left out: it only says what the CAM screen shows"
+        self.notes.add("CS317", "note", statement.line, text)
+        return []
+
+    def mode(self, statement: Statement) -> list[str] | None:
+        """SET/MODE,ABSOL: positions are absolute, as ours always are."""
+        return comment_lines(statement.text) if _words(statement) == ["MODE", "ABSOL"] else None
+
+    def start(self, statement: Statement) -> list[str]:
+        """FROM: a position that is stated; the tool is not sent there."""
+        decimals = {"mm": 4, "inch": 5}[self.program.units]
+        numbers = (format_number(value, decimals, trim=True) for value in _numbers(statement))
+        place = " ".join(letter + number for letter, number in zip("XYZ", numbers, strict=True))
+        return comment_lines(f"FROM {place}")
 
 
 def _numbers(statement: Statement) -> list[float]:
@@ -86,63 +295,48 @@ def _words(statement: Statement) -> list[str]:
     return [value for value in statement.args if isinstance(value, str) and value]
 
 
-def _tool(writer: StatementWriter, statement: Statement) -> list[str] | None:
-    words = _words(statement)
-    if statement.word == "LOAD" and words[:1] != ["TOOL"]:
+def _after(statement: Statement, word: str) -> list[float]:
+    """Return the number that stands behind a word, if any."""
+    args = statement.args
+    place = args.index(word) + 1 if word in args else len(args)
+    return [value for value in args[place : place + 1] if isinstance(value, float)]
+
+
+def _whole(numbers: list[float]) -> int | None:
+    """Return the only number, where it is a whole one that is not negative."""
+    if len(numbers) != 1 or not 0.0 <= numbers[0] < 1e9 or numbers[0] != int(numbers[0]):
         return None
-    numbers = _numbers(statement)
-    if not numbers or numbers[0] != int(numbers[0]) or numbers[0] < 0:
-        return None
-    number = int(numbers[0])
-    if number == writer.tool:  # CATIA loads a tool twice: at the change and in the operation
-        return comment_lines(statement.text)
-    blocks = [*writer.end_motion(), f"T{number} M6"]
-    writer.tool = number
-    return blocks
+    return int(numbers[0])
 
 
-def _spindle(writer: StatementWriter, statement: Statement) -> list[str] | None:
-    words, numbers = _words(statement), _numbers(statement)
-    if "OFF" in words:
-        return ["M5"]
-    if any(word not in ("RPM", "CLW", "CCLW", "ON", "SFM", "SMM") for word in words) or len(numbers) > 1:
-        return None
-    if "SFM" in words or "SMM" in words:
-        return None
-    if "CLW" in words or "CCLW" in words:
-        writer.spindle = "M4" if "CCLW" in words else "M3"
-    speed = f"S{format_number(numbers[0], 3, trim=True).rstrip('.')} " if numbers else ""
-    return [speed + writer.spindle]
+def _spoken(statement: Statement) -> str:
+    """Text of a text statement without its word and quotes."""
+    text = statement.args[0] if statement.args and isinstance(statement.args[0], str) else statement.text
+    text = text.strip()
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] == "'" else text
 
 
-def _coolant(writer: StatementWriter, statement: Statement) -> list[str] | None:
-    words = _words(statement) or ["ON"]
-    code = _COOLANT.get(words[0])
-    return [code] if code else None
+Handler = Callable[[StatementWriter, Statement], list[str] | None]
 
-
-def _delay(writer: StatementWriter, statement: Statement) -> list[str] | None:
-    numbers = _numbers(statement)
-    if len(numbers) != 1 or numbers[0] < 0 or _words(statement):
-        return None
-    return [f"G4 P{format_number(1000.0 * numbers[0], 0).rstrip('.')}"]
-
-
-def _compensation(writer: StatementWriter, statement: Statement) -> list[str] | None:
-    code = _COMPENSATION.get((_words(statement) or [""])[0])
-    if code is None:
-        return None
-    return [code if code == "G40" else f"{code} D{writer.tool or 1}"]
-
-
-_HANDLERS: dict[str, Callable[[StatementWriter, Statement], list[str] | None]] = {
-    "LOADTL": _tool,
-    "LOAD": _tool,
-    "TURRET": _tool,
-    "SPINDL": _spindle,
-    "COOLNT": _coolant,
-    "DELAY": _delay,
-    "CUTCOM": _compensation,
-    "STOP": lambda writer, statement: ["M0"],
-    "OPSTOP": lambda writer, statement: ["M1"],
+_HANDLERS: dict[str, Handler] = {
+    "LOADTL": StatementWriter.load,
+    "LOAD": StatementWriter.load,
+    "TURRET": StatementWriter.load,
+    "TOOLNO": StatementWriter.toolno,
+    "SELECT": StatementWriter.select,
+    "CUTTER": StatementWriter.cutter,
+    "TLDATA": StatementWriter.cutter,
+    "SPINDL": StatementWriter.spindle,
+    "COOLNT": StatementWriter.coolant,
+    "DELAY": StatementWriter.delay,
+    "CUTCOM": StatementWriter.compensation,
+    "CYCLE": StatementWriter.hole_cycle,
+    "STOP": lambda writer, statement: list(writer.words.stop),
+    "OPSTOP": lambda writer, statement: list(writer.words.optional_stop),
+    "END": StatementWriter.end,
+    "INSERT": StatementWriter.insert,
+    "AUXFUN": StatementWriter.auxiliary,
+    "PAINT": StatementWriter.paint,
+    "SET": StatementWriter.mode,
+    "FROM": StatementWriter.start,
 }

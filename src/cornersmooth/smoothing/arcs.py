@@ -1,4 +1,9 @@
-"""Arcs and helices as points."""
+"""Arcs and helices as points: all arcs of a program at once.
+
+Between its start and end an arc turns evenly about its axis. What rounding in the file leaves between the turned start
+and the end is spread evenly over the arc, and so are the height of a helix and a change of the tool axis: tip and axis
+are functions of one share, from 0 at the start to 1 at the end.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +11,96 @@ import math
 
 import numpy as np
 
-from cornersmooth.model import Arcs, Floats, Program
+from cornersmooth.model import Floats, Ints, Program
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.neighbours import norm
+
+#: share of the tolerance that a chord may take where `Settings.chord` would allow more: the rest is for arithmetic
+_MOST_OF_TOLERANCE = 0.9
+
+#: largest turn about the arc's axis in one chord, rad: coarser chords of small arcs would not look like an arc
+_LARGEST_STEP = math.pi / 2.0
 
 
-def arc_points(program: Program, index: int, chord: float) -> Floats:
-    """End points of the lines that stand for one arc or helix, within `chord` of it: (m, 3) mm."""
-    arcs: Arcs = program.arcs
-    pose = int(arcs.pose[index])
-    start, end, normal = program.tip[pose - 1], program.tip[pose], arcs.normal[index]
-    radius_vector = start - arcs.centre[index]
-    radius_vector = radius_vector - (radius_vector @ normal) * normal
-    radius = float(np.linalg.norm(radius_vector))
-    sweep = float(arcs.sweep[index])
-    step = 2.0 * math.acos(max(-1.0, 1.0 - min(chord / radius, 1.0))) if radius > 0.0 else math.pi
-    number = max(1, math.ceil(sweep / min(step, math.pi / 2.0) - 1e-9))
-    share = np.arange(1, number + 1) / number
-    angle = sweep * share[:, None]
-    side = np.cross(normal, radius_vector)
-    turned = radius_vector * np.cos(angle) + side * np.sin(angle)
-    # what rounding in the file leaves between the turned start and the end is spread over the arc, with the helix
-    closing = (end - start) - (turned[-1] - radius_vector)
-    points: Floats = start + (turned - radius_vector) + share[:, None] * closing
-    points[-1] = end
-    return points
+def arc_radii(program: Program) -> Floats:
+    """(k,) mean of the distances of start and end from the axis, mm."""
+    start, end = _radius_vectors(program)
+    radii: Floats = (norm(start) + norm(end)) / 2.0
+    return radii
+
+
+def arc_lines(program: Program, settings: Settings) -> Ints:
+    """(k,) number of lines that stand for each arc within the chord tolerance, at the tip and at the axis point."""
+    chord = min(
+        settings.chord,
+        _MOST_OF_TOLERANCE * min(settings.tip_tolerance, settings.axis_point_tolerance),
+    )
+    start, end = _radius_vectors(program)
+    radius = np.maximum(norm(start), norm(end))
+    flat = radius <= chord
+    step = 2.0 * np.arccos(1.0 - np.where(flat, 1.0, chord / np.where(flat, 1.0, radius)))
+    lines = np.ceil(program.arcs.sweep / np.minimum(step, _LARGEST_STEP) - 1e-9)
+    # the axis turns about a sphere of radius H, and fastest in the middle where equal shares are not equal angles
+    pose = program.arcs.pose
+    half = np.arcsin(np.minimum(norm(program.axis[pose] - program.axis[pose - 1]) / 2.0, 1.0))
+    bend = settings.axis_length * (1.0 + 2.0 * np.tan(np.minimum(half, math.radians(80.0))))
+    turning = np.ceil(2.0 * half * np.sqrt(bend / (8.0 * chord)) - 1e-9)
+    return np.maximum(np.maximum(lines, turning), 1).astype(np.int64)
+
+
+def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Floats]:
+    """Tips and tool axes on arcs.
+
+    Parameters
+    ----------
+    program : Program
+    rows : (m,) int64
+        Rows of `Program.arcs`, one for each point.
+    share : (m,) float64
+        From 0 at the start of the arc to 1 at its end; ends are exact.
+
+    Returns
+    -------
+    tip : (m, 3) float64, mm
+    axis : (m, 3) float64
+        Unit vectors.
+    """
+    arcs = program.arcs
+    pose = arcs.pose[rows]
+    start, end, normal = program.tip[pose - 1], program.tip[pose], arcs.normal[rows]
+    radius = start - arcs.centre[rows]
+    radius -= np.einsum("ij,ij->i", radius, normal)[:, None] * normal
+    side = np.cross(normal, radius)
+
+    def swung(angle: Floats) -> Floats:
+        offset: Floats = (np.cos(angle) - 1.0)[:, None] * radius + np.sin(angle)[:, None] * side
+        return offset
+
+    sweep = arcs.sweep[rows]
+    closing = (end - start) - swung(sweep)
+    tip: Floats = start + swung(sweep * share) + share[:, None] * closing
+    first, last = program.axis[pose - 1], program.axis[pose]
+    axis = first + share[:, None] * (last - first)
+    length = norm(axis)
+    axis = np.where((length > 0.0)[:, None], axis / np.where(length > 0.0, length, 1.0)[:, None], last)
+    ends = share >= 1.0
+    tip[ends], axis[ends] = end[ends], last[ends]
+    return tip, axis
+
+
+def divided(counts: Ints) -> tuple[Ints, Floats]:
+    """Rows and shares of the ends of the parts when arc r is divided into ``counts[r]`` equal parts."""
+    rows = np.repeat(np.arange(len(counts)), counts)
+    first = np.cumsum(counts) - counts
+    share: Floats = (np.arange(len(rows)) - first[rows] + 1) / counts[rows]
+    return rows, share
+
+
+def _radius_vectors(program: Program) -> tuple[Floats, Floats]:
+    """Vectors from the axis of each arc to its start and to its end, (k, 3) mm."""
+    arcs = program.arcs
+    vectors = []
+    for point in (program.tip[arcs.pose - 1], program.tip[arcs.pose]):
+        offset = point - arcs.centre
+        vectors.append(offset - np.einsum("ij,ij->i", offset, arcs.normal)[:, None] * arcs.normal)
+    return vectors[0], vectors[1]

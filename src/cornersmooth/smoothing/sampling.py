@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.arcs import arc_points
+from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
 from cornersmooth.smoothing.layout import Layout, lay_out, lines_per_half
 from cornersmooth.smoothing.neighbours import norm
 from cornersmooth.smoothing.synchronise import angle_between, matching_parameters
@@ -31,7 +31,7 @@ class Rows:
     other : (r, 3) float64
         Unit axis vector in dense rows; axis point (mm) or control point of the axis-point curve in curve rows.
     move : (r,) int64
-        Pose whose move the row belongs to: after the middle of a transition it is the next pose. Never decreasing.
+        Pose whose move the row belongs to; lines after the middle of a transition are of the next. Never decreasing.
         Feed, kind and the place of statements follow from it.
     curve : (r,) int8
         0 for the end of a line; 1 to 5 for a control point of a transition.
@@ -39,6 +39,9 @@ class Rows:
         First control points that are the end of the row before, with no line between.
     weights : (r, 2) float64 or None
         w1 and w2 of the transition the row belongs to, in curve rows.
+    arc : (r,) int64 or None
+        Row of `Program.arcs` where the tool gets here on a circle or helix about that arc's axis, -1 where it gets here
+        straight; None where the program has no such rows.
     """
 
     tip: Floats
@@ -47,6 +50,7 @@ class Rows:
     curve: NDArray[np.int8]
     joined: Bools
     weights: Floats | None = None
+    arc: Ints | None = None
 
 
 @dataclass(frozen=True)
@@ -61,8 +65,13 @@ class _Block:
     move: Ints
 
 
-def dense_rows(smoothed: SmoothProgram, poses: int = 16384) -> Iterator[Rows]:
+def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines with tool vectors, in blocks of about `poses` poses.
+
+    Parameters
+    ----------
+    circles : (k,) int64, optional
+        Number of circular pieces that each arc of the program is written as, 0 for lines; all lines by default.
 
     Yields
     ------
@@ -75,14 +84,15 @@ def dense_rows(smoothed: SmoothProgram, poses: int = 16384) -> Iterator[Rows]:
     counts = np.where(layout.skip, 0, layout.pieces)
     rounded = corners.pose[corners.smoothed]
     counts[rounded] = np.where(layout.line[rounded], layout.pieces[rounded], 0) + 2 * np.abs(halves[corners.smoothed])
-    for block in _blocks(smoothed, layout, counts, poses):
+    pieces = _pieces(smoothed, circles)
+    for block in _blocks(smoothed, counts, pieces, poses):
         sharp = (layout.row[block.poses] < 0) & (block.last > block.first)
         at = block.last[sharp] - 1
         block.tip[at], block.other[at] = program.tip[block.poses[sharp]], program.axis[block.poses[sharp]]
         _fill_divided(smoothed, layout, block)
         _fill_transitions(smoothed, layout, block, halves)
-        _fill_arcs(smoothed, block, program.axis)
-        yield Rows(block.tip, block.other, block.move, *_no_curves(len(block.tip)))
+        arc = _fill_arcs(smoothed, block, pieces, circles)
+        yield Rows(block.tip, block.other, block.move, *_no_curves(len(block.tip)), arc=arc)
 
 
 def curve_rows(smoothed: SmoothProgram, poses: int = 16384) -> Iterator[Rows]:
@@ -96,13 +106,14 @@ def curve_rows(smoothed: SmoothProgram, poses: int = 16384) -> Iterator[Rows]:
     program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
     layout = lay_out(smoothed, dense=False)
     counts = np.where(layout.skip, 0, np.where(layout.row >= 0, 5 + layout.line, 1))
-    for block in _blocks(smoothed, layout, counts, poses):
+    pieces = _pieces(smoothed)
+    for block in _blocks(smoothed, counts, pieces, poses):
         row = layout.row[block.poses]
         sharp = (row < 0) & (block.last > block.first)
         pose, at = block.poses[sharp], block.last[sharp] - 1
         block.tip[at] = program.tip[pose]
         block.other[at] = program.tip[pose] + height * program.axis[pose]
-        _fill_arcs(smoothed, block, program.axis, height)
+        _fill_arcs(smoothed, block, pieces, height=height)
 
         curve, joined = _no_curves(len(block.tip))
         weights = np.ones((len(block.tip), 2))
@@ -116,7 +127,6 @@ def curve_rows(smoothed: SmoothProgram, poses: int = 16384) -> Iterator[Rows]:
             line = layout.line[pose]
             joined[first] = ~line
             block.tip[first[line] - 1], block.other[first[line] - 1] = tip_curve[line, 0], axis_curve[line, 0]
-            block.move[places[:, 4]] = layout.following[pose]
         yield Rows(block.tip, block.other, block.move, curve, joined, weights)
 
 
@@ -124,11 +134,18 @@ def _no_curves(count: int) -> tuple[NDArray[np.int8], Bools]:
     return np.zeros(count, np.int8), np.zeros(count, np.bool_)
 
 
-def _blocks(smoothed: SmoothProgram, layout: Layout, counts: Ints, poses: int) -> Iterator[_Block]:
-    """Blocks of empty rows, `counts` of them for each pose."""
+def _pieces(smoothed: SmoothProgram, circles: Ints | None = None) -> Ints:
+    """(k,) number of rows of each arc."""
+    if not len(smoothed.program.arcs):
+        return np.zeros(0, np.int64)
+    lines = arc_lines(smoothed.program, smoothed.settings)
+    return lines if circles is None else np.where(circles > 0, circles, lines)
+
+
+def _blocks(smoothed: SmoothProgram, counts: Ints, pieces: Ints, poses: int) -> Iterator[_Block]:
+    """Blocks of empty rows, `counts` of them for each pose, `pieces` for each arc."""
     program = smoothed.program
-    if len(program.arcs):
-        counts[program.arcs.pose] = [len(_chords(smoothed, index)) for index in range(len(program.arcs))]
+    counts[program.arcs.pose] = pieces
     for begin in range(0, len(program), poses):
         own = np.arange(begin, min(begin + poses, len(program)))
         last = np.cumsum(counts[own])
@@ -138,20 +155,25 @@ def _blocks(smoothed: SmoothProgram, layout: Layout, counts: Ints, poses: int) -
         )
 
 
-def _chords(smoothed: SmoothProgram, index: int) -> Floats:
-    return arc_points(smoothed.program, index, smoothed.settings.chord)
-
-
-def _fill_arcs(smoothed: SmoothProgram, block: _Block, axis: Floats, height: float | None = None) -> None:
-    """Chords of the arcs in the block, with the constant axis or its axis points."""
+def _fill_arcs(
+    smoothed: SmoothProgram, block: _Block, pieces: Ints, circles: Ints | None = None, height: float | None = None
+) -> Ints | None:
+    """Points of the arcs in the block with their axes or axis points; returns `Rows.arc`."""
     arcs = smoothed.program.arcs.pose
     inside = np.flatnonzero((arcs >= block.poses[0]) & (arcs <= block.poses[-1]))
-    for index in inside.tolist():
-        pose = int(arcs[index]) - int(block.poses[0])
-        where = slice(int(block.first[pose]), int(block.last[pose]))
-        points = _chords(smoothed, index)
-        block.tip[where] = points
-        block.other[where] = axis[arcs[index]] if height is None else points + height * axis[arcs[index]]
+    if not len(inside):
+        return None
+    local, share = divided(pieces[inside])
+    rows = inside[local]
+    where = np.flatnonzero(np.isin(block.move, arcs[inside]))
+    tip, axis = arc_points(smoothed.program, rows, share)
+    block.tip[where] = tip
+    block.other[where] = axis if height is None else tip + height * axis
+    if circles is None:
+        return None
+    arc = np.full(len(block.tip), -1, np.int64)
+    arc[where] = np.where(circles[rows] > 0, rows, -1)
+    return arc
 
 
 def _nodes(lines: int) -> Floats:

@@ -1,0 +1,130 @@
+"""Which arcs are written as G2 and G3, and how.
+
+A circular block gives its end point and its radius; the control makes of them, and of the point it stands at, a circle
+in the plane that is selected. So an arc is written that way where its axis is a coordinate axis and the tool axis
+stays, and where the circle through the rounded numbers is within the tolerance of the arc; else it becomes lines.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Program
+from cornersmooth.nc.control import Form
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.arcs import arc_points, arc_radii, divided
+from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.text import to_ticks
+
+#: largest turn of one circular block: in R form a control cannot tell which way to go near 180 degrees
+_LARGEST_SWEEP = math.radians(120.0)
+
+#: mm; a radius beyond is a straight line to most controls, or too long a number
+_LARGEST_RADIUS = 1e5
+
+#: shortest chord of a circular block in steps of the last digit: rounding turns the direction of a shorter one too far
+_SHORTEST_CHORD = 20
+
+#: how far an arc's axis may lean from a coordinate axis; the deviation is measured besides
+_UPRIGHT = 1e-6
+
+#: shares of a block at which its deviation is measured
+_PROBES = np.linspace(0.0, 1.0, 9)
+
+#: axes of the planes G17, G18 and G19 in the order in which a right-handed turn about the third goes round:
+#: X to Y about Z, Z to X about Y, Y to Z about X
+PLANES = np.array([[0, 1, 2], [2, 0, 1], [1, 2, 0]])
+FIRST_PLANE = 17
+
+
+@dataclass(frozen=True)
+class Circles:
+    """How the arcs of a program are written, k rows.
+
+    Parameters
+    ----------
+    pieces : (k,) int64
+        Circular blocks of each arc; 0 where it becomes lines.
+    plane : (k,) int64
+        17, 18 or 19.
+    clockwise : (k,) bool
+        G2 rather than G3, seen from the positive end of the axis that stands on the plane.
+    radius : (k,) int64
+        In steps of the last written digit.
+    """
+
+    pieces: Ints
+    plane: Ints
+    clockwise: Bools
+    radius: Ints
+
+
+def plan_circles(program: Program, settings: Settings, form: Form) -> Circles:
+    """Choose the arcs that a form can write as circles.
+
+    Parameters
+    ----------
+    settings : Settings
+        The circle through the written numbers keeps its tolerance, at the tip and at the axis point.
+    """
+    arcs = program.arcs
+    plane = np.array([2, 1, 0])[np.argmax(np.abs(arcs.normal), axis=1)] if len(arcs) else np.zeros(0, np.int64)
+    third = PLANES[plane, 2]
+    height = np.take_along_axis(arcs.normal, third[:, None], axis=1)[:, 0]
+    radius = arc_radii(program)
+    unit = program.mm_per_unit
+    decimals = form.tip_decimals[program.units]
+    ticks = to_ticks(np.minimum(radius, _LARGEST_RADIUS) / unit, decimals)
+    vectors = to_ticks(program.axis, form.vector_decimals)
+    fits = (
+        form.circles
+        & (np.abs(height) > 1.0 - _UPRIGHT)
+        & (radius < _LARGEST_RADIUS)
+        & (ticks > 0)
+        & (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1)
+    )
+    pieces = np.where(fits, np.ceil(arcs.sweep / _LARGEST_SWEEP - 1e-9), 0.0).astype(np.int64)
+    if fits.any():
+        step = float(unit * 10.0**-decimals)
+        tolerance = min(settings.tip_tolerance, settings.axis_point_tolerance)
+        written: Floats = ticks.astype(np.float64) * step
+        deviation = _deviation(program, pieces, PLANES[plane], height > 0.0, written, step)
+        pieces[deviation > tolerance] = 0
+    return Circles(pieces, plane + FIRST_PLANE, height < 0.0, ticks)
+
+
+def _deviation(
+    program: Program, pieces: Ints, planes: Ints, counterclockwise: Bools, radius: Floats, step: float
+) -> Floats:
+    """(k,) mm from the written circles to the arcs at equal shares; infinite for a block that is too short."""
+    rows, share = divided(pieces)
+    before = share - 1.0 / pieces[rows]
+    start, end = (step * np.rint(arc_points(program, rows, at)[0] / step) for at in (before, share))
+    first, second, third = planes[rows].T
+    own = np.arange(len(rows))
+    chord = np.stack([end[own, axis] - start[own, axis] for axis in (first, second, third)], axis=1)
+    length = np.hypot(chord[:, 0], chord[:, 1])
+    size, left = radius[rows], np.where(counterclockwise[rows], 1.0, -1.0)
+    proper = (length >= _SHORTEST_CHORD * step) & (length < 2.0 * size)
+    safe = np.where(proper, length, 1.0)
+    across = np.stack((-chord[:, 1], chord[:, 0]), axis=1) / safe[:, None]
+    rise = np.sqrt(np.maximum(size**2 - length**2 / 4.0, 0.0))
+    to_centre = chord[:, :2] / 2.0 + (left * rise)[:, None] * across
+    turn = 2.0 * left * np.arcsin(np.minimum(length / 2.0 / size, 1.0))
+    worst = np.zeros(len(rows))
+    for probe in _PROBES:
+        cosine, sine = np.cos(turn * probe), np.sin(turn * probe)
+        x, y = -to_centre.T
+        point = start.copy()
+        point[own, first] += to_centre[:, 0] + cosine * x - sine * y
+        point[own, second] += to_centre[:, 1] + sine * x + cosine * y
+        point[own, third] += probe * chord[:, 2]
+        arc, _ = arc_points(program, rows, before + probe * (share - before))
+        worst = np.maximum(worst, norm(point - arc))
+    worst[~proper] = np.inf
+    deviation = np.zeros(len(pieces))
+    np.maximum.at(deviation, rows, worst)
+    return deviation

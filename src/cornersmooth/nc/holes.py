@@ -1,0 +1,256 @@
+"""Hole cycles as plain moves: rapid over the hole, rapid to the clearance, feed to the depth, out again.
+
+Plain moves run under tool tip control with any tool axis, where canned cycles are refused. All distances count along
+the tool axis from the position that the CL file gives, the top of the hole:
+
+* ``RAPTO`` (or ``CLEAR``) above it the feed begins; ``RTRCTO`` or ``RETURN`` above it the tool goes when it is done;
+* ``FEDTO`` or ``DEPTH`` below it the hole ends. NX writes ``FEDTO`` negative (``FEDTO,-33.0043``), everyone else
+  positive; a positive number in an NX file would lie in the air and is not understood.
+
+The tool travels between holes at the greatest of these heights and of the height from which the first hole was
+approached. ``DEEP`` retracts to the clearance after every ``STEP``, ``INCR`` or ``1STPECK``/``SUBPECK``, ``BRKCHP`` by
+`PECK_GAP` only. ``REAM`` and ``BORE`` come out at feed. HSM's ``CLEAR`` is an absolute height and is passed over for
+its ``RAPTO`` and ``RETURN``.
+
+Not understood, and so never drilled by guess: taps and threads, bores that orient or stop the spindle, countersinks by
+diameter, numbers without a word that says what they are (CATIA's ``CYCLE/DRILL, 3.0, 5.0`` depends on the PP table).
+Such holes are approached at the height from which the cycle was entered, and no further.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
+from cornersmooth.nc.revolutions import milliseconds
+
+#: mm left above the last depth before feeding goes on, and moved up to break a chip
+PECK_GAP = 0.5
+
+#: more pecks in one hole are a misunderstanding
+_MOST_PECKS = 1000
+
+#: axes whose directions differ by less, in the cosine, are the same for the height of travel
+_SAME_AXIS = 1e-9
+
+_KINDS = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP"}
+_PECKING = {"DEEP", "DEEP2", "BRKCHP"}
+_AT_FEED = {"REAM", "BORE"}
+_DEPTHS = ("FEDTO", "DEPTH")
+_RETURNS = ("RTRCTO", "RETURN")
+_STEPS = ("STEP", "INCR", "1STPECK", "SUBPECK")
+_DISTANCES = {*_DEPTHS, *_RETURNS, *_STEPS, "RAPTO", "CLEAR"}
+_FEEDS = {
+    "MMPM": (1.0, FeedMode.PER_MINUTE),
+    "IPM": (25.4, FeedMode.PER_MINUTE),
+    "MMPR": (1.0, FeedMode.PER_REVOLUTION),
+    "IPR": (25.4, FeedMode.PER_REVOLUTION),
+}
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """What a CYCLE statement asks for; lengths in mm along the tool axis.
+
+    Parameters
+    ----------
+    depth : float
+        Below the position.
+    clearance : float or None
+        Above the position: where feeding begins; None for the height of travel.
+    retract : float
+        Above the position: least height when the hole is done.
+    feed : float
+        mm/min or mm/rev; NaN for the feed in force.
+    feed_mode : FeedMode
+    dwell : int
+        Milliseconds at the depth.
+    steps : tuple of float
+        Depths of the pecks, the last one repeated; none for a single feed.
+    full_retract : bool
+        Whether a peck comes out of the hole.
+    feed_out : bool
+    pecking : bool
+        Whether `steps` are to be taken; without any the hole is drilled in one feed.
+    """
+
+    depth: float
+    clearance: float | None
+    retract: float = 0.0
+    feed: float = math.nan
+    feed_mode: FeedMode = FeedMode.PER_MINUTE
+    dwell: int = 0
+    steps: tuple[float, ...] = ()
+    full_retract: bool = True
+    feed_out: bool = False
+    pecking: bool = False
+
+
+def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | None) -> Cycle | None:
+    """Read the arguments of a CYCLE statement; None where any of them is not understood.
+
+    Parameters
+    ----------
+    speed : float or None
+        Revolutions per minute, for a dwell in revolutions.
+    """
+    given = _pairs(args)
+    if given is None:
+        return None
+    kinds, values = given
+    scale = program.mm_per_unit
+    depths = [values[word][0] for word in _DEPTHS if word in values]
+    if not kinds or len(depths) != 1:
+        return None
+    depth = depths[0]
+    depth = -depth if program.source.dialect == "nx" else abs(depth)
+    returns = [values[word][0] for word in _RETURNS if word in values]
+    hsm = program.source.dialect == "hsm"
+    clearances = [values["RAPTO"][0]] if "RAPTO" in values else []
+    clearances += returns if hsm else values.get("CLEAR", ())[:1] or returns
+    if depth < 0.0 or any(height < 0.0 for height in (*clearances, *returns)):
+        return None
+    first, rest = values.get("1STPECK", ()), values.get("SUBPECK", ())
+    steps = tuple(scale * step for step in (*values.get("STEP", ()), *values.get("INCR", ()), *first, *rest))
+    if any(step <= 0.0 for step in steps) or (steps and depth * scale / min(steps) > _MOST_PECKS):
+        return None
+    dwell = 0
+    if "DWELL" in values:
+        time = milliseconds(values["DWELL"][0], "REV" in kinds, speed)
+        if time is None:
+            return None
+        dwell = time
+    elif "REV" in kinds:
+        return None
+    cycle = Cycle(
+        depth=depth * scale,
+        clearance=clearances[0] * scale if clearances else None,
+        retract=max(returns, default=0.0) * scale,
+        dwell=dwell,
+        steps=steps,
+        full_retract="BRKCHP" not in kinds,
+        feed_out=bool(_AT_FEED & kinds),
+        pecking=bool(_PECKING & kinds),
+    )
+    for word, (per_unit, mode) in _FEEDS.items():
+        if word in values:
+            cycle = replace(cycle, feed=values[word][0] * per_unit, feed_mode=mode)
+    return cycle
+
+
+def _pairs(args: tuple[float | str, ...]) -> tuple[set[str], dict[str, tuple[float, ...]]] | None:
+    """Words that say what kind of cycle it is, and words with their numbers; None for anything else."""
+    kinds: set[str] = set()
+    values: dict[str, tuple[float, ...]] = {}
+    word = ""
+    for value in args:
+        if isinstance(value, float):
+            many = word == "STEP" and word in values
+            if not math.isfinite(value) or not word or (word in values and not many):
+                return None
+            values[word] = (*values.get(word, ()), value)
+        elif value == "AUTO" and word in _RETURNS and word not in values:
+            word = ""  # the control's own height: ours is the height of travel
+        elif value == "REV" and word == "DWELL":
+            kinds.add(value)
+        elif value in _KINDS:
+            kinds.add(value)
+            word = ""
+        elif value in _DISTANCES or value in _FEEDS or value == "DWELL":
+            if value in values or (word and word not in values):
+                return None
+            word = value
+        elif value:
+            return None
+    if (word and word not in values) or len(_FEEDS.keys() & values.keys()) > 1:
+        return None
+    return kinds, values
+
+
+@dataclass(frozen=True)
+class HoleMoves:
+    """Moves of a run of holes, m of them: end points, whether rapid, the hole each belongs to, dwells after them."""
+
+    tip: Floats
+    rapid: Bools
+    hole: Ints
+    dwell: Bools
+
+
+def approaches(program: Program) -> Ints:
+    """(n,) pose from which the run of holes is approached that each pose belongs to, -1 for none."""
+    return np.maximum.accumulate(np.where(program.kind == Move.HOLE, -1, np.arange(len(program))))
+
+
+def hole_moves(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> HoleMoves:
+    """Plain moves for holes at the given poses, all of one cycle.
+
+    Parameters
+    ----------
+    approach : (h,) int64
+        What `approaches` says of the poses.
+
+    Returns
+    -------
+    HoleMoves
+        `hole` counts from 0 in the order of `poses`.
+    """
+    travel = np.maximum(travel_height(program, poses, approach), max(cycle.retract, cycle.clearance or 0.0))
+    clearance = travel if cycle.clearance is None else np.full(len(poses), cycle.clearance)
+    heights, rapid, dwell = [travel, clearance], [True, True], [False, False]
+
+    def go(height: Floats, *, fast: bool) -> None:
+        heights.append(height)
+        rapid.append(fast)
+        dwell.append(False)
+
+    done = 0.0
+    for depth in _peck_depths(cycle):
+        if done > 0.0:
+            if cycle.full_retract:
+                go(clearance, fast=True)
+                go(np.minimum(clearance, PECK_GAP - done), fast=True)
+            else:
+                go(np.minimum(clearance, PECK_GAP - done), fast=True)
+        go(np.full(len(poses), -depth), fast=False)
+        done = depth
+    dwell[-1] = cycle.dwell > 0
+    if cycle.feed_out:
+        go(clearance, fast=False)
+    go(travel, fast=True)
+    height = np.stack(heights, axis=1)
+    tip = program.tip[poses][:, None, :] + height[..., None] * program.axis[poses][:, None, :]
+    count = len(poses)
+    return HoleMoves(
+        tip=tip.reshape(-1, 3),
+        rapid=np.tile(rapid, count),
+        hole=np.repeat(np.arange(count), len(rapid)),
+        dwell=np.tile(dwell, count),
+    )
+
+
+def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:
+    """(h,) mm: height over each hole, along its axis, of the pose from which its run of holes is approached.
+
+    Zero where there is none, or where it has another axis or lies lower.
+    """
+    known = np.maximum(approach, 0)
+    axis = program.axis[poses]
+    same = (approach >= 0) & (np.einsum("ij,ij->i", axis, program.axis[known]) > 1.0 - _SAME_AXIS)
+    height = np.einsum("ij,ij->i", program.tip[known] - program.tip[poses], axis)
+    return np.where(same, np.maximum(height, 0.0), 0.0)
+
+
+def _peck_depths(cycle: Cycle) -> list[float]:
+    """Depths to which the tool feeds, one after another."""
+    depths = []
+    depth, steps = 0.0, list(cycle.steps) if cycle.pecking else []
+    while steps:
+        depth += steps.pop(0) if len(steps) > 1 else steps[0]
+        if depth >= cycle.depth:
+            break
+        depths.append(depth)
+    return [*depths, cycle.depth]

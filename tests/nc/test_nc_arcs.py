@@ -1,0 +1,201 @@
+"""Arcs in the text: which way, how far, how exactly; with an evaluator that knows nothing of the writer."""
+
+from __future__ import annotations
+
+import cmath
+import math
+import re
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cornersmooth.model import Program
+from nc.writing import codes, one_arc, text_of, text_of_cl
+
+Floats = NDArray[np.float64]
+
+WORD = re.compile(r"([A-Z])(-?\d+\.?\d*)")
+#: the planes of the standard: seen from the positive third axis, first and second lie like X and Y
+PLANE = {"G17": "XYZ", "G18": "ZXY", "G19": "YZX"}
+
+
+def walk(lines: list[str], samples: int = 17) -> Floats:
+    """Points of the feed motion, from circular blocks the way controls read them: the shorter arc of radius R."""
+    where, plane, points = dict.fromkeys("XYZ", 0.0), "G17", []
+    for line in lines:
+        if line in PLANE:
+            plane = line
+        if not re.match(r"G[0123] ", line):
+            continue
+        words = {letter: float(number) for letter, number in WORD.findall(line)}
+        end = {letter: words[letter] for letter in "XYZ"}
+        if line[:2] in ("G2", "G3"):
+            u, v, w = PLANE[plane]
+            a, b = complex(where[u], where[v]), complex(end[u], end[v])
+            chord, radius = abs(b - a), words["R"]
+            assert 0.0 < chord < 2.0 * radius, line
+            left = 1 if line[:2] == "G3" else -1
+            centre = (a + b) / 2 + left * 1j * (b - a) / chord * math.sqrt(radius**2 - chord**2 / 4)
+            turn = cmath.phase((b - centre) / (a - centre))
+            assert turn * left > 0.0, line
+            assert abs(turn) < math.radians(125), line
+            for share in np.linspace(0, 1, samples)[1:]:
+                point = centre + (a - centre) * cmath.exp(1j * turn * share)
+                here = {u: point.real, v: point.imag, w: where[w] + share * (end[w] - where[w])}
+                points.append([here[letter] for letter in "XYZ"])
+        else:
+            points.append([end[letter] for letter in "XYZ"])
+        where = end
+    return np.array(points)
+
+
+def turned(axis: Floats, vector: Floats, angle: float) -> Floats:
+    return (
+        math.cos(angle) * vector
+        + math.sin(angle) * np.cross(axis, vector)
+        + (1 - math.cos(angle)) * (axis @ vector) * axis
+    )
+
+
+def arc_about(number: int, seed: int) -> tuple[Program, Callable[[float], Floats]]:
+    """A random arc about a coordinate axis, and its point at a share."""
+    rng = np.random.default_rng(seed)
+    normal = np.eye(3)[number] * rng.choice([-1.0, 1.0])
+    radius, sweep = 10 ** rng.uniform(-0.5, 2.5), math.radians(rng.uniform(2, 719))
+    height = rng.choice([0.0, 0.3, -2.0]) * radius
+    centre = rng.uniform(-100, 100, 3)
+    arm = turned(normal, np.roll(np.eye(3)[number], 1) * radius, rng.uniform(0, 6))
+
+    def at(share: float) -> Floats:
+        return centre + turned(normal, arm, sweep * share) + height * share * normal
+
+    return one_arc(at(0), at(1), centre, normal, sweep, axis=rng.normal(size=3)), at
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+@pytest.mark.parametrize("tolerance", [0.01, 0.0005])
+def test_circles_keep_the_tolerance(number: int, tolerance: float) -> None:
+    """At equal shares of the way, so both ways and in order."""
+    for seed in range(40):
+        program, at = arc_about(number, seed)
+        lines, written = text_of(program, tolerance=tolerance, axis_length=50.0)
+        assert codes(written) == {"CS313": 1}
+        path = walk(lines)[1:]
+        for index, point in enumerate(path, 1):
+            assert np.linalg.norm(point - at(index / len(path))) <= tolerance, (number, seed)
+        np.testing.assert_allclose(path[-1], program.tip[1], atol=0.51e-4)
+
+
+def nearest(point: Floats, path: Floats) -> float:
+    """Distance from a point to a polyline."""
+    start, step = path[:-1], np.diff(path, axis=0)
+    size = np.einsum("ij,ij->i", step, step)
+    share = np.clip(np.einsum("ij,ij->i", point - start, step) / np.where(size > 0, size, 1), 0, 1)
+    return float(np.linalg.norm(start + share[:, None] * step - point, axis=1).min())
+
+
+@pytest.mark.parametrize(
+    ("normal", "start", "end", "expected"),
+    [
+        ((0, 0, 1), (10, 0, 0), (0, 10, 0), "G3 X0.0000 Y10.0000 Z0.0000 R10.0000 F300."),
+        ((0, 0, -1), (0, 10, 0), (10, 0, 0), "G2 X10.0000 Y0.0000 Z0.0000 R10.0000 F300."),
+        # about +Y a right-handed turn goes from Z to X: in G18, seen from +Y, Z lies like X does in G17
+        ((0, 1, 0), (0, 0, 10), (10, 0, 0), "G3 X10.0000 Y0.0000 Z0.0000 R10.0000 F300."),
+        ((0, -1, 0), (10, 0, 0), (0, 0, 10), "G2 X0.0000 Y0.0000 Z10.0000 R10.0000 F300."),
+        ((1, 0, 0), (0, 10, 0), (0, 0, 10), "G3 X0.0000 Y0.0000 Z10.0000 R10.0000 F300."),
+        ((-1, 0, 0), (0, 0, 10), (0, 10, 0), "G2 X0.0000 Y10.0000 Z0.0000 R10.0000 F300."),
+    ],
+)
+def test_direction_is_seen_from_the_positive_third_axis(
+    normal: tuple[int, ...], start: tuple[int, ...], end: tuple[int, ...], expected: str
+) -> None:
+    lines, _ = text_of(one_arc(start, end, (0, 0, 0), normal, math.pi / 2))
+    arc = next(index for index, line in enumerate(lines) if line[:2] in ("G2", "G3") and " X" in line)
+    assert lines[arc] == expected
+    plane = {0: "G19", 1: "G18", 2: None}[int(np.argmax(np.abs(normal)))]
+    assert (lines[arc - 1] if lines[arc - 1] in PLANE else None) == plane
+
+
+def test_full_circle_and_turns_are_divided() -> None:
+    """R form cannot hold a half turn or more."""
+    for turns, blocks in ((1, 3), (2.25, 7)):
+        end = turned(np.array([0.0, 0, 1]), np.array([10.0, 0, 0]), 2 * math.pi * turns)
+        lines, _ = text_of(one_arc((10, 0, 0), (end[0], end[1], 3.0), (0, 0, 0), (0, 0, 1), 2 * math.pi * turns))
+        assert sum(line.startswith("G3 ") for line in lines) == blocks
+
+
+@pytest.mark.parametrize(
+    ("why", "program"),
+    [
+        ("tilted plane", one_arc((10, 0, 0), (0, 10, 0), (0, 0, 0), (0.0, 0.1, 0.995), math.pi / 2)),
+        ("too small", one_arc((1e-3, 0, 0), (0, 1e-3, 0), (0, 0, 0), (0, 0, 1), math.pi / 2)),
+        ("huge", one_arc((2e5, 0, 0), (2e5, 1, 0), (0, 0, 0), (0, 0, 1), 5e-6)),
+        ("radii differ", one_arc((10, 0, 0), (0, 10.05, 0), (0, 0, 0), (0, 0, 1), math.pi / 2)),
+    ],
+)
+def test_what_no_circle_can_be_becomes_lines(why: str, program: Program) -> None:
+    lines, written = text_of(program)
+    assert codes(written) == {"CS314": 1}, why
+    assert not [line for line in lines if line[:3] in ("G2 ", "G3 ")]
+
+
+def test_turning_tool_axis_becomes_lines_with_the_axis_spread() -> None:
+    """A circular block has no room for a tool vector."""
+    program = one_arc((10, 0, 0), (0, 10, 0), (0, 0, 0), (0, 0, 1), math.pi / 2)
+    turned_axis = program.axis.copy()
+    turned_axis[1] = (0.6, 0.0, 0.8)
+    lines, written = text_of(Program(**{**vars(program), "axis": turned_axis}), tolerance=0.05)
+    assert codes(written) == {"CS314": 1}
+    vectors = np.array([[float(n) for n in re.findall(r"[IJK](-?[\d.]+)", line)] for line in lines if " I" in line])
+    assert len(vectors) > 5
+    assert np.diff(vectors[:, 0]).max() < 0.3
+    np.testing.assert_allclose(vectors[-1], (0.6, 0.0, 0.8))
+
+
+@pytest.mark.parametrize("form", ["g1", "g6.2"])
+@pytest.mark.parametrize("chord", [None, 0.05])
+def test_lines_for_an_arc_stay_within_the_tolerance(form: str, chord: float | None) -> None:
+    """Even where lines on curves may be coarser than the tolerance."""
+    normal = np.array([0.0, 0.6, 0.8])
+    arm = np.array([25.0, 0, 0])
+    shares = np.linspace(0, 1, 2001)
+    points = np.array([turned(normal, arm, 4.0 * s) for s in shares])
+    program = one_arc(points[0], points[-1], (0, 0, 0), normal, 4.0)
+    lines, _ = text_of(program, form, tolerance=0.01, chord_tolerance=chord)
+    path = walk(lines)
+    worst = max(nearest(point, path) for point in points)
+    assert worst <= 0.01
+    assert (worst > 5e-4) or chord is None, "finer than asked for"
+
+
+def test_planes_change_only_when_they_must() -> None:
+    lines, _ = text_of_cl(
+        "UNITS/MM\nFEDRAT/100,MMPM\nRAPID\nGOTO/10,0,0\n"
+        "CIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/-10,0,0\n"
+        "CIRCLE/0,0,0,0,1,0,10\nGOTO/0,0,10\nGOTO/0,0,20\nCIRCLE/0,0,0,0,-1,0,20\nGOTO/-20,0,0\n"
+        "CIRCLE/0,0,0,0,0,-1,20\nGOTO/0,20,0\nFINI\n"
+    )
+    assert [line for line in lines if line in PLANE] == ["G18", "G17"]
+    assert [line[:2] for line in lines if re.match("G[23] ", line)] == ["G3", "G3", "G3", "G2", "G2"]
+
+
+def test_arc_after_a_tool_change_is_approached() -> None:
+    """A circular block starts where the tool is, and after a tool change nobody knows where."""
+    lines, _ = text_of_cl(
+        "UNITS/MM\nFEDRAT/100,MMPM\nRAPID\nGOTO/10,0,0\nLOADTL/2\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\nFINI\n"
+    )
+    arc = next(index for index, line in enumerate(lines) if line.startswith("G3 "))
+    assert lines[arc - 1].startswith("G1 X10.0000 Y0.0000 Z0.0000 ")
+
+
+def test_arcs_in_every_file_are_on_their_circles(corpus) -> None:  # type: ignore[no-untyped-def]
+    for name in ("nx_clsf_coremill_steptools.cls", "swcam_teste_metrologia.apt", "steptools_plane_1.cldata"):
+        lines, written = text_of_cl((corpus / name).read_bytes().decode("cp1252"))
+        assert codes(written)["CS313"] > 20
+        path = walk(lines)
+        assert np.isfinite(path).all()
+        feeds = [line for line in lines if re.match("G[123] ", line)]
+        assert all(one != other for one, other in pairwise(feeds))

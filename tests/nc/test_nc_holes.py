@@ -1,0 +1,165 @@
+"""Hole cycles: plain moves that end where the cycle says, or no plunge at all."""
+
+from __future__ import annotations
+
+import re
+from itertools import chain
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from nc.writing import codes, text_of_cl
+
+NX = "TOOL PATH/A,TOOL,B\nTLDATA/DRILL,MILL,8.0,0.0,80.0,118.0,35.0\nMSYS/0,0,0,1,0,0,0,1,0\n"
+PLAIN = "UNITS/MM\n"
+SOLIDWORKS = "UNIT/MM\nTRNTYP/WORLD,0,0,0\nCSYS/1.,0,0,0,0,1.,0,0,0,0,1.,0\n"
+
+
+def moves(cl: str, form: str = "g1") -> tuple[list[str], dict[str, int]]:
+    lines, written = text_of_cl(cl, form)
+    return [line for line in lines if line[:3] in ("G0 ", "G1 ", "G4 ")], codes(written)
+
+
+def heights(cl: str) -> tuple[list[str], dict[str, int]]:
+    """Moves along Z as ``G0 30`` or ``G1 -3.2``."""
+    lines, findings = moves(cl)
+    short = []
+    for line in lines:
+        z = re.search(r" Z(-?[\d.]+)", line)
+        short.append(f"{line[:2]} {float(z[1]):g}" if z else line)
+    return short, findings
+
+
+@pytest.mark.parametrize(
+    ("cycle", "expected"),
+    [
+        ("CYCLE/DRILL,FEDTO,10,MMPM,250,RAPTO,3", ["G0 30", "G0 3", "G1 -10", "G0 30"]),
+        ("CYCLE/DRILL,DEPTH,4.6,MMPR,0.08,CLEAR,2,RETURN,0", ["G0 30", "G0 2", "G1 -4.6", "G0 30"]),
+        ("CYCLE/DRILL,FEDTO,10,RAPTO,3,RTRCTO,50,MMPM,250", ["G0 50", "G0 3", "G1 -10", "G0 50"]),
+        ("CYCLE/DRILL,FEDTO,10,RAPTO,3,RTRCTO,AUTO,MMPM,250", ["G0 30", "G0 3", "G1 -10", "G0 30"]),
+        ("CYCLE/FACE,FEDTO,1,MMPM,250,RAPTO,3,DWELL,0.5", ["G0 30", "G0 3", "G1 -1", "G4 P500", "G0 30"]),
+        ("CYCLE/DRILL,FEDTO,1,MMPM,250,RAPTO,3,DWELL,REV,5", ["G0 30", "G0 3", "G1 -1", "G4 P300", "G0 30"]),
+        ("CYCLE/REAM,FEDTO,10,MMPM,250,RAPTO,3", ["G0 30", "G0 3", "G1 -10", "G1 3", "G0 30"]),
+        (
+            "CYCLE/DRILL,DEEP,FEDTO,10,MMPM,250,RAPTO,3,STEP,5,4",
+            ["G0 30", "G0 3", "G1 -5", "G0 3", "G0 -4.5", "G1 -9", "G0 3", "G0 -8.5", "G1 -10", "G0 30"],
+        ),
+        (
+            "CYCLE/BRKCHP,FEDTO,10,INCR,4,MMPM,250,RAPTO,3",
+            ["G0 30", "G0 3", "G1 -4", "G0 -3.5", "G1 -8", "G0 -7.5", "G1 -10", "G0 30"],
+        ),
+        ("CYCLE/DRILL,FEDTO,10,MMPM,250", ["G0 30", "G1 -10", "G0 30"]),  # no clearance: feed all the way
+    ],
+)
+def test_explicit_moves(cycle: str, expected: list[str]) -> None:
+    cl = f"{PLAIN}SPINDL/1000,RPM,CLW\nRAPID\nGOTO/0,0,30\n{cycle}\nGOTO/10,0,0\nCYCLE/OFF\nFINI\n"
+    found, findings = heights(cl)
+    assert found == ["G0 30", *expected]
+    assert findings == {"CS316": 1}
+
+
+@pytest.mark.parametrize(
+    "cycle",
+    [
+        "CYCLE/DRILL,    3.000000,    5.000000",  # depth? clearance? feed? CATIA's table decides
+        "CYCLE/TAP,FEDTO,10,MMPM,250,RAPTO,3",
+        "CYCLE/BORE,NODRAG,FEDTO,10,MMPM,250,RAPTO,3",
+        "CYCLE/DRILL,CSINK,20,FEDTO,10,MMPM,250,RAPTO,3",
+        "CYCLE/DRILL,FEDTO,10,DEPTH,12,MMPM,250,RAPTO,3",
+        "CYCLE/DRILL,FEDTO,10,MMPM,250,RAPTO,-3",
+        "CYCLE/DRILL,MMPM,250,RAPTO,3",
+        "CYCLE/DRILL,FEDTO",
+        "CYCLE/DRILL,FEDTO,10,FEDTO,20,MMPM,250",
+        "CYCLE/DRILL,FEDTO,10,MMPM,250,IPM,10",
+        "CYCLE/DRILL,DEEP,FEDTO,10,MMPM,250,STEP,0",
+        "CYCLE/DRILL,FEDTO,10,MMPM,250,DWELL,5,REV",  # the spindle stands
+        "CYCLE/MILL,FEDTO,10",
+        "CYCLE/INIT",
+    ],
+)
+def test_what_is_not_understood_never_plunges(cycle: str) -> None:
+    lines, written = text_of_cl(f"{PLAIN}RAPID\nGOTO/0,0,30\n{cycle}\nGOTO/10,5,0\nGOTO/20,5,0\nCYCLE/OFF\nFINI\n")
+    assert codes(written) == {"CS315": 2}
+    assert "(NOT DRILLED: HOLE AT X10.0000 Y5.0000 Z0.0000)" in lines
+    places = [line for line in lines if line.startswith("G0 ")]
+    assert [line.split(" I")[0] for line in places[1:]] == [
+        "G0 X10.0000 Y5.0000 Z30.0000",
+        "G0 X20.0000 Y5.0000 Z30.0000",
+    ]
+    assert not [line for line in lines if line.startswith("G1 ")]
+
+
+def test_nx_counts_depths_upwards() -> None:
+    """NX: CYCLE/DRILL,RAPTO,3.0000,FEDTO,-33.0043,RTRCTO,AUTO,MMPM,250.0000."""
+    text = (
+        NX + "RAPID\nGOTO/0,0,50,0,0,1\nCYCLE/DRILL,RAPTO,3.0,FEDTO,{},RTRCTO,AUTO,MMPM,250.0\nGOTO/0,0,10\nCYCLE/OFF\n"
+    )
+    found, findings = heights(text.format("-33.0043"))
+    assert found == ["G0 50", "G0 13", "G1 -23.0043", "G0 50"]
+    assert findings == {"CS316": 1}
+    found, findings = heights(text.format("33.0043"))
+    assert found == ["G0 50"]
+    assert findings == {"CS315": 1}
+
+
+def test_a_tilted_hole_is_drilled_along_the_tool() -> None:
+    axis = np.array([0.6, 0.0, 0.8])
+    cl = (
+        f"{PLAIN}MULTAX/ON\nRAPID\nGOTO/56,0,48,0.6,0,0.8\n"
+        "CYCLE/DRILL,FEDTO,10,MMPM,250,RAPTO,5\nGOTO/20,0,0,0.6,0,0.8\nCYCLE/OFF\nFINI\n"
+    )
+    for form in ("g1", "g6.2"):
+        lines, _ = moves(cl, form)
+        places: NDArray[np.float64] = np.array([re.findall(r"[XYZ](-?[\d.]+)", line) for line in lines], float)
+        along = (places - [20, 0, 0]) @ axis
+        np.testing.assert_allclose(along, [60, 5, -10, 60], atol=1e-3)
+        np.testing.assert_allclose(places - [20, 0, 0] - along[:, None] * axis, 0, atol=1e-3)
+        assert [line[:2] for line in lines] == ["G0", "G0", "G1", "G0"]
+        assert lines[2].endswith(" F250.")
+
+
+def test_solidworks_pecks() -> None:
+    cl = (
+        SOLIDWORKS + "RAPID/\nGOTO/3,2,25.\nCYCLE/INIT\n"
+        "CYCLE/DEEP2,FEDTO,8.,1STPECK,5.,SUBPECK,2.,MMPM,670.56,RAPTO,3.,RTRCTO,25.4\nGOTO/3,2,-0.4\nCYCLE/OFF\n"
+    )
+    found, findings = heights(cl)
+    assert found == [
+        "G0 25",
+        "G0 2.6",
+        "G1 -5.4",
+        "G0 2.6",
+        "G0 -4.9",
+        "G1 -7.4",
+        "G0 2.6",
+        "G0 -6.9",
+        "G1 -8.4",
+        "G0 25",
+    ]
+    assert findings == {"CS316": 1}
+
+
+def test_several_holes_share_the_height_of_travel() -> None:
+    found, findings = heights(
+        f"{PLAIN}RAPID\nGOTO/0,0,20\nCYCLE/DRILL,FEDTO,5,IPM,10,RAPTO,2\nGOTO/10,0,0\nPPRINT next\nGOTO/20,0,8\n"
+        "GOTO/30,0,19\nCYCLE/OFF\nRAPID\nGOTO/30,0,50\nFINI\n"
+    )
+    holes = ["G0 20", "G0 2", "G1 -5", "G0 20"], ["G0 20", "G0 10", "G1 3", "G0 20"], ["G0 21", "G1 14", "G0 21"]
+    assert found == ["G0 20", *chain(*holes), "G0 50"]
+    assert findings == {"CS316": 3}
+
+
+def test_pecks_without_depth_are_one_feed_and_a_warning() -> None:
+    found, findings = heights(
+        NX + "RAPID\nGOTO/0,0,50,0,0,1\nCYCLE/DRILL,DEEP,RAPTO,3.0,FEDTO,-9,MMPM,250.0\nGOTO/0,0,0\nCYCLE/OFF\n"
+    )
+    assert found == ["G0 50", "G0 3", "G1 -9", "G0 50"]
+    assert findings == {"CS316": 1, "CS321": 1}
+
+
+def test_feed_of_the_cycle_does_not_outlive_it() -> None:
+    lines, _ = moves(
+        f"{PLAIN}FEDRAT/800,MMPM\nGOTO/0,0,30\nCYCLE/DRILL,FEDTO,5,MMPM,250,RAPTO,2\nGOTO/0,0,0\nCYCLE/OFF\nGOTO/9,9,30\nFINI\n"
+    )
+    assert [line.split()[-1] for line in lines if " F" in line] == ["F800.", "F250.", "F800."]

@@ -1,0 +1,197 @@
+"""What becomes of every CL statement: words, comments, findings."""
+
+from __future__ import annotations
+
+import pytest
+
+from nc.writing import codes, text_of_cl
+
+HEAD = ["%", "O0001", "G21 G90 G94 G17 G40 G49 G80"]
+TAIL = ["M30", "%"]
+
+
+def said(cl: str, *, start: str = "UNITS/MM\n") -> tuple[list[str], dict[str, int]]:
+    """Blocks between head and tail of statements that stand alone, and the findings."""
+    lines, written = text_of_cl(f"{start}{cl}\nRAPID\nGOTO/0,0,0\nFINI\n")
+    assert lines[:3] == HEAD
+    assert lines[-2:] == TAIL
+    return [line for line in lines[3:-2] if not line.startswith(("G0 ", "G43", "G49", "(UNITS"))], codes(written)
+
+
+@pytest.mark.parametrize(
+    ("cl", "blocks"),
+    [
+        # spindle: the words in any order
+        ("SPINDL/12000,RPM,CLW", ["S12000 M3"]),
+        ("SPINDL/RPM,1000.000000,CLW", ["S1000 M3"]),
+        ("SPINDL/CCLW,RPM,2546.479", ["S2546.479 M4"]),
+        ("SPINDL/  500.0000,RPM, CLW", ["S500 M3"]),
+        ("SPINDL/1200", ["S1200 M3"]),
+        ("SPINDL/1200,CCLW\nSPINDL/OFF\nSPINDL/ON", ["S1200 M4", "M5", "M4"]),
+        ("SPINDL/0,RPM", ["M5"]),
+        ("SPINDL/1200,RPM,CLW,RANGE,2", ["S1200 M3"]),
+        ("SPINDL/RANGE,HIGH,1200,RPM", ["S1200 M3"]),
+        ("SPINDL/LOCK", ["M19"]),
+        # coolant
+        ("COOLNT/ON\nCOOLNT/MIST\nCOOLNT/OFF", ["M8", "M7", "M9"]),
+        ("COOLNT/FLOOD", ["M8"]),
+        ("COOLNT/FLOOD,ON", ["M8"]),
+        ("COOLNT", ["M8"]),
+        # tools
+        ("LOADTL/2", ["T2 M6"]),
+        ("LOADTL/2,1", ["T2 M6"]),
+        ("LOADTL/2\nLOADTL/2,1", ["T2 M6", "(LOADTL/2,1)"]),
+        ("LOADTL/         1", ["T1 M6"]),
+        ("LOADTL/T12", ["T12 M6"]),
+        ("LOAD/TOOL,13", ["T13 M6"]),
+        ("TURRET/1,OSETNO,1,SETOOL,0.,0.,0.", ["T1 M6"]),
+        ("TOOLNO/2,10.0\nLOADTL/2", ["(TOOLNO/2,10.0)", "T2 M6"]),
+        ("TOOLNO/3,10.0", ["T3 M6"]),
+        ("LOAD/TOOL,13\nSELECT/TOOL,16\nLOAD/TOOL,16", ["T13 M6", "T16", "T16 M6"]),
+        # waits
+        ("DELAY/2.5", ["G4 P2500"]),
+        ("DELAY/0.0001", ["G4 P1"]),
+        ("DELAY/0", []),
+        ("SPINDL/1200,RPM,CLW\nDELAY/10,REV", ["S1200 M3", "G4 P500"]),
+        ("STOP\nOPSTOP", ["M0", "M1"]),
+        ("AUXFUN/8", ["M8"]),
+        # cutter compensation off
+        ("CUTCOM/OFF", ["G40"]),
+        # text: what the machinist reads
+        ("PPRINT OPERATION: zabusivanje", ["(OPERATION: zabusivanje)"]),
+        ("PPRINT/'two (2) words'", ["(two [2] words)"]),
+        ("TPRINT/T1 Drill D 10", ["(T1 Drill D 10)"]),
+        ("$$ OPERATION NAME : x", ["(OPERATION NAME : x)"]),
+        ("$$", []),
+        ("PARTNO / MFG0001", ["(PARTNO / MFG0001)"]),
+        ("INSERT/[HOLDER=C40-M06EM2] 6MM CRB", ["([HOLDER=C40-M06EM2] 6MM CRB)"]),
+        ("TOOL PATH/A,TOOL,B\nEND-OF-PATH", ["(TOOL PATH/A,TOOL,B)"]),
+        ("MODE/MILL\nREWIND/0", ["(MODE/MILL)"]),
+        ("PPRINT " + 130 * "x", ["(" + 120 * "x" + ")", "(" + 10 * "x" + ")"]),
+        ("SET/MODE,ABSOL", ["(SET/MODE,ABSOL)"]),
+    ],
+)
+def test_what_is_understood(cl: str, blocks: list[str]) -> None:
+    found, findings = said(cl)
+    assert found == blocks
+    assert findings == ({"CS310": 1} if cl.startswith("MODE") else {})
+
+
+@pytest.mark.parametrize(
+    "cl",
+    [
+        "SPINDL/500,FAST",
+        "SPINDL/500,600,RPM",
+        "SPINDL/500,SFM,CLW",  # no cutter, no revolutions
+        "CUTTER/0.8\nSPINDL/500,SMM,CLW",  # the nose of a lathe tool is no diameter
+        "COOLNT/",  # a parameter of the CAM system that was left empty
+        "COOLNT/THRU",
+        "LOADTL/'EM10'",
+        "LOADTL/1.5",
+        "LOADTL/-1",
+        "LOAD/PUNCH,3",
+        "DELAY/10,REV",  # the spindle stands
+        "DELAY/-1",
+        "DELAY/1,2",
+        "CUTCOM/LEFT,SOMETHING",
+        "GOHOME",
+        "CLEARP/XYPLAN,50",
+        "AUXFUN/30",  # it would end the program
+        "PREFUN/51",
+        "SWITCH/9",
+    ],
+)
+def test_what_is_not_understood_becomes_a_comment_and_a_warning(cl: str) -> None:
+    found, findings = said(cl)
+    assert found[-1].startswith(f"({cl.splitlines()[-1].partition('/')[0]}")
+    assert findings == {"CS310": 1}
+
+
+def test_unknown_words_are_counted_by_word() -> None:
+    _, written = text_of_cl("UNITS/MM\nABC/1\nABC/2\nDEF\nGOTO/1,0,0\nFINI\n")
+    found = {finding.text.split()[0]: (finding.count, finding.line) for finding in written.findings[:2]}
+    assert found == {"ABC": (2, 2), "DEF": (1, 4)}
+
+
+@pytest.mark.parametrize("cl", ["PAINT/PATH\nPAINT/COLOR,31\nPAINT/SPEED,10"])
+def test_paint_is_counted_and_left_out(cl: str) -> None:
+    assert said(cl) == ([], {"CS317": 3})
+
+
+def test_cutting_speed_becomes_revolutions_at_the_diameter_of_a_mill() -> None:
+    for cl in ("CUTTER/10,0,5,5,0,0,50\nSPINDL/100,SMM,CLW", "TLDATA/MILL,10,0,80,0,0\nSPINDL/SMM,CLW,100"):
+        found, findings = said(cl)
+        assert found[-1] == "S3183 M3"
+        assert findings == {"CS322": 1}
+    lines, _ = text_of_cl("UNITS/INCHES\nCUTTER/0.5,0,0.25\nSPINDL/100,SFM\nRAPID\nGOTO/0,0,0\nFINI\n")
+    assert "S764 M3" in lines
+
+
+def test_insert_with_nc_words_is_not_passed_through() -> None:
+    assert said("INSERT/M88$") == (["(M88$)"], {"CS320": 1})
+
+
+def test_several_tools_have_their_own_lengths() -> None:
+    lines, _ = text_of_cl(
+        "UNITS/MM\nFEDRAT/100,MMPM\nLOADTL/2\nSPINDL/500,RPM,CLW\nGOTO/0,0,0\nGOTO/1,0,0\n"
+        "LOAD/TOOL,5,ADJUST,25\nSPINDL/700,RPM,CLW\nGOTO/1,0,0\nGOTO/2,0,0\nSPINDL/OFF\nFINI\n"
+    )
+    assert [line.split(" X")[0] for line in lines[4:-2]] == [
+        "T2 M6",
+        "S500 M3",
+        "G43.5 H2",
+        "G1",
+        "G1",
+        "G49",
+        "T5 M6",
+        "S700 M3",
+        "G43.5 H25",
+        "G1",  # again: after the change the tool is elsewhere
+        "G1",
+        "M5",
+        "G49",
+    ]
+
+
+def test_end_in_the_middle_is_a_stop_and_m30_comes_once() -> None:
+    lines, written = text_of_cl("UNITS/MM\nFEDRAT/100,MMPM\nGOTO/0,0,0\nEND\nGOTO/1,0,0\nEND\nFINI\n")
+    assert codes(written) == {"CS318": 1}
+    assert lines.index("M0") > lines.index("(END)")
+    assert [line for line in lines if line in ("M30", "M2", "M0")] == ["M0", "M30"]
+
+
+def test_cutter_compensation_names_register_and_plane() -> None:
+    cl = (
+        "UNITS/MM\nLOADTL/4\nFEDRAT/100,MMPM\nGOTO/0,0,0\nCUTCOM/LEFT,XYPLAN\nGOTO/5,0,0\nGOTO/5,5,0\nCUTCOM/OFF\n"
+        "CUTCOM/RIGHT,ZXPLAN,14\nGOTO/9,5,0\nCUTCOM/OFF\nGOTO/0,0,0\nFINI\n"
+    )
+    lines, written = text_of_cl(cl)
+    kept = [line for line in lines if line[:3] in ("G40", "G41", "G42", "G18", "G17")]
+    assert kept == ["G41 D4", "G40", "G18", "G42 D14", "G40"]
+    assert codes(written) == {"CS319": 2}
+    assert "G1 X5.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000" in lines
+
+
+def test_from_is_told_and_not_moved_to() -> None:
+    lines, _ = text_of_cl("UNITS/MM\nPPRINT before\nFROM/1,2,300\nFEDRAT/100,MMPM\nGOTO/0,0,0\nFINI\n")
+    at = lines.index("(FROM X1. Y2. Z300.)")
+    assert lines[at - 1] == "(before)"
+    assert not [line for line in lines if "Z300" in line and line[0] == "G"]
+
+
+def test_feed_per_revolution_switches_there_and_back() -> None:
+    lines, _ = text_of_cl(
+        "UNITS/MM\nFEDRAT/100,MMPM\nGOTO/0,0,0\nFEDRAT/0.1,MMPR\nGOTO/1,0,0\nGOTO/2,0,0\nRAPID\nGOTO/3,0,0\n"
+        "FEDRAT/100,MMPM\nGOTO/4,0,0\nFINI\n"
+    )
+    feeds = [line.split()[-1] if " F" in line else line for line in lines if line in ("G94", "G95") or " F" in line]
+    assert feeds == ["F100.", "G95", "F0.1", "G94", "F100."]
+
+
+def test_comments_stand_where_they_stood() -> None:
+    lines, _ = text_of_cl(
+        "UNITS/MM\nFEDRAT/100,MMPM\nGOTO/0,0,0\nPPRINT one\nPPRINT two\n"
+        "GOTO/9,0,0\nSTOP\nGOTO/9,9,0\nPPRINT three\nFINI\n"
+    )
+    order = [line for line in lines if line[0] == "(" or line == "M0"]
+    assert order == ["(UNITS/MM)", "(one)", "(two)", "M0", "(three)"]

@@ -1,0 +1,47 @@
+"""Programs made by hand and the text that is written of them."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from cornersmooth.cl import read
+from cornersmooth.model import Arcs, Move, Program
+from cornersmooth.nc import Written, choose_form, fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+
+
+def text_of(program: Program, form: str = "g1", **settings: Any) -> tuple[list[str], Written]:
+    """Lines of the NC text, and what was said of it."""
+    chosen = choose_form("fanuc", form)
+    smoothed = smooth(program, fit_settings(Settings(**settings), chosen, program.units))
+    stream = io.BytesIO()
+    written = write(smoothed, stream, form=form)
+    return stream.getvalue().decode("ascii").splitlines(), written
+
+
+def text_of_cl(cl: str, form: str = "g1", **settings: Any) -> tuple[list[str], Written]:
+    """Lines of the NC text of a CL text."""
+    return text_of(read(cl.encode(), name="test.cls"), form, **settings)
+
+
+def codes(written: Written) -> dict[str, int]:
+    """Findings by code, with their counts."""
+    return {finding.code: finding.count for finding in written.findings}
+
+
+def one_arc(
+    start: Any, end: Any, centre: Any, normal: Any, sweep: float, *, axis: Any = (0, 0, 1), **rest: Any
+) -> Program:
+    """Program of a rapid to the start and one arc at 300 mm/min."""
+    return Program.from_poses(
+        [start, end],
+        np.broadcast_to(np.array(axis, float), (2, 3)),
+        kind=np.array([Move.RAPID, Move.ARC]),
+        feed=300.0,
+        arcs=Arcs(np.array([1]), np.array([centre], float), np.array([normal], float), np.array([sweep])),
+        **rest,
+    )
