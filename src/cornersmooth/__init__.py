@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cornersmooth.cl import read
     from cornersmooth.errors import CornersmoothError, Finding
+    from cornersmooth.feedrate import Limits, TimeLaw, compare, direct, plan
     from cornersmooth.model import Corners, Program, SmoothProgram, Statement
     from cornersmooth.nc import fit_settings, write
     from cornersmooth.report import report
@@ -32,6 +33,11 @@ _HOME = {
     "write": "nc",
     "report": "report",
     "Settings": "settings",
+    "plan": "feedrate",
+    "direct": "feedrate",
+    "compare": "feedrate",
+    "Limits": "feedrate",
+    "TimeLaw": "feedrate",
     "CornersmoothError": "errors",
     "Finding": "errors",
     "Corners": "model",
@@ -44,11 +50,16 @@ __all__ = [
     "Corners",
     "CornersmoothError",
     "Finding",
+    "Limits",
     "Program",
     "Settings",
     "SmoothProgram",
     "Statement",
+    "TimeLaw",
+    "compare",
+    "direct",
     "fit_settings",
+    "plan",
     "read",
     "report",
     "smooth",

@@ -19,6 +19,7 @@ from cornersmooth import __version__
 COMMANDS = {
     "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC text."),
     "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
+    "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
 }
 
 EXIT_INTERRUPTED = 130

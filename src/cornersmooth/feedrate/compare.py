@@ -118,6 +118,8 @@ class Comparison:
             "saving_percent": self.saving_percent,
             "constant_feed_seconds": self.constant_feed_seconds,
             "length_mm": {name: law.length for name, law in self.laws.items()},
+            "stops": {name: stops(law) for name, law in self.laws.items()},
+            "turning_seconds": {name: turning_seconds(law) for name, law in self.laws.items()},
             "peaks": {name: vars(peaks(law)) for name, law in self.laws.items()},
             "slowest": {name: [vars(place) for place in slowest(law, places)] for name, law in self.laws.items()},
         }
@@ -157,10 +159,26 @@ def compare(
             program, limits, "velocity_jump", settings=settings, progress=step("direct_velocity_jump")
         ),
     }
-    for method in ("zhang2016", "proportional"):
-        smoothed = smooth(program, settings.but(method=method))
-        laws[method] = plan(smoothed, limits, progress=step(method))
+    # the paper's method has one shape and one allocation
+    paper = settings.but(method="zhang2016", shape="paper", allocation="half")
+    for method, chosen in (("zhang2016", paper), ("proportional", settings.but(method="proportional"))):
+        laws[method] = plan(smooth(program, chosen), limits, progress=step(method))
     return Comparison(program, settings, limits, laws)
+
+
+def stops(law: TimeLaw) -> int:
+    """How often the motion comes to rest between its start and its end."""
+    return int((law.path.joint[1:-1] == 0.0).sum())
+
+
+def turning_seconds(law: TimeLaw) -> float:
+    """Time in which the tip stands still while the axis turns, s.
+
+    The paper's method has such moments where neighbouring transitions use up a tip segment but not its axis-point
+    segment: what is left of the turn has to be made on the spot.
+    """
+    took = np.diff(law.times_at(law.edge))
+    return float(took[law.path.turning].sum())
 
 
 def slowest(law: TimeLaw, count: int = 10) -> list[Place]:

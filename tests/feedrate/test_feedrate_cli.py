@@ -1,0 +1,86 @@
+"""``cornersmooth time``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cornersmooth.cli import run
+
+ROOT = Path(__file__).resolve().parents[2]
+TABLE_1 = str(ROOT / "samples" / "paper_table1.csv")
+IMPELLER = str(ROOT / "samples" / "impeller.cls")
+PAPER = ["--units", "mm", "--feed", "1800", "--accel", "1000", "--jerk", "5000", "--period", "2ms"]
+
+
+def test_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["time", TABLE_1, "-e", "0.15", *PAPER, "--json"]) == 0
+    contents = json.loads(capsys.readouterr().out)
+    assert contents["seconds"]["direct_exact_stop"] == pytest.approx(0.7777, abs=1e-4)
+    assert contents["limits"]["period_s"] == pytest.approx(0.002)
+    assert contents["limits"]["feed_mm_per_min"] == 1800.0
+    assert contents["settings"]["tolerance"] == 0.15
+
+
+def test_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["time", IMPELLER, "-e", "0.02"]) == 0
+    text = capsys.readouterr().out
+    for words in ("direct, exact stop", "smoothed, proportional", "where the time goes", "at constant feed"):
+        assert words in text
+    assert run(["time", TABLE_1, *PAPER, "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize("law", ["proportional", "direct_velocity_jump"])
+def test_csv_holds_the_motion(tmp_path: Path, law: str) -> None:
+    path = tmp_path / "motion.csv"
+    arguments = ["time", TABLE_1, "-e", "0.15", *PAPER, "--law", law, "--csv", str(path), "-q"]
+    assert run(arguments) == 0
+    rows = list(csv.DictReader(io.StringIO(path.read_text())))
+    table = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    t, way = table["t_s"], table["s_mm"]
+    assert np.diff(t)[:-1] == pytest.approx(0.002)
+    # the jerk as third differences of the written way
+    assert np.abs(np.diff(way[:-1], n=3)).max() / 0.002**3 <= 5000.0 * 1.005
+    assert np.abs(np.diff(way[:-1], n=2)).max() / 0.002**2 <= 1000.0 * 1.001
+    tip = np.column_stack((table["x_mm"], table["y_mm"], table["z_mm"]))
+    assert np.linalg.norm(np.diff(tip, axis=0), axis=1).max() <= 30.0 * 0.002 * 1.001
+    assert run(arguments) == 4  # exists already
+    assert run([*arguments, "--force"]) == 0
+
+
+def test_pictures_are_repeatable(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    first, second = tmp_path / "one.svg", tmp_path / "two.svg"
+    for path in (first, second):
+        assert run(["time", TABLE_1, *PAPER, "--plot", str(path), "-q"]) == 0
+    assert first.read_bytes() == second.read_bytes()
+    assert first.read_bytes().count(b"<path") > 6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--period", "2min"], 2, "not a time"),
+        (["--jerk", "-1"], 2, "jerk is -1"),
+        (["--plot", "picture.txt"], 2, ".svg"),
+        ([], 2, "no feed is programmed"),
+    ],
+)
+def test_refusals(arguments: list[str], code: int, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["time", TABLE_1, "--units", "mm", *arguments]) == code
+    assert words in capsys.readouterr().err
+
+
+def test_shapes_leave_the_paper_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    seconds = []
+    for more in ([], ["--shape", "auto", "--allocation", "fair"]):
+        assert run(["time", TABLE_1, *PAPER, "--json", *more]) == 0
+        seconds.append(json.loads(capsys.readouterr().out)["seconds"])
+    assert seconds[0]["zhang2016"] == seconds[1]["zhang2016"]
+    assert seconds[0]["proportional"] != seconds[1]["proportional"]
