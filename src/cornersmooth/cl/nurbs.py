@@ -27,6 +27,9 @@ DEGREE: Final = 3
 #: the lines stay this many printed digits near the curve
 CURVE_DIGITS: Final = 5
 
+#: knots are equal or differ by this part of the last one; NX prints seven decimals
+LEAST_STEP: Final = 1e-9
+
 #: lines for every control point at most; more would be no tool path
 MOST_LINES: Final = 1000
 
@@ -49,6 +52,9 @@ class Curve:
         knots = np.array([0.0, *self.knots])
         if not (np.diff(knots) >= 0).all() or not 0 < knots[-1] < np.inf or knots[1] <= 0:
             return "its knots do not ascend from above 0"
+        steps = np.diff(knots) / knots[-1]
+        if ((steps > 0) & (steps < LEAST_STEP)).any():
+            return "two of its knots are nearly the same"
         if (knots[:-2] == knots[2:]).any():
             return "a knot is repeated more than once"
         if np.count_nonzero(knots == knots[-1]) > 1:
