@@ -63,7 +63,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS132": ("note", "the file states no units: {units} assumed ({why})"),
     "CS133": ("warning", "the file says {stated}, read as {units} as asked for"),
     "CS134": ("warning", "GOTO numbers separated by blanks instead of commas"),
-    "CS135": ("note", "FEDRAT between RAPID and its GOTO: the move stays rapid"),
+    "CS135": ("warning", "FEDRAT between RAPID and its GOTO: the move stays rapid"),
     "CS136": ("warning", "FEDRAT/{text} is not understood; kept in place, the feed stays"),
     "CS137": ("warning", "axis vectors after MULTAX/OFF are ignored: the axis is locked"),
     "CS138": ("note", "poses under CUTCOM are passed exactly: the control offsets the path"),
