@@ -216,17 +216,19 @@ def _proportional_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tupl
         parts[:, 0] = at
         parts[:, 1] = trim_in * (at - values[before])
         parts[:, 2] = trim_out * (values[after] - at)
-    # one table of coefficients for all corners with weights 1, the most frequent shape
-    common = (weights == 1.0).all(axis=1) & (ratio == ratio[0])
-    if not common.any():
-        common = (weights == weights[0]).all(axis=1) & (ratio == ratio[0])
-    first = int(np.argmax(common))
-    coefficients = nurbs.leg_coefficients(u, weights[first], ratio[first])
+    # corners with all weights 1 share one table of coefficients, the others at least its numerators
+    plain = (weights == 1.0).all(axis=1) & (ratio == ratio[0])
+    coefficients = nurbs.leg_coefficients(u, np.ones(2), ratio[0])
     points, vectors = coefficients @ tips, coefficients @ levers
-    other = np.flatnonzero(~common)
+    other = np.flatnonzero(~plain)
     if len(other):
-        coefficients = nurbs.leg_coefficients(u, weights[other], ratio[other])
-        points[other], vectors[other] = coefficients @ tips[other], coefficients @ levers[other]
+        shares = nurbs.basis(u)
+        sums = nurbs.full_weights(weights[other]) @ shares.T
+        inner = (ratio[other] * weights[other, 0])[:, None]
+        incoming = -(shares[:, 0] + inner * shares[:, 1]) / sums
+        outgoing = (shares[:, 4] + inner * shares[:, 3]) / sums
+        along = np.stack((np.ones_like(incoming), incoming, outgoing), axis=-1)
+        points[other], vectors[other] = along @ tips[other], along @ levers[other]
     return points, vectors
 
 
