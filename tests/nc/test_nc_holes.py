@@ -163,3 +163,13 @@ def test_feed_of_the_cycle_does_not_outlive_it() -> None:
         f"{PLAIN}FEDRAT/800,MMPM\nGOTO/0,0,30\nCYCLE/DRILL,FEDTO,5,MMPM,250,RAPTO,2\nGOTO/0,0,0\nCYCLE/OFF\nGOTO/9,9,30\nFINI\n"
     )
     assert [line.split()[-1] for line in lines if " F" in line] == ["F800.", "F250.", "F800."]
+
+
+def test_the_corner_after_a_hole_is_passed_exactly() -> None:
+    """The tool comes down from above the hole, not along the segment from its position."""
+    lines, _ = moves(
+        f"{PLAIN}FEDRAT/800,MMPM\nRAPID\nGOTO/0,0,30\nCYCLE/DRILL,FEDTO,5,MMPM,250,RAPTO,2\nGOTO/0,0,0\nCYCLE/OFF\n"
+        "GOTO/9,0,0\nGOTO/9,9,0\nGOTO/0,9,0\nFINI\n"
+    )
+    assert "G1 X9.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000 F800." in lines
+    assert not [line for line in lines if " X9.0000 Y9.0000" in line]

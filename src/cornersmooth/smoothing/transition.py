@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Corners, FeedMode, Floats, Ints, Program, Status
+from cornersmooth.model import Corners, FeedMode, Floats, Ints, Move, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.allocation import fair_room
 from cornersmooth.smoothing.legs import Legs, Placed, legs_at
@@ -136,6 +136,7 @@ def _what_forbids(
     if not settings.round_feed_changes:
         status[program.feed_mode[pose] == FeedMode.PER_REVOLUTION] = Status.FEED_PER_REVOLUTION
     status[program.keep[pose] != 0] = Status.KEPT
+    status[program.kind[pose - 1] == Move.HOLE] = Status.KEPT  # the tool comes from above the hole, not out of its pose
     status[after == 0] = Status.TOO_SHORT
     status[duplicate] = Status.DUPLICATE
     return status
