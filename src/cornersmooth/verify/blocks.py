@@ -103,11 +103,21 @@ class Matcher:
         """Give out all stretches, in blocks of about `BLOCK` elements, each vertex with its place."""
         last_vertex = self.original.trail.last
         pending: list[tuple[int, int, int, int, float]] = []
-        columns = (stretches.move_first, stretches.move_last, stretches.element_first, stretches.element_last)
-        for move_first, move_last, first, last in zip(*(column.tolist() for column in columns), strict=True):
+        columns = (
+            stretches.move_first,
+            stretches.move_last,
+            stretches.element_first,
+            stretches.element_last,
+            stretches.fraction,
+        )
+        for move_first, move_last, first, last, share in zip(*(column.tolist() for column in columns), strict=True):
             if move_first == move_last or first == last:
                 continue
-            start, stop, fraction = int(last_vertex[move_first]), int(last_vertex[move_last]), 0.0
+            start, stop = int(last_vertex[move_first]), int(last_vertex[move_last])
+            along = share * (last_vertex[move_first + 1] - start)  # in vertices; the walker finds the rest
+            start, fraction = start + int(along), float(along - int(along))
+            if start == stop:
+                start, fraction = stop - 1, 1.0
             while True:
                 if pending and last - pending[0][0] > BLOCK:
                     done, _ = self._match(pending, open_end=False)

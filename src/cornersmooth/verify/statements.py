@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from cornersmooth.model import Statement
+import numpy as np
+
+from cornersmooth.model import Move, Program, Statement
 from cornersmooth.verify.ncprogram import Event, Problem
 
 #: decimals of a spindle speed that count
 SPEED_DECIMALS = 3
 
-#: M words without an effect that the CL data speak of
-_KNOWN_M = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30}
+#: decimals of a spindle speed that count
+SPEED_DECIMALS = 3
+
+#: cutting speeds in mm per minute
+_MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}
+
+_COOLANT = {"ON": 8.0, "FLOOD": 8.0, "MIST": 7.0, "OFF": 9.0, "NOMORE": 9.0}
+
+_COMPENSATION = {"LEFT": 41.0, "RIGHT": 42.0, "OFF": 40.0, "NOMORE": 40.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,119 +49,224 @@ class Token:
 
 _NAMES = {
     "tool": ("tool T{:g}", 551),
+    "next tool": ("next tool T{:g}", 551),
+    "offset": ("offset H{:g}", 559),
     "spindle": ("spindle M{:g}", 552),
     "speed": ("speed S{:g}", 552),
     "coolant": ("coolant M{:g}", 553),
     "compensation": ("cutter compensation G{:g}", 554),
+    "register": ("compensation register D{:g}", 554),
     "stop": ("stop M{:g}", 555),
     "dwell": ("dwell of {:g} ms", 556),
     "end": ("end of program M{:g}", 557),
+    "auxiliary": ("M{:g}", 558),
 }
 
 #: what holds before anything is said; repeating it changes nothing
-_AT_START = {"spindle": 5.0, "coolant": 9.0, "compensation": 40.0}
+_AT_START = {"spindle": 5.0, "coolant": 9.0, "compensation": 40.0, "offset": 1.0}
 
-_STATES = ("tool", "spindle", "speed", "coolant", "compensation")
+_STATES = ("tool", "offset", "spindle", "speed", "coolant", "compensation")
 
 
-def asked(statements: Iterable[Statement], places: Sequence[float], end: float) -> list[Token]:
-    """What the CL statements ask for; `places` are where they stand, `end` the length of the path."""
+class _Asking:
+    """Goes through the CL statements and notes what they ask for. What it cannot interpret asks for nothing."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.tokens: list[Token] = []
+        self.place, self.line = 0.0, 0
+        self.running, self.speed, self.diameter = 3.0, 0.0, 0.0
+        self.tool, self.offset = -1.0, 1.0
+        self.moving = np.flatnonzero(program.kind != Move.FROM)
+        said = {statement.word for statement in program.statements}
+        self.handlers: dict[str, Callable[[list[str], list[float], Statement], None]] = {
+            "LOADTL": self.load,
+            "LOAD": self.load,
+            "TURRET": self.load,
+            "SELECT": self.select,
+            "SPINDL": self.spindle,
+            "COOLNT": self.coolant,
+            "CUTCOM": self.compensation,
+            "DELAY": self.delay,
+            "CUTTER": self.cutter,
+            "TLDATA": self.cutter,
+            "AUXFUN": self.auxiliary,
+            "END": self.end,
+            "STOP": lambda words, numbers, statement: self.say("stop", 0.0),
+            "OPSTOP": lambda words, numbers, statement: self.say("stop", 1.0),
+        }
+        if not said & {"LOADTL", "LOAD", "TURRET"}:
+            self.handlers["TOOLNO"] = self.load
+
+    def take(self, statement: Statement, place: float) -> None:
+        """Note one statement."""
+        handler = self.handlers.get(statement.word)
+        if handler is not None:
+            numbers = [value for value in statement.args if isinstance(value, float)]
+            words = [value for value in statement.args if isinstance(value, str) and value]
+            self.place, self.line = place, statement.line
+            handler(words, numbers, statement)
+
+    def say(self, kind: str, value: float) -> None:
+        """Note a token."""
+        self.tokens.append(Token(kind, value, self.place, self.line))
+
+    def load(self, words: list[str], numbers: list[float], statement: Statement) -> None:
+        """Change the tool; ADJUST or OSETNO names another length register."""
+        if statement.word == "LOAD" and words[:1] != ["TOOL"]:
+            return
+        if not numbers and words and words[0][:1] == "T" and words[0][1:].isdigit():
+            numbers = [float(words[0][1:])]
+        if not numbers or not _whole(numbers[0]):
+            return
+        registers = [_behind(statement, word) for word in ("ADJUST", "OSETNO")]
+        offset = next((number for number in registers if number is not None), numbers[0])
+        self.tool, self.offset = numbers[0], offset if _whole(offset) else numbers[0]
+        self.say("tool", self.tool)
+        self.say("offset", self.offset)
+
+    def select(self, words: list[str], numbers: list[float], statement: Statement) -> None:
+        """Bring the next tool near."""
+        if words == ["TOOL"] and len(numbers) == 1 and _whole(numbers[0]) and numbers[0] != self.tool:
+            self.say("next tool", numbers[0])
+
+    def spindle(self, words: list[str], numbers: list[float], statement: Statement) -> None:
+        """Start, stop or orient the spindle; RANGE and MAXRPM say nothing about its speed."""
+        for word in ("RANGE", "MAXRPM"):
+            behind = _behind(statement, word) if word in words else None
+            if behind is not None:
+                numbers.remove(behind)
+        known = {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}
+        gears = {"RANGE", "MAXRPM", "HIGH", "LOW", "MEDIUM"}
+        if not set(words) <= known | gears or len(numbers) > 1 or any(number < 0 for number in numbers):
+            return
+        if {"LOCK", "ORIENT"} & set(words):
+            if not numbers:
+                self.say("spindle", 19.0)
+            return
+        if {"OFF", "NOMORE"} & set(words) or numbers == [0.0]:
+            self.say("spindle", 5.0)
+            return
+        speed = numbers[0] if numbers else None
+        cutting = next((_MM_PER_MINUTE[word] for word in words if word in _MM_PER_MINUTE), None)
+        if cutting is not None and speed is not None:
+            if not self.diameter > 0:
+                return
+            speed = float(round(speed * cutting / (math.pi * self.diameter)))
+        if {"CLW", "CCLW"} & set(words):
+            self.running = 4.0 if "CCLW" in words else 3.0
+        if speed is not None:
+            self.speed = speed
+            self.say("speed", round(speed, SPEED_DECIMALS))
+        self.say("spindle", self.running)
+
+    def coolant(self, words: list[str], numbers: list[float], statement: Statement) -> None:
+        """Coolant on, of a kind, or off."""
+        if not words and "/" in statement.text:  # an empty list says nothing
+            return
+        words = words or ["ON"]
+        kinds = ["OFF"] if "OFF" in words else [word for word in words if word != "ON"] or ["ON"]
+        if len(kinds) == 1 and not numbers and kinds[0] in _COOLANT:
+            self.say("coolant", _COOLANT[kinds[0]])
+
+    def compensation(self, words: list[str], numbers: list[float], statement: Statement) -> None:
+        """Cutter compensation left, right or off."""
+        code = _COMPENSATION.get((words or [""])[0])
+        register = (numbers or [self.offset])[0]
+        if code is None or not set(words[1:]) <= {"XYPLAN", "ZXPLAN", "YZPLAN"} or not _whole(register):
+            return
+        self.say("compensation", code)
+        if code != _COMPENSATION["OFF"]:
+            self.say("register", register)
+
+    def delay(self, words: list[str], numbers: list[float], statement: Statement) -> None:
+        """Wait for seconds or revolutions."""
+        if len(numbers) != 1 or numbers[0] <= 0 or words not in ([], ["REV"]):
+            return
+        if words and not self.speed:
+            return
+        seconds = numbers[0] * (60.0 / self.speed if words else 1.0)
+        self.say("dwell", max(1, round(1000.0 * seconds)))
+
+    def cutter(self, words: list[str], numbers: list[float], statement: Statement) -> None:
+        """Keep the diameter, for cutting speeds."""
+        mill = bool({"MILL", "DRILL"} & set(words)) if statement.word == "TLDATA" else len(numbers) > 2
+        self.diameter = numbers[0] * self.program.mm_per_unit if mill and numbers else 0.0
+
+    def auxiliary(self, words: list[str], numbers: list[float], statement: Statement) -> None:
+        """An M word by its number, unless it would end or change more than a word may."""
+        if len(numbers) == 1 and not words and _whole(numbers[0]) and numbers[0] not in (2, 6, 30, 98, 99):
+            self.tokens += _of_m(numbers[0], self.place, self.line)
+
+    def end(self, words: list[str], numbers: list[float], statement: Statement) -> None:
+        """END in the middle of the path is a stop."""
+        if len(self.moving) and statement.pose <= self.moving[-1]:
+            self.say("stop", 0.0)
+
+
+def asked(program: Program, places: Sequence[float], end: float) -> list[Token]:
+    """What the CL statements ask for; `places` are where they stand, `end` the length of the path, mm."""
+    asking = _Asking(program)
+    for statement, place in zip(program.statements, places, strict=True):
+        asking.take(statement, place)
+    line = max((item.line for item in program.statements if item.word in ("FINI", "END")), default=0)
+    return [*asking.tokens, Token("end", 30.0, end, line)]
+
+
+def _behind(statement: Statement, word: str) -> float | None:
+    """Return the number right behind a word."""
+    args = statement.args
+    place = args.index(word) + 1 if word in args else len(args)
+    following = args[place] if place < len(args) else None
+    return following if isinstance(following, float) else None
+
+
+def _whole(number: float) -> bool:
+    return 0 <= number < 1e9 and number == int(number)
+
+
+def _of_m(value: float, place: float, line: int) -> list[Token]:
+    """Token of an M word other than M6."""
+    if value in (3, 4, 5, 19):
+        return [Token("spindle", value, place, line)]
+    if value in (7, 8, 9):
+        return [Token("coolant", value, place, line)]
+    if value in (0, 1):
+        return [Token("stop", value, place, line)]
+    return [Token("auxiliary", value, place, line)]
+
+
+def said(events: Sequence[Event], places: Sequence[float]) -> list[Token]:
+    """What the words of the NC text do."""
     tokens: list[Token] = []
-    running = 3.0
-
-    for statement, place in zip(statements, places, strict=True):
-        numbers = [value for value in statement.args if isinstance(value, float)]
-        words = [value for value in statement.args if isinstance(value, str) and value]
-
-        def say(kind: str, value: float, place: float = place, line: int = statement.line) -> None:
-            tokens.append(Token(kind, value, place, line))
-
-        match statement.word:
-            case "LOADTL" | "LOAD" | "TURRET":
-                if (
-                    (statement.word != "LOAD" or words[:1] == ["TOOL"])
-                    and numbers
-                    and numbers[0] == int(numbers[0]) >= 0
-                ):
-                    say("tool", numbers[0])
-            case "SPINDL":
-                if "OFF" in words:
-                    say("spindle", 5.0)
-                elif set(words) <= {"RPM", "CLW", "CCLW", "ON"} and len(numbers) <= 1:
-                    if "CLW" in words or "CCLW" in words:
-                        running = 4.0 if "CCLW" in words else 3.0
-                    if numbers:
-                        say("speed", round(numbers[0], SPEED_DECIMALS))
-                    say("spindle", running)
-            case "COOLNT":
-                code = {"ON": 8.0, "FLOOD": 8.0, "MIST": 7.0, "OFF": 9.0}.get((words or ["ON"])[0])
-                if code is not None:
-                    say("coolant", code)
-            case "CUTCOM":
-                code = {"LEFT": 41.0, "RIGHT": 42.0, "OFF": 40.0}.get((words or [""])[0])
-                if code is not None:
-                    say("compensation", code)
-            case "STOP":
-                say("stop", 0.0)
-            case "OPSTOP":
-                say("stop", 1.0)
-            case "DELAY":
-                if len(numbers) == 1 and numbers[0] >= 0 and not words:
-                    say("dwell", round(1000.0 * numbers[0]))
-            case _:
-                pass
-    tokens.append(Token("end", 30.0, end, statements_end_line(statements)))
+    chosen: float | None = None
+    speaking = [pair for pair in zip(events, places, strict=True) if pair[0].letter != "("]
+    for k, (event, place) in enumerate(speaking):
+        value, line = event.value, event.line
+        if event.letter == "T":
+            chosen = value
+            following = speaking[k + 1][0] if k + 1 < len(speaking) else None
+            if following is None or (following.letter, following.value) != ("M", 6.0):
+                tokens.append(Token("next tool", value, place, line))
+        elif event.letter == "M" and value == 6:
+            if chosen is not None:
+                tokens.append(Token("tool", chosen, place, line))
+        elif event.letter == "M" and value in (2, 30):
+            tokens.append(Token("end", 30.0, place, line))
+        elif event.letter == "M":
+            tokens += _of_m(value, place, line)
+        elif event.letter == "G" and value == 4:
+            tokens.append(Token("dwell", round(float(event.text)), place, line))
+        elif event.letter == "G" and value in (40, 41, 42):
+            tokens.append(Token("compensation", value, place, line))
+        elif event.letter in _PLAIN:
+            number = round(value, SPEED_DECIMALS) if event.letter == "S" else value
+            tokens.append(Token(_PLAIN[event.letter], number, place, line))
     return tokens
 
 
-def statements_end_line(statements: Iterable[Statement]) -> int:
-    """CL line of the end of the program, 0 where the file does not say."""
-    return next((item.line for item in statements if item.word in ("FINI", "END")), 0)
-
-
-def said(events: Iterable[Event], places: Sequence[float]) -> tuple[list[Token], list[Problem]]:
-    """What the words of the NC text do; and words that fit nothing, or an H or D that is not the tool's."""
-    tokens: list[Token] = []
-    problems: list[Problem] = []
-    chosen = tool = None
-    for event, place in zip(events, places, strict=True):
-        value = event.value
-
-        def say(kind: str, value: float, place: float = place, line: int = event.line) -> None:
-            tokens.append(Token(kind, value, place, line))
-
-        match event.letter:
-            case "T":
-                chosen = value
-            case "S":
-                say("speed", round(value, SPEED_DECIMALS))
-            case "M":
-                if value == 6 and chosen is not None:
-                    tool = chosen
-                    say("tool", tool)
-                elif value in (3, 4, 5):
-                    say("spindle", value)
-                elif value in (7, 8, 9):
-                    say("coolant", value)
-                elif value in (0, 1):
-                    say("stop", value)
-                elif value in (2, 30):
-                    say("end", 30.0)
-                elif value not in _KNOWN_M:
-                    text = f"{event.text} is nothing that the CL file asks for"
-                    problems.append(Problem("CS558", 0, event.line, text))
-            case "G":
-                if value == 4:
-                    say("dwell", round(float(event.text)))
-                elif value in (40, 41, 42):
-                    say("compensation", value)
-            case "H" | "D":
-                if value != (1 if tool is None else tool):
-                    text = f"{event.text} does not belong to tool T{1 if tool is None else tool:g}"
-                    problems.append(Problem("CS559", 0, event.line, text))
-            case _:
-                pass
-    return tokens, problems
+#: letters whose words are tokens as they stand
+_PLAIN = {"S": "speed", "H": "offset", "D": "register"}
 
 
 def compare(asked_for: list[Token], found: list[Token], room: float) -> list[Problem]:

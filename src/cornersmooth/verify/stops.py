@@ -32,12 +32,15 @@ class Stretches:
         The stretch starts at the end of one original move and ends with another.
     element_first, element_last : (k,) int64
         The same for the path elements.
+    fraction : (k,) float64
+        Where on the next original move the stretch starts; 0 but for moves out of a hole.
     """
 
     move_first: Ints
     move_last: Ints
     element_first: Ints
     element_last: Ints
+    fraction: Floats
 
     def __len__(self) -> int:
         return len(self.move_first)
@@ -75,8 +78,18 @@ def digit_errors(nc: NcProgram, element: Ints, tip: Floats, axis: Floats, axis_l
     return exact, np.maximum(np.linalg.norm(off, axis=1), np.linalg.norm(turned, axis=1))
 
 
-def find_stretches(original: Original, nc: NcProgram, axis_length: float) -> tuple[Stretches, list[Problem]]:
+def find_stretches(
+    original: Original, nc: NcProgram, axis_length: float, parts: list[tuple[int, int, int, int]] | None = None
+) -> tuple[Stretches, list[Problem]]:
     """Match the stops of both motions in order.
+
+    Parameters
+    ----------
+    original : Original
+    nc : NcProgram
+    axis_length : float, mm
+    parts : list of (move_first, move_last, element_first, element_last), optional
+        Ranges to match one by one, both ends included; everything by default.
 
     Returns
     -------
@@ -85,42 +98,78 @@ def find_stretches(original: Original, nc: NcProgram, axis_length: float) -> tup
     list of Problem
         CS531 a rapid goes elsewhere, CS532 a rapid is missing, CS533 a rapid too many, CS534 no motion at all.
     """
-    moves, elements = len(original.pose), len(nc)
-    if not moves or not elements:
-        problems = []
-        if moves or elements:
-            side = "the NC text has no motion" if moves else "the CL file has no motion, the NC text has"
-            problems = [Problem("CS534", 0, 0, side)]
-        return Stretches(*(np.zeros(0, np.int64),) * 4), problems
+    if parts is None:
+        parts = [(0, len(original.pose) - 1, 0, len(nc) - 1)]
+    problems: list[Problem] = []
+    none = np.zeros(0, np.int64)
+    rows: list[tuple[Ints, Ints, Ints, Ints, Floats]] = [(none, none, none, none, np.zeros(0))]
+    for move_first, move_last, element_first, element_last in parts:
+        if move_last < move_first and element_last < element_first:
+            continue
+        if move_last < move_first or element_last < element_first:
+            ours = move_last < move_first
+            line = 0 if ours else int(original.program.line[original.pose[move_first]])
+            text = "motion that the CL file does not have" if ours else "the NC text lacks motion of the CL file"
+            problems.append(Problem("CS534", line, int(nc.line[element_first]) if ours else 0, text))
+            continue
+        pairs, found = _match_part(original, nc, axis_length, move_first, move_last, element_first, element_last)
+        move, element = pairs
+        problems += found
+        fraction = np.zeros(len(move))
+        if original.program.kind[original.pose[move_first]] == Move.HOLE:
+            fraction[0] = _fraction(original, nc, move_first, element_first, axis_length)
+        last = np.append(move[1:] - 1, move_last), np.append(element[1:] - 1, element_last)
+        rows.append((move, last[0], element, last[1], fraction))
+    return Stretches(*(np.concatenate(column) for column in zip(*rows, strict=True))), problems
+
+
+def _fraction(original: Original, nc: NcProgram, move: int, element: int, axis_length: float) -> float:
+    """Where on the move after `move` an element ends."""
+    program = original.program
+    start, end = (
+        np.concatenate((program.tip[pose], program.tip[pose] + axis_length * program.axis[pose]))
+        for pose in original.pose[[move, move + 1]]
+    )
+    axis = directions(nc, nc.tip[element : element + 1], nc.second[element : element + 1])[0]
+    point = np.concatenate((nc.tip[element], nc.tip[element] + axis_length * axis))
+    way = end - start
+    size = float(way @ way)
+    return float(np.clip((point - start) @ way / size, 0.0, 1.0)) if size > 0 else 1.0
+
+
+def _match_part(
+    original: Original,
+    nc: NcProgram,
+    axis_length: float,
+    move_first: int,
+    move_last: int,
+    element_first: int,
+    element_last: int,
+) -> tuple[tuple[Ints, Ints], list[Problem]]:
+    """Match the stops of a range of moves with those of a range of elements."""
     program = original.program
     kind = program.kind[original.pose]
     tip, axis = program.tip[original.pose], program.axis[original.pose]
-    theirs = _stops(
-        (kind == Move.RAPID) | (kind == Move.HOLE),
-        np.hstack((np.round(tip / nc.tip_step), np.round(axis * axis_length / nc.tip_step))),
-    )
-    ours = _stops(nc.kind == Element.RAPID, np.hstack((nc.tip, nc.second)))
+    theirs = _stops(kind == Move.RAPID, tip, axis * axis_length, nc.tip_step, move_first, move_last)
+    ours = _stops(nc.kind == Element.RAPID, nc.tip, nc.second, 0.0, element_first, element_last)
     pairs, problems = _match(original, nc, theirs, ours, axis_length)
-    if kind[0] == Move.RAPID and nc.kind[0] != Element.RAPID:
-        problems.insert(0, _problem("CS532", original, 0, nc, 0, "the first rapid is written as a feed move"))
-    move, element = pairs
-    return (
-        Stretches(
-            move_first=move,
-            move_last=np.append(move[1:] - 1, moves - 1),
-            element_first=element,
-            element_last=np.append(element[1:] - 1, elements - 1),
-        ),
-        problems,
-    )
+    if kind[move_first] == Move.RAPID and nc.kind[element_first] != Element.RAPID:
+        text = "the first rapid is written as a feed move"
+        problems.insert(0, _problem("CS532", original, move_first, nc, element_first, text))
+    return pairs, problems
 
 
-def _stops(is_stop: Bools, place: Floats) -> Ints:
-    """Indices of the stops that move the tool, and of the very first move."""
-    index = np.flatnonzero(is_stop)
-    index = index[index > 0]
-    moved = (place[index] != place[index - 1]).any(axis=1)
-    return np.concatenate(([0], index[moved]))
+def _stops(is_stop: Bools, tip: Floats, other: Floats, step: float, first: int, last: int) -> Ints:
+    """Indices from `first` to `last` of the stops that move the tool in steps of `step`, and of the first of all."""
+    index = np.flatnonzero(is_stop[first : last + 1]) + first
+    index = index[index > first]
+    moved = np.zeros(len(index), np.bool_)
+    for values in (tip, other):
+        here, before = values[index], values[index - 1]
+        if step > 0:
+            here, before = np.round(here / step), np.round(before / step)
+        moved |= (here != before).any(axis=1)
+    return np.concatenate(([first], index[moved]))
 
 
 def _match(
@@ -130,6 +179,8 @@ def _match(
     tip, axis = program.tip[original.pose[theirs]], program.axis[original.pose[theirs]]
     count = min(len(theirs), len(ours))
     exact, _ = digit_errors(nc, ours[:count], tip[:count], axis[:count], axis_length)
+    if program.kind[original.pose[theirs[0]]] == Move.HOLE:  # out of a hole the tool comes from anywhere
+        exact[0] = True
     if len(theirs) == len(ours) and exact.all():
         return (theirs, ours), []
     head = count if exact.all() else int(np.argmin(exact))

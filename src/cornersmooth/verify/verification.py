@@ -14,6 +14,7 @@ from cornersmooth.settings import BOUNDS
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.deviation import Deviation, Meter, Worst
 from cornersmooth.verify.feeds import check_feeds
+from cornersmooth.verify.holes import divide_at_holes
 from cornersmooth.verify.joints import joint_jumps
 from cornersmooth.verify.ncprogram import NcProgram, Problem
 from cornersmooth.verify.reader import read_nc
@@ -151,6 +152,9 @@ class Verification:
         }
 
 
+#: place of what stands before the first motion, mm of path
+_BEFORE = -1.0
+
 #: problems of one code that are kept
 MOST_PROBLEMS = 1000
 
@@ -214,12 +218,13 @@ class _Run:
         if nc.units != self.program.units:
             text = f"the text is in {nc.units}, the CL file in {self.program.units}"
             problems.append(Problem("CS505", 0, 1, text))
-        stretches, found = find_stretches(self.original, nc, self.axis_length)
-        problems += found
+        holes = divide_at_holes(self.original, nc, self.axis_length)
+        stretches, found = find_stretches(self.original, nc, self.axis_length, holes.parts)
+        problems += holes.problems + found
         problems += self._lost_stretches(stretches)
         meter = Meter(self.matcher, self.tolerance)
         asked_elements = np.unique([event.element - 1 for event in nc.events]).astype(np.int64)
-        element_place = self._stop_places(stretches, asked_elements)
+        element_place = self._stop_places(stretches, asked_elements, holes.element_move)
         feeds: list[tuple[float, Problem]] = []
         for block in self.matcher.blocks(stretches):
             written = meter.measure(block)
@@ -246,6 +251,8 @@ class _Run:
                 part = slice(int(stretches.move_first[k]), int(stretches.move_last[k]) + 1)
                 tip, other = self.program.tip[original.pose[part]], self.program.axis[original.pose[part]]
                 extent = np.abs(tip - tip[0]).max() + self.axis_length * np.abs(other - other[0]).max()
+                if len(tip) == 2:
+                    extent *= 1.0 - stretches.fraction[k]
                 text, code = "feed moves of the CL file are missing", "CS535"
             else:
                 part = slice(int(stretches.element_first[k]), int(stretches.element_last[k]) + 1)
@@ -260,14 +267,15 @@ class _Run:
                 problems.append(Problem(code, line, int(nc.line[element]), text, float(extent)))
         return problems
 
-    def _stop_places(self, stretches: Stretches, elements: Ints) -> Floats:
+    def _stop_places(self, stretches: Stretches, elements: Ints, holes: dict[int, int]) -> Floats:
         """Path length at the ends of the given elements as far as stops tell; NaN inside stretches."""
         length, last = self.matcher.track.length, self.original.trail.last
         place = np.full(len(elements), np.nan)
-        if not len(stretches):
-            return np.zeros(len(elements))
+        for row, element in enumerate(elements.tolist() if holes else []):
+            if element in holes:
+                place[row] = length[last[holes[element]]]
         k = np.searchsorted(stretches.element_first, elements, side="right") - 1
-        place[k < 0] = 0.0
+        place[(k < 0) & np.isnan(place)] = _BEFORE
         at = np.flatnonzero(k >= 0)
         stop = at[stretches.element_first[k[at]] == elements[at]]
         place[stop] = length[last[stretches.move_first[k[stop]]]]
@@ -318,12 +326,11 @@ class _Run:
         move = np.searchsorted(original.pose, [statement.pose for statement in statements]) - 1
         moves = len(original.pose)
         end = float(length[-1]) if moves else 0.0
-        places = np.where(move >= 0, length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0, 0.0)
-        theirs = asked(statements, places.tolist(), end)
+        places = np.where(move >= 0, length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0, _BEFORE)
+        theirs = asked(self.program, places.tolist(), end)
         index = np.searchsorted(elements, [event.element - 1 for event in self.nc.events])
         mine = np.nan_to_num(element_place[index], nan=0.0) if len(elements) else np.zeros(0)
-        ours, problems = said(self.nc.events, mine.tolist())
-        return problems + compare(theirs, ours, self.matcher.margin)
+        return compare(theirs, said(self.nc.events, mine.tolist()), self.matcher.margin)
 
     def _verification(self, deviation: Deviation, problems: list[Problem]) -> Verification:
         kept: list[Problem] = []

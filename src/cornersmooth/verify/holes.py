@@ -1,0 +1,191 @@
+"""Holes: which path elements drill them, and whether they do it properly.
+
+A hole is a line through its pose along the tool axis. Between the pose before a run of holes and the pose behind it,
+the text may move only along these lines, one after another in the order of the CL file, and rapidly from line to line
+above the holes. How often it retracts is its own affair.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Move
+from cornersmooth.verify.cycles import Drilling, drillings
+from cornersmooth.verify.ncprogram import Element, NcProgram, Problem
+from cornersmooth.verify.stops import digit_errors
+from cornersmooth.verify.trails import Original, directions
+
+#: elements looked through at a time for the beginning of a run
+_WINDOW = 512
+
+#: last printed digits that a point may be beside its hole
+_STEPS = 1.0
+
+
+@dataclass
+class HoleRuns:
+    """The parts into which holes divide the two motions.
+
+    Parameters
+    ----------
+    parts : list of (move_first, move_last, element_first, element_last)
+        Moves and elements between the runs of holes, all included.
+    element_move : dict of int to int
+        Move of the hole that an element belongs to.
+    problems : list of Problem
+        CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside a hole, CS564 a feed that is not a hole's.
+    """
+
+    parts: list[tuple[int, int, int, int]] = field(default_factory=list)
+    element_move: dict[int, int] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+
+
+def divide_at_holes(original: Original, nc: NcProgram, axis_length: float) -> HoleRuns:
+    """Find the elements of all holes and check them; say what lies between."""
+    hole = original.program.kind[original.pose] == Move.HOLE
+    found = HoleRuns()
+    moves, elements = len(original.pose), len(nc)
+    if not hole.any():
+        found.parts.append((0, moves - 1, 0, elements - 1))
+        return found
+    edges = np.flatnonzero(np.diff(hole, prepend=False, append=False))
+    search = _Search(original, nc, axis_length)
+    all_cycles = drillings(original.program, original.pose[hole].tolist())
+    move = element = used = 0
+    for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        start = search.start(first, element) if first > move else element
+        if first > move:
+            found.parts.append((move, first - 1, element, start - 1))
+        groups, element = search.consume(first, stop, start)
+        cycles = all_cycles[used : used + stop - first]
+        used += stop - first
+        if stop < moves:
+            groups[-1], element = search.give_back(stop, groups[-1], cycles[-1], element)
+        for k, group in enumerate(groups):
+            found.element_move.update(dict.fromkeys(group, first + k))
+            found.problems += search.check(first + k, group, cycles[k])
+        # the move out of the last hole starts wherever the tool has been left
+        loose = stop < moves and original.program.kind[original.pose[stop]] != Move.RAPID
+        move = stop - 1 if loose else stop
+    if move < moves or element < elements:
+        found.parts.append((move, moves - 1, element, elements - 1))
+    return found
+
+
+class _Search:
+    """Looks for holes in the text."""
+
+    def __init__(self, original: Original, nc: NcProgram, axis_length: float) -> None:
+        self.original, self.nc, self.axis_length = original, nc, axis_length
+        program = original.program
+        self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]
+        self.line = program.line[original.pose]
+        second = nc.second_step * (axis_length if nc.second_is == "vector" else 1.0)
+        self.room = _STEPS * (nc.tip_step + second)
+
+    def exact(self, move: int, elements: Ints) -> Bools:
+        """(k,) whether elements end exactly at a move's pose."""
+        tip = np.broadcast_to(self.tip[move], (len(elements), 3))
+        axis = np.broadcast_to(self.axis[move], (len(elements), 3))
+        same: Bools = digit_errors(self.nc, elements, tip, axis, self.axis_length)[0]
+        return same
+
+    def heights(self, move: int, elements: Ints) -> Floats:
+        """(k,) mm above the hole's pose at the ends of elements; NaN beside the hole or with another axis."""
+        nc = self.nc
+        away = nc.tip[elements] - self.tip[move]
+        height = away @ self.axis[move]
+        beside = np.linalg.norm(away - height[:, None] * self.axis[move], axis=1)
+        turned = np.linalg.norm(directions(nc, nc.tip[elements], nc.second[elements]) - self.axis[move], axis=1)
+        on = (beside <= self.room) & (turned * self.axis_length <= 2 * self.room)
+        return np.where(on, height, np.nan)
+
+    def start(self, hole: int, element: int) -> int:
+        """First element of a run of holes: behind the pose before it, where the text goes over to the first hole."""
+        reached = None
+        for begin in range(element, len(self.nc), _WINDOW):
+            window = np.arange(begin, min(begin + _WINDOW, len(self.nc)))
+            for k in window[self.exact(hole - 1, window)].tolist():
+                reached = k if reached is None else reached
+                if k + 1 < len(self.nc) and not np.isnan(self.heights(hole, np.array([k + 1]))[0]):
+                    return int(k) + 1
+        return element if reached is None else int(reached) + 1
+
+    def consume(self, first: int, stop: int, element: int) -> tuple[list[list[int]], int]:
+        """Elements of each hole, and the element behind them all."""
+        groups: list[list[int]] = []
+        for move in range(first, stop):
+            group: list[int] = []
+            while element < len(self.nc) and not np.isnan(self.heights(move, np.array([element]))[0]):
+                group.append(element)
+                element += 1
+            if not group and groups and groups[-1]:  # the same hole again
+                again = np.array(groups[-1])
+                group = again[~np.isnan(self.heights(move, again))].tolist()
+            groups.append(group)
+        return groups, element
+
+    def give_back(self, move: int, group: list[int], cycle: Drilling, end: int) -> tuple[list[int], int]:
+        """Elements of the last hole, and the first of what follows: a move out of the hole may be the CL file's own.
+
+        A rapid may be both, the retreat and the next pose; a feed move is not the hole's then.
+        """
+        nc = self.nc
+        feeds = [k for k in group if nc.kind[k] != Element.RAPID]
+        deepest = -1
+        if feeds and not np.isnan(cycle.depth):
+            height = self.heights(move - 1, np.array(feeds))
+            deepest = feeds[int(np.argmin(height))]
+        behind = np.array([k for k in group if k > deepest], np.int64)
+        same = behind[self.exact(move, behind)] if len(behind) else behind
+        if not len(same):
+            return group, end
+        first = int(same[0])
+        keep = first if nc.kind[first] != Element.RAPID else first + 1
+        return [k for k in group if k < keep], first
+
+    def check(self, move: int, group: list[int], cycle: Drilling) -> list[Problem]:
+        """Depth, feeds and rapids of one hole."""
+        nc, cl_line = self.nc, int(self.line[move])
+        feeds = [k for k in group if nc.kind[k] != Element.RAPID]
+        known = not np.isnan(cycle.depth)
+        if not feeds:
+            if known and cycle.depth > self.room:
+                near = int(nc.line[group[0]]) if group else 0
+                return [Problem("CS561", cl_line, near, "a hole of the CL file is not drilled")]
+            return []
+        if not known:
+            return [Problem("CS564", cl_line, int(nc.line[feeds[0]]), "the cycle does not say what is fed here")]
+        problems = []
+        height = dict(zip(group, self.heights(move, np.array(group)).tolist(), strict=True))
+        before = self.heights(move, np.array([max(group[0] - 1, 0)]))[0]
+        deepest = min(feeds, key=lambda k: height[k])
+        off = height[deepest] + cycle.depth
+        if abs(off) > self.room:
+            text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
+            problems.append(Problem("CS562", cl_line, int(nc.line[deepest]), text, abs(off)))
+        drilled = 0.0
+        for k in group:
+            line = int(nc.line[k])
+            if nc.kind[k] == Element.RAPID:
+                if height[k] < -drilled - self.room:
+                    amount = -drilled - height[k]
+                    text = f"a rapid goes {amount:.4f} mm into the uncut hole"
+                    problems.append(Problem("CS563", cl_line, line, text, amount))
+            else:
+                if k == group[0] and np.isnan(before):
+                    problems.append(Problem("CS563", cl_line, line, "a feed move enters a hole from the side"))
+                wrong = not np.isnan(cycle.feed) and (
+                    abs(nc.feed[k] - cycle.feed) > 1e-4 * nc.mm_per_unit or nc.per_revolution[k] != cycle.per_revolution
+                )
+                if wrong:
+                    text = f"the feed is {nc.feed[k]:g}, the cycle says {cycle.feed:g}"
+                    problems.append(Problem("CS541", cl_line, line, text))
+                drilled = max(drilled, -height[k])
+        if height[group[-1]] < -self.room:
+            text = "the tool leaves a hole sideways"
+            problems.append(Problem("CS563", cl_line, int(nc.line[group[-1]]), text, -height[group[-1]]))
+        return problems

@@ -1,0 +1,171 @@
+"""Statements and holes: what the CL file asks for, and what the text does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cornersmooth.model import Move, Program, Source, Statement
+from cornersmooth.verify import verify
+
+from .writing import HEAD, TAIL, encode
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def said(*statements, kind=None, tip=None, **rest):
+    tip = np.array([[0.0, 0, 5], [10, 0, 5], [20, 0, 5]]) if tip is None else np.array(tip, float)
+    n = len(tip)
+    kind = np.array([Move.RAPID] + [Move.LINEAR] * (n - 1), np.uint8) if kind is None else np.array(kind, np.uint8)
+    return Program.from_poses(
+        tip,
+        np.tile(UP, (n, 1)),
+        kind=kind,
+        feed=100.0,
+        statements=tuple(statements),
+        line=np.arange(10, 10 + n),
+        **rest,
+    )
+
+
+def text(*lines, offset=1):
+    """Lines with places given as (code, x, y, z)."""
+    out = [*HEAD]
+    for line in lines:
+        if isinstance(line, str):
+            out.append(line)
+        else:
+            code, x, y, z = line
+            feed = " F100." if code == "G1" else ""
+            out.append(f"{code} X{x:.4f} Y{y:.4f} Z{z:.4f} I0.0000000 J0.0000000 K1.0000000{feed}")
+    return encode([*out, *TAIL])
+
+
+def codes(program, nc):
+    return sorted({problem.code for problem in verify(program, nc, tolerance=0.01).problems})
+
+
+PATH = [("G0", 0, 0, 5), ("G1", 10, 0, 5), ("G1", 20, 0, 5)]
+
+
+@pytest.mark.parametrize(
+    ("statement", "block"),
+    [
+        (Statement(0, 1, "LOADTL", (7.0,)), ["T7 M6", "G43.5 H7"]),
+        (Statement(0, 1, "LOAD", ("TOOL", 7.0, "ADJUST", 2.0)), ["T7 M6", "G43.5 H2"]),
+        (Statement(0, 1, "TURRET", (7.0, "OSETNO", 17.0)), ["T7", "M6", "G43.5 H17"]),
+        (Statement(0, 1, "SELECT", ("TOOL", 9.0)), ["T9", "G43.5 H1"]),
+        (Statement(0, 1, "SPINDL", (800.0, "RPM", "CCLW")), ["S800 M4", "G43.5 H1"]),
+        (Statement(0, 1, "SPINDL", ("RPM", 800.5, "CLW", "RANGE", 2.0)), ["M3 S800.5", "G43.5 H1"]),
+        (Statement(0, 1, "SPINDL", ("ORIENT",)), ["M19", "G43.5 H1"]),
+        (Statement(0, 1, "COOLNT", ("FLOOD",)), ["M8", "G43.5 H1"]),
+        (Statement(0, 1, "COOLNT", (), "COOLNT"), ["M8", "G43.5 H1"]),
+        (Statement(0, 1, "DELAY", (2.5,)), ["G4 P2500", "G43.5 H1"]),
+        (Statement(0, 1, "DELAY", (2.5,)), ["G4 X2.5", "G43.5 H1"]),
+        (Statement(0, 1, "STOP"), ["M0", "G43.5 H1"]),
+        (Statement(0, 1, "OPSTOP"), ["M1", "G43.5 H1"]),
+        (Statement(0, 1, "AUXFUN", (31.0,)), ["M31", "G43.5 H1"]),
+        (Statement(0, 1, "END"), ["M0", "G43.5 H1"]),
+    ],
+)
+def test_statement_and_its_words(statement, block):
+    program = said(statement)
+    assert codes(program, text(*block, *PATH)) == []
+    without = [line for line in block if line.startswith("G43")]
+    assert codes(program, text(*without, *PATH)) != []
+    late = [block[-1], PATH[0], PATH[1], *block[:-1], PATH[2]]
+    assert codes(program, text(*late)) != []
+    assert codes(said(), text(*block, *PATH)) != []
+
+
+def test_cutting_speed_needs_the_diameter():
+    cutter = Statement(0, 1, "CUTTER", (20.0, 0.0, 10.0))
+    speed = Statement(0, 2, "SPINDL", (100.0, "SMM", "CLW"))
+    assert codes(said(cutter, speed), text("S1592 M3", "G43.5 H1", *PATH)) == []
+    assert codes(said(cutter, speed), text("S1590 M3", "G43.5 H1", *PATH)) == ["CS552"]
+    # without a diameter nobody can say: nothing is asked for
+    assert codes(said(speed), text("G43.5 H1", *PATH)) == []
+
+
+def test_what_is_repeated_changes_nothing():
+    program = said(Statement(0, 1, "COOLNT", ("ON",)), Statement(1, 2, "COOLNT", ("ON",)))
+    assert codes(program, text("G43.5 H1", "M8", *PATH)) == []
+    assert codes(program, text("G43.5 H1", PATH[0], "M8", *PATH[1:])) == ["CS553"]
+
+
+def test_compensation_and_its_register():
+    program = said(Statement(1, 1, "CUTCOM", ("LEFT",)), Statement(3, 2, "CUTCOM", ("OFF",)))
+    assert codes(program, text("G43.5 H1", PATH[0], "G41 D1", *PATH[1:], "G40")) == []
+    assert codes(program, text("G43.5 H1", PATH[0], "G42 D1", *PATH[1:], "G40")) == ["CS554"]
+    assert codes(program, text("G43.5 H1", PATH[0], "G41 D2", *PATH[1:], "G40")) == ["CS554"]
+
+
+CYCLE = Statement(1, 3, "CYCLE", ("DRILL", "FEDTO", 8.0, "MMPM", 100.0, "RAPTO", 2.0))
+OFF = Statement(3, 9, "CYCLE", ("OFF",))
+HOLES = [[0.0, 0, 20], [0, 0, 0], [15, 0, 0], [15, 0, 30]]
+KINDS = [Move.RAPID, Move.HOLE, Move.HOLE, Move.RAPID]
+DRILLED = [
+    ("G0", 0, 0, 20),
+    ("G0", 0, 0, 2),
+    ("G1", 0, 0, -8),
+    ("G0", 0, 0, 20),
+    ("G0", 15, 0, 20),
+    ("G0", 15, 0, 2),
+    ("G1", 15, 0, -8),
+    ("G0", 15, 0, 20),
+    ("G0", 15, 0, 30),
+]
+
+
+def drilled(**changes):
+    lines = list(DRILLED)
+    for name, line in changes.items():
+        lines[int(name[1:])] = line
+    return text("G43.5 H1", *[line for line in lines if line])
+
+
+def test_holes():
+    program = said(CYCLE, OFF, kind=KINDS, tip=HOLES)
+    assert codes(program, drilled()) == []
+    # pecks are nobody's business
+    pecked = [*DRILLED[:2], ("G1", 0, 0, -3), ("G0", 0, 0, 2), ("G0", 0, 0, -2.5), *DRILLED[2:]]
+    assert codes(program, text("G43.5 H1", *pecked)) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "code"),
+    [
+        ({"n2": ("G1", 0, 0, -8.01)}, "CS562"),
+        ({"n6": ("G1", 15, 0, -7.99)}, "CS562"),
+        ({"n2": None}, "CS561"),
+        ({"n1": ("G0", 0, 0, -1)}, "CS563"),
+        ({"n3": None}, "CS563"),
+        ({"n6": ("G1", 15.001, 0, -8)}, "CS561"),
+        ({"n8": ("G0", 15, 0, 31)}, "CS534"),
+    ],
+)
+def test_wrong_holes(changes, code):
+    program = said(CYCLE, OFF, kind=KINDS, tip=HOLES)
+    assert code in codes(program, drilled(**changes))
+
+
+def test_depth_upwards_in_nx():
+    cycle = Statement(1, 3, "CYCLE", ("DRILL", "FEDTO", -8.0, "RAPTO", 2.0))
+    program = said(cycle, OFF, kind=KINDS, tip=HOLES, source=Source("a.cls", "apt", "nx"))
+    assert codes(program, drilled()) == []
+
+
+def test_cycle_that_says_no_depth_may_not_be_drilled():
+    cycle = Statement(1, 3, "CYCLE", ("DRILL", 8.0, 2.0))
+    program = said(cycle, OFF, kind=KINDS, tip=HOLES)
+    assert codes(program, drilled()) == ["CS564"]
+    over = [("G0", 0, 0, 20), ("G0", 15, 0, 20), ("G0", 15, 0, 30)]
+    assert codes(program, text("G43.5 H1", *over)) == []
+
+
+def test_statement_between_holes():
+    program = said(CYCLE, Statement(2, 5, "OPSTOP"), OFF, kind=KINDS, tip=HOLES)
+    lines = [*DRILLED[:4], "M1", *DRILLED[4:]]
+    assert codes(program, text("G43.5 H1", *lines)) == []
+    lines = [*DRILLED[:8], "M1", *DRILLED[8:]]
+    assert codes(program, text("G43.5 H1", *lines)) == ["CS555"]
