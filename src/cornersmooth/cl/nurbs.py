@@ -47,12 +47,14 @@ class Curve:
     @property
     def complaint(self) -> str | None:
         """What is wrong with knots and control points, if anything."""
-        if len(self.points) != len(self.knots) + DEGREE - 1:
+        if not self.knots or len(self.points) != len(self.knots) + DEGREE - 1:
             return f"{len(self.knots)} knots and {len(self.points)} control points are no cubic"
-        knots = np.array([0.0, *self.knots])
-        if not (np.diff(knots) >= 0).all() or not 0 < knots[-1] < np.inf or knots[1] <= 0:
+        if not 0 < self.knots[-1] < np.inf:
+            return "its last knot is not positive"
+        knots = np.array([0.0, *self.knots]) / self.knots[-1]
+        steps = np.diff(knots)
+        if not (steps >= 0).all() or steps[0] == 0:
             return "its knots do not ascend from above 0"
-        steps = np.diff(knots) / knots[-1]
         if ((steps > 0) & (steps < LEAST_STEP)).any():
             return "two of its knots are nearly the same"
         if (knots[:-2] == knots[2:]).any():
