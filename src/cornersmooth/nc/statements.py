@@ -85,6 +85,13 @@ class StatementWriter:
             self._not_understood(statement)
         return comment_lines(statement.text or word)
 
+    def only_counted(self, statement: Statement) -> bool:
+        """Whether a statement says nothing to the control; it has been counted then."""
+        if statement.word != "PAINT":
+            return False
+        self.paint(statement)
+        return True
+
     def begin_motion(self) -> list[str]:
         """Blocks needed before the next motion: tool tip control, where it is off."""
         if self._tip_control:
