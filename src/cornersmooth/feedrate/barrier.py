@@ -1,11 +1,14 @@
 """The fastest speed profile under speed, acceleration and jerk limits, by an interior-point method.
 
 Over the path coordinate s the square of the speed, z(s) = v², is a quadratic spline: in every cell the acceleration
-z′/2 is linear and z″ constant. Then
+z′/2 is linear and z″ constant. An axis whose position is q(s) moves with
 
-    speed          z ≤ cap                         linear in z
-    acceleration   |z′|/2 ≤ A                      linear
-    jerk           |z″|/2 ≤ J·z^(−1/2)             the right side is convex: its tangent lies below it
+    speed          q₁·√z
+    acceleration   q₂·z + q₁·z′/2
+    jerk           √z·(q₃·z + 3/2·q₂·z′ + q₁·z″/2)              (q₁, q₂, q₃: derivatives of q)
+
+so limits of speed and acceleration are linear in z, and a jerk limit is linear but for J·z^(−1/2) on its right side,
+which is convex: its tangent lies below it. For the path itself q = s: z ≤ v², |z′|/2 ≤ A, |z″|/2 ≤ J·z^(−1/2).
 
 z is written with Bézier coefficients c, one for the middle of each cell and one more at each end of a run: inside a
 cell z never exceeds the largest of the two end values and c, so limits that hold for these hold everywhere.
@@ -18,12 +21,14 @@ The time Σ w/√c is convex. Primal-dual Newton steps follow the central path; 
 enters with its tangent at the current profile, which keeps the system positive definite, while the step length is taken
 on the limit itself, so every profile on the way is feasible and the last one is used as it stands. The normal matrix
 has five diagonals: one step costs a fixed time per cell. Linear limits in z: Verscheure et al. 2009; tangent of the
-jerk limit: Erkorkmaz et al. 2017; predictor of the barrier: Nocedal and Wright, Numerical Optimization, ch. 19.
+jerk limit: Erkorkmaz et al. 2017; primal-dual steps: Nocedal and Wright, Numerical Optimization, ch. 19.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -38,6 +43,19 @@ MAX_STEPS = 200
 TO_LIMIT = 0.95
 #: the profile that the iteration starts from, over the largest constant one that keeps the limits
 START = 0.5
+
+
+class Row(NamedTuple):
+    """One limit in every slot: z·`level` + z′·`slope` + z″/2·`bend` ≤ `right`, or ≤ z^(−1/2) where `right` is None.
+
+    z and z′ are those of node k (`at` 0), of node k + 1 (`at` 1), or z is coefficient k (`at` 2) or k + 1 (`at` 3).
+    """
+
+    at: int
+    level: Floats | None
+    slope: Floats | None
+    bend: Floats | None
+    right: Floats | None
 
 
 @dataclass(frozen=True)
@@ -55,7 +73,10 @@ class Batch:
         Cell k: z″/2 = Σ bend[i]·c[k+i].
     node_cap, cell_cap : (n,) float64
         Bounds of z at node k and of coefficient k.
-    accel, jerk : (n,) float64
+    accel_level, accel_slope : (n,) float64
+        Node k: accel_level·z + accel_slope·|z′| ≤ 1.
+    jerk_level, jerk_slope, jerk_bend : (n,) float64
+        Cell k: jerk_level·z + jerk_slope·|z′| + jerk_bend·|z″/2| ≤ z^(−1/2).
     weight : (n,) float64
         The time is about Σ weight/√c.
     first, last : (r,) int64
@@ -72,8 +93,11 @@ class Batch:
     bend: Floats
     node_cap: Floats
     cell_cap: Floats
-    accel: Floats
-    jerk: Floats
+    accel_level: Floats
+    accel_slope: Floats
+    jerk_level: Floats
+    jerk_slope: Floats
+    jerk_bend: Floats
     weight: Floats
     first: Ints
     last: Ints
@@ -84,40 +108,63 @@ class Batch:
     def __len__(self) -> int:
         return len(self.near)
 
-    def forms(self, c: Floats, idle: float) -> tuple[Floats, Floats, Floats]:
-        """Values z and z′ at the nodes and z″/2 in the cells; `idle` is the z of slots without node."""
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """All limits."""
+        one = np.ones(len(self))
+        level = self.accel_level if self.accel_level.any() else None
+        rows = [Row(0, one, None, None, self.node_cap), Row(2, one, None, None, self.cell_cap)]
+        rows += [Row(0, level, sign * self.accel_slope, None, one) for sign in (1.0, -1.0)]
+        bends = (self.jerk_bend, -self.jerk_bend)
+        if self.jerk_level.any() or self.jerk_slope.any():
+            slopes = (self.jerk_slope, -self.jerk_slope)
+            rows += [Row(at, self.jerk_level, slope, bend, None) for at in (0, 1) for slope in slopes for bend in bends]
+            rows.append(Row(3, self.jerk_level, None, bends[1], None))
+        else:
+            rows += [Row(at, None, None, bend, None) for at in (0, 1) for bend in bends]
+            # where z″ < 0 the largest z in the cell may lie inside
+            rows.append(Row(3, None, None, bends[1], None))
+        return tuple(rows)
+
+    @cached_property
+    def idle(self) -> Floats:
+        """One in slots without node."""
+        return np.where(self.slope > 0.0, 0.0, 1.0)
+
+    def forms(self, c: Floats) -> tuple[Floats, Floats, Floats]:
+        """Values z and z′ at the nodes and z″/2 in the cells; zero in slots without."""
         after = _ahead(c)
-        z = self.near * c + self.far * after + np.where(self.slope > 0.0, 0.0, idle)
+        z = self.near * c + self.far * after
         slope = self.slope * (after - c)
         bend = self.bend[0] * c + self.bend[1] * after + self.bend[2] * _ahead(after)
         return z, slope, bend
 
-    def slacks(self, c: Floats) -> tuple[Floats, Floats]:
-        """(9, n) distances to the limits, and z at the nodes."""
-        z, slope, bend = self.forms(c, 1.0)
-        rows = np.empty((9, len(c)))
-        allowed = self.jerk / np.sqrt(z)
-        allowed_next = _ahead(allowed)
-        np.subtract(self.node_cap, z, out=rows[0])
-        np.subtract(self.cell_cap, c, out=rows[1])
-        np.subtract(2.0 * self.accel, slope, out=rows[2])
-        np.add(2.0 * self.accel, slope, out=rows[3])
-        np.subtract(allowed, bend, out=rows[4])
-        np.subtract(allowed_next, bend, out=rows[5])
-        np.add(allowed, bend, out=rows[6])
-        np.add(allowed_next, bend, out=rows[7])
-        np.add(self.jerk / np.sqrt(_ahead(c)), bend, out=rows[8])
-        return rows, z
+    def places(self, c: Floats, idle: float) -> tuple[list[Floats], list[Floats], Floats]:
+        """Arrays z and z′ as rows see them, by `Row.at`, and z″/2; `idle` is the z of slots without node."""
+        z, slope, bend = self.forms(c)
+        z = z + idle * self.idle
+        return [z, _ahead(z), c, _ahead(c)], [slope, _ahead(slope)], bend
+
+    def slacks(self, c: Floats) -> tuple[Floats, list[Floats]]:
+        """(rows, n) distances to the limits, and z by `Row.at`."""
+        z, slope, bend = self.places(c, 1.0)
+        root = [1.0 / np.sqrt(values) for values in z]
+        slack = np.empty((len(self.rows), len(c)))
+        for row, into in zip(self.rows, slack, strict=True):
+            np.subtract(root[row.at] if row.right is None else row.right, _left(row, z, slope, bend), out=into)
+        return slack, z
 
     def start(self) -> Floats:
         """Coefficients of constant profiles, one per run, that keep every limit with room to spare."""
         c = np.ones(len(self))
         self.follow(c)
-        z, slope, bend = self.forms(c, 1.0)
-        highest = np.maximum(np.maximum(z, _ahead(z)), 1.0)
-        use = np.maximum(z / self.node_cap, c / self.cell_cap)
-        use = np.maximum(use, np.abs(slope) / (2.0 * self.accel))
-        use = np.maximum(use, np.cbrt(np.abs(bend) * np.sqrt(highest) / self.jerk) ** 2)
+        z, slope, bend = self.places(c, 1.0)
+        use = np.zeros(len(self))
+        for row in self.rows:
+            left = np.maximum(_left(row, z, slope, bend), 0.0)
+            # left sides grow with z, the right side of jerk limits falls with its root
+            used = np.cbrt(left * np.sqrt(z[row.at])) ** 2 if row.right is None else left / row.right
+            np.maximum(use, used, out=use)
         lowest = START / np.maximum.reduceat(use, self.first)
         started: Floats = c * np.repeat(lowest, self.last - self.first + 1)
         return started
@@ -145,15 +192,12 @@ def solve(batch: Batch, c: Floats) -> Floats:
         Strictly feasible coefficients; the time is within about `GAP` of the smallest on this grid.
     """
     slack, z = batch.slacks(c)
-    rows = slack.size
-    barrier = float((batch.weight / np.sqrt(c)).sum()) / rows
+    barrier = float((batch.weight / np.sqrt(c)).sum()) / slack.size
     dual = barrier / slack
     for _ in range(MAX_STEPS):
-        bite = 0.5 * batch.jerk * z**-1.5  # −d(J·z^(−1/2))/dz
-        bite_cell = 0.5 * batch.jerk * _ahead(c) ** -1.5
-        step = _newton_step(batch, c, slack, dual, barrier, bite, bite_cell)
-        push = _change(batch, step, bite, bite_cell)
-        relative = push / slack
+        bites = [0.5 * values**-1.5 for values in z]  # −d(z^(−1/2))/dz
+        step = _newton_step(batch, c, slack, dual, barrier, bites)
+        relative = _change(batch, step, bites) / slack
         dual_step = barrier / slack - dual + dual * relative
         dual_length = min(1.0, TO_LIMIT / max(float((-dual_step / dual).max()), TO_LIMIT))
         length = min(1.0, TO_LIMIT / max(float(relative.max()), float((-step / c).max()), TO_LIMIT))
@@ -171,69 +215,93 @@ def solve(batch: Batch, c: Floats) -> Floats:
             break
         # lower the barrier only as fast as the steps arrive; raise it where they are cut short
         shrink = 0.2 if worst > 0.9 else 0.5 if worst > 0.6 else 1.0 if worst > 0.2 else 2.0
-        barrier = shrink * gap / rows
+        barrier = shrink * gap / slack.size
     return c
 
 
-def _newton_step(
-    batch: Batch, c: Floats, slack: Floats, dual: Floats, barrier: float, bite: Floats, bite_cell: Floats
-) -> Floats:
+def _left(row: Row, z: list[Floats], slope: list[Floats], bend: Floats) -> Floats:
+    """Left side of a limit."""
+    terms = []
+    if row.level is not None:
+        terms.append(row.level * z[row.at])
+    if row.slope is not None:
+        terms.append(row.slope * slope[row.at])
+    if row.bend is not None:
+        terms.append(row.bend * bend)
+    left: Floats = sum(terms[1:], start=terms[0])
+    return left
+
+
+def _weight_of_z(row: Row, bites: list[Floats]) -> Floats:
+    """Derivative of left minus right side by z."""
+    if row.right is not None:
+        return np.zeros_like(bites[0]) if row.level is None else row.level
+    return bites[row.at] if row.level is None else row.level + bites[row.at]
+
+
+def _change(batch: Batch, step: Floats, bites: list[Floats]) -> Floats:
+    """(rows, n) linear change of the limits' left minus right sides with a step of the coefficients."""
+    z, slope, bend = batch.places(step, 0.0)
+    change = np.empty((len(batch.rows), len(step)))
+    for row, into in zip(batch.rows, change, strict=True):
+        np.multiply(_weight_of_z(row, bites), z[row.at], out=into)
+        if row.slope is not None:
+            into += row.slope * slope[row.at]
+        if row.bend is not None:
+            into += row.bend * bend
+    return change
+
+
+def _newton_step(batch: Batch, c: Floats, slack: Floats, dual: Floats, barrier: float, bites: list[Floats]) -> Floats:
     """Solve the normal equations of the barrier problem for the change of the coefficients."""
     n = len(c)
-    w = dual / slack
-    force = barrier / slack
-    # forces on z at the nodes, z′, z″/2 and on the coefficients
-    bite_next = _ahead(bite)
-    on_z = force[0] + bite * (force[4] + force[6]) + _behind(bite_next * (force[5] + force[7]))
-    on_slope = batch.slope * (force[2] - force[3])
-    on_bend = force[4] + force[5] - force[6] - force[7] - force[8]
-    gradient = force[1] - 0.5 * batch.weight * c**-1.5
-    gradient += batch.near * on_z - on_slope + batch.bend[0] * on_bend
-    gradient += _behind(batch.far * on_z + on_slope + batch.bend[1] * on_bend + bite_cell * force[8])
-    gradient += _behind(_behind(batch.bend[2] * on_bend))
+    # forces on, and stiffness of, z and z′ at the nodes and coefficients by `Row.at`, and z″/2
+    on_z, on_slope, on_bend = np.zeros((4, n)), np.zeros((2, n)), np.zeros(n)
+    zz, zs, ss, bb = np.zeros((4, n)), np.zeros((2, n)), np.zeros((2, n)), np.zeros(n)
+    zb, sb = np.zeros((4, n)), np.zeros((2, n))
+    stiffness, pressure = dual / slack, barrier / slack
+    for row, w, force in zip(batch.rows, stiffness, pressure, strict=True):
+        by_z = _weight_of_z(row, bites)
+        wz = w * by_z
+        on_z[row.at] += force * by_z
+        zz[row.at] += wz * by_z
+        if row.slope is not None:
+            on_slope[row.at] += force * row.slope
+            ss[row.at] += w * row.slope**2
+            if row.level is not None or row.right is None:
+                zs[row.at] += wz * row.slope
+        if row.bend is not None:
+            on_bend += force * row.bend
+            bb += w * row.bend**2
+            zb[row.at] += wz * row.bend
+            if row.slope is not None:
+                sb[row.at] += w * row.slope * row.bend
 
+    near, far, s = batch.near, batch.far, batch.slope
     r0, r1, r2 = batch.bend
-    w_z = w[0] + bite**2 * (w[4] + w[6]) + _behind(bite_next**2 * (w[5] + w[7]))
-    w_slope = (w[2] + w[3]) * batch.slope**2
-    w_bend = w[4] + w[5] + w[6] + w[7] + w[8]
-    cross, cross_next = bite * (w[4] - w[6]), bite_next * (w[5] - w[7])
-    # z″/2 times z at both nodes and times the middle coefficient, spread over the cell's three coefficients
-    k0 = cross * batch.near
-    k1 = cross * batch.far + cross_next * _ahead(batch.near) - w[8] * bite_cell
-    k2 = cross_next * _ahead(batch.far)
+    node_z, node_s = on_z[0] + _behind(on_z[1]), s * (on_slope[0] + _behind(on_slope[1]))
+    gradient = on_z[2] - 0.5 * batch.weight * c**-1.5 + near * node_z - node_s + r0 * on_bend
+    gradient += _behind(far * node_z + node_s + r1 * on_bend + on_z[3]) + _behind(_behind(r2 * on_bend))
+
+    w_z, w_zs, w_s = (at[0] + _behind(at[1]) for at in (zz, zs, ss))
+    w_zs, w_s = s * w_zs, s * s * w_s
+    # z″/2 times z and z′ at both nodes and times the middle coefficient, spread over the cell's three coefficients
+    k0 = zb[0] * near - sb[0] * s
+    k1 = zb[0] * far + sb[0] * s + zb[1] * _ahead(near) - sb[1] * _ahead(s) + zb[3]
+    k2 = zb[1] * _ahead(far) + sb[1] * _ahead(s)
     bands = np.zeros((3, n))
     diagonal, beside, beyond = bands[2], bands[1], bands[0]
-    diagonal += 0.75 * batch.weight * c**-2.5 + w[1]
-    diagonal += w_z * batch.near**2 + w_slope + r0 * (w_bend * r0 + 2.0 * k0)
-    diagonal += _behind(w_z * batch.far**2 + w_slope + r1 * (w_bend * r1 + 2.0 * k1) + w[8] * bite_cell**2)
-    diagonal += _behind(_behind(r2 * (w_bend * r2 + 2.0 * k2)))
-    beside += _behind(w_z * batch.near * batch.far - w_slope + w_bend * r0 * r1 + r0 * k1 + r1 * k0)
-    beside += _behind(_behind(w_bend * r1 * r2 + r1 * k2 + r2 * k1))
-    beyond += _behind(_behind(w_bend * r0 * r2 + r0 * k2 + r2 * k0))
+    diagonal += 0.75 * batch.weight * c**-2.5 + zz[2]
+    diagonal += w_z * near**2 - 2.0 * w_zs * near + w_s + r0 * (bb * r0 + 2.0 * k0)
+    diagonal += _behind(w_z * far**2 + 2.0 * w_zs * far + w_s + r1 * (bb * r1 + 2.0 * k1) + zz[3])
+    diagonal += _behind(_behind(r2 * (bb * r2 + 2.0 * k2)))
+    beside += _behind(w_z * near * far + w_zs * (near - far) - w_s + bb * r0 * r1 + r0 * k1 + r1 * k0)
+    beside += _behind(_behind(bb * r1 * r2 + r1 * k2 + r2 * k1))
+    beyond += _behind(_behind(bb * r0 * r2 + r0 * k2 + r2 * k0))
     _eliminate(batch, bands, gradient)
     step = solveh_banded(bands, -gradient, overwrite_ab=True, overwrite_b=True, check_finite=False)
     batch.follow(step)
     return np.asarray(step, np.float64)
-
-
-def _change(batch: Batch, step: Floats, bite: Floats, bite_cell: Floats) -> Floats:
-    """(9, n) linear change of the limits' left sides with a step of the coefficients."""
-    z, slope, bend = batch.forms(step, 0.0)
-    used = bite * z
-    used_next = _ahead(used)
-    return np.stack(
-        (
-            z,
-            step,
-            slope,
-            -slope,
-            used + bend,
-            used_next + bend,
-            used - bend,
-            used_next - bend,
-            bite_cell * _ahead(step) - bend,
-        )
-    )
 
 
 def _eliminate(batch: Batch, bands: Floats, gradient: Floats) -> None:
@@ -241,12 +309,12 @@ def _eliminate(batch: Batch, bands: Floats, gradient: Floats) -> None:
     beyond, beside, diagonal = bands
     for end, ratio, inward in ((batch.first, batch.first_ratio, 1), (batch.last, batch.last_ratio, -1)):
         rest = ~np.isnan(ratio)
-        at, ratio = end[rest], ratio[rest]
+        at, part = end[rest], ratio[rest]
         to = at + inward
         pair = np.maximum(at, to)  # column of the entry that joins both
-        diagonal[to] += ratio * (ratio * diagonal[at] + 2.0 * beside[pair])
-        beside[np.maximum(to, to + inward)] += ratio * beyond[np.maximum(at, at + 2 * inward)]
-        gradient[to] += ratio * gradient[at]
+        diagonal[to] += part * (part * diagonal[at] + 2.0 * beside[pair])
+        beside[np.maximum(to, to + inward)] += part * beyond[np.maximum(at, at + 2 * inward)]
+        gradient[to] += part * gradient[at]
         _isolate(bands, gradient, at)
     _isolate(bands, gradient, np.flatnonzero(batch.frozen))
 

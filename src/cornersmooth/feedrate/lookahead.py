@@ -68,8 +68,11 @@ def batch_of(grid: Grid, accel: Floats, jerk: Floats) -> Batch:
         bend=bend,
         node_cap=node_cap,
         cell_cap=cell_cap,
-        accel=accel,
-        jerk=jerk,
+        accel_level=np.zeros(n),
+        accel_slope=0.5 / accel,
+        jerk_level=np.zeros(n),
+        jerk_slope=np.zeros(n),
+        jerk_bend=1.0 / jerk,
         weight=weight,
         first=first,
         last=last,
@@ -109,7 +112,8 @@ def _solve_long(
     batch: Batch, grid: Grid, c: Floats, begin: int, end: int, progress: Callable[[int, int], None] | None
 ) -> None:
     speed = np.sqrt(batch.cell_cap[begin + 1 : end - 1].max())
-    brake = 1.1 * float(stopping_distance(speed, batch.accel[begin], batch.jerk[begin]))
+    accel, jerk = 0.5 / batch.accel_slope[begin:end].max(), 1.0 / batch.jerk_bend[begin:end].max()
+    brake = 1.1 * float(stopping_distance(speed, accel, jerk))
     at = begin
     while True:
         stop = min(at + WINDOW, end)
@@ -154,8 +158,11 @@ def _part(batch: Batch, begin: int, end: int) -> Batch:
         bend=bend,
         node_cap=node_cap,
         cell_cap=batch.cell_cap[begin:end],
-        accel=batch.accel[begin:end],
-        jerk=batch.jerk[begin:end],
+        accel_level=batch.accel_level[begin:end],
+        accel_slope=batch.accel_slope[begin:end],
+        jerk_level=batch.jerk_level[begin:end],
+        jerk_slope=batch.jerk_slope[begin:end],
+        jerk_bend=batch.jerk_bend[begin:end],
         weight=batch.weight[begin:end],
         first=first,
         last=last,
@@ -163,11 +170,6 @@ def _part(batch: Batch, begin: int, end: int) -> Batch:
         last_ratio=last_ratio,
         frozen=frozen,
     )
-
-
-def node_values(batch: Batch, c: Floats) -> tuple[Floats, Floats, Floats]:
-    """Values z and z′ at the end of every cell, and z″/2 in the cell after it; zero where there is none."""
-    return batch.forms(c, 0.0)
 
 
 def run_of_cells(grid: Grid) -> Ints:

@@ -163,7 +163,7 @@ def _uneven_runs(
     of_cell = lookahead.run_of_cells(grid)
     batch = lookahead.batch_of(grid, accel[runs][of_cell], jerk[runs][of_cell])
     c = lookahead.solve_runs(batch, grid, progress)
-    z, slope, bend = lookahead.node_values(batch, c)
+    z, slope, bend = batch.forms(c)
     v, a = np.sqrt(z), 0.5 * slope  # at the end of each cell
     before_v = np.concatenate(([0.0], v[:-1]))
     before_a = np.concatenate(([0.0], a[:-1]))
