@@ -15,7 +15,9 @@ included, within 1 % in most curves: each curve runs at constant speed, as it sh
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -49,13 +51,12 @@ class Curve:
         """What is wrong with knots and control points, if anything."""
         if not self.knots or len(self.points) != len(self.knots) + DEGREE - 1:
             return f"{len(self.knots)} knots and {len(self.points)} control points are no cubic"
-        if not 0 < self.knots[-1] < np.inf:
-            return "its last knot is not positive"
+        ascend = all(low <= high for low, high in pairwise((0.0, *self.knots)))
+        if not ascend or not 0 < self.knots[0] <= self.knots[-1] < math.inf:
+            return "its knots do not ascend from above 0"
         knots = np.array([0.0, *self.knots]) / self.knots[-1]
         steps = np.diff(knots)
-        if not (steps >= 0).all() or steps[0] == 0:
-            return "its knots do not ascend from above 0"
-        if ((steps > 0) & (steps < LEAST_STEP)).any():
+        if steps[0] == 0 or ((steps > 0) & (steps < LEAST_STEP)).any():
             return "two of its knots are nearly the same"
         if (knots[:-2] == knots[2:]).any():
             return "a knot is repeated more than once"
