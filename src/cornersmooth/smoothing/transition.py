@@ -6,6 +6,7 @@ Every function works on whole arrays of corners; memory is bounded by working th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,9 @@ from cornersmooth.smoothing.zhang2016 import place_zhang2016
 
 #: corners worked on at once: their intermediate arrays fit the processor's cache
 BLOCK = 16384
+
+#: blocks worked on side by side
+THREADS = 2
 
 
 def place_corners(program: Program, settings: Settings, progress: Callable[[int, int], None] | None = None) -> Corners:
@@ -59,15 +63,21 @@ def place_corners(program: Program, settings: Settings, progress: Callable[[int,
     )
     if settings.method == "proportional":  # the same fractions on both curves: one array
         whole.axis_trim_in, whole.axis_trim_out = whole.trim_in, whole.trim_out
-    for start, rows in work.blocks():
+
+    def settle(block: tuple[int, Ints]) -> int:
+        start, rows = block
         if len(rows):
             part, shape = work.place(rows, None if room is None else room[rows])
             if automatic:
                 weights[rows] = shape
             for name in Placed.__dataclass_fields__:
                 getattr(whole, name)[rows] = getattr(part, name)
-        if progress is not None:
-            progress(min(start + BLOCK, k), k)
+        return min(start + BLOCK, k)
+
+    with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; blocks share no rows
+        for done in pool.map(settle, work.blocks()):
+            if progress is not None:
+                progress(done, k)
     ratio = np.broadcast_to(np.float64(settings.ratio), (k,))
     return Corners(pose=pose, before=before, after=after, weights=weights, ratio=ratio, **vars(whole))
 
