@@ -1,4 +1,4 @@
-"""NC text from a smoothed program: the registry of controls and forms, and `write`."""
+"""NC text from a smoothed program: controls and their forms, and `write`."""
 
 from __future__ import annotations
 
@@ -9,22 +9,31 @@ from typing import Protocol
 
 import numpy as np
 
-from cornersmooth.errors import Finding, SettingsError
+from cornersmooth.errors import Finding
 from cornersmooth.model import Program, SmoothProgram, Units
-from cornersmooth.nc import fanuc
 from cornersmooth.nc.blocks import BlockWriter
+from cornersmooth.nc.choice import choose_form
 from cornersmooth.nc.circles import Circles, plan_circles
-from cornersmooth.nc.control import Form
+from cornersmooth.nc.control import Control, Form
+from cornersmooth.nc.framing import Frame
 from cornersmooth.nc.motion import MotionWriter
 from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.statements import StatementWriter
+from cornersmooth.nc.tables import control_names, load_control
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
 
-__all__ = ["FORMS", "Form", "Written", "choose_form", "fit_settings", "write"]
-
-#: every control with its forms; the first is the control's default
-FORMS: dict[str, dict[str, Form]] = {"fanuc": {form.name: form for form in (fanuc.G1, fanuc.G62)}}
+__all__ = [
+    "Control",
+    "Form",
+    "Frame",
+    "Written",
+    "choose_form",
+    "control_names",
+    "fit_settings",
+    "load_control",
+    "write",
+]
 
 
 class Stream(Protocol):
@@ -49,29 +58,12 @@ class Written:
     findings: tuple[Finding, ...]
 
 
-def choose_form(control: str = "fanuc", form: str | None = None) -> Form:
-    """Return the form of a control by name; the control's default where `form` is None.
-
-    Raises
-    ------
-    SettingsError
-        Unknown control, or a form that the control does not have.
-    """
-    forms = FORMS.get(control)
-    if forms is None:
-        raise SettingsError("CS210", f"unknown control {control!r}", f"choose one of {', '.join(sorted(FORMS))}")
-    if form is None:
-        return next(iter(forms.values()))
-    if form not in forms:
-        raise SettingsError("CS211", f"{control} has no form {form!r}", f"choose one of {', '.join(forms)}")
-    return forms[form]
-
-
 def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
     """Settings that know the digits and the abilities of the output form, so that ε holds for the written numbers."""
+    tolerance = settings.tolerance
     return settings.but(
-        tip_resolution=form.tip_resolution(units),
-        axis_point_resolution=form.axis_point_resolution(units, settings.axis_length),
+        tip_resolution=form.tip_resolution(units, tolerance),
+        axis_point_resolution=form.axis_point_resolution(units, tolerance, settings.axis_length),
         round_feed_changes=settings.round_feed_changes and not form.curves,
     )
 
@@ -81,7 +73,8 @@ def write(
     stream: Stream,
     *,
     control: str = "fanuc",
-    form: str | None = None,
+    form: str | Form | None = None,
+    frame: Frame | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Written:
     """Write the NC text of a smoothed program.
@@ -92,6 +85,12 @@ def write(
         Made with settings that fit the form (`fit_settings`), or ε is exceeded by the rounding.
     stream : binary stream
         Written in blocks; memory does not grow with the program.
+    control : str
+        Name or TOML file; of no account where `form` is a `Form`.
+    form : str or Form, optional
+        The control's default, or what `choose_form` gave.
+    frame : Frame, optional
+        Program name, block numbers, texts before and behind.
     progress : callable, optional
         Called now and then with (poses done, poses in all).
 
@@ -102,25 +101,30 @@ def write(
     OutputError
         A number that the form cannot hold.
     """
-    chosen = choose_form(control, form)
+    chosen = form if isinstance(form, Form) else choose_form(control, form)
     program, notes = smoothed.program, Notes()
-    statements = StatementWriter(fanuc.words(chosen), program, notes)
+    statements = StatementWriter(chosen, program, notes)
     circles = plan_circles(program, smoothed.settings, chosen)
     _tell_arcs(circles, program, notes)
     writer = BlockWriter(chosen, program, statements, notes, circles)
-    motion = MotionWriter(program, smoothed.settings.axis_length, writer, statements, notes)
-    head = fanuc.head(program)
-    stream.write(_text(head))
-    for rows in _one_ahead(curve_rows(smoothed) if chosen.curves else dense_rows(smoothed, circles.pieces)):
+    motion = MotionWriter(program, writer, statements, notes)
+    framing = (frame or Frame()).start(stream, chosen, program, smoothed.settings.tolerance)
+    framing.head()
+    for rows in _one_ahead(_rows(smoothed, chosen, circles)):
         for text in motion.write(rows):
-            stream.write(text)
+            framing.write(text)
         if progress is not None and len(rows.move):
             progress(int(rows.move[-1]) + 1, len(program))
     for text in motion.finish():
-        stream.write(text)
-    tail = fanuc.tail(statements)
-    stream.write(_text(tail))
-    return Written(len(head) + motion.blocks + writer.blocks + len(tail), notes.findings())
+        framing.write(text)
+    framing.tail(statements.end_motion())
+    return Written(framing.blocks + motion.blocks + writer.blocks, notes.findings())
+
+
+def _rows(smoothed: SmoothProgram, form: Form, circles: Circles) -> Iterator[Rows]:
+    if form.curves:
+        return curve_rows(smoothed)
+    return dense_rows(smoothed, circles.pieces)
 
 
 def _one_ahead(blocks: Iterator[Rows]) -> Iterator[Rows]:
@@ -130,10 +134,6 @@ def _one_ahead(blocks: Iterator[Rows]) -> Iterator[Rows]:
         while (rows := coming.result()) is not None:
             coming = pool.submit(next, blocks, None)
             yield rows
-
-
-def _text(blocks: list[str]) -> bytes:
-    return "".join(block + "\n" for block in blocks).encode("ascii")
 
 
 def _tell_arcs(circles: Circles, program: Program, notes: Notes) -> None:

@@ -6,67 +6,21 @@ never per row.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cornersmooth.kinematics import machine_position
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.circles import Circles
-from cornersmooth.nc.control import Form
+from cornersmooth.nc.control import INVERSE_TIME, Form
+from cornersmooth.nc.curves import Curves, curves_for
 from cornersmooth.nc.notes import Notes
+from cornersmooth.nc.run import Run
 from cornersmooth.nc.statements import StatementWriter
 from cornersmooth.text import RowFormat, format_number, to_ticks
-
-#: knot written with each of the five control points: u0 to u4; u5 to u8 have blocks of their own
-_KNOT = (b"K0. ", b"K0. ", b"K0. ", b"K0. ", b"K0.5 ")
-_LAST_KNOTS = b"K1.\n" * 4
-
-
-@dataclass(frozen=True)
-class Run:
-    """Rows that nothing interrupts, r of them: what each block says.
-
-    Parameters
-    ----------
-    ticks : (r, 6) int64
-        Numbers in steps of their last digit.
-    move : (r,) int64
-        Pose, for messages.
-    rapid : (r,) bool
-    feed : (r,) float64
-        mm/min or mm/rev, NaN where there is none.
-    mode : (r,) int64
-        `FeedMode`.
-    curve : (r,) int8
-        As in `Rows`.
-    weights : (r, 2) float64 or None
-    arc : (r,) int64 or None
-    dwell : (r,) bool or None
-        Where the tool waits after the block.
-    """
-
-    ticks: Ints
-    move: Ints
-    rapid: Bools
-    feed: Floats
-    mode: Ints
-    curve: NDArray[np.int8]
-    weights: Floats | None = None
-    arc: Ints | None = None
-    dwell: Bools | None = None
-
-    def __len__(self) -> int:
-        return len(self.ticks)
-
-    def only(self, chosen: Bools) -> Run:
-        """Return the chosen rows."""
-        columns: dict[str, Any] = {
-            name: None if column is None else column[chosen] for name, column in vars(self).items()
-        }
-        return Run(**columns)
 
 
 @dataclass
@@ -94,62 +48,80 @@ class BlockWriter:
     _mode: int = FeedMode.PER_MINUTE
     _format: RowFormat = field(init=False)
     _arc_format: RowFormat = field(init=False)
+    _curves: Curves = field(init=False)
 
     def __post_init__(self) -> None:
-        words = (*self.form.coordinate_words, *self.form.other_words)
+        motion = self.form.mode.motion
+        words = [word.encode() for word in (*motion.coordinates, *self.form.other_words)]
         decimals = self.form.decimals(self.program.units)
-        self._format = RowFormat(
-            words=tuple(word if i == 0 else b" " + word for i, word in enumerate(words)), decimals=decimals
-        )
-        self._arc_format = RowFormat(words=(*self._format.words[:3], b" R"), decimals=decimals[:3] + decimals[:1])
+        spaced = (words[0], *(b" " + word for word in words[1:]))
+        self._format = RowFormat(words=spaced, decimals=decimals, plus=motion.signs)
+        radius = f" {motion.radius}".encode()
+        self._arc_format = RowFormat((*spaced[:3], radius), decimals[:3] + decimals[:1], plus=motion.signs)
+        self._curves = curves_for(self.form, self.program.units)
 
     def ticks(self, tip: Floats, other: Floats) -> Ints:
-        """(r, 6) numbers of rows in steps of their last digit."""
+        """Numbers of rows in steps of their last digit, (r, c), from `Rows.tip` and `Rows.other`."""
+        form = self.form
+        if form.orientation == "machine" and form.machine is not None:
+            tip = machine_position(form.machine, tip, other)
+        if form.rotary and form.machine is not None and form.machine.names != form.other_words:
+            other = other[:, ::-1]
+        numbers = np.concatenate((tip, other[:, : len(form.other_words)]), axis=1)
         unit = self.program.mm_per_unit
-        numbers = np.concatenate((tip, other), axis=1)
         if unit != 1.0:
-            numbers[:, : 3 if self.form.vectors else 6] /= unit
+            numbers[:, : 6 if form.orientation == "point" else 3] /= unit
         ticks: Ints = to_ticks(numbers, self._format.decimals)
         return ticks
 
     def text(self, run: Run, dwell: int = 0) -> bytes:
         """Text of a run that is not empty; `dwell` in milliseconds."""
+        run = self._curves.prepare(run)
         prefix, prefix_id, extra = self._prefixes(run)
         suffix, suffix_id = self._suffixes(run, dwell)
-        self.blocks += len(run.ticks) + extra + 4 * int(np.count_nonzero(run.curve == 5))
-        if run.arc is None or not (circular := run.arc >= 0).any():
+        self.blocks += len(run) + extra
+        apart: list[tuple[Bools, RowFormat, Ints]] = []  # rows with words of their own
+        if run.arc is not None and (circular := run.arc >= 0).any():
+            numbers = np.column_stack((run.ticks[circular, :3], self.circles.radius[run.arc[circular]]))
+            apart.append((circular, self._arc_format, numbers))
+        if self._curves.format is not None and (curved := run.curve > 0).any():
+            apart.append((curved, self._curves.format, self._curves.numbers(run, curved)))
+        if not apart:
             return self._format.rows(run.ticks, prefix, prefix_id, suffix, suffix_id)[0]
-        straight = ~circular
-        ticks = np.column_stack((run.ticks[circular, :3], self.circles.radius[run.arc[circular]]))
-        return _interleave(
-            circular,
-            self._format.rows(run.ticks[straight], prefix, prefix_id[straight], suffix, suffix_id[straight]),
-            self._arc_format.rows(ticks, prefix, prefix_id[circular], suffix, suffix_id[circular]),
-        )
+        which = np.zeros(len(run), np.int64)
+        for number, (rows, _, _) in enumerate(apart, start=1):
+            which[rows] = number
+        plain = which == 0
+        texts = [
+            layout.rows(numbers, prefix, prefix_id[rows], suffix, suffix_id[rows])
+            for rows, layout, numbers in ((plain, self._format, run.ticks[plain]), *apart)
+        ]
+        return _interleave(which, texts)
 
     def _prefixes(self, run: Run) -> tuple[list[bytes], Ints, int]:
         """Table of what stands before the numbers, an entry for each row, and the blocks hidden in the prefixes."""
-        table = [b"G1 ", b"G0 ", b"G6.2 P4 " + _KNOT[0], *_KNOT[1:], b"G2 ", b"G3 "]
-        chosen = np.where(run.curve > 0, run.curve + 1, run.rapid).astype(np.int64)
+        motion = self.form.mode.motion
+        table = [f"{word} ".encode() for word in (motion.line, motion.rapid, motion.clockwise, motion.counterclockwise)]
+        chosen = run.rapid.astype(np.int64)
         before: dict[int, bytes] = {}  # blocks before some rows
         feeding = np.flatnonzero(~run.rapid)
         modes = run.mode[feeding]
         for place in np.flatnonzero(np.diff(modes, prepend=self._mode)).tolist():
             self._mode = int(modes[place])
-            before[int(feeding[place])] = self.statements.words.feed_mode[FeedMode(self._mode)].encode() + b"\n"
-        extra = len(before)
+            before[int(feeding[place])] = self._block(self.statements.words.feed_mode, self._mode)
         if run.arc is not None:
             rows = np.flatnonzero(run.arc >= 0)
             arcs = run.arc[rows]
-            chosen[rows] = np.where(self.circles.clockwise[arcs], len(table) - 2, len(table) - 1)
+            chosen[rows] = np.where(self.circles.clockwise[arcs], 2, 3)
             planes = self.circles.plane[arcs]
-            changes = np.flatnonzero(np.diff(planes, prepend=self.statements.plane)).tolist()
-            for place in changes:
-                block = self.statements.words.plane[int(planes[place])].encode() + b"\n"
+            for place in np.flatnonzero(np.diff(planes, prepend=self.statements.plane)).tolist():
+                block = self._block(self.statements.words.plane, int(planes[place]))
                 before[int(rows[place])] = before.get(int(rows[place]), b"") + block
             if len(planes):
                 self.statements.plane = int(planes[-1])
-            extra += len(changes)
+        extra = sum(blocks.count(b"\n") for blocks in before.values())
+        if (run.curve > 0).any():
+            extra += self._curves.add_prefixes(run, table, chosen)
         entries: dict[bytes, int] = {}
         for row, blocks in before.items():
             text = blocks + table[chosen[row]]
@@ -159,66 +131,62 @@ class BlockWriter:
             chosen[row] = entry
         return table, chosen, extra
 
+    def _block(self, table: Mapping[int, str], key: int) -> bytes:
+        return table[key].encode() + b"\n" if key in table else b""
+
     def _suffixes(self, run: Run, dwell: int) -> tuple[list[bytes], Ints]:
         """Table of what stands behind the numbers, feed or weight, and an entry for each row."""
-        table = [b"\n"]
-        chosen = np.zeros(len(run.move), np.int64)
+        motion, digits = self.form.mode.motion, self.form.table.digits
+        table = [b"\n", f"{motion.rapid_end}\n".encode()]
+        chosen = run.rapid.astype(np.int64)
         feeding = np.flatnonzero(~run.rapid & (run.curve == 0))
         if len(feeding):
             feed = run.feed[feeding]
             missing = np.isnan(feed)
             if missing.any():
                 self._count_missing(run.move[feeding[missing]])
-            unit = np.where(missing, 0.0, feed) / self.program.mm_per_unit
-            ticks = to_ticks(unit, self.form.feed_decimals)[~missing]
+            inverse = run.mode[feeding] == INVERSE_TIME
+            unit = np.where(missing, 0.0, feed) / np.where(inverse, 1.0, self.program.mm_per_unit)
+            ticks = to_ticks(unit, digits.feed)[~missing]
             given = feeding[~missing]
             # F is given again with its unit: the same number per minute and per revolution is not the same feed
-            keys = 2 * ticks + run.mode[given]
-            changed = np.flatnonzero(np.diff(keys, prepend=self._feed))
+            keys = 4 * ticks + run.mode[given]
+            fresh = np.diff(keys, prepend=self._feed) != 0
+            fresh |= run.mode[given] == INVERSE_TIME  # which every block wants
+            changed = np.flatnonzero(fresh)
             if len(changed):
                 values, which = np.unique(ticks[changed], return_inverse=True)
-                scale = 10.0**self.form.feed_decimals
-                table += [
-                    b" F" + format_number(value / scale, self.form.feed_decimals, trim=True).encode() + b"\n"
-                    for value in values.tolist()
-                ]
-                chosen[given[changed]] = 1 + which.reshape(-1)
+                chosen[given[changed]] = len(table) + which.reshape(-1)
+                table += [f" {motion.feed}{self._feed_digits(value)}\n".encode() for value in values.tolist()]
                 self._feed = int(keys[-1])
         if run.weights is not None and (run.curve > 0).any():
-            _add_weights(table, chosen, run.curve, run.weights)
+            self._curves.add_suffixes(run, table, chosen)
         if run.dwell is not None and run.dwell.any():
-            wait = "".join(block + "\n" for block in self.statements.dwell(dwell)).encode()
+            blocks = self.statements.dwell(dwell)
             chosen[run.dwell] += len(table)
-            table += [end + wait for end in table]
-            self.blocks += int(np.count_nonzero(run.dwell))
+            table += [end + "".join(block + "\n" for block in blocks).encode() for end in table]
+            self.blocks += int(np.count_nonzero(run.dwell)) * len(blocks)
         return table, chosen
+
+    def _feed_digits(self, ticks: int) -> str:
+        decimals = self.form.table.digits.feed
+        text = format_number(ticks / 10.0**decimals, decimals, trim=True)
+        return text if self.form.mode.motion.feed_point else text.rstrip(".")
 
     def _count_missing(self, moves: Ints) -> None:
         text = "feed move without a feed in the CL file; most controls stop with an alarm, give one with --feed"
         self.notes.add("CS311", "warning", int(self.program.line[moves[0]]), text, len(moves))
 
 
-def _add_weights(table: list[bytes], chosen: Ints, curve: NDArray[np.int8], weights: Floats) -> None:
-    column = np.array([0, -1, 0, 1, 0, -1])[curve]
-    on_curve = curve > 0
-    number = np.where(column < 0, 1.0, weights[np.arange(len(curve)), np.maximum(column, 0)])
-    values, which = np.unique(number[on_curve], return_inverse=True)
-    ends = [b" R" + format_number(value, 3, trim=True).encode() + b"\n" for value in values.tolist()]
-    base = len(table)
-    table += ends
-    table += [end + _LAST_KNOTS for end in ends]
-    chosen[on_curve] = base + which.reshape(-1) + np.where(curve[on_curve] == 5, len(ends), 0)
-
-
-def _interleave(second: Bools, *texts: tuple[bytes, Ints]) -> bytes:
-    """Put two texts of rows together; `second` says for each row which of them it is in."""
-    edges = [0, *(1 + np.flatnonzero(second[1:] != second[:-1])).tolist(), len(second)]
-    at = [0, 0]
+def _interleave(which: Ints, texts: Sequence[tuple[bytes, Ints]]) -> bytes:
+    """Put texts of rows together; `which` says for each row in which of them it is."""
+    edges = [0, *(1 + np.flatnonzero(which[1:] != which[:-1])).tolist(), len(which)]
+    at = [0] * len(texts)
     pieces = []
     for first, last in pairwise(edges):
-        which = int(second[first])
-        text, offsets = texts[which]
-        stop = at[which] + last - first
-        pieces.append(text[offsets[at[which]] : offsets[stop]])
-        at[which] = stop
+        own = int(which[first])
+        text, offsets = texts[own]
+        stop = at[own] + last - first
+        pieces.append(text[offsets[at[own]] : offsets[stop]])
+        at[own] = stop
     return b"".join(pieces)

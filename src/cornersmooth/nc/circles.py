@@ -76,11 +76,11 @@ def plan_circles(program: Program, settings: Settings, form: Form) -> Circles:
     height = np.take_along_axis(arcs.normal, third[:, None], axis=1)[:, 0]
     radius = arc_radii(program)
     unit = program.mm_per_unit
-    decimals = form.tip_decimals[program.units]
+    decimals = form.tip_decimals(program.units)
     ticks = to_ticks(np.minimum(radius, _LARGEST_RADIUS) / unit, decimals)
-    vectors = to_ticks(program.axis, form.vector_decimals)
+    vectors = to_ticks(program.axis, form.table.digits.vector)
     fits = (
-        form.circles
+        form.mode.circles
         & (np.abs(height) > 1.0 - _UPRIGHT)
         & (radius < _LARGEST_RADIUS)
         & (ticks > 0)

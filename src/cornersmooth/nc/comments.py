@@ -20,11 +20,11 @@ def plain_text(text: str) -> str:
     return " ".join(printable.translate(str.maketrans("()%", "[]/")).split())
 
 
-def comment_lines(text: str) -> list[str]:
-    """Text as one or more comments in parentheses; none for an empty text."""
+def comment_lines(text: str, marks: tuple[str, str] = ("(", ")")) -> list[str]:
+    """Text as one or more comments between marks; none for an empty text."""
     rest = plain_text(text)
     lines = []
     while rest:
-        lines.append(f"({rest[:_LONGEST]})")
+        lines.append(f"{marks[0]}{rest[:_LONGEST]}{marks[1]}".rstrip())
         rest = rest[_LONGEST:].lstrip()
     return lines

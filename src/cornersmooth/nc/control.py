@@ -1,29 +1,45 @@
-"""What the writers know about a control: its words, its digits and what it can do."""
+"""What the writers know about a control: its words, its digits and what it can do. All of it comes from a table."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
-from cornersmooth.model import MM_PER_UNIT, FeedMode, Units
+from cornersmooth.kinematics import Machine
+from cornersmooth.model import MM_PER_UNIT, Units
 
 Blocks = tuple[str, ...]
+
+#: what stands beside the tip in a motion block: the tool vector, a second point on the tool axis, the words of two
+#: rotary axes with the tip (tool tip control) or with the linear axes of the machine, or nothing
+Orientation = Literal["vector", "point", "angles", "machine", "fixed"]
+
+#: how curves are written; empty for lines
+CurveStyle = Literal["", "g6.2", "bspline", "poly", "spl"]
+
+#: feed modes of the words: those of `model.FeedMode`, and inverse time
+INVERSE_TIME = 2
+
+#: share of ε, at the axis point, that rotary axes may take between and at the written words
+ROTARY_SHARE = 0.1
+
+#: share of ε that the tip may leave its line where the control knows nothing of the tip
+TIP_SHARE = 0.1
 
 
 @dataclass(frozen=True)
 class Words:
-    """Blocks by which a control is told what is not motion; each field holds zero or more blocks.
+    """Blocks by which a control is told what is not motion; an empty field is not translated.
 
     Parameters
     ----------
     tool_change, tool_select : tuple of str
         With ``{tool}``; the latter only brings the tool near.
-    tip_control_on, tip_control_off : tuple of str
-        Tool tip control; with ``{offset}``, the length register.
     spindle_speed : tuple of str
-        With ``{speed}`` and ``{direction}``, one of `spindle_on`.
-    spindle_on : mapping
-        Block for ``"clockwise"`` and ``"counterclockwise"``.
+        With ``{speed}`` and ``{direction}``, one of the next two.
+    clockwise, counterclockwise : str
     coolant : mapping
         Blocks by CL word; other words are not translated.
     dwell : tuple of str
@@ -33,77 +49,230 @@ class Words:
     plane : mapping
         Block for the planes 17 (XY), 18 (ZX) and 19 (YZ).
     feed_mode : mapping
-        Block by `FeedMode`.
+        Block for `FeedMode` and `INVERSE_TIME`.
     """
 
-    tool_change: Blocks
-    tool_select: Blocks
-    tip_control_on: Blocks
-    tip_control_off: Blocks
-    spindle_speed: Blocks
-    spindle_on: Mapping[str, str]
-    spindle_off: Blocks
-    spindle_orient: Blocks
-    coolant: Mapping[str, Blocks]
-    dwell: Blocks
-    stop: Blocks
-    optional_stop: Blocks
-    compensation_left: Blocks
-    compensation_right: Blocks
-    compensation_off: Blocks
-    plane: Mapping[int, str]
-    feed_mode: Mapping[FeedMode, str]
+    tool_change: Blocks = ()
+    tool_select: Blocks = ()
+    spindle_speed: Blocks = ()
+    clockwise: str = "M3"
+    counterclockwise: str = "M4"
+    spindle_off: Blocks = ()
+    spindle_orient: Blocks = ()
+    coolant: Mapping[str, Blocks] = field(default_factory=dict)
+    dwell: Blocks = ()
+    stop: Blocks = ()
+    optional_stop: Blocks = ()
+    compensation_left: Blocks = ()
+    compensation_right: Blocks = ()
+    compensation_off: Blocks = ()
+    plane: Mapping[int, str] = field(default_factory=dict)
+    feed_mode: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How motion blocks look.
+
+    Parameters
+    ----------
+    rapid, line, clockwise, counterclockwise : str
+        What blocks begin with.
+    rapid_end : str
+        What rapids end with.
+    coordinates : tuple of str
+        Addresses of X, Y and Z.
+    radius, feed : str
+        Addresses.
+    feed_point : bool
+        Whether a whole feed is written with a point.
+    signs : bool
+        Whether numbers that are not negative have a plus.
+    """
+
+    rapid: str = "G0"
+    line: str = "G1"
+    clockwise: str = "G2"
+    counterclockwise: str = "G3"
+    rapid_end: str = ""
+    coordinates: tuple[str, ...] = ("X", "Y", "Z")
+    radius: str = "R"
+    feed: str = "F"
+    feed_point: bool = True
+    signs: bool = False
+
+
+@dataclass(frozen=True)
+class Digits:
+    """Digits after the point; `mm` and `inch` for lengths, `feed` and `coefficient` at most."""
+
+    mm: int = 4
+    inch: int = 5
+    vector: int = 7
+    angle: int = 5
+    feed: int = 4
+    weight: int = 3
+    coefficient: int = 7
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One way in which a form can say the orientation.
+
+    Parameters
+    ----------
+    words : tuple of str
+        Addresses of vector or point; rotary addresses come from the machine.
+    on, off : tuple of str
+        Blocks before the motion and behind it; with ``{offset}``, the length register.
+    motion : Motion
+    circles : bool
+        Whether arcs may be written as circular blocks, without the words of the orientation.
+    """
+
+    words: tuple[str, ...]
+    on: Blocks
+    off: Blocks
+    motion: Motion
+    circles: bool
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The text around the motion.
+
+    Parameters
+    ----------
+    program : str
+        Name or number of the program.
+    head, tail : tuple of str
+        Blocks; with ``{program}``, ``{units}`` and, in the head, ``{blend}``, a tenth of ε.
+    units : mapping
+        What ``{units}`` stands for.
+    comment : (str, str)
+        What stands before and behind a comment.
+    block_number : str
+        With ``{number}``; empty where blocks have none unless asked for.
+    number_start, number_step : int
+    """
+
+    program: str = "O0001"
+    head: Blocks = ()
+    tail: Blocks = ()
+    units: Mapping[Units, str] = field(default_factory=dict)
+    comment: tuple[str, str] = ("(", ")")
+    block_number: str = ""
+    number_start: int = 10
+    number_step: int = 10
+
+
+@dataclass(frozen=True)
+class FormTable:
+    """A form of a control with all its modes."""
+
+    name: str
+    description: str
+    curve: CurveStyle
+    modes: Mapping[Orientation, Mode]
+
+
+@dataclass(frozen=True)
+class Control:
+    """A control as its table describes it; the first form is the default."""
+
+    name: str
+    description: str
+    digits: Digits
+    layout: Layout
+    words: Words
+    forms: Mapping[str, FormTable]
 
 
 @dataclass(frozen=True)
 class Form:
-    """One way of writing the smoothed motion for a control.
+    """A form of a control in one of its modes: everything the writers go by.
 
     Parameters
     ----------
-    control, name : str
+    table : Control
+    name : str
         As on the command line.
-    curves : bool
-        Whether transitions are written as curves (control points) instead of lines.
-    coordinate_words, other_words : tuple of bytes
-        Addresses of the tip and of the tool vector or axis point.
-    vectors : bool
-        Whether `other_words` are unit vectors; otherwise they are axis points, in the units of the tip.
-    tip_decimals : dict
-        Decimals of lengths by unit.
-    vector_decimals : int
-    feed_decimals : int
-        Most decimals of F; trailing zeros are not written.
-    circles : bool
-        Whether arcs may be written as circular blocks, the tool vector kept.
+    curve : CurveStyle
+    orientation : Orientation
+    mode : Mode
+    machine : Machine or None
+        For rotary words.
     """
 
-    control: str
+    table: Control
     name: str
-    curves: bool
-    coordinate_words: tuple[bytes, ...]
-    other_words: tuple[bytes, ...]
-    vectors: bool
-    tip_decimals: dict[Units, int]
-    vector_decimals: int = 7
-    feed_decimals: int = 4
-    circles: bool = False
+    curve: CurveStyle
+    orientation: Orientation
+    mode: Mode
+    machine: Machine | None = None
+
+    @property
+    def control(self) -> str:
+        """Name of the control."""
+        return self.table.name
+
+    @property
+    def curves(self) -> bool:
+        """Whether transitions are written as curves instead of lines."""
+        return bool(self.curve)
+
+    @property
+    def vectors(self) -> bool:
+        """Whether the words behind the tip are a unit vector."""
+        return self.orientation == "vector"
+
+    @property
+    def rotary(self) -> bool:
+        """Whether the words behind the tip are angles."""
+        return self.orientation in ("angles", "machine")
+
+    @property
+    def other_words(self) -> tuple[str, ...]:
+        """Addresses behind those of the tip; rotary ones in the order of the alphabet."""
+        return tuple(sorted(self.machine.names)) if self.machine is not None and self.rotary else self.mode.words
+
+    def tip_decimals(self, units: Units) -> int:
+        """Decimals of lengths."""
+        return self.table.digits.mm if units == "mm" else self.table.digits.inch
 
     def decimals(self, units: Units) -> tuple[int, ...]:
-        """Decimals of the six numbers of a motion block."""
-        tip = self.tip_decimals[units]
-        return (tip,) * 3 + ((self.vector_decimals if self.vectors else tip),) * 3
+        """Decimals of the numbers of a motion block."""
+        tip, digits = self.tip_decimals(units), self.table.digits
+        other = {"vector": digits.vector, "point": tip, "angles": digits.angle, "machine": digits.angle, "fixed": 0}
+        return (tip,) * 3 + (other[self.orientation],) * len(self.other_words)
 
-    def tip_resolution(self, units: Units) -> float:
-        """Step of the written tip coordinates, mm."""
-        return float(MM_PER_UNIT[units] * 10.0 ** -self.tip_decimals[units])
+    def rounding(self, units: Units) -> float:
+        """Step of the written coordinates, mm."""
+        return float(MM_PER_UNIT[units] * 10.0 ** -self.tip_decimals(units))
 
-    def axis_point_resolution(self, units: Units, axis_length: float) -> float:
-        """What the rounding of vector or axis point is worth at the axis point, as a step in mm.
+    def tip_resolution(self, units: Units, tolerance: float) -> float:
+        """What is to be taken off ε at the tip, as a step of its coordinates: half of it per axis, mm."""
+        step = self.rounding(units)
+        return step + 2.0 / math.sqrt(3.0) * TIP_SHARE * tolerance if self.orientation == "machine" else step
+
+    def axis_point_resolution(self, units: Units, tolerance: float, axis_length: float) -> float:
+        """What the orientation is worth at the axis point, as a step in mm.
 
         A rounded axis point moves b = tip + H·dir by at most its own rounding and, across the tool, that of the tip;
-        the latter is in `tip_resolution` already.
+        the latter is in `tip_resolution` already. Rotary words have besides what `rotary_tolerance` leaves to them.
         """
-        if self.vectors:
-            return axis_length * float(10.0**-self.vector_decimals)
-        return self.tip_resolution(units)
+        if self.orientation == "point":
+            return self.rounding(units)
+        if self.rotary:
+            reserve = axis_length * math.radians(self.rotary_tolerance(tolerance, axis_length) + self._angle_rounding)
+            return 2.0 / math.sqrt(3.0) * reserve
+        return axis_length * float(10.0**-self.table.digits.vector)
+
+    def rotary_tolerance(self, tolerance: float, axis_length: float) -> float:
+        """Degrees by which rotary axes may leave the axis asked for, rounding of the words not counted."""
+        return math.degrees(ROTARY_SHARE * tolerance / axis_length)
+
+    @property
+    def _angle_rounding(self) -> float:
+        """Degrees by which the rounding of both rotary words may turn the axis."""
+        return float(10.0**-self.table.digits.angle)

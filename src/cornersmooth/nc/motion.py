@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, Statement
-from cornersmooth.nc.blocks import BlockWriter, Run
-from cornersmooth.nc.comments import comment_lines
+from cornersmooth.nc.blocks import BlockWriter
 from cornersmooth.nc.holes import approaches, hole_moves, travel_height
 from cornersmooth.nc.notes import Notes
+from cornersmooth.nc.run import Run
 from cornersmooth.nc.statements import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
@@ -32,21 +32,19 @@ class MotionWriter:
     Parameters
     ----------
     program : Program
-    axis_length : float, mm
-        H of the axis points, in forms that write them.
     writer : BlockWriter
     statements : StatementWriter
     notes : Notes
     """
 
     program: Program
-    axis_length: float
     writer: BlockWriter
     statements: StatementWriter
     notes: Notes
     blocks: int = 0  #: those that are not `writer`'s
     _repeated: int = 0
     _position: NDArray[np.int64] | None = None
+    _last: NDArray[np.int64] | None = None  #: what was written last, a tool change or not
     _return_to: int = _NOWHERE  #: first pose behind a tool change, until it is reached
     _next_statement: int = 0
     _said: tuple[Statement, ...] = field(init=False)
@@ -110,7 +108,7 @@ class MotionWriter:
         edges = [start, *(start + 1 + np.flatnonzero(hole[1:] != hole[:-1])).tolist(), stop]
         for first, last in pairwise(edges):
             if hole[first - start]:
-                yield from self._holes(rows.move[first:last], self._approach)
+                yield from self._holes(rows, slice(first, last), self._approach)
             else:
                 yield from self._lines(rows, first, last)
 
@@ -121,7 +119,7 @@ class MotionWriter:
         arc = rows.arc[part] if rows.arc is not None else None
         yield from self._go_back(int(move[0]))
         if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
-            yield from self._go_to(int(move[0]) - 1, int(move[0]))
+            yield from self._go_to(self.writer.ticks(program.tip[move[:1] - 1], rows.other[part][:1]), move[:1])
         self._join(ticks, rows.joined[part])
         run = Run(
             ticks=ticks,
@@ -139,56 +137,60 @@ class MotionWriter:
         yield from self._emit(run)
 
     def _go_back(self, move: int) -> Iterator[bytes]:
-        """Go to the first pose behind a tool change even if it repeats the last one before, and so is no row."""
+        """Go to the pose behind a tool change even if it repeats the last one before, and so is no row."""
         begin, self._return_to = self._return_to, _NOWHERE
-        left_out = np.flatnonzero(self.program.kind[begin:move] != Move.FROM)
-        if begin < move and len(left_out):
-            yield from self._go_to(begin + int(left_out[0]), move)
+        if self._last is not None and (self.program.kind[begin:move] != Move.FROM).any():
+            yield from self._emit(self._run(self._last[None], np.array([move])))
 
-    def _go_to(self, pose: int, move: int) -> Iterator[bytes]:
-        """Go to a pose at the feed of a move, if the tool is elsewhere."""
-        at = np.array([pose])
-        run = self._run(self.program.tip[at], self.program.axis[at], np.array([move]), np.zeros(1, np.bool_))
-        yield from self._emit(self._moving(run))
+    def _go_to(self, ticks: Ints, move: Ints) -> Iterator[bytes]:
+        """Go to a place at the feed of a move, if the tool is elsewhere."""
+        yield from self._emit(self._moving(self._run(ticks, move)))
 
-    def _holes(self, poses: Ints, approach: Ints) -> Iterator[bytes]:
+    def _holes(self, rows: Rows, part: slice, approach: Ints) -> Iterator[bytes]:
         """Holes of one cycle as plain moves; those not understood are only approached."""
-        cycle, program = self.statements.cycle, self.program
+        cycle, program, poses = self.statements.cycle, self.program, rows.move[part]
         line = int(program.line[poses[0]])
         if cycle is None:
             text = "hole of a cycle that is not understood; it is not drilled, the tool only goes over it"
             self.notes.add("CS315", "warning", line, text, len(poses))
-            yield from self._over_holes(poses, travel_height(program, poses, approach[poses]))
+            yield from self._over_holes(rows, part, travel_height(program, poses, approach[poses]))
             return
         self.notes.add("CS316", "note", line, "hole of a cycle written as plain moves", len(poses))
         moves = hole_moves(cycle, program, poses, approach[poses])
         move = poses[moves.hole]
-        run = replace(self._run(moves.tip, program.axis[move], move, moves.rapid), dwell=moves.dwell)
+        ticks = self._shifted(rows, part, moves.tip, moves.hole)
+        run = replace(self._run(ticks, move), rapid=moves.rapid, dwell=moves.dwell)
         if not np.isnan(cycle.feed):
             run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
         yield from self._emit(self._moving(run), cycle.dwell)
 
-    def _over_holes(self, poses: Ints, height: Floats) -> Iterator[bytes]:
+    def _over_holes(self, rows: Rows, part: slice, height: Floats) -> Iterator[bytes]:
         program = self.program
-        decimals = self.writer.form.tip_decimals[program.units]
-        for pose, over in zip(poses.tolist(), height.tolist(), strict=True):
+        decimals = self.writer.form.tip_decimals(program.units)
+        poses = rows.move[part]
+        tips = program.tip[poses] + height[:, None] * program.axis[poses]
+        ticks = self._shifted(rows, part, tips, np.arange(len(poses)))
+        for index, pose in enumerate(poses.tolist()):
             tip = (program.tip[pose] / program.mm_per_unit).tolist()
             place = " ".join(
                 f"{letter}{format_number(value, decimals)}" for letter, value in zip("XYZ", tip, strict=True)
             )
-            yield from self._blocks(comment_lines(f"NOT DRILLED: HOLE AT {place}"))
-            move = np.array([pose])
-            axis = program.axis[move]
-            run = self._run(program.tip[move] + over * axis, axis, move, np.ones(1, np.bool_))
+            yield from self._blocks(self.statements.comment(f"NOT DRILLED: HOLE AT {place}"))
+            run = replace(self._run(ticks[index : index + 1], poses[index : index + 1]), rapid=np.ones(1, np.bool_))
             yield from self._emit(self._moving(run))
 
-    def _run(self, tip: Floats, axis: Floats, move: Ints, rapid: Bools) -> Run:
-        """Straight moves through poses that need not be the program's, with the feeds of its moves."""
-        program = self.program
-        other = axis if self.writer.form.vectors else tip + self.axis_length * axis
+    def _shifted(self, rows: Rows, part: slice, tips: Floats, own: Ints) -> Ints:
+        """Ticks of tips reached with the orientation of rows, which `own` names for each of them."""
+        other = rows.other[part][own]
+        if self.writer.form.orientation == "point":
+            other = other + (tips - rows.tip[part][own])
+        return self.writer.ticks(tips, other)
+
+    def _run(self, ticks: Ints, move: Ints) -> Run:
+        """Straight moves at the feeds of moves of the program."""
+        program, count = self.program, len(ticks)
         mode = program.feed_mode[move].astype(np.int64)
-        ticks = self.writer.ticks(tip, other)
-        return Run(ticks, move, rapid, program.feed[move], mode, np.zeros(len(ticks), np.int8))
+        return Run(ticks, move, np.zeros(count, np.bool_), program.feed[move], mode, np.zeros(count, np.int8))
 
     def _join(self, ticks: Ints, joined: Bools) -> None:
         """Give first control points that follow without a line the digits of the row before."""
@@ -213,7 +215,7 @@ class MotionWriter:
 
     def _emit(self, run: Run, dwell: int = 0) -> Iterator[bytes]:
         if len(run):
-            self._position = run.ticks[-1]
+            self._position = self._last = run.ticks[-1]
             yield self.writer.text(run, dwell)
 
 

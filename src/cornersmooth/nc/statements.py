@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
-from cornersmooth.nc.control import Words
+from cornersmooth.nc.control import Form, Words
 from cornersmooth.nc.holes import Cycle, read_cycle
 from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.revolutions import milliseconds, revolutions
@@ -42,14 +42,13 @@ class StatementWriter:
 
     Parameters
     ----------
-    words : Words
-        Of the control.
+    form : Form
     program : Program
     notes : Notes
         Takes what is noticed.
     """
 
-    words: Words
+    form: Form
     program: Program
     notes: Notes
     plane: int = 17  #: the plane selected, kept by who writes the motion
@@ -62,9 +61,11 @@ class StatementWriter:
     _speed: float | None = None
     _diameter: float = 0.0
     _last_cycle: Cycle | None = None
+    words: Words = field(init=False)
     _toolno_loads: bool = field(init=False)
 
     def __post_init__(self) -> None:
+        self.words = self.form.table.words
         said = {statement.word for statement in self.program.statements}
         self._toolno_loads = not _TOOL_WORDS & said
 
@@ -78,12 +79,12 @@ class StatementWriter:
                 return written
             self._not_understood(statement)
         elif word in _TEXT_WORDS:
-            return comment_lines(_spoken(statement))
+            return self.comment(_spoken(statement))
         elif word in _SILENT:
             return []
         elif word not in _DESCRIBING:
             self._not_understood(statement)
-        return comment_lines(statement.text or word)
+        return self.comment(statement.text or word)
 
     def only_counted(self, statement: Statement) -> bool:
         """Whether a statement says nothing to the control; it has been counted then."""
@@ -97,14 +98,18 @@ class StatementWriter:
         if self._tip_control:
             return []
         self._tip_control = True
-        return [block.format(offset=self._offset) for block in self.words.tip_control_on]
+        return [block.format(offset=self._offset) for block in self.form.mode.on]
 
     def end_motion(self) -> list[str]:
         """Blocks that switch tool tip control off, where it is on."""
         if not self._tip_control:
             return []
         self._tip_control = False
-        return list(self.words.tip_control_off)
+        return list(self.form.mode.off)
+
+    def comment(self, text: str) -> list[str]:
+        """Comments that hold a text."""
+        return comment_lines(text, self.form.table.layout.comment)
 
     def _not_understood(self, statement: Statement) -> None:
         text = f"{statement.word} is not translated; written as a comment"
@@ -123,7 +128,7 @@ class StatementWriter:
         offset = _whole(_after(statement, "ADJUST") or _after(statement, "OSETNO"))
         offset = number if offset is None else offset
         if (number, offset) == (self._tool, self._offset):  # CATIA loads a tool twice: at the change, in the operation
-            return comment_lines(statement.text)
+            return self.comment(statement.text)
         blocks = self.end_motion()
         if number != self._tool:
             blocks += [block.format(tool=number) for block in self.words.tool_change]
@@ -133,7 +138,7 @@ class StatementWriter:
 
     def toolno(self, statement: Statement) -> list[str] | None:
         """TOOLNO/n,...: describes the tool that LOADTL loads; without any such statement it loads itself."""
-        return self.load(statement) if self._toolno_loads else comment_lines(statement.text)
+        return self.load(statement) if self._toolno_loads else self.comment(statement.text)
 
     def select(self, statement: Statement) -> list[str] | None:
         """SELECT/TOOL,n: brings the next tool near."""
@@ -141,15 +146,16 @@ class StatementWriter:
         if number is None or _words(statement) != ["TOOL"]:
             return None
         if number == self._tool:
-            return comment_lines(statement.text)
-        return [block.format(tool=number) for block in self.words.tool_select]
+            return self.comment(statement.text)
+        blocks = [block.format(tool=number) for block in self.words.tool_select]
+        return blocks or self.comment(statement.text)
 
     def cutter(self, statement: Statement) -> list[str]:
         """CUTTER/d,r,e,... and TLDATA/MILL,d,...: the diameter is kept; CUTTER/d alone is the nose of a lathe tool."""
         numbers = _numbers(statement)
         mill = {"MILL", "DRILL"} & set(_words(statement)) if statement.word == "TLDATA" else len(numbers) > 2
         self._diameter = numbers[0] * self.program.mm_per_unit if mill and numbers else 0.0
-        return comment_lines(statement.text)
+        return self.comment(statement.text)
 
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
@@ -165,7 +171,7 @@ class StatementWriter:
         if "LOCK" in words or "ORIENT" in words:
             return None if numbers else list(self.words.spindle_orient) or None
         if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
-            return list(self.words.spindle_off)
+            return list(self.words.spindle_off) or None
         if len(numbers) > 1 or any(number < 0.0 for number in numbers):
             return None
         cutting = next((unit for unit in ("SFM", "SMM") if unit in words), None)
@@ -179,7 +185,7 @@ class StatementWriter:
             self.notes.add("CS322", "note", statement.line, text)
         if "CLW" in words or "CCLW" in words:
             self._direction = "counterclockwise" if "CCLW" in words else "clockwise"
-        direction = self.words.spindle_on[self._direction]
+        direction = getattr(self.words, self._direction)
         if speed is None:
             return [direction]
         self._speed = speed
@@ -195,7 +201,7 @@ class StatementWriter:
         if _numbers(statement) or len(kinds) != 1:
             return None
         if "OFF" in words or kinds == ["NOMORE"]:
-            return list(self.words.coolant["OFF"])
+            return list(self.words.coolant.get("OFF", ())) or None
         blocks = self.words.coolant.get(kinds[0])
         return None if blocks is None else list(blocks)
 
@@ -207,7 +213,7 @@ class StatementWriter:
         time = milliseconds(numbers[0], "REV" in words, self._speed)
         if time is None:
             return None
-        return self.dwell(time)
+        return self.dwell(time) if self.words.dwell else None
 
     def dwell(self, time: int) -> list[str]:
         """Blocks that wait for so many milliseconds."""
@@ -218,11 +224,11 @@ class StatementWriter:
         """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF."""
         words, numbers = _words(statement), _numbers(statement)
         if words[:1] in (["OFF"], ["NOMORE"]):
-            return list(self.words.compensation_off)
+            return list(self.words.compensation_off) or None
         planes = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
         side = {"LEFT": self.words.compensation_left, "RIGHT": self.words.compensation_right}.get((words or [""])[0])
         register = _whole(numbers or [float(self._offset)])
-        if side is None or len(words) > 2 or not set(words[1:]) <= planes.keys() or register is None:
+        if not side or len(words) > 2 or not set(words[1:]) <= planes.keys() or register is None:
             return None
         self.notes.add(
             "CS319",
@@ -235,7 +241,7 @@ class StatementWriter:
         plane = planes[words[1]] if len(words) > 1 else 17
         if plane != self.plane:
             self.plane = plane
-            blocks.append(self.words.plane[plane])
+            blocks += [self.words.plane[plane]] if plane in self.words.plane else []
         return [*blocks, *(block.format(register=register) for block in side)]
 
     def hole_cycle(self, statement: Statement) -> list[str]:
@@ -251,7 +257,7 @@ class StatementWriter:
         if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
             text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
             self.notes.add("CS321", "warning", statement.line, text)
-        return comment_lines(statement.text)
+        return self.comment(statement.text)
 
     def end(self, statement: Statement) -> list[str]:
         """END: the end of the text; in the middle of the path a stop."""
@@ -259,7 +265,7 @@ class StatementWriter:
             return []
         text = "END stands before the last motion; written as a program stop"
         self.notes.add("CS318", "warning", statement.line, text)
-        return [*comment_lines(statement.text), *self.words.stop]
+        return [*self.comment(statement.text), *self.words.stop]
 
     def insert(self, statement: Statement) -> list[str]:
         """INSERT: text for the NC file; as a comment, since nobody has looked at what it does."""
@@ -267,7 +273,7 @@ class StatementWriter:
         if _NC_WORDS.fullmatch(text):
             what = "INSERT with NC words is written as a comment; where the machine needs them, put them in by hand"
             self.notes.add("CS320", "warning", statement.line, what)
-        return comment_lines(text)
+        return self.comment(text)
 
     def auxiliary(self, statement: Statement) -> list[str] | None:
         """AUXFUN/n: M code n, unless it ends the program or calls another."""
@@ -284,14 +290,14 @@ class StatementWriter:
 
     def mode(self, statement: Statement) -> list[str] | None:
         """SET/MODE,ABSOL: positions are absolute, as ours always are."""
-        return comment_lines(statement.text) if _words(statement) == ["MODE", "ABSOL"] else None
+        return self.comment(statement.text) if _words(statement) == ["MODE", "ABSOL"] else None
 
     def start(self, statement: Statement) -> list[str]:
         """FROM: a position that is stated; the tool is not sent there."""
-        decimals = {"mm": 4, "inch": 5}[self.program.units]
+        decimals = self.form.tip_decimals(self.program.units)
         numbers = (format_number(value, decimals, trim=True) for value in _numbers(statement))
         place = " ".join(letter + number for letter, number in zip("XYZ", numbers, strict=True))
-        return comment_lines(f"FROM {place}")
+        return self.comment(f"FROM {place}")
 
 
 def _numbers(statement: Statement) -> list[float]:
@@ -338,8 +344,8 @@ _HANDLERS: dict[str, Handler] = {
     "DELAY": StatementWriter.delay,
     "CUTCOM": StatementWriter.compensation,
     "CYCLE": StatementWriter.hole_cycle,
-    "STOP": lambda writer, statement: list(writer.words.stop),
-    "OPSTOP": lambda writer, statement: list(writer.words.optional_stop),
+    "STOP": lambda writer, statement: list(writer.words.stop) or None,
+    "OPSTOP": lambda writer, statement: list(writer.words.optional_stop) or None,
     "END": StatementWriter.end,
     "INSERT": StatementWriter.insert,
     "AUXFUN": StatementWriter.auxiliary,

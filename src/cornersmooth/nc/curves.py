@@ -1,0 +1,147 @@
+"""How transitions are written as curves: five rows of control points become the blocks of each control."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from cornersmooth.model import Bools, Ints, Units
+from cornersmooth.nc.control import Form
+from cornersmooth.nc.run import Run
+from cornersmooth.text import RowFormat, format_number
+
+
+class Curves(Protocol):
+    """What the block writer asks of a way to write curves.
+
+    `format` is None where control points have the words of lines; else rows on curves have words of their own and
+    `numbers`.
+    """
+
+    format: RowFormat | None
+
+    def prepare(self, run: Run) -> Run:
+        """Return the run with only the rows that become blocks, and remember what follows."""
+        ...
+
+    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """Give rows on curves an entry in the table of prefixes; return the blocks that rows make beside their own."""
+        ...
+
+    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
+        """Give rows on curves an entry in the table of suffixes."""
+        ...
+
+    def numbers(self, run: Run, curved: Bools) -> Ints:
+        """Ticks of the rows on curves in `format`."""
+        ...
+
+
+class NoCurves:
+    """Forms of lines only."""
+
+    format: RowFormat | None = None
+
+    def prepare(self, run: Run) -> Run:
+        """Return the run as it is."""
+        return run
+
+    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """Nothing to add."""
+        return 0
+
+    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
+        """Nothing to add."""
+
+    def numbers(self, run: Run, curved: Bools) -> Ints:
+        """Return the ticks as they are."""
+        return run.ticks[curved]
+
+
+class KnotBlocks(NoCurves):
+    """FANUC's G06.2: a knot before and a weight behind every control point, the last four knots in blocks of their own.
+
+    The first control point is the current position (B-63324EN/03 4.17). Knots {0, 0, 0, 0, 1/2, 1, 1, 1, 1}.
+    """
+
+    _knots = (b"K0. ", b"K0. ", b"K0. ", b"K0. ", b"K0.5 ")
+    _last_knots = b"K1.\n" * 4
+
+    def __init__(self, weight_decimals: int) -> None:
+        self._decimals = weight_decimals
+
+    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """Knots."""
+        curved = run.curve > 0
+        chosen[curved] = len(table) - 1 + run.curve[curved]
+        table += [b"G6.2 P4 " + self._knots[0], *self._knots[1:]]
+        return 4 * int(np.count_nonzero(run.curve == 5))
+
+    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
+        """Weights, and the last knots."""
+        curved = run.curve > 0
+        values, which = _weights(run, curved)
+        ends = [b" R" + format_number(value, self._decimals, trim=True).encode() + b"\n" for value in values]
+        base = len(table)
+        table += ends
+        table += [end + self._last_knots for end in ends]
+        chosen[curved] = base + which + np.where(run.curve[curved] == 5, len(ends), 0)
+
+
+class SplineBlocks(NoCurves):
+    """Siemens' BSPLINE: the first control point is where the block before ended; knot intervals PL and weights PW.
+
+    With the clamped knots u the block of control point j has PL = u[j+2] − u[j+1]: 0, 1/2, 1/2, 0. Curves that follow
+    one another are one spline with triple knots between them, with the same intervals.
+    """
+
+    _intervals = (b"0", b"0.5", b"0.5", b"0")
+
+    def __init__(self, weight_decimals: int) -> None:
+        self._decimals = weight_decimals
+        self._open = False  # the last block was on a spline
+
+    def prepare(self, run: Run) -> Run:
+        """Leave out the first control points."""
+        return run.only(run.curve != 1)
+
+    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """``BSPLINE`` where a spline begins."""
+        curved = run.curve > 0
+        begins = curved & ~np.concatenate(([self._open], curved[:-1]))
+        chosen[curved] = len(table)
+        chosen[begins] = len(table) + 1
+        table += [b"", b"BSPLINE SD=3 "]
+        self._open = bool(curved[-1])
+        return 0
+
+    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
+        """Knot intervals and weights."""
+        curved = run.curve > 0
+        values, which = _weights(run, curved)
+        base = len(table)
+        for interval in self._intervals:
+            for value in values:
+                weight = format_number(value, self._decimals, trim=True).rstrip(".").encode()
+                table.append(b" PL=" + interval + b" PW=" + weight + b"\n")
+        chosen[curved] = base + (run.curve[curved] - 2) * len(values) + which
+
+
+def curves_for(form: Form, units: Units) -> Curves:
+    """Way to write curves of a form."""
+    decimals = form.table.digits.weight
+    if form.curve == "g6.2":
+        return KnotBlocks(decimals)
+    if form.curve == "bspline":
+        return SplineBlocks(decimals)
+    return NoCurves()
+
+
+def _weights(run: Run, curved: Bools) -> tuple[list[float], Ints]:
+    """Distinct weights of the rows on curves, and which of them each has."""
+    assert run.weights is not None
+    column = np.array([0, -1, 0, 1, 0, -1])[run.curve[curved]]
+    number = np.where(column < 0, 1.0, run.weights[curved][np.arange(len(column)), np.maximum(column, 0)])
+    values, which = np.unique(number, return_inverse=True)
+    return values.tolist(), which.reshape(-1)

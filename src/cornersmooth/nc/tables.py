@@ -1,0 +1,288 @@
+"""Controls as TOML tables: those that come with the program, and the user's own.
+
+A table may say ``like = "fanuc"`` and then only what is different, ``false`` for a form or mode that it has not; the
+keys are those of the tables in the folder ``controls``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from dataclasses import fields
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.model import FeedMode
+from cornersmooth.nc.control import (
+    INVERSE_TIME,
+    Control,
+    CurveStyle,
+    Digits,
+    FormTable,
+    Layout,
+    Mode,
+    Motion,
+    Orientation,
+    Words,
+)
+
+Table = dict[str, Any]
+Record = TypeVar("Record", Digits, Layout, Words, Motion)
+
+_CONTROL_KEYS = ("name", "like", "description", "digits", "layout", "words", "motion", "forms")
+_FORM_KEYS = ("description", "curve", *get_args(Orientation))
+_MODE_KEYS = ("words", "on", "off", "circles", *(item.name for item in fields(Motion)))
+_PLANES = {"xy": 17, "zx": 18, "yz": 19}
+_FEED_MODES = {
+    "per_minute": int(FeedMode.PER_MINUTE),
+    "per_revolution": int(FeedMode.PER_REVOLUTION),
+    "inverse_time": INVERSE_TIME,
+}
+#: what stands in braces in blocks
+_PLACES: dict[str, Table] = {
+    "tool_change": {"tool": 1},
+    "tool_select": {"tool": 1},
+    "spindle_speed": {"speed": "1", "direction": "M3"},
+    "dwell": {"milliseconds": 1, "seconds": "1."},
+    "compensation_left": {"register": 1},
+    "compensation_right": {"register": 1},
+    "on": {"offset": 1},
+    "head": {"program": "O1", "units": "G21", "blend": "0.001"},
+    "tail": {"program": "O1", "units": "G21"},
+    "block_number": {"number": 10},
+}
+
+
+def control_names() -> tuple[str, ...]:
+    """Names of the controls that come with the program, sorted."""
+    folder = resources.files(__package__) / "controls"
+    return tuple(sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")))
+
+
+def load_control(name_or_path: str | Path) -> Control:
+    """Control of that name, or described by that TOML file.
+
+    A text that ends in ``.toml`` or holds a path separator is a file; anything else is a name.
+
+    Raises
+    ------
+    SettingsError
+        The name is unknown (with the closest known one), the file cannot be read, or it does not describe a control.
+    """
+    given = str(name_or_path)
+    if isinstance(name_or_path, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
+        try:
+            text = Path(name_or_path).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else "not UTF-8 text"
+            raise SettingsError(
+                "CS212", f"control file cannot be read: {reason}", "check the name", file=given
+            ) from error
+        return parse_control(text, file=given, name=Path(name_or_path).stem)
+    return parse_control(_built_in(given), file=f"{given}.toml", name=given)
+
+
+def parse_control(text: str, *, file: str = "<control>", name: str = "control") -> Control:
+    """Control that a TOML text describes.
+
+    Parameters
+    ----------
+    file : str
+        For messages.
+    name : str
+        Where the text has none.
+
+    Raises
+    ------
+    SettingsError
+        The text is not TOML, has an unknown key (with the closest known one), or does not describe a control.
+    """
+    try:
+        table = _resolved(_parsed(text))
+        return Control(
+            name=_text(table, "name", name),
+            description=_text(table, "description", ""),
+            digits=_record(Digits, table.get("digits", {}), "digits"),
+            layout=_layout(table.get("layout", {})),
+            words=_words(table.get("words", {})),
+            forms=_forms(table),
+        )
+    except SettingsError as error:
+        raise SettingsError(error.code, error.what, error.hint, file=file) from error
+
+
+def _built_in(name: str) -> str:
+    known = control_names()
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=1)
+        advice = f"did you mean {close[0]}? " if close else ""
+        raise SettingsError(
+            "CS210", f"unknown control {name!r}", f"{advice}use a TOML file or one of {', '.join(known)}"
+        )
+    return (resources.files(__package__) / "controls" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def _parsed(text: str) -> Table:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError("CS212", f"not TOML: {error}", "correct the text") from error
+
+
+def _resolved(table: Table) -> Table:
+    """Return the table on top of the one that it is like."""
+    _check_keys(table, _CONTROL_KEYS, "")
+    like = table.get("like")
+    if like is None:
+        return table
+    if not isinstance(like, str):
+        raise SettingsError("CS213", f"like is {like!r}", "name one of the built-in controls")
+    base = _resolved(_parsed(_built_in(like)))
+    return _merged(base, {key: value for key, value in table.items() if key != "like"})
+
+
+def _merged(base: Table, changes: Table) -> Table:
+    result = dict(base)
+    for key, value in changes.items():
+        old = result.get(key)
+        if value is False and isinstance(old, dict):  # what the other control has and this one has not
+            del result[key]
+        else:
+            result[key] = _merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return result
+
+
+def _layout(table: Table) -> Layout:
+    units = {"mm": "", "inch": ""} | _strings(table.get("units", {}), "layout.units", ("mm", "inch"))
+    plain = {key: value for key, value in table.items() if key != "units"}
+    if "comment" in plain and len(plain["comment"]) != 2:
+        raise SettingsError("CS213", f"layout.comment is {plain['comment']!r}", "give what stands before and behind")
+    _check_keys(table, tuple(item.name for item in fields(Layout)), "layout.")
+    layout = _record(Layout, plain, "layout")
+    return Layout(**{**vars(layout), "units": units})
+
+
+def _words(table: Table) -> Words:
+    _check_keys(table, tuple(item.name for item in fields(Words)), "words.")
+    special = {"coolant", "plane", "feed_mode"}
+    words = _record(Words, {key: value for key, value in table.items() if key not in special}, "words")
+    coolant = {
+        word.upper(): _blocks(blocks, f"words.coolant.{word}") for word, blocks in table.get("coolant", {}).items()
+    }
+    planes = _strings(table.get("plane", {}), "words.plane", tuple(_PLANES))
+    modes = _strings(table.get("feed_mode", {}), "words.feed_mode", tuple(_FEED_MODES))
+    return Words(
+        **{
+            **vars(words),
+            "coolant": coolant,
+            "plane": {_PLANES[key]: block for key, block in planes.items()},
+            "feed_mode": {_FEED_MODES[key]: block for key, block in modes.items()},
+        }
+    )
+
+
+def _forms(table: Table) -> dict[str, FormTable]:
+    entries = table.get("forms", {})
+    if not isinstance(entries, dict) or not entries:
+        raise SettingsError("CS213", "there are no forms", "write a table [forms.g1]")
+    motion = table.get("motion", {})
+    _check_keys(motion, tuple(item.name for item in fields(Motion)), "motion.")
+    return {name: _form(name, entry, motion) for name, entry in entries.items()}
+
+
+def _form(name: str, entry: Table, motion: Table) -> FormTable:
+    where = f"forms.{name}"
+    _check_keys(entry, _FORM_KEYS, f"{where}.")
+    curve = entry.get("curve", "")
+    if curve not in get_args(CurveStyle):
+        raise SettingsError("CS213", f"{where}.curve is {curve!r}", f"use one of {', '.join(get_args(CurveStyle)[1:])}")
+    modes: dict[Orientation, Mode] = {}
+    for orientation in get_args(Orientation):
+        if orientation in entry:
+            modes[orientation] = _mode(entry[orientation], motion, f"{where}.{orientation}")
+            wanted = {"vector": 3, "point": 3}.get(orientation, 0)
+            if len(modes[orientation].words) != wanted:
+                raise SettingsError(
+                    "CS213", f"{where}.{orientation} has {len(modes[orientation].words)} words", f"give {wanted}"
+                )
+    if not modes:
+        raise SettingsError("CS213", f"{where} says no orientation", f"use one of {', '.join(get_args(Orientation))}")
+    return FormTable(name, _text(entry, "description", ""), curve, modes)
+
+
+def _mode(entry: Table, motion: Table, where: str) -> Mode:
+    _check_keys(entry, _MODE_KEYS, f"{where}.")
+    own = {item.name for item in fields(Motion)}
+    return Mode(
+        words=_blocks(entry.get("words", []), f"{where}.words"),
+        on=_blocks(entry.get("on", []), f"{where}.on"),
+        off=_blocks(entry.get("off", []), f"{where}.off"),
+        motion=_record(Motion, {**motion, **{key: value for key, value in entry.items() if key in own}}, where),
+        circles=_flag(entry.get("circles", False), f"{where}.circles"),
+    )
+
+
+def _record(kind: type[Record], table: Table, where: str) -> Record:
+    """Dataclass of plain fields from a table, each checked against the type of its default."""
+    values: Table = {}
+    _check_keys(table, tuple(item.name for item in fields(kind)), f"{where}.")
+    plain = kind()
+    for key, value in table.items():
+        default = getattr(plain, key)
+        if isinstance(default, tuple):
+            values[key] = _blocks(value, f"{where}.{key}")
+        elif isinstance(default, bool):
+            values[key] = _flag(value, f"{where}.{key}")
+        elif isinstance(default, int):
+            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 1_000_000:
+                raise SettingsError("CS213", f"{where}.{key} is {value!r}", "give a whole number")
+            values[key] = value
+        else:
+            values[key] = _string(value, f"{where}.{key}")
+    return kind(**values)
+
+
+def _blocks(value: object, where: str) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(block, str) for block in value):
+        raise SettingsError("CS213", f"{where} is {value!r}", 'give a list of texts, as in ["M8"]')
+    return tuple(_string(block, where) for block in value)
+
+
+def _strings(table: Any, where: str, keys: tuple[str, ...]) -> dict[str, str]:
+    if not isinstance(table, dict):
+        raise SettingsError("CS213", f"{where} is {table!r}", "give a table of texts")
+    _check_keys(table, keys, f"{where}.")
+    return {key: _string(value, f"{where}.{key}") for key, value in table.items()}
+
+
+def _string(value: object, where: str) -> str:
+    if not isinstance(value, str) or not value.isascii() or not (value.isprintable()):
+        raise SettingsError("CS213", f"{where} is {value!r}", "give ASCII text without line ends")
+    places = _PLACES.get(where.rpartition(".")[2], {})
+    if "{" in value or "}" in value:
+        try:
+            value.format(**places)
+        except (KeyError, IndexError, ValueError) as error:
+            known = ", ".join(f"{{{place}}}" for place in places) or "no braces"
+            raise SettingsError("CS213", f"{where}: {value!r} has unknown braces", f"use {known}") from error
+    return value
+
+
+def _text(table: Table, key: str, default: str) -> str:
+    return _string(table.get(key, default), key)
+
+
+def _flag(value: object, where: str) -> bool:
+    if not isinstance(value, bool):
+        raise SettingsError("CS213", f"{where} is {value!r}", "give true or false")
+    return value
+
+
+def _check_keys(table: Table, known: tuple[str, ...], where: str) -> None:
+    for key in table:
+        if key not in known:
+            close = difflib.get_close_matches(key, known, n=1)
+            advice = f"did you mean {close[0]}?" if close else f"known keys are {', '.join(known)}"
+            raise SettingsError("CS214", f"unknown key {where}{key}", advice)
