@@ -62,8 +62,8 @@ def test_curve():
     assert nc.line.tolist() == [4, 5, 6, 15]
     assert nc.curves.knot.tolist() == [0, 0, 0, 0, 0.5, 1, 1, 1, 1]
     assert nc.curves.weight.tolist() == [1, 1, 2, 1, 1]
-    assert nc.curves.tip[2].tolist() == [2, 0, 0]
-    assert nc.curves.second[3].tolist() == [2, 1, 10]
+    assert nc.curves.point[2].tolist() == [2, 0, 0, 2, 0, 10]
+    assert nc.curves.point[3].tolist() == [2, 1, 0, 2, 1, 10]
     assert nc.tip[2].tolist() == [2, 2, 0]
     assert nc.second_is == "point"
 
@@ -149,7 +149,7 @@ def test_runs_and_single_lines_give_the_same(form, tmp_path):
     slow = read_nc(path)
     for name in ("kind", "tip", "second", "line", "feed"):
         assert np.array_equal(getattr(fast, name), getattr(slow, name), equal_nan=name == "feed"), name
-    for name in ("element", "order", "points", "tip", "second", "weight", "knot"):
+    for name in ("element", "order", "points", "point", "weight", "knot"):
         assert np.array_equal(getattr(fast.curves, name), getattr(slow.curves, name)), name
     assert fast.problems == slow.problems == ()
 

@@ -15,10 +15,10 @@ from cornersmooth.verify.trails import Original, Written, written_motion
 from cornersmooth.verify.walking import Lanes, Track, cut_lane, walk
 
 #: path elements in a block
-BLOCK = 1 << 18
+BLOCK = 1 << 17
 
 #: written vertices between anchors
-LANE = 700
+LANE = 300
 
 #: last printed digits by which the next segment must be nearer to be taken
 MARGIN_STEPS = 4.0
@@ -44,6 +44,7 @@ class Block:
     fraction : (v,) float64
         On that segment.
     backward : (v,) bool
+    distance : (v,) float64, mm
         See `walking.walk`.
     low, high : (v,) int64
         First and last original segment of the stretch a vertex belongs to.
@@ -58,6 +59,7 @@ class Block:
     segment: Ints
     fraction: Floats
     backward: Bools
+    distance: Floats
     low: Ints
     high: Ints
     closed: bool
@@ -155,7 +157,7 @@ class Matcher:
             lanes += cut
             spans.append((lane[0], cut[-1][1], lane[2], cut[-1][3]))
         table = Lanes(*(np.array(column) for column in zip(*lanes, strict=True)))
-        segment, fraction, backward = walk(six, self.track, table, self.margin, self.near)
+        segment, fraction, backward, distance = walk(six, self.track, table, self.margin, self.near)
         on = fraction >= 0
         number = np.full(len(six), -1, np.int64)
         low, high = np.zeros(len(six), np.int64), np.zeros(len(six), np.int64)
@@ -168,6 +170,6 @@ class Matcher:
             vertex = np.repeat(a - np.cumsum(b - a + 1) + (b - a + 1), b - a + 1) + np.arange(len(index))
             number[vertex], low[vertex], high[vertex] = index, start[index], stop[index] - 1
         tail = spans[-1][1]
-        block = Block(written, six, on, number, segment, fraction, backward, low, high, not open_end)
+        block = Block(written, six, on, number, segment, fraction, backward, distance, low, high, not open_end)
         rest = (int(written.trail.owner[tail]), int(segment[tail]), float(fraction[tail]))
         return block, rest

@@ -7,9 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.ncprogram import Curves
+
+#: curves taken at a time; their control points stay in the cache
+_BLOCK = 4096
 
 
 def basis(knot: Floats, order: int, u: Floats) -> Floats:
@@ -96,7 +100,7 @@ class CurveGroup:
     @cached_property
     def weighted(self) -> Floats:
         """(k, p, 6) control points times their weights."""
-        return self.points * self.weight[:, :, None]
+        return self.points if self.plain else self.points * self.weight[:, :, None]
 
     @cached_property
     def plain(self) -> bool:
@@ -105,7 +109,21 @@ class CurveGroup:
 
     def at(self, u: Floats) -> Floats:
         """(k, len(u), 6) points of every curve at the same parameters."""
-        return self._combine(basis(self.knot, self.order, u))
+        values = basis(self.knot, self.order, u)
+        points = self._combine(values)
+        if not self.plain:
+            points /= (self.weight @ values.T)[:, :, None]
+        return points
+
+    def _combine(self, values: Floats, columns: slice = slice(None)) -> Floats:
+        """(k, r, 6) sums of the weighted control points with the coefficients (r, p), most of which are zero."""
+        weighted = self.weighted[:, :, columns]
+        result = np.zeros((len(weighted), len(values), weighted.shape[2]))
+        for begin in range(0, len(weighted), _BLOCK):
+            own, out = weighted[begin : begin + _BLOCK], result[begin : begin + _BLOCK]
+            for r, p in zip(*np.nonzero(values), strict=True):
+                out[:, r] += values[r, p] * own[:, p]
+        return result
 
     def at_own(self, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """(r, 6) points and (r, 6) derivatives of the curves `rows`, each at its own parameter."""
@@ -116,17 +134,18 @@ class CurveGroup:
         point = np.einsum("ri,rid->rd", value, weighted) / below
         return point, (np.einsum("ri,rid->rd", slope, weighted) - fall * point) / below
 
-    def jet(self, u: float) -> tuple[Floats, Floats, Floats]:
-        """Points, first and second derivatives (k, 6) of all curves at one parameter."""
+    def jet(self, u: float, columns: slice = slice(None)) -> tuple[Floats, Floats, Floats]:
+        """Points, first and second derivatives (k, 6) of all curves at one parameter, or some of their columns."""
         at = np.array([u])
-        values = [basis_derivative(self.knot, self.order, at, times)[0] for times in range(3)]
-        point, slope, bend = (np.einsum("i,cid->cd", value, self.weighted) for value in values)
+        values = np.concatenate([basis_derivative(self.knot, self.order, at, times) for times in range(3)])
+        both = self._combine(values, columns)
+        point, slope, bend = both[:, 0], both[:, 1], both[:, 2]
         if self.plain:
             return point, slope, bend
-        below, fall, curl = (self.weight @ value for value in values)
-        point = point / below[:, None]
-        slope = (slope - fall[:, None] * point) / below[:, None]
-        return point, slope, (bend - curl[:, None] * point - 2 * fall[:, None] * slope) / below[:, None]
+        below, fall, curl = (self.weight @ values.T).T[:, :, None]
+        point = point / below
+        slope = (slope - fall * point) / below
+        return point, slope, (bend - curl * point - 2 * fall * slope) / below
 
     def bezier(self, k: int) -> tuple[Floats, Floats]:
         """Control points (k, order, 6) and weights (k, order) of the k-th knot interval alone.
@@ -139,15 +158,14 @@ class CurveGroup:
         i = np.arange(self.order)
         binomial = np.array([_binomial(degree, int(r)) for r in i])
         bernstein = binomial * t[:, None] ** i * (1 - t[:, None]) ** (degree - i)
-        convert = np.linalg.solve(bernstein, basis(self.knot, self.order, start + t * (stop - start)))
+        nodes = basis(self.knot, self.order, start + t * (stop - start))
+        convert: Floats = np.linalg.solve(bernstein, nodes).astype(np.float64)
         weight = self.weight @ convert.T
-        return np.einsum("qp,cpd->cqd", convert, self.weighted) / weight[:, :, None], weight
+        return self._combine(convert) / weight[:, :, None], weight
 
-    def _combine(self, values: Floats) -> Floats:
-        points: Floats = np.matmul(values, self.weighted)
-        if not self.plain:
-            points = points / np.matmul(values, self.weight[:, :, None])
-        return points
+    def only(self, rows: Ints | NDArray[np.bool_]) -> CurveGroup:
+        """Some of the curves."""
+        return CurveGroup(self.index[rows], self.order, self.knot, self.points[rows], self.weight[rows])
 
 
 def _binomial(n: int, k: int) -> float:
@@ -167,8 +185,13 @@ def groups(curves: Curves, index: Ints) -> Iterator[CurveGroup]:
         knots = curves.knot[curves.first_knot[rows][:, None] + np.arange(order + points)]
         alike = (knots == knots[0]).all(axis=1)
         rows = rows[alike]
-        place = curves.first_point[rows][:, None] + np.arange(points)
-        both = np.concatenate((curves.tip[place], curves.second[place]), axis=2)
-        yield CurveGroup(rows, order, knots[0], both, curves.weight[place])
+        place = curves.first_point[rows]
+        if len(rows) and place[-1] - place[0] == (len(rows) - 1) * points and (np.diff(place) == points).all():
+            part = slice(int(place[0]), int(place[-1]) + points)  # one after another: no copy
+            control, weight = curves.point[part], curves.weight[part]
+        else:
+            several = (place[:, None] + np.arange(points)).ravel()
+            control, weight = curves.point[several], curves.weight[several]
+        yield CurveGroup(rows, order, knots[0], control.reshape(-1, points, 6), weight.reshape(-1, points))
         same[same] = alike
         index = index[~same]

@@ -21,7 +21,7 @@ from cornersmooth.verify.nearest import gap_between, nearest_segments
 from cornersmooth.verify.stops import ARITHMETIC, digit_errors
 
 #: rows of a block for which tip and axis point are looked at each on its own: at a time, and at most
-_OWN_ROWS, _MOST_OWN_ROWS = 128, 4096
+_OWN_ROWS, _MOST_OWN_ROWS = 64, 2048
 
 #: neighbouring violations no farther apart on the original than this many segments are one problem
 _SAME_PROBLEM = 3.0

@@ -22,7 +22,7 @@ from cornersmooth.verify.trails import directions, written_at
 _SHORT_STEP = 0.02
 
 #: samples and rounds of the search on single elements
-_SAMPLES, _ROUNDS, _ZOOM = 33, 3, 9
+_SAMPLES, _ROUNDS, _ZOOM = 17, 4, 9
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,18 @@ def from_written(matcher: Matcher, block: Block) -> Reached:
     """Deviation of every written vertex from the pose of the original it was assigned to."""
     vertex = np.flatnonzero(block.on)
     segment, at = block.segment[vertex], block.fraction[vertex]
-    gap = _gap_to_original(matcher, block, vertex, segment, at)
-    # the walker stays on a segment until the next is nearer by a margin
-    loose = np.flatnonzero(gap.larger > matcher.margin)
+    # measured in full where it may matter: the walker's own distance is a bound, and it is of use for the rest
+    bound = block.distance[vertex]
+    known = bound[np.isfinite(bound)]
+    gap = Gap(bound.copy(), bound.copy(), np.zeros(len(vertex)))
+    loose = np.flatnonzero(bound > min(matcher.margin, known.max(initial=0.0) / 2))
     rows = vertex[loose]
+    # the walker stays on a segment until the next is nearer by a margin
     segment[loose], at[loose] = nearest_segments(
         block.six[rows], matcher.track.six, segment[loose], 1, block.low[rows], block.high[rows]
     )
     better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
-    for name in ("tip", "axis_point", "angle"):
-        getattr(gap, name)[loose] = getattr(better, name)
+    gap.tip[loose], gap.axis_point[loose], gap.angle[loose] = better.tip, better.axis_point, better.angle
     return Reached(vertex, gap, segment + at)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.curves import CurveGroup
 from cornersmooth.verify.nearest import gap_between, nearest_segments
@@ -71,13 +71,16 @@ def _suspects(matcher: Matcher, block: Block, group: CurveGroup, limit: float) -
     trail, first = block.written.trail, block.written.first
     element = matcher.nc.curves.element[group.index]
     end = trail.last[element - first]
-    keep = block.on[end]
-    element, end = element[keep], end[keep]
+    keep = block.on[end].copy()
+    if len(group.spans) == 3 and group.points.shape[1] == 5:
+        keep &= ~_plain_corners(matcher, block, group, end)
+    if not keep.any():
+        return element[:0]
+    group, element, end = group.only(keep), element[keep], end[keep]
     spans = len(group.spans) - 1
     doubtful = np.zeros(len(element), np.bool_)
     for k in range(spans):
         inner, _ = group.bezier(k)
-        inner = inner[keep]
         before, after = end - (spans - k), end - (spans - k) + 1
         ends = np.maximum(
             _off(matcher, block, block.six[before], before), _off(matcher, block, block.six[after], before)
@@ -89,6 +92,28 @@ def _suspects(matcher: Matcher, block: Block, group: CurveGroup, limit: float) -
             off = np.minimum(_off(matcher, block, six, before), _off(matcher, block, six, after))
             doubtful |= (off > limit) & (off > ends * (1 + _HULL_SLACK))
     return element[doubtful]
+
+
+def _plain_corners(matcher: Matcher, block: Block, group: CurveGroup, end: Ints) -> Bools:
+    """(k,) whether a five-point curve has its middle point on an original vertex and the others on lines to it.
+
+    Then each half is farthest from its leg at the middle knot, whatever the weights: its hull has no other point off
+    the leg.
+    """
+    nc, points = matcher.nc, group.points
+    if nc.second_is != "point":
+        return np.zeros(len(points), np.bool_)
+    corner = np.minimum(block.segment[end - 2] + 1, len(matcher.track.six) - 1)
+    off = points[:, 2] - matcher.track.six[corner]
+    plain: Bools = np.abs(off).max(axis=1) <= matcher.margin
+    for outer, inner in ((0, 1), (4, 3)):
+        leg = points[:, outer] - points[:, 2]
+        way = points[:, inner] - points[:, 2]
+        size = np.einsum("ij,ij->i", leg, leg)
+        share = np.divide(np.einsum("ij,ij->i", way, leg), size, out=np.zeros(len(leg)), where=size > 0)
+        way -= share[:, None] * leg
+        plain &= (share >= 0) & (share <= 1) & (np.abs(way).max(axis=1) <= matcher.margin)
+    return plain
 
 
 def _off(matcher: Matcher, block: Block, six: Floats, vertex: Ints) -> Floats:

@@ -71,9 +71,9 @@ def _add_curves(
     for group in block.written.curves:
         at = matcher.nc.curves.element[group.index] - block.written.first
         for u, tangent, bend in ((group.spans[0], leave, bend_out), (group.spans[-1], arrive, bend_in)):
-            _, slope, second = group.jet(float(u))
-            tangent[at] = slope[:, :3]
-            bend[at] = _curvature(slope[:, :3], second[:, :3])
+            _, slope, second = group.jet(float(u), slice(0, 3))
+            tangent[at] = slope
+            bend[at] = _curvature(slope, second)
 
 
 def _add_arcs(

@@ -69,8 +69,7 @@ class Piece:
     curve_element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     curve_order: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     curve_points: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    control_tip: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    control_second: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    control: Floats = field(default_factory=lambda: np.zeros((0, 6)))
     weight: Floats = field(default_factory=lambda: np.zeros(0))
     knot: Floats = field(default_factory=lambda: np.zeros(0))
     arc_element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
@@ -134,7 +133,7 @@ def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
     if curve.any():
         piece.curve_element = np.flatnonzero(kind == Element.CURVE)
         piece.curve_order, piece.curve_points = curves["order"], curves["points"]
-        piece.control_tip, piece.control_second = curves["tip"], curves["second"]
+        piece.control = curves["point"]
         piece.weight, piece.knot = curves["weight"], curves["knot"]
         _check_starts(piece, modal)
     if is_arc.any():
@@ -253,8 +252,7 @@ def _read_curves(
         {
             "order": order,
             "points": points,
-            "tip": tip[point_rows],
-            "second": second[point_rows],
+            "point": np.hstack((tip[point_rows], second[point_rows])),
             "weight": weight,
             "knot": _exactly(knot, start, size, points + order),
         },
@@ -286,12 +284,13 @@ def _check_starts(piece: Piece, modal: Modal) -> None:
     """First control points must be where the tool is, digit for digit (FANUC alarm PS1009)."""
     element = piece.curve_element
     first = np.cumsum(piece.curve_points) - piece.curve_points
+    control = piece.control[first]
     for own, end, before in (
-        (piece.control_tip, piece.tip, modal.tip),
-        (piece.control_second, piece.second, modal.second),
+        (control[:, :3], piece.tip, modal.tip),
+        (control[:, 3:], piece.second, modal.second),
     ):
         position = np.vstack((before, end))[element]
-        wrong = (own[first] != position).any(axis=1)
+        wrong = (own != position).any(axis=1)
         for k in np.flatnonzero(wrong).tolist():
             text = "first control point is not the current position"
             piece.problems.append(Problem("CS519", 0, int(piece.line[element[k]]), text))

@@ -38,7 +38,7 @@ class Curves:
         Where a curve's control points start in the tables below, and how many there are.
     first_knot : (c,) int64
         Where its ``points + order`` knots start.
-    tip, second : (p, 3) float64
+    point : (p, 6) float64
         Control points of tip and of tool vector or axis point, mm (vectors: 1).
     weight : (p,) float64
     knot : (q,) float64
@@ -49,8 +49,7 @@ class Curves:
     first_point: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     points: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     first_knot: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    tip: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    second: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    point: Floats = field(default_factory=lambda: np.zeros((0, 6)))
     weight: Floats = field(default_factory=lambda: np.zeros(0))
     knot: Floats = field(default_factory=lambda: np.zeros(0))
 

@@ -224,8 +224,7 @@ class _Reader:
             points=points,
             first_point=np.cumsum(points) - points,
             first_knot=np.cumsum(points + order) - points - order,
-            tip=_scaled([piece.control_tip for piece in pieces], unit),
-            second=_scaled([piece.control_second for piece in pieces], second_unit),
+            point=_scaled([piece.control for piece in pieces], unit, 6),
             weight=_joined_arrays([piece.weight for piece in pieces], np.float64),
             knot=_joined_arrays([piece.knot for piece in pieces], np.float64),
         )
@@ -299,10 +298,10 @@ def _joined_arrays(parts: list[Any], dtype: type) -> Any:
     return np.concatenate([np.zeros(0, dtype), *parts]).astype(dtype, copy=False)
 
 
-def _scaled(parts: list[Any], unit: list[float]) -> Any:
-    """Stack (r, 3) parts in millimetres; a factor of one leaves the numbers untouched."""
+def _scaled(parts: list[Any], unit: list[float], width: int = 3) -> Any:
+    """Stack (r, width) parts in millimetres; a factor of one leaves the numbers untouched."""
     if not parts:
-        return np.zeros((0, 3))
+        return np.zeros((0, width))
     return np.concatenate([part if factor == 1.0 else part * factor for part, factor in zip(parts, unit, strict=True)])
 
 

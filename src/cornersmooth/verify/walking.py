@@ -78,7 +78,7 @@ class Lanes:
         return len(self.first)
 
 
-def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) -> tuple[Ints, Floats, Bools]:
+def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) -> tuple[Ints, Floats, Bools, Floats]:
     """Assign the vertices of all lanes.
 
     Parameters
@@ -99,10 +99,13 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
         On its segment; -1 for vertices in no lane.
     backward : (v,) bool
         Whether the vertex lies more than `margin` behind the one before it, as seen from its segment.
+    distance : (v,) float64, mm
+        From its place, in six dimensions: neither tip nor axis point is farther.
     """
     segment = np.zeros(len(six), np.int64)
     fraction = np.full(len(six), -1.0)
     backward = np.zeros(len(six), np.bool_)
+    distance = np.full(len(six), np.inf)  # what a lane starts with has not been measured
     vertex, last = lanes.first.copy(), lanes.last
     here, least, end = lanes.start.copy(), lanes.fraction.copy(), lanes.stop - 1
     segment[vertex], fraction[vertex] = here, least
@@ -113,7 +116,7 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
         if not active.all():
             keep = np.flatnonzero(active)
             if not len(keep):
-                return segment, fraction, backward
+                return segment, fraction, backward, distance
             vertex, last, here, least, end = vertex[keep], last[keep], here[keep], least[keep], end[keep]
         point = six.take(vertex, axis=0)
         own = track.row.take(here, axis=0)
@@ -138,7 +141,7 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
         behind = (least - t) > 0
         place = ~advance
         at = vertex[place]
-        segment[at], fraction[at] = here[place], on[place]
+        segment[at], fraction[at], distance[at] = here[place], on[place], d[place]
         if behind.any():
             back = (least - t) ** 2 > square_margin * own[:, 12]
             backward[at] = (behind & back & (own[:, 12] > 0))[place]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from cornersmooth.errors import InputError
 from cornersmooth.model import Floats, Ints
 from cornersmooth.text import NumberError, parse_numbers
+from cornersmooth.verify.fixed import MARGIN, read_column, words_of
 
 #: letters of a motion block; N is a block number and says nothing
 MOTION_LETTERS = "GXYZIJKUVWFRPN"
@@ -27,16 +28,16 @@ _PLACE_LETTERS = frozenset("XYZUVWIJK")
 MOTION_CODES = (0.0, 1.0, 2.0, 3.0, 6.2)
 
 #: bytes read at a time
-CHUNK = 1 << 22
+CHUNK = 1 << 20
 
-_NOT_LETTERS = b"0123456789.-+ \t\r"
 _TO_BLANKS = bytes(32 if chr(code).isalpha() or code == 13 else code for code in range(128)) + bytes(range(128, 256))
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _COMMENT = re.compile(r"\(([^)]*)\)|;(.*)$")
 
-#: a number for every letter; sums of them tell sets of letters apart, which `_Signatures` then compares in full
-_MARK = np.zeros(256, np.int64)
-_MARK[1:] = np.random.default_rng(1).integers(1, 1 << 52, 255)
+#: bytes that are no part of a number and no blank between words
+_SPEAKS = bytes(code not in b"0123456789.-+ \t\r" for code in range(256))
+
+_LINE_END, _BLANK = 10, 32
 
 
 @dataclass(frozen=True)
@@ -172,15 +173,13 @@ class _Signatures:
 
     def classify(self, letters: NDArray[np.uint8], start: Ints, end: Ints) -> Ints:
         """Index into `letters` for every line; the lines' letters are ``letters[start:end]``."""
-        marks = _MARK.take(letters)
-        marks[end] = 0  # line ends
-        sums = np.add.reduceat(marks, start)
         length = end - start
+        head = np.where(length > 0, letters[np.minimum(start, len(letters) - 1)], 0)
         index = np.full(len(start), -1, np.int64)
         tried = 0
         while True:
             for known in range(tried, len(self.letters)):
-                self._match(known, letters, start, length, sums, index)
+                self._match(known, letters, start, length, head, index)
             tried = len(self.letters)
             missing = np.flatnonzero(index < 0)
             if not len(missing):
@@ -189,13 +188,17 @@ class _Signatures:
             self._learn(letters[start[first] : end[first]].tobytes())
 
     def _match(
-        self, known: int, letters: NDArray[np.uint8], start: Ints, length: Ints, sums: Ints, index: Ints
+        self, known: int, letters: NDArray[np.uint8], start: Ints, length: Ints, head: NDArray[np.uint8], index: Ints
     ) -> None:
         pattern = np.frombuffer(self.letters[known], np.uint8)
-        rows = np.flatnonzero((sums == _MARK[pattern].sum()) & (length == len(pattern)) & (index < 0))
-        if len(rows) and len(pattern):
-            same = (letters[start[rows][:, None] + np.arange(len(pattern))] == pattern).all(axis=1)
-            rows = rows[same]
+        same = length == len(pattern)
+        if len(pattern):
+            same &= head == pattern[0]
+        same &= index < 0
+        rows = np.flatnonzero(same)
+        if len(rows) and len(pattern) > 1:
+            found = letters[start[rows][:, None] + np.arange(1, len(pattern))]
+            rows = rows[(found == pattern[1:]).all(axis=1)]
         index[rows] = known
 
     def _learn(self, signature: bytes) -> None:
@@ -206,54 +209,114 @@ class _Signatures:
         )
 
 
+@dataclass(frozen=True)
+class _Chunk:
+    """Lines of a chunk, and where the letters and numbers of each are.
+
+    Parameters
+    ----------
+    raw : (n,) uint8
+        The text behind `MARGIN` line ends.
+    place : (p,) int64
+        Every byte that is no digit, point, sign or blank: letters, line ends, anything strange.
+    first, last : (l,) int64
+        Each line's letters are ``place[first:last]``; ``place[last]`` is its end.
+    index : (l,) int64
+        Signature of each line.
+    """
+
+    raw: NDArray[np.uint8]
+    place: Ints
+    first: Ints
+    last: Ints
+    index: Ints
+
+    def text(self, row: int, stop: int) -> bytes:
+        """Lines ``row`` to ``stop`` (excluded) as written."""
+        begin = int(self.place[self.last[row - 1]]) + 1 if row else MARGIN
+        return self.raw[begin : int(self.place[self.last[stop - 1]]) + 1].tobytes()
+
+
 def _read_chunk(chunk: bytes, number: int, signatures: _Signatures, name: str | None) -> Iterator[Table | Line]:
-    letters = np.frombuffer(chunk.translate(None, _NOT_LETTERS), np.uint8)
-    end = np.flatnonzero(letters == 10)
-    start = np.concatenate(([0], end[:-1] + 1))
-    index = signatures.classify(letters, start, end)
-    bulk = np.array(signatures.bulk)[index]
-    stops = np.flatnonzero(np.frombuffer(chunk, np.uint8) == 10) + 1  # byte after each line end
-    starts = np.concatenate(([0], stops[:-1]))
+    raw = np.frombuffer(b"\n" * MARGIN + chunk, np.uint8)
+    place = np.flatnonzero(np.frombuffer(chunk.translate(_SPEAKS), np.bool_)) + MARGIN
+    letters = raw[place]
+    last = np.flatnonzero(letters == _LINE_END)
+    first = np.concatenate(([0], last[:-1] + 1))
+    found = _Chunk(raw, place, first, last, signatures.classify(letters, first, last))
+    bulk = np.array(signatures.bulk)[found.index]
     edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
-    for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        if bulk[first]:
-            text = chunk[starts[first] : stops[last - 1]]
-            table = _read_run(text, index[first:last], number + first, signatures)
-            if table is not None:
-                yield table
+    for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        if bulk[start]:
+            columns = _read_run(found, start, stop, signatures)
+            if columns is not None:
+                yield Table(np.arange(number + start, number + stop), columns)
                 continue
-        for row in range(first, last):
-            yield tokenise(chunk[starts[row] : stops[row]], number + row, name)
+        for row in range(start, stop):
+            yield tokenise(found.text(row, row + 1), number + row, name)
 
 
-def _read_run(text: bytes, index: Ints, number: int, signatures: _Signatures) -> Table | None:
-    """Numbers of a run of lines with known letters; None where they are not what the letters promise."""
-    raw = np.frombuffer(text, np.uint8)
-    if ((raw[:-1] >= ord("A")) & (raw[1:] <= ord(" "))).any():  # a letter without its number right behind it
+def _read_run(chunk: _Chunk, start: int, stop: int, signatures: _Signatures) -> dict[str, Floats] | None:
+    """Columns of a run of lines with known letters; None where the numbers are not what the letters promise."""
+    index = chunk.index[start:stop]
+    patterns = {k: signatures.letters[k].decode() for k in np.flatnonzero(np.bincount(index)).tolist()}
+    fields = _fields(chunk, start, stop, index, patterns)
+    if fields is None:
         return None
-    patterns = [letters.decode("latin-1") for letters in signatures.letters]
-    count = np.array([len(pattern) for pattern in patterns])[index]
-    try:
-        values = parse_numbers(text.translate(_TO_BLANKS))
-    except NumberError:
-        return None
-    if len(values) != count.sum():
-        return None
-    line = np.arange(number, number + len(index))
-    kinds = np.flatnonzero(np.bincount(index, minlength=len(patterns)))
-    if len(kinds) == 1:
-        pattern = patterns[kinds[0]]
-        columns = dict(zip(pattern, values.reshape(-1, len(pattern)).T, strict=True))
-    else:
-        first = np.cumsum(count) - count
-        columns = {letter: np.full(len(index), np.nan) for kind in kinds for letter in patterns[kind]}
-        for kind in kinds:
-            rows = np.flatnonzero(index == kind)
-            place = first[rows]
-            for k, letter in enumerate(patterns[kind]):
-                columns[letter][rows] = values[place + k]
+    columns: dict[str, Floats] = {}
+    for rows, pattern, numbers in fields:
+        for letter, values in zip(pattern, numbers, strict=True):
+            if len(patterns) == 1:
+                columns[letter] = values
+            else:
+                column = columns.setdefault(letter, np.full(stop - start, np.nan))
+                column[rows] = values
     if "G" in columns:
         code = columns["G"]
         if not (np.isnan(code) | np.isin(code, MOTION_CODES)).all():
             return None
-    return Table(line, columns)
+    return columns
+
+
+_Fields = list[tuple[Ints, str, list[Floats]]]
+
+
+def _fields(chunk: _Chunk, start: int, stop: int, index: Ints, patterns: dict[int, str]) -> _Fields | None:
+    """Numbers of every signature's lines, column by column; all at once where the columns are not regular."""
+    raw, words = chunk.raw, words_of(chunk.raw)
+    first = chunk.first[start:stop]
+    found: _Fields = []
+    for k, pattern in patterns.items():
+        rows = np.flatnonzero(index == k)
+        own = first[rows]
+        numbers: list[Floats] = []
+        for column in range(len(pattern)):
+            begin = chunk.place[own + column] + 1
+            end = chunk.place[own + column + 1]
+            end = end - (raw[end - 1] <= _BLANK)
+            values = read_column(raw, words, begin, end)
+            if values is None:
+                return _irregular_fields(chunk, start, stop, index, patterns)
+            numbers.append(values)
+        found.append((rows, pattern, numbers))
+    return found
+
+
+def _irregular_fields(chunk: _Chunk, start: int, stop: int, index: Ints, patterns: dict[int, str]) -> _Fields | None:
+    text = chunk.text(start, stop)
+    raw = np.frombuffer(text, np.uint8)
+    if ((raw[:-1] >= ord("A")) & (raw[1:] <= _BLANK)).any():  # a letter without its number right behind it
+        return None
+    try:
+        values = parse_numbers(text.translate(_TO_BLANKS))
+    except NumberError:
+        return None
+    count = chunk.last[start:stop] - chunk.first[start:stop]
+    if len(values) != count.sum():
+        return None
+    first = np.cumsum(count) - count
+    found: _Fields = []
+    for k, pattern in patterns.items():
+        rows = np.flatnonzero(index == k)
+        found.append((rows, pattern, [values[first[rows] + column] for column in range(len(pattern))]))
+    return found
