@@ -7,7 +7,9 @@ The whole program in three calls::
     with open("part.nc", "wb") as stream:
         cornersmooth.write(smoothed, stream)
 
-Nothing is imported before it is used, so that the command line answers at once.
+`cornersmooth.verify.verify` measures NC text against a program, `cornersmooth.report.report` tells the whole story as a
+dictionary, `cornersmooth.feedrate.plan` says how long a machine takes. Nothing is imported before it is used, so that the
+command line answers at once.
 """
 
 from __future__ import annotations
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits, TimeLaw, compare, direct, plan
     from cornersmooth.model import Corners, Program, SmoothProgram, Statement
     from cornersmooth.nc import fit_settings, write
-    from cornersmooth.report import report
     from cornersmooth.settings import Settings
     from cornersmooth.smoothing import smooth
 
@@ -31,7 +32,6 @@ _HOME = {
     "smooth": "smoothing",
     "fit_settings": "nc",
     "write": "nc",
-    "report": "report",
     "Settings": "settings",
     "plan": "feedrate",
     "direct": "feedrate",
@@ -61,7 +61,6 @@ __all__ = [
     "fit_settings",
     "plan",
     "read",
-    "report",
     "smooth",
     "write",
 ]

@@ -1,0 +1,101 @@
+"""The JSON and CSV reports of a smoothed program: design section 7."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from cornersmooth import Program, Settings, smooth
+from cornersmooth.errors import Finding
+from cornersmooth.report import corners_csv, report, report_json
+
+COLUMNS = (
+    "corner,line,x,y,z,tip_angle_deg,axis_angle_deg,tip_length_in_mm,tip_length_out_mm,axis_length_in_mm,"
+    "axis_length_out_mm,tip_error_mm,axis_error_mm,orientation_error_deg,curvature_max_per_mm,limited_by,status"
+)
+
+
+@pytest.fixture
+def program() -> Program:
+    """A square with a repeated corner, a tilting axis and a reversal."""
+    tips = [[0, 0, 0], [10, 0, 0], [10, 10, 0], [10, 10, 0], [0, 10, 0], [10, 10, 0]]
+    axes = [[0, 0, 1], [0, 0, 1], [0.1, 0, 1], [0.1, 0, 1], [0.1, 0, 1], [0.1, 0, 1]]
+    return Program.from_poses(np.array(tips, float), np.array(axes, float), feed=1000.0)
+
+
+def table(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_json_has_the_agreed_keys_and_counts(program):
+    smoothed = smooth(program, Settings(tolerance=0.02))
+    finding = Finding("CS310", "warning", 7, "X is not translated", 3)
+    contents = json.loads(report_json(report(smoothed, blocks_out=40, seconds={"read": 0.5}, findings=(finding,))))
+    assert contents["schema"] == "cornersmooth-report/1"
+    assert set(contents) == {"schema", "tool", "input", "settings", "summary", "findings", "worst"}
+    given = contents["input"]
+    assert (given["poses"], given["chains"], given["feed_moves"], given["units"]) == (6, 1, 6, "mm")
+    summary = contents["summary"]
+    assert summary["corners"] == 4
+    assert summary["smoothed"] == 2
+    assert summary["not_smoothed"] == {"reversal": 1, "duplicate": 1}
+    assert summary["limited_by_tolerance"] + summary["limited_by_segment"] == 2
+    assert summary["blocks_in"] == 6
+    assert summary["blocks_out"] == 40
+    assert summary["seconds"] == {"read": 0.5}
+    assert summary["length_mm"] == pytest.approx(40.0)
+    assert contents["findings"] == [
+        {"code": "CS310", "severity": "warning", "line": 7, "text": "X is not translated", "count": 3}
+    ]
+    assert contents["settings"]["tolerance"] == 0.02
+    assert len(contents["worst"]) == 2
+    assert list(contents["worst"][0]) == COLUMNS.split(",")
+
+
+def test_csv_has_a_row_for_every_corner(program):
+    smoothed = smooth(program, Settings(tolerance=0.02))
+    text = "".join(corners_csv(smoothed))
+    assert text.splitlines()[0] == COLUMNS
+    rows = table(text)
+    assert [row["status"] for row in rows] == ["smoothed", "smoothed", "duplicate", "reversal"]
+    assert [row["line"] for row in rows] == ["2", "3", "4", "5"]
+    first = rows[0]
+    assert float(first["tip_angle_deg"]) == pytest.approx(90.0)
+    assert float(first["tip_error_mm"]) == pytest.approx(smoothed.corners.tip_error[0], rel=1e-9)
+    assert float(rows[3]["tip_angle_deg"]) == pytest.approx(180.0)
+    assert float(rows[3]["tip_length_in_mm"]) == 0.0
+
+
+def test_lengths_and_curvature_are_those_of_the_closed_form():
+    tips = np.array([[-50.0, 0, 0], [0, 0, 0], [0, 50.0, 0]])
+    smoothed = smooth(Program.from_poses(tips, np.tile([0.0, 0, 1], (3, 1))), Settings(tolerance=0.05))
+    (row,) = table("".join(corners_csv(smoothed)))
+    beta = np.pi / 4
+    length = 3 * 0.05 / np.sin(beta)
+    assert float(row["tip_length_in_mm"]) == pytest.approx(length, rel=1e-8)
+    assert float(row["curvature_max_per_mm"]) == pytest.approx(
+        2 * np.sin(beta) / (length * np.cos(beta) ** 2), rel=1e-8
+    )
+    assert row["limited_by"] == "tolerance"
+
+
+def test_the_papers_method_adds_what_its_synchronisation_leaves(program):
+    smoothed = smooth(program, Settings(tolerance=0.02, method="zhang2016"))
+    rows = table("".join(corners_csv(smoothed)))
+    assert float(rows[0]["sync_residual_mm"]) >= 0.0
+    assert {"joint_jump_in_deg", "joint_jump_out_deg"} <= set(rows[0])
+    summary = json.loads(report_json(report(smoothed)))["summary"]
+    assert summary["max_sync_residual_mm"] >= 0.0
+    assert summary["max_joint_jump_deg"] >= 0.0
+
+
+def test_a_program_without_corners_has_an_empty_report():
+    smoothed = smooth(Program.from_poses(np.zeros((1, 3)), np.array([[0.0, 0, 1]])))
+    assert "".join(corners_csv(smoothed)) == COLUMNS + "\n"
+    contents = json.loads(report_json(report(smoothed)))
+    assert contents["summary"]["max_tip_error_mm"] == 0.0
+    assert contents["worst"] == []
