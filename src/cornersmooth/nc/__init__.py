@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from cornersmooth.errors import Finding
+from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.model import Program, SmoothProgram, Units
 from cornersmooth.nc.blocks import BlockWriter
 from cornersmooth.nc.choice import choose_form
@@ -18,6 +18,7 @@ from cornersmooth.nc.control import Control, Form
 from cornersmooth.nc.framing import Frame
 from cornersmooth.nc.motion import MotionWriter
 from cornersmooth.nc.notes import Notes
+from cornersmooth.nc.rotary import rotary_rows
 from cornersmooth.nc.statements import StatementWriter
 from cornersmooth.nc.tables import control_names, load_control
 from cornersmooth.settings import Settings
@@ -34,6 +35,13 @@ __all__ = [
     "load_control",
     "write",
 ]
+
+
+#: curve styles without weights
+_POLYNOMIAL = ("poly", "spl")
+
+#: curve styles of controls that may turn the tool in their own way on a line between two axis points
+_TURNING = ("bspline", "poly")
 
 
 class Stream(Protocol):
@@ -59,8 +67,20 @@ class Written:
 
 
 def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
-    """Settings that know the digits and the abilities of the output form, so that ε holds for the written numbers."""
+    """Settings that know the digits and the abilities of the output form, so that ε holds for the written numbers.
+
+    Raises
+    ------
+    SettingsError
+        The form cannot hold what the settings ask for.
+    """
     tolerance = settings.tolerance
+    if form.curve in _POLYNOMIAL and (settings.weights != (1.0, 1.0) or settings.shape != "paper"):
+        raise SettingsError(
+            "CS217",
+            f"{form.control} form {form.name} holds curves with weights 1 only",
+            "leave out --weights and --shape, or choose another form",
+        )
     return settings.but(
         tip_resolution=form.tip_resolution(units, tolerance),
         axis_point_resolution=form.axis_point_resolution(units, tolerance, settings.axis_length),
@@ -110,7 +130,7 @@ def write(
     motion = MotionWriter(program, writer, statements, notes)
     framing = (frame or Frame()).start(stream, chosen, program, smoothed.settings.tolerance)
     framing.head()
-    for rows in _one_ahead(_rows(smoothed, chosen, circles)):
+    for rows in _one_ahead(_rows(smoothed, chosen, circles, notes)):
         for text in motion.write(rows):
             framing.write(text)
         if progress is not None and len(rows.move):
@@ -121,10 +141,11 @@ def write(
     return Written(framing.blocks + motion.blocks + writer.blocks, notes.findings())
 
 
-def _rows(smoothed: SmoothProgram, form: Form, circles: Circles) -> Iterator[Rows]:
+def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, notes: Notes) -> Iterator[Rows]:
     if form.curves:
-        return curve_rows(smoothed)
-    return dense_rows(smoothed, circles.pieces)
+        return curve_rows(smoothed, divide=form.curve in _TURNING)
+    rows = dense_rows(smoothed, circles.pieces)
+    return rotary_rows(rows, smoothed.program, smoothed.settings, form, notes) if form.rotary else rows
 
 
 def _one_ahead(blocks: Iterator[Rows]) -> Iterator[Rows]:

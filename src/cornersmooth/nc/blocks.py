@@ -11,12 +11,13 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.kinematics import machine_position
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.control import INVERSE_TIME, Form
-from cornersmooth.nc.curves import Curves, curves_for
+from cornersmooth.nc.curves import Curves, curves_for, halves_of
 from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.statements import StatementWriter
@@ -62,6 +63,17 @@ class BlockWriter:
 
     def ticks(self, tip: Floats, other: Floats) -> Ints:
         """Numbers of rows in steps of their last digit, (r, c), from `Rows.tip` and `Rows.other`."""
+        ticks: Ints = to_ticks(self._numbers(tip, other), self._format.decimals)
+        return ticks
+
+    def halves(self, tip: Floats, other: Floats, curve: NDArray[np.int8]) -> Floats | None:
+        """`Run.halves` where the form writes polynomials."""
+        if self._curves.format is None or not (curve > 0).any():
+            return None
+        return halves_of(self._numbers(tip, other), curve)
+
+    def _numbers(self, tip: Floats, other: Floats) -> Floats:
+        """Numbers of rows in units of the text, (r, c)."""
         form = self.form
         if form.orientation == "machine" and form.machine is not None:
             tip = machine_position(form.machine, tip, other)
@@ -71,8 +83,7 @@ class BlockWriter:
         unit = self.program.mm_per_unit
         if unit != 1.0:
             numbers[:, : 6 if form.orientation == "point" else 3] /= unit
-        ticks: Ints = to_ticks(numbers, self._format.decimals)
-        return ticks
+        return numbers
 
     def text(self, run: Run, dwell: int = 0) -> bytes:
         """Text of a run that is not empty; `dwell` in milliseconds."""

@@ -128,6 +128,8 @@ class Mode:
     motion : Motion
     circles : bool
         Whether arcs may be written as circular blocks, without the words of the orientation.
+    timed_turns : bool
+        Whether blocks in which only rotary axes turn are written with inverse time: F would be degrees per minute.
     """
 
     words: tuple[str, ...]
@@ -135,6 +137,7 @@ class Mode:
     off: Blocks
     motion: Motion
     circles: bool
+    timed_turns: bool
 
 
 @dataclass(frozen=True)

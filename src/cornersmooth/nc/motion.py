@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.blocks import BlockWriter
+from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.holes import approaches, hole_moves, travel_height
 from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.run import Run
@@ -121,15 +122,21 @@ class MotionWriter:
         if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
             yield from self._go_to(self.writer.ticks(program.tip[move[:1] - 1], rows.other[part][:1]), move[:1])
         self._join(ticks, rows.joined[part])
+        feed, mode = program.feed[move], program.feed_mode[move].astype(np.int64)
+        if rows.rate is not None:
+            rate = rows.rate[part]
+            timed = ~np.isnan(rate)
+            feed, mode = np.where(timed, rate, feed), np.where(timed, INVERSE_TIME, mode)
         run = Run(
             ticks=ticks,
             move=move,
             rapid=program.kind[move] == Move.RAPID,
-            feed=program.feed[move],
-            mode=program.feed_mode[move].astype(np.int64),
+            feed=feed,
+            mode=mode,
             curve=rows.curve[part],
             weights=rows.weights[part] if rows.weights is not None else None,
             arc=arc,
+            halves=self.writer.halves(rows.tip[part], rows.other[part], rows.curve[part]),
         )
         before = len(run)
         run = self._moving(run)

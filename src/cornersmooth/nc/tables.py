@@ -33,7 +33,7 @@ Record = TypeVar("Record", Digits, Layout, Words, Motion)
 
 _CONTROL_KEYS = ("name", "like", "description", "digits", "layout", "words", "motion", "forms")
 _FORM_KEYS = ("description", "curve", *get_args(Orientation))
-_MODE_KEYS = ("words", "on", "off", "circles", *(item.name for item in fields(Motion)))
+_MODE_KEYS = ("words", "on", "off", "circles", "timed_turns", *(item.name for item in fields(Motion)))
 _PLANES = {"xy": 17, "zx": 18, "yz": 19}
 _FEED_MODES = {
     "per_minute": int(FeedMode.PER_MINUTE),
@@ -221,6 +221,7 @@ def _mode(entry: Table, motion: Table, where: str) -> Mode:
         off=_blocks(entry.get("off", []), f"{where}.off"),
         motion=_record(Motion, {**motion, **{key: value for key, value in entry.items() if key in own}}, where),
         circles=_flag(entry.get("circles", False), f"{where}.circles"),
+        timed_turns=_flag(entry.get("timed_turns", False), f"{where}.timed_turns"),
     )
 
 

@@ -42,6 +42,8 @@ class Rows:
     arc : (r,) int64 or None
         Row of `Program.arcs` where the tool gets here on a circle or helix about that arc's axis, -1 where it gets here
         straight; None where the program has no such rows.
+    rate : (r,) float64 or None
+        Moves per minute (inverse time) of rows that are timed so, NaN for the others; None where none is.
     """
 
     tip: Floats
@@ -51,6 +53,7 @@ class Rows:
     joined: Bools
     weights: Floats | None = None
     arc: Ints | None = None
+    rate: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -95,8 +98,13 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
         yield Rows(block.tip, block.other, block.move, *_no_curves(len(block.tip)), arc=arc)
 
 
-def curve_rows(smoothed: SmoothProgram, poses: int = 16384) -> Iterator[Rows]:
+def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16384) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines and curve pairs, in blocks of about `poses` poses.
+
+    Parameters
+    ----------
+    divide : bool
+        Whether lines in which the axis turns much are divided: for controls that do not run the axis point straight.
 
     Yields
     ------
@@ -104,11 +112,15 @@ def curve_rows(smoothed: SmoothProgram, poses: int = 16384) -> Iterator[Rows]:
         `other` holds axis points; a transition is five rows.
     """
     program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
-    layout = lay_out(smoothed, dense=False)
-    counts = np.where(layout.skip, 0, np.where(layout.row >= 0, 5 + layout.line, 1))
+    layout = lay_out(smoothed, dense=divide)
+    counts = np.where(layout.line, layout.pieces, 0) + np.where(layout.row >= 0, 5, 0)
+    counts[layout.skip] = 0
     pieces = _pieces(smoothed)
     for block in _blocks(smoothed, counts, pieces, poses):
         row = layout.row[block.poses]
+        if divide:
+            _fill_divided(smoothed, layout, block)
+            block.other[:] = block.tip + height * block.other
         sharp = (row < 0) & (block.last > block.first)
         pose, at = block.poses[sharp], block.last[sharp] - 1
         block.tip[at] = program.tip[pose]
