@@ -88,15 +88,17 @@ def _grid(rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
     return tip.astype(float), GRID_AXES[rng.integers(0, few, n + 1)]
 
 
-KINDS = (_finishing, _benchmark, _wild, _steep, _piecewise, _grid)
+TAME = (_finishing, _benchmark)
+KINDS = (*TAME, _wild, _steep, _piecewise, _grid)
 
 
-def random_chains(seed: int, count: int, corners: int = 6) -> list[Chain]:
-    """Chains of one to `corners` corners, all kinds in turn; some change their feed on the way."""
+def random_chains(seed: int, count: int, corners: int = 6, *, tame: bool = False) -> list[Chain]:
+    """Chains of one to `corners` corners, all kinds in turn or the `tame` ones; some change their feed on the way."""
+    kinds = TAME if tame else KINDS
     rng = np.random.default_rng(seed)
     chains = []
     for index in range(count):
-        tip, axis = KINDS[index % len(KINDS)](rng, int(rng.integers(2, corners + 2)))
+        tip, axis = kinds[index % len(kinds)](rng, int(rng.integers(2, corners + 2)))
         feed = np.full(len(tip), float(rng.integers(100, 5000)))
         if rng.random() < 0.2:
             feed[rng.integers(1, len(tip)) :] = float(rng.integers(100, 5000))

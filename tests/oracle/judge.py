@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from oracle.distance import Deviation, deviation, match_poses, match_samples
 from oracle.motion import Original, Path, unit, written_path
@@ -61,13 +62,13 @@ def not_passed(written: Written, path: Path, tip: Floats, axis: Floats, axis_len
     step = 10.0 ** -TIP_DECIMALS[written.units] * (1.0 if written.units == "mm" else 25.4)
     # an axis point is printed like a tip: its direction is known to a step over H in each coordinate, twice
     turn = 10.0**-VECTOR_DECIMALS if written.form == "g1" else 2 * step / axis_length
-    lost = []
-    for pose in range(len(tip)):
-        near = np.all(np.abs(shown[:, :3] - tip[pose]) <= HALF * step + 1e-9, axis=1)
-        near &= np.all(np.abs(shown[:, 3:] - axis[pose]) <= 2 * turn, axis=1)
-        if not near.any():
-            lost.append(pose)
-    return lost
+    room = np.array([HALF * step + 1e-9] * 3 + [2 * turn] * 3)
+    near = cKDTree(shown[:, :3]).query_ball_point(tip, 2 * step)
+    return [
+        pose
+        for pose, found in enumerate(near)
+        if not np.all(np.abs(shown[found] - np.concatenate((tip[pose], axis[pose]))) <= room, axis=1).any()
+    ]
 
 
 def feeds_out_of_place(

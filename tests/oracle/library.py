@@ -36,8 +36,8 @@ def write(
 
 
 def exact_poses(smoothed: SmoothProgram) -> NDArray[np.int64]:
-    """Indices of the poses that must be passed: all but the rounded, the repeated and the stated ones."""
-    exact = smoothed.program.kind != Move.FROM
+    """Indices of the poses that must be passed: all but the rounded, the repeated and the stated ones, and holes."""
+    exact = (smoothed.program.kind != Move.FROM) & (smoothed.program.kind != Move.HOLE)
     status = smoothed.corners.status
     exact[smoothed.corners.pose[(status == Status.SMOOTHED) | (status == Status.DUPLICATE)]] = False
     return np.flatnonzero(exact)

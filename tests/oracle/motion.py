@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from oracle.nc_text import KNOTS, Arc, Code, Curve, Line, Written
+from oracle.nc_text import KNOTS, Arc, Curve, Line, Written
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -128,41 +128,35 @@ def written_path(
         Whether rapids are part of the path: then there is one, from the first position to the last.
     """
     step = axis_step(axis_length, limit)
-    blocks = written.blocks
-    lines = [index for index, block in enumerate(blocks) if isinstance(block, Line)]
-    samples = dict(_line_paths(written, lines, axis_length, step, turn))
-    for index, block in enumerate(blocks):
+    parts = [_line_path(written, axis_length, step, turn)]
+    starts = []
+    for index, block in enumerate(written.blocks):
         if isinstance(block, Curve):
             six = curve_point(block, CURVE_PARAMETERS)[1:]
-            samples[index] = _path(six[:, :3], six[:, 3:] - six[:, :3], axis_length, index)
+            parts.append(_path(six[:, :3], six[:, 3:] - six[:, :3], axis_length, index))
         elif isinstance(block, Arc):
             tip = arc_points(block, math.sqrt(8 * SAGITTA_SHARE * limit / block.radius))
-            samples[index] = _path(tip, np.broadcast_to(block.end[3:], tip.shape), axis_length, index)
-    runs: list[list[Path]] = []
-    for index, block in enumerate(blocks):
-        if isinstance(block, Code):
-            continue
-        if isinstance(block, Line) and ((block.rapid and not rapids) or block.start is None):
-            last = len(samples[index])
-            runs.append([samples[index].slice(last - 1, last)])
-        else:
-            runs[-1].append(samples[index])
-    return [run[0].joined(*run[1:]) for run in runs]
+            parts.append(_path(tip, np.broadcast_to(block.end[3:], tip.shape), axis_length, index))
+        elif isinstance(block, Line) and ((block.rapid and not rapids) or block.start is None):
+            starts.append(index)
+    whole = parts[0].joined(*parts[1:])
+    order = np.argsort(whole.block, kind="stable")
+    whole = Path(whole.tip[order], whole.point[order], whole.block[order])
+    # a rapid belongs to a run with its end only
+    first = np.searchsorted(whole.block, starts, side="right") - 1
+    last = np.append(np.searchsorted(whole.block, starts[1:], side="left"), len(whole))
+    return [whole.slice(*run) for run in zip(first.tolist(), last.tolist(), strict=True)]
 
 
 def _path(tip: Floats, direction: Floats, axis_length: float, index: int) -> Path:
     return Path(tip, tip + axis_length * unit(direction), np.full(len(tip), index, np.int64))
 
 
-def _line_paths(
-    written: Written, lines: list[int], axis_length: float, step: float, turn: str
-) -> list[tuple[int, Path]]:
+def _line_path(written: Written, axis_length: float, step: float, turn: str) -> Path:
     """Samples of every straight block, its end included and its start not; all blocks at once."""
-    if not lines:
-        return []
-    blocks = [written.blocks[index] for index in lines]
-    end = np.array([block.end for block in blocks])  # type: ignore[union-attr]
-    start = np.array([block.start or block.end for block in blocks])  # type: ignore[union-attr]
+    lines = [(index, block) for index, block in enumerate(written.blocks) if isinstance(block, Line)]
+    end = np.array([block.end for _, block in lines]).reshape(-1, 6)
+    start = np.array([block.start or block.end for _, block in lines]).reshape(-1, 6)
     if written.form == "g6.2":  # only the direction counts; both ends of it run linearly
         first, last = start[:, 3:] - start[:, :3], end[:, 3:] - end[:, :3]
     else:
@@ -175,10 +169,8 @@ def _line_paths(
     row = np.repeat(np.arange(len(lines)), count)
     part = ((np.arange(offset[-1]) - offset[row] + 1) / count[row])[:, None]
     tip = start[row, :3] + (end - start)[row, :3] * part
-    way = "vector" if written.form == "g6.2" else turn
-    axis = _turned(first[row], last[row], part, way)
-    whole = Path(tip, tip + axis_length * axis, np.array(lines)[row])
-    return [(index, whole.slice(offset[k], offset[k + 1])) for k, index in enumerate(lines)]
+    axis = _turned(first[row], last[row], part, "vector" if written.form == "g6.2" else turn)
+    return Path(tip, tip + axis_length * axis, np.array([index for index, _ in lines], dtype=np.int64)[row])
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,7 @@ class _State:
     """What the control knows while it reads."""
 
     position: tuple[str, ...] | None = None
+    values: Six | None = None  # the same as numbers
     feed: str | None = None
     per_revolution: bool = False
     plane: int = 17
@@ -238,24 +239,24 @@ class _Grammar:
         if rapid and feed is not None:
             raise BadTextError(f"{number}: F on a rapid")
         end = self.numbers(words, number)
-        start = None if state.position is None else self.numbers(state.position, number)
+        start = state.values
         value = self.feed(number, feed, state)
-        state.position, state.in_curve = words, False
+        state.position, state.values, state.in_curve = words, end, False
         state.blocks.append(Line(number, rapid, start, end, None if rapid else value, state.per_revolution))
 
     def circular(self, match: re.Match[str], number: int, state: _State) -> None:
-        if state.position is None:
+        if state.position is None or state.values is None:
             raise BadTextError(f"{number}: arc without a position to start from")
         if self.form != "g1":
             raise BadTextError(f"{number}: arcs do not carry the axis point")
         words = (*match.groups()[1:4], *state.position[3:])
         self.moves(number, words, state)
-        start, end = self.numbers(state.position, number), self.numbers(words, number)
+        start, end = state.values, self.numbers(words, number)
         value = self.feed(number, match[6], state)
         radius = float(match[5]) * self.scale
         if radius <= 0:
             raise BadTextError(f"{number}: radius {match[5]}; a sweep of 180 degrees or more is not allowed")
-        state.position, state.in_curve = words, False
+        state.position, state.values, state.in_curve = words, end, False
         state.blocks.append(Arc(number, state.plane, match[1] == "2", start, end, radius, value, state.per_revolution))
 
     def curve(self, lines: list[str], index: int, state: _State) -> int:
@@ -286,7 +287,7 @@ class _Grammar:
         if len(set(words)) == 1:
             raise BadTextError(f"{number}: curve without length")
         points = tuple(self.numbers(point, number) for point in words)
-        state.position, state.in_curve = words[-1], True
+        state.position, state.values, state.in_curve = words[-1], points[-1], True
         state.blocks.append(Curve(number, points, tuple(map(float, weights)), value, state.per_revolution))
         return index + len(KNOTS)
 
