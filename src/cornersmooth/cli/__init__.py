@@ -18,7 +18,10 @@ from cornersmooth import __version__
 #: name of each command, its module and its line in the list of commands
 COMMANDS = {
     "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC text."),
+    "verify": ("cornersmooth.cli.verify", "Measure NC text against the CL file it was made from."),
     "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
+    "controls": ("cornersmooth.cli.controls", "List the controls that NC text can be written for, and their forms."),
+    "machines": ("cornersmooth.cli.machines", "List the machines whose rotary words can be written, or describe one."),
     "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
 }
 

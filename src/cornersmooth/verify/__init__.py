@@ -6,8 +6,19 @@ Shares no code with `smoothing` and `nc`::
     found.passed, found.max_tip_deviation_mm, found.problems
 """
 
+from cornersmooth.verify.along import Distribution, deviation_along
 from cornersmooth.verify.ncprogram import Event, NcProgram, Problem
 from cornersmooth.verify.reader import read_nc
 from cornersmooth.verify.verification import Verification, Where, verify
 
-__all__ = ["Event", "NcProgram", "Problem", "Verification", "Where", "read_nc", "verify"]
+__all__ = [
+    "Distribution",
+    "Event",
+    "NcProgram",
+    "Problem",
+    "Verification",
+    "Where",
+    "deviation_along",
+    "read_nc",
+    "verify",
+]

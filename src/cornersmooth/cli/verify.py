@@ -1,0 +1,147 @@
+"""``cornersmooth verify``: reads NC text back as the control would and measures it against the CL file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cornersmooth.cli import options
+from cornersmooth.cli.files import STANDARD, check_output, open_output, read_input
+
+if TYPE_CHECKING:
+    from cornersmooth.model import Program
+    from cornersmooth.verify import NcProgram, Verification, Where
+
+_READING = ("dialect", "units", "arc_rule", "lenient")
+
+#: problems shown without -v
+_PROBLEMS_SHOWN = 20
+
+
+@click.command(
+    "verify",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit codes: 0 the text keeps the tolerance; 1 it does not, or something else is wrong with it; "
+    "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
+)
+@click.argument("source", metavar="IN")
+@click.argument("text", metavar="NC")
+@options.tolerance
+@options.axis_length
+@options.control
+@options.reading
+@click.option(
+    "--report",
+    "reports",
+    type=click.Path(),
+    multiple=True,
+    help="Write what was found: .json for the results, .csv for a row per pose. May be repeated.",
+)
+@click.option("--plot", type=click.Path(), help="Draw the deviation along the path: .png, .svg or .pdf.")
+@options.force
+@options.quiet
+@options.verbose
+def command(source: str, text: str, **given: Any) -> int:
+    """Measure the NC text NC against the CL file IN, whoever wrote it.
+
+    Tip and axis point must stay within the tolerance of their paths, in order; rapids, statements, feeds and exact
+    poses must be where the CL file has them. Shares no code with what smooths and writes.
+
+    \b
+    Examples:
+      cornersmooth verify part.cls part.nc -e 0.04
+      cornersmooth verify part.cls part.nc -e 0.04 -H 25 --report found.json --report poses.csv
+      cornersmooth verify part.cls part.nc -e 0.04 -v --plot deviation.png
+    """
+    from cornersmooth.cl import read
+    from cornersmooth.verify import read_nc, verify
+
+    if source == text == STANDARD:
+        raise click.UsageError("only one of the inputs can be standard input")
+    form = _check_outputs(source, text, given)
+    data, name = read_input(source)
+    program = read(data, name=name, format=given["input_format"], **{key: given[key] for key in _READING})
+    nc = read_nc(read_input(text)[0] if text == STANDARD else text, control=given["control"])
+    measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
+    found = verify(program, nc, **measures)
+    _write_reports(program, found, given["reports"])
+    if given["plot"]:
+        from cornersmooth.report.deviationplot import draw_deviation
+        from cornersmooth.verify import deviation_along
+
+        picture = draw_deviation(deviation_along(program, nc, **measures), given["tolerance"], form)
+        with open_output(given["plot"]) as output:
+            output.stream.write(picture)
+    for line in _problems(found, name, given["verbose"]):
+        click.echo(line, err=True)
+    if not given["quiet"]:
+        for line in _summary(program, nc, found, given["verbose"]):
+            click.echo(line)
+    return 0 if found.passed else 1
+
+
+def _check_outputs(source: str, text: str, given: dict[str, Any]) -> str:
+    """Refuse wrong names before anything is read; return the form of the picture."""
+    for path in given["reports"]:
+        if os.path.splitext(path)[1].lower() not in (".json", ".csv"):
+            raise click.UsageError(f"--report {path}: let the name end in .json or .csv")
+    form = os.path.splitext(given["plot"] or "picture.png")[1].lower().lstrip(".")
+    if form not in ("png", "svg", "pdf"):
+        raise click.UsageError(f"--plot {given['plot']}: let the name end in .png, .svg or .pdf")
+    for path in (*given["reports"], given["plot"]):
+        if path:
+            check_output(path, [source, text], force=given["force"])
+    return form
+
+
+def _write_reports(program: Program, found: Verification, paths: tuple[str, ...]) -> None:
+    from cornersmooth.report.verification import verification_csv, verification_json
+
+    for path in paths:
+        parts = verification_csv(program, found) if path.lower().endswith(".csv") else [verification_json(found)]
+        with open_output(path) as output:
+            for part in parts:
+                output.stream.write(part.encode("utf-8"))
+
+
+def _problems(found: Verification, name: str, verbose: int) -> Iterator[str]:
+    shown = found.problems if verbose else found.problems[:_PROBLEMS_SHOWN]
+    for problem in shown:
+        place = f"{name}:{problem.cl_line}" if problem.cl_line else name
+        where = f" (NC line {problem.nc_line})" if problem.nc_line else ""
+        yield f"{place}: error: {problem.text}{where}"
+    if found.problem_count > len(shown):
+        yield f"{name}: {found.problem_count - len(shown)} more problems; -v shows more, a JSON report lists them"
+
+
+def _summary(program: Program, nc: NcProgram, found: Verification, verbose: int) -> Iterator[str]:
+    """Label and text of everything measured, and with -v where along the path it lies."""
+    from cornersmooth.report.verification import along_lines, histogram_lines
+
+    yield f"{'result':<18}{'passed' if found.passed else f'FAILED: {found.problem_count} problems'}"
+    yield f"{'tolerance':<18}{found.tolerance:g} mm, axis point at {found.axis_length:g} mm"
+    yield f"{'tip':<18}{_place(found.tip, 'mm')}"
+    yield f"{'axis point':<18}{_place(found.axis_point, 'mm')}"
+    yield f"{'tool axis':<18}{_place(found.orientation, 'deg')}"
+    yield f"{'common pose':<18}tip {_place(found.together_tip, 'mm')}"
+    yield f"{'':<18}axis point {_place(found.together_axis_point, 'mm')}"
+    yield f"{'tangent jump':<18}{_place(found.tangent_jump, 'deg')}"
+    if found.curves:
+        yield f"{'curvature jump':<18}{_place(found.curvature_jump, '1/mm')}"
+    yield f"{'blocks':<18}{found.blocks}, shortest move {_place(found.shortest, 'mm')}"
+    if verbose:
+        from cornersmooth.verify import deviation_along
+
+        yield ""
+        yield from histogram_lines(found)
+        yield ""
+        along = deviation_along(program, nc, tolerance=found.tolerance, axis_length=found.axis_length)
+        yield from along_lines(along, found.tolerance)
+
+
+def _place(where: Where, unit: str) -> str:
+    lines = f" at CL line {where.cl_line}, NC line {where.nc_line}" if where.nc_line else ""
+    return f"{where.value:.6g} {unit}{lines}"

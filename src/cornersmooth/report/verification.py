@@ -1,0 +1,106 @@
+"""What the verification found, as JSON, as CSV and as lines to read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import numpy as np
+
+from cornersmooth.model import Floats, Program
+from cornersmooth.verify import Distribution, Verification
+
+CSV_COLUMNS = (
+    "pose",
+    "cl_line",
+    "nc_line",
+    "x",
+    "y",
+    "z",
+    "tip_deviation_mm",
+    "axis_point_deviation_mm",
+    "orientation_deviation_deg",
+)
+
+#: classes of the histogram as parts of the tolerance, and the width of its longest bar
+_CLASSES, _BAR = 10, 40
+
+#: rows of the table along the path
+_ROWS = 20
+
+#: rows of CSV text made at a time
+_BLOCK = 10_000
+
+
+def verification_json(found: Verification) -> str:
+    """One JSON object with a final line end."""
+    return json.dumps(found.to_dict(), indent=1, sort_keys=False, allow_nan=False) + "\n"
+
+
+def verification_csv(program: Program, found: Verification) -> Iterator[str]:
+    """Header, then a row for every pose that is passed at feed, in blocks of text. Lengths are mm."""
+    yield ",".join(CSV_COLUMNS) + "\n"
+    poses = np.flatnonzero(np.isfinite(found.pose_tip))
+    for begin in range(0, len(poses), _BLOCK):
+        rows = poses[begin : begin + _BLOCK]
+        columns = (
+            rows.tolist(),
+            program.line[rows].tolist(),
+            found.pose_nc_line[rows].tolist(),
+            *program.tip[rows].T.tolist(),
+            found.pose_tip[rows].tolist(),
+            found.pose_axis_point[rows].tolist(),
+            found.pose_angle[rows].tolist(),
+        )
+        yield "".join(
+            f"{pose},{cl},{nc},{x:.6f},{y:.6f},{z:.6f},{tip:.7f},{axis:.7f},{angle:.7f}\n"
+            for pose, cl, nc, x, y, z, tip, axis, angle in zip(*columns, strict=True)
+        )
+
+
+def histogram_lines(found: Verification) -> list[str]:
+    """How many poses are how far off: the larger deviation of tip and axis point, in tenths of the tolerance."""
+    larger = np.fmax(found.pose_tip, found.pose_axis_point)
+    larger = larger[np.isfinite(larger)]
+    if not len(larger):
+        return []
+    step = found.tolerance / _CLASSES
+    counts = np.bincount(np.minimum((larger / step).astype(np.int64), _CLASSES), minlength=_CLASSES + 1)
+    most = int(counts.max())
+    lines = []
+    for k, count in enumerate(counts.tolist()):
+        if k == _CLASSES and not count:
+            continue
+        label = f"over {found.tolerance:.5g}" if k == _CLASSES else f"{k * step:.5f} - {(k + 1) * step:.5f}"
+        bar = "#" * max(round(_BAR * count / most), int(count > 0))
+        lines.append(f"{label:>19} mm {count:>9} {bar}".rstrip())
+    return lines
+
+
+def along_lines(found: Distribution, tolerance: float) -> list[str]:
+    """Table along the path: the largest deviations in each of a number of equal parts of it."""
+    if not len(found):
+        return []
+    edges = np.linspace(found.way[0], found.way[-1], _ROWS + 1)
+    part = np.clip(np.searchsorted(edges, found.way, side="right") - 1, 0, _ROWS - 1)
+    lines = [f"{'path mm':>21} {'tip mm':>10} {'axis pt mm':>10} {'axis deg':>9} {'CL line':>8} {'NC line':>8}"]
+    for k in range(_ROWS):
+        rows = np.flatnonzero(part == k)
+        if not len(rows):
+            continue
+        worst = rows[int(np.argmax(np.maximum(found.tip[rows], found.axis_point[rows])))]
+        bar = "#" * round(_BAR / 2 * _share(found.tip[worst], found.axis_point[worst], tolerance))
+        lines.append(
+            f"{edges[k]:>10.3f}-{edges[k + 1]:>10.3f} {found.tip[rows].max():>10.6f} "
+            f"{found.axis_point[rows].max():>10.6f} {_largest(found.angle[rows]):>9.5f} "
+            f"{found.cl_line[worst]:>8} {found.nc_line[worst]:>8} {bar}".rstrip()
+        )
+    return lines
+
+
+def _share(tip: float, axis_point: float, tolerance: float) -> float:
+    return min(max(float(tip), float(axis_point)) / tolerance, 1.0)
+
+
+def _largest(values: Floats) -> float:
+    return float(values.max())

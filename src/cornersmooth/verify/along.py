@@ -1,0 +1,119 @@
+"""Deviation along the written path, for tables and pictures such as Figures 10, 11 and 16 of the paper."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints, Program
+from cornersmooth.verify.blocks import Block, Matcher
+from cornersmooth.verify.gaps import from_original, owner_fraction
+from cornersmooth.verify.holes import divide_at_holes
+from cornersmooth.verify.ncprogram import NcProgram
+from cornersmooth.verify.nearest import gap_between, nearest_segments
+from cornersmooth.verify.reader import read_nc
+from cornersmooth.verify.stops import find_stretches
+from cornersmooth.verify.trails import original_motion, written_at
+from cornersmooth.verify.walking import Track
+
+#: segments on either side in which the common pose is looked for
+_REACH = 2
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """Deviations along the feed moves, in path order: of written poses from the original, and of its poses from them.
+
+    Parameters
+    ----------
+    way : (k,) float64, mm
+        Length of the original path, rapids included, up to the original pose.
+    tip, axis_point : (k,) float64, mm
+    angle : (k,) float64, degrees
+    cl_line, nc_line : (k,) int64
+    """
+
+    way: Floats
+    tip: Floats
+    axis_point: Floats
+    angle: Floats
+    cl_line: Ints
+    nc_line: Ints
+
+    def __len__(self) -> int:
+        return len(self.way)
+
+
+def deviation_along(
+    program: Program,
+    nc: NcProgram | bytes | str | os.PathLike[str],
+    *,
+    tolerance: float,
+    axis_length: float = 10.0,
+    samples: int = 8,
+    control: str = "fanuc",
+) -> Distribution:
+    """Measure the deviation at equally spaced parameters of every path element, and at every original pose.
+
+    Parameters
+    ----------
+    program, nc, tolerance, axis_length, control
+        As in `verify`.
+    samples : int
+        Poses per element.
+
+    Returns
+    -------
+    Distribution
+        At the poses of the original that come nearest to tip and axis point together.
+    """
+    text = nc if isinstance(nc, NcProgram) else read_nc(nc, control=control)
+    original = original_motion(program, tolerance, axis_length)
+    matcher = Matcher(original, text, Track.of(original.trail.six(axis_length)), tolerance, axis_length)
+    holes = divide_at_holes(original, text, axis_length)
+    stretches, _ = find_stretches(original, text, axis_length, holes.parts)
+    parts = [np.zeros((0, 6))]
+    for block in matcher.blocks(stretches):
+        parts += [_of_elements(matcher, block, samples), _of_poses(matcher, block)]
+    rows = np.concatenate(parts)
+    columns = rows[np.argsort(rows[:, 0], kind="stable")].T
+    return Distribution(*columns[:4], *(column.astype(np.int64) for column in columns[4:]))
+
+
+def _of_poses(matcher: Matcher, block: Block) -> Floats:
+    """(k, 6) columns of the distribution at the original poses of one block."""
+    reached = from_original(matcher, block)
+    original, trail = matcher.original, block.written.trail
+    cl_line = original.program.line[original.pose[original.trail.owner[reached.vertex]]]
+    nc_line = matcher.nc.line[trail.owner[np.minimum(reached.place.astype(np.int64) + 1, len(trail) - 1)]]
+    gap = reached.gap
+    columns = (matcher.track.length[reached.vertex], gap.tip, gap.axis_point, np.degrees(gap.angle), cl_line, nc_line)
+    return np.stack([column.astype(np.float64) for column in columns], axis=1)
+
+
+def _of_elements(matcher: Matcher, block: Block, samples: int) -> Floats:
+    """(k, 6) columns of the distribution at written poses of one block."""
+    trail, first = block.written.trail, block.written.first
+    end = trail.last[1:]
+    start = trail.last[:-1]
+    feeding = np.flatnonzero(block.on[start] & block.on[end] & (block.piece[start] == block.piece[end]))
+    element = np.repeat(feeding + first + 1, samples)
+    share = np.tile(np.arange(1, samples + 1) / samples, len(feeding))
+    tip, axis = written_at(matcher.nc, element, share)
+    # somewhere between the places of the element's ends
+    low, high = block.place[start[feeding]], block.place[end[feeding]]
+    place = np.repeat(low, samples) + share * np.repeat(high - low, samples)
+    vertex = np.repeat(end[feeding], samples)
+    limits = block.low[vertex], block.high[vertex]
+    middle = np.clip(place.astype(np.int64), *limits)
+    six = np.hstack((tip, tip + matcher.axis_length * axis))
+    segment, at = nearest_segments(six, matcher.track.six, middle, _REACH, *limits)
+    original, length = matcher.original, matcher.track.length
+    owner, fraction = owner_fraction(original.trail.owner, original.trail.fraction, segment, at)
+    gap = gap_between(tip, axis, *original.at(owner, fraction), matcher.axis_length)
+    way = length[segment] + at * (length[segment + 1] - length[segment])
+    cl_line = original.program.line[original.pose[owner]]
+    columns = (way, gap.tip, gap.axis_point, np.degrees(gap.angle), cl_line, matcher.nc.line[element])
+    return np.stack([column.astype(np.float64) for column in columns], axis=1)

@@ -1,0 +1,127 @@
+"""The verification on the command line, its reports, tables and pictures."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from cornersmooth.cli import run
+from cornersmooth.report.verification import (
+    CSV_COLUMNS,
+    along_lines,
+    histogram_lines,
+    verification_csv,
+    verification_json,
+)
+from cornersmooth.verify import deviation_along, verify
+
+from .writing import encode, job
+
+CL = """TOOL PATH/A
+LOADTL/3
+FEDRAT/MMPM,250
+RAPID
+GOTO/0,0,0,0,0,1
+GOTO/10,0,0
+GOTO/10,10,0
+FINI
+"""
+NC = """%
+O0001
+G21 G90 G94 G17 G40 G49 G80
+T3 M6
+G43.5 H3
+G0 X0.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000
+G1 X9.9500 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000 F250.
+G1 X10.0000 Y0.0500 Z0.0000 I0.0000000 J0.0000000 K1.0000000
+G1 X10.0000 Y10.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000
+G49
+M30
+%
+"""
+
+
+@pytest.fixture
+def files(tmp_path):
+    source, text = tmp_path / "part.cls", tmp_path / "part.nc"
+    source.write_text(CL)
+    text.write_text(NC)
+    return str(source), str(text)
+
+
+def test_command(files, tmp_path, capsys):
+    source, text = files
+    assert run(["verify", source, text, "-e", "0.04"]) == 0
+    told = capsys.readouterr()
+    assert told.err == ""
+    # corner to chamfer: 0.05/sqrt(2)
+    assert "passed" in told.out
+    assert "0.0353553 mm at CL line 6, NC line 8" in told.out
+    assert run(["verify", source, text, "-e", "0.03", "-q"]) == 1
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert f"{source}:6: error: the tip leaves its path by 0.035355 mm (NC line 8)" in told.err
+
+
+def test_reports_and_refusals(files, tmp_path, capsys):
+    source, text = files
+    found, rows = tmp_path / "found.json", tmp_path / "poses.csv"
+    assert run(["verify", source, text, "-e", "0.04", "--report", str(found), "--report", str(rows)]) == 0
+    contents = json.loads(found.read_text())
+    assert contents["schema"] == "cornersmooth-verification/1"
+    assert contents["max_tip_deviation_mm"] == pytest.approx(0.05 / np.sqrt(2))
+    assert contents["where"]["max_tip_deviation_mm"] == {"cl_line": 6, "nc_line": 8}
+    table = list(csv.DictReader(rows.read_text().splitlines()))
+    assert tuple(table[0]) == CSV_COLUMNS
+    assert [float(row["tip_deviation_mm"]) for row in table] == pytest.approx([0, 0.0353553, 0], abs=1e-6)
+    assert run(["verify", source, text, "--report", str(found)]) == 4
+    assert run(["verify", source, text, "--report", str(tmp_path / "found.txt")]) == 2
+    assert run(["verify", source, text, "--plot", str(tmp_path / "found.gif")]) == 2
+    assert run(["verify", source, text, "--report", source + ".csv", "--control", "nobody"]) == 2
+    assert run(["verify", "-", "-"]) == 2
+    (tmp_path / "bad.nc").write_text("G1 X1.0 ???\n")
+    assert run(["verify", source, str(tmp_path / "bad.nc")]) == 3
+    assert "bad.nc:1: error" in capsys.readouterr().err
+
+
+def test_tables_on_the_terminal(files, capsys):
+    assert run(["verify", *files, "-e", "0.04", "-v"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    histogram = [line for line in lines if " - " in line]
+    assert len(histogram) == 10
+    assert sum(int(line.split()[4]) for line in histogram) == 3
+    assert any("CL line" in line and "path mm" in line for line in lines)
+
+
+def test_distribution_along_the_path():
+    program, lines = job("g6.2")
+    found = verify(program, encode(lines), tolerance=0.02)
+    along = deviation_along(program, encode(lines), tolerance=0.02, samples=16)
+    assert (np.diff(along.way) >= 0).all()
+    # the largest deviation is that of a corner from its curve: no written pose is farther off
+    assert along.tip.max() == pytest.approx(found.max_tip_deviation_mm, abs=1e-4)
+    # at common poses, which serve tip and axis point together: a little more than for the axis point alone
+    assert found.max_axis_point_deviation_mm - 1e-4 < along.axis_point.max() < 1.1 * found.max_axis_point_deviation_mm
+    worst = int(np.argmax(along.tip))
+    assert along.cl_line[worst] == found.tip.cl_line
+    table = along_lines(along, 0.02)
+    assert f"{along.tip.max():.6f}" in "\n".join(table)
+    assert "".join(verification_csv(program, found)).count("\n") == 1 + np.isfinite(found.pose_tip).sum()
+    assert json.loads(verification_json(found))["poses"] == len(program)
+    over = verify(program, encode(lines), tolerance=0.01)
+    assert histogram_lines(over)[-1].lstrip().startswith("over 0.01 mm")
+
+
+@pytest.mark.parametrize("form", ["png", "svg"])
+def test_picture(form):
+    pytest.importorskip("matplotlib")
+    from cornersmooth.report.deviationplot import draw_deviation
+
+    program, lines = job("g1")
+    along = deviation_along(program, encode(lines), tolerance=0.02)
+    picture = draw_deviation(along, 0.02, form)
+    assert picture == draw_deviation(along, 0.02, form)
+    assert picture[:4] == (b"\x89PNG" if form == "png" else b"<?xm")
