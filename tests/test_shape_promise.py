@@ -13,8 +13,9 @@ import cornersmooth
 from cornersmooth.model import Program, SmoothProgram
 from cornersmooth.nc import choose_form
 from oracle.chains import cl_text, random_chains
+from oracle.command import run
 from oracle.distance import deviation
-from oracle.judge import judge, not_passed, runs_of
+from oracle.judge import feeds_out_of_place, judge, not_passed, runs_of
 from oracle.library import exact_poses, original_motion
 from oracle.motion import written_path
 from oracle.nc_text import Curve, Form, Written, parse
@@ -58,11 +59,12 @@ def test_random_chains(form: Form, tolerance: float, axis_length: float, options
     program = cornersmooth.read(cl_text(chains)[0])
     written, smoothed = write(program, form, {"tolerance": tolerance, "axis_length": axis_length, **options})
     assert smoothed.corners.smoothed.mean() > 0.6
-    originals = [
-        chain.original for chain in chains if np.ptp(chain.tip, axis=0).any() or np.ptp(chain.axis, axis=0).any()
-    ]
-    verdict = judge(runs_of(written, axis_length, tolerance), originals, axis_length, tolerance)
+    moving = [chain for chain in chains if np.ptp(chain.tip, axis=0).any() or np.ptp(chain.axis, axis=0).any()]
+    paths = runs_of(written, axis_length, tolerance)
+    verdict = judge(paths, [chain.original for chain in moving], axis_length, tolerance)
     assert verdict.deviation.worst <= tolerance, verdict
+    for path, chain in zip(paths, moving, strict=True):
+        assert not feeds_out_of_place(written, path, chain.original, chain.feed, axis_length, tolerance)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -101,3 +103,25 @@ def test_weights_stand_in_the_text_with_three_decimals() -> None:
     assert shown[:, 2].tolist() == corners.weights[corners.smoothed, 1].tolist()
     assert (shown[:, [0, 1, 3, 4]] == 1.0).all()
     assert len(np.unique(shown[:, 2])) > 2
+
+
+def test_the_command_takes_both_options(tmp_path: Path) -> None:
+    out = tmp_path / "out.nc"
+    result = run("smooth", ROOT / "samples" / "impeller.cls", "-f", "g6.2", "--shape", "auto", "-o", out)
+    assert result.returncode == 0, result.stderr.decode()
+    assert b" R0.58" in out.read_bytes()
+    half = out.stat().st_size
+    result = run(
+        "smooth", ROOT / "samples" / "impeller.cls", "-f", "g6.2", "--allocation", "fair", "-o", out, "--force"
+    )
+    assert result.returncode == 0, result.stderr.decode()
+    assert out.stat().st_size < half, "fewer lines between transitions"
+
+
+@pytest.mark.parametrize("also", [("--weights", "1,0.5"), ("--method", "zhang2016")])
+def test_the_command_refuses_contradictions(tmp_path: Path, also: tuple[str, str]) -> None:
+    out = tmp_path / "out.nc"
+    result = run("smooth", ROOT / "samples" / "paper_table1.csv", "--shape", "auto", *also, "-o", out)
+    assert result.returncode == 2
+    assert b"shape" in result.stderr
+    assert not out.exists()

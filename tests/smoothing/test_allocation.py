@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from cornersmooth.model import LimitedBy, Program, Status
@@ -44,6 +45,7 @@ def test_transitions_never_overlap_and_keep_the_tolerance(tolerance, shape):
     assert top.max() <= tolerance * (1 + 1e-9)
 
 
+@hypothesis_settings(deadline=None)
 @given(grid_program(), st.sampled_from([0.01, 0.3, 3.0]))
 def test_coarse_grids_never_overlap(program, tolerance):
     with np.errstate(all="raise", under="ignore"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from cornersmooth.errors import SettingsError
@@ -131,6 +132,7 @@ def test_any_weights_keep_the_tolerance(weights, ratio, wobble):
     assert top.max() <= 0.1 + 1e-10
 
 
+@hypothesis_settings(deadline=None)
 @given(grid_program(), st.sampled_from(["half", "fair"]), st.sampled_from([0.01, 0.3, 3.0]))
 def test_coarse_grids_keep_the_tolerance(program, allocation, tolerance):
     """Reversals, collinear and repeated poses, pure rotations: all of them occur on a coarse grid."""
@@ -147,6 +149,7 @@ def test_coarse_grids_keep_the_tolerance(program, allocation, tolerance):
 # ---------------------------------------------------------------- the order along the path
 
 
+@hypothesis_settings(deadline=None)
 @given(
     st.floats(0.001, 3.0),
     st.floats(0.001, 3.0),
