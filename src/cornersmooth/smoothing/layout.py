@@ -164,13 +164,14 @@ def lines_per_half(smoothed: SmoothProgram) -> Ints:
         by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
         number = np.ceil(by_chord - 1e-9)
 
-        sine = np.sqrt(np.maximum(_square(turn_in), _square(turn_out))) / (2.0 * settings.axis_length)
-        half_turn = np.arcsin(np.minimum(sine, 1.0))
-        reach = np.maximum(
-            np.maximum(corners.axis_trim_in[block], corners.trim_in[block]),
-            np.maximum(corners.axis_trim_out[block], corners.trim_out[block]),
-        )
-        by_turn = 2.0 * half_turn * reach * more_turn / _turn_limit(settings, half_turn)
+        by_turn = np.zeros(len(block))
+        for turn, reach in (
+            (turn_in, np.maximum(corners.axis_trim_in[block], corners.trim_in[block])),
+            (turn_out, np.maximum(corners.axis_trim_out[block], corners.trim_out[block])),
+        ):
+            half = np.arcsin(np.minimum(np.sqrt(_square(turn)) / (2.0 * settings.axis_length), 1.0))
+            turned = 2.0 * half * reach + corners.orientation_error[block]  # on this side of the middle
+            by_turn = np.maximum(by_turn, turned * more_turn / _turn_limit(settings, half))
         graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
         even = np.maximum(np.ceil(1.5 * by_chord), np.ceil(by_turn - 1e-9))
         chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))
