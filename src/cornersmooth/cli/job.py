@@ -7,10 +7,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cornersmooth.cli.files import REJECTED, STANDARD, check_output, open_output, read_input
-from cornersmooth.errors import CornersmoothError, OutputError, SettingsError
+from cornersmooth.errors import CornersmoothError, Finding, OutputError, SettingsError
+
+if TYPE_CHECKING:
+    from cornersmooth.nc import Form, Frame
 
 #: how the reports of earlier runs begin; such files are replaced without being asked
 _OUR_JSON = b'{\n "schema": "cornersmooth-report/'
@@ -20,6 +23,56 @@ _OUR_CSV = b"corner,line,x,y,z,tip_angle_deg,"
 _PROBLEMS_SHOWN = 5
 
 Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Writing:
+    """What is asked for the NC text.
+
+    Parameters
+    ----------
+    control : str
+        Name or TOML file.
+    form : str or None
+        None for the control's default.
+    machine : str or None
+        Name or TOML file.
+    tcp : bool
+        Whether the control keeps the tool tip.
+    program : str or None
+        Name of the NC program.
+    header, footer : tuple of str
+        Lines behind the head and before the tail.
+    """
+
+    control: str = "fanuc"
+    form: str | None = None
+    machine: str | None = None
+    tcp: bool = True
+    program: str | None = None
+    block_numbers: bool = False
+    header: tuple[str, ...] = ()
+    footer: tuple[str, ...] = ()
+
+    def choose(self) -> Form:
+        """Form of the control.
+
+        Raises
+        ------
+        SettingsError
+            Unknown names, or what the control cannot run.
+        """
+        from cornersmooth.kinematics import load_machine
+        from cornersmooth.nc import choose_form
+
+        machine = load_machine(self.machine) if self.machine else None
+        return choose_form(self.control, self.form, machine=machine, tcp=self.tcp)
+
+    def frame(self) -> Frame:
+        """What stands around the motion."""
+        from cornersmooth.nc import Frame
+
+        return Frame(self.program, self.block_numbers, self.header, self.footer)
 
 
 @dataclass(frozen=True)
@@ -35,6 +88,9 @@ class Job:
         Keyword arguments of `cornersmooth.cl.read`.
     settings : dict
         Keyword arguments of `Settings`.
+    writing : Writing
+    feed : float or None, mm/min
+        For moves without one.
     """
 
     source: str
@@ -42,8 +98,7 @@ class Job:
     reports: tuple[str, ...]
     reading: dict[str, Any]
     settings: dict[str, Any]
-    control: str
-    form: str | None
+    writing: Writing
     feed: float | None
     force: bool
     verify: bool = True
@@ -98,7 +153,7 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
     import numpy as np
 
     from cornersmooth.cl import read
-    from cornersmooth.nc import choose_form, fit_settings, write
+    from cornersmooth.nc import fit_settings, write
     from cornersmooth.report import corners_csv, report, report_json
     from cornersmooth.settings import Settings
     from cornersmooth.smoothing import smooth
@@ -108,7 +163,8 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
     def step(stage: str) -> Callable[[int, int], None] | None:
         return None if progress is None else lambda done, total: progress(stage, done, total)
 
-    form = choose_form(job.control, job.form)
+    form = job.writing.choose()
+    verifying = job.verify and form.readable
     with _timed(seconds, "read"):
         data, name = read_input(job.source)
         program = read(data, name=name, **job.reading)
@@ -119,11 +175,11 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
     with _timed(seconds, "smooth"):
         smoothed = smooth(program, settings, progress=step("smoothing"))
     verification: dict[str, Any] | None = None
-    with open_output(job.target, hold=job.verify) as output:
+    with open_output(job.target, hold=verifying) as output:
         with _timed(seconds, "write"):
-            written = write(smoothed, output.stream, control=job.control, form=form.name, progress=step("writing"))
+            written = write(smoothed, output.stream, form=form, frame=job.writing.frame(), progress=step("writing"))
             output.stream.flush()
-        if job.verify:
+        if verifying:
             from cornersmooth.verify import verify
 
             with _timed(seconds, "verify"):
@@ -132,15 +188,18 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
                     output.path,
                     tolerance=settings.verified_tolerance,
                     axis_length=settings.axis_length,
-                    control=job.control,
+                    control=form.control,
                 )
             verification = verified.to_dict()
             output.rejected = not verified.passed
+    findings = written.findings
+    if job.verify and not verifying:
+        findings += (Finding("CS509", "note", 0, f"the text is not read back: {form.unreadable}"),)
     contents = report(
         smoothed,
         blocks_out=written.blocks,
         seconds=seconds,
-        findings=written.findings,
+        findings=findings,
         verification=verification,
     )
     for path in job.reports:

@@ -139,10 +139,40 @@ jobs = click.option(
     flag_value=0,
     help="Processes for several inputs; a bare -j takes all cores.",
 )
-form = click.option("-f", "--form", type=str, metavar="g1|g6.2", help="Dense lines or NURBS blocks. [default: g1]")
-control = click.option(
-    "--control", type=str, metavar="NAME", default="fanuc", show_default=True, help="Control the NC text is for."
+form = click.option(
+    "-f",
+    "--form",
+    type=str,
+    metavar="g1|g6.2|...",
+    help="Dense lines, or curves in the control's own form; 'cornersmooth controls' lists them. [default: g1]",
 )
+control = click.option(
+    "--control",
+    type=str,
+    metavar="NAME|FILE",
+    default="fanuc",
+    show_default=True,
+    help="Control the NC text is for: a name that 'cornersmooth controls' lists, or a TOML file.",
+)
+machine = click.option(
+    "--machine",
+    type=str,
+    metavar="NAME|FILE",
+    help="Write rotary words of this machine instead of tool vectors: a name that 'cornersmooth machines' lists, or a "
+    "TOML file.",
+)
+no_tcp = click.option(
+    "--no-tcp", is_flag=True, help="Positions of the machine's axes, for controls that do not keep the tool tip."
+)
+header = click.option(
+    "--header",
+    type=click.Path(),
+    metavar="FILE",
+    help="Lines to write behind the head; {program} and {units} are filled in.",
+)
+footer = click.option("--footer", type=click.Path(), metavar="FILE", help="Lines to write before the tail.")
+program_name = click.option("--program-name", type=str, metavar="TEXT", help="Name or number of the NC program.")
+block_numbers = click.option("--block-numbers", is_flag=True, help="Number the blocks.")
 reports = click.option(
     "--report",
     "reports",
@@ -173,6 +203,11 @@ lenient = click.option("--lenient", is_flag=True, help="Go on after errors in th
 def reading(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that reads CL files."""
     return _apply(function, (input_format, dialect, units, arc_rule, lenient))
+
+
+def writing(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every command that writes NC text, besides its form."""
+    return _apply(function, (control, machine, no_tcp, program_name, header, footer, block_numbers))
 
 
 def smoothing(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from cornersmooth.cli import options
-from cornersmooth.cli.files import STANDARD
-from cornersmooth.cli.job import Job, Outcome, check, make_folder, run_job
+from cornersmooth.cli.files import STANDARD, read_input
+from cornersmooth.cli.job import Job, Outcome, Writing, check, make_folder, run_job
 from cornersmooth.cli.show import print_line, progress_bar, show_batch, show_findings, show_summary
 from cornersmooth.errors import CornersmoothError
 
@@ -41,7 +41,7 @@ _SETTINGS = (
 @options.directory
 @options.jobs
 @options.reports
-@options.control
+@options.writing
 @options.method
 @options.shape
 @options.allocation
@@ -66,6 +66,8 @@ def command(inputs: tuple[str, ...], **given: Any) -> int:
     Examples:
       cornersmooth smooth part.cls -e 0.04 -o part.nc
       cornersmooth smooth part.cls -e 0.04 -f g6.2 -o part.nc --report part.json --report part.csv
+      cornersmooth smooth part.cls -e 0.04 --control siemens -f bspline -o part.mpf
+      cornersmooth smooth part.cls -e 0.04 --control linuxcnc --machine xyzac-trt -o part.ngc
       cornersmooth smooth part.ncl -e 0.0005in -H 25 -o part.nc
       cornersmooth smooth *.cls -e 0.04 -d out/ -j 2
       cat part.cls | cornersmooth smooth - -e 0.04 > part.nc
@@ -128,7 +130,8 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
         raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
     settings = {name: given[name] for name in _SETTINGS} | {"chord_tolerance": given["chord"]}
     reading = {name: given[name] for name in _READING} | {"format": given["input_format"]}
-    _try_settings(settings, given)
+    writing = _writing(given)
+    _try_settings(settings, writing, given)
     if folder:
         make_folder(folder)
     jobs = []
@@ -142,8 +145,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 reports=tuple(path.replace("{stem}", stem) for path in reports),
                 reading=reading,
                 settings=settings,
-                control=given["control"],
-                form=given["form"],
+                writing=writing,
                 feed=given["feed"],
                 force=given["force"],
                 verify=not given["no_verify"],
@@ -158,13 +160,29 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     return jobs
 
 
-def _try_settings(settings: dict[str, Any], given: dict[str, Any]) -> None:
+def _writing(given: dict[str, Any]) -> Writing:
+    """What is asked for the NC text, with the texts of header and footer."""
+    texts = {}
+    for name in ("header", "footer"):
+        path = given[name]
+        texts[name] = tuple(read_input(path)[0].decode("utf-8", "replace").splitlines()) if path else ()
+    return Writing(
+        control=given["control"],
+        form=given["form"],
+        machine=given["machine"],
+        tcp=not given["no_tcp"],
+        program=given["program_name"],
+        block_numbers=given["block_numbers"],
+        **texts,
+    )
+
+
+def _try_settings(settings: dict[str, Any], writing: Writing, given: dict[str, Any]) -> None:
     """Refuse wrong settings before any file is touched."""
-    from cornersmooth.nc import choose_form
+    from cornersmooth.nc import fit_settings
     from cornersmooth.settings import Settings
 
-    Settings(**settings)
-    choose_form(given["control"], given["form"])
+    fit_settings(Settings(**settings), writing.choose(), "mm")
     if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
         raise click.UsageError("--feed must be a positive number of mm/min")
 

@@ -12,7 +12,7 @@ import numpy as np
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.model import Program, SmoothProgram, Units
 from cornersmooth.nc.blocks import BlockWriter
-from cornersmooth.nc.choice import choose_form
+from cornersmooth.nc.choice import check_program, choose_form
 from cornersmooth.nc.circles import Circles, plan_circles
 from cornersmooth.nc.control import Control, Form
 from cornersmooth.nc.framing import Frame
@@ -118,11 +118,14 @@ def write(
     ------
     SettingsError
         Unknown control or form.
+    InputError
+        The form or its machine cannot follow the program.
     OutputError
         A number that the form cannot hold.
     """
     chosen = form if isinstance(form, Form) else choose_form(control, form)
     program, notes = smoothed.program, Notes()
+    check_program(chosen, program, smoothed.settings)
     statements = StatementWriter(chosen, program, notes)
     circles = plan_circles(program, smoothed.settings, chosen)
     _tell_arcs(circles, program, notes)

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cornersmooth.errors import SettingsError
+import numpy as np
+
+from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import Machine
-from cornersmooth.nc.control import Control, Form, FormTable, Orientation
+from cornersmooth.model import Move, Program
+from cornersmooth.nc.control import ROTARY_SHARE, Control, Form, FormTable, Orientation
 from cornersmooth.nc.tables import load_control
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.neighbours import norm
 
 
 def choose_form(
@@ -47,6 +52,29 @@ def choose_form(
         if orientation in chosen.modes:
             return Form(table, name, chosen.curve, orientation, chosen.modes[orientation], machine)
     raise _refusal(table, chosen, wanted)
+
+
+def check_program(form: Form, program: Program, settings: Settings) -> None:
+    """Refuse a program that the form cannot hold.
+
+    Raises
+    ------
+    InputError
+        The tool is not parallel to Z and the form has no words for that.
+    """
+    if form.orientation != "fixed":
+        return
+    tilt = norm(program.axis - (0.0, 0.0, 1.0))
+    tilt[program.kind == Move.FROM] = 0.0
+    tilted = np.flatnonzero(settings.axis_length * tilt > ROTARY_SHARE * settings.tolerance)
+    if len(tilted):
+        raise InputError(
+            "CS368",
+            f"the tool is not parallel to Z, and {form.control} form {form.name} has no words for its axis",
+            "use -f g1",
+            file=program.source.name,
+            line=int(program.line[tilted[0]]),
+        )
 
 
 def _refusal(table: Control, form: FormTable, wanted: tuple[Orientation, ...]) -> SettingsError:

@@ -230,6 +230,18 @@ class Form:
         return self.orientation == "vector"
 
     @property
+    def unreadable(self) -> str:
+        """Why `cornersmooth.verify` cannot read the text back; empty where it can."""
+        if self.rotary:
+            return "rotary words are not understood by the verification"
+        return "" if self.control == "fanuc" else f"the verification does not know the text of {self.control}"
+
+    @property
+    def readable(self) -> bool:
+        """Whether `cornersmooth.verify` can read the text back."""
+        return not self.unreadable
+
+    @property
     def rotary(self) -> bool:
         """Whether the words behind the tip are angles."""
         return self.orientation in ("angles", "machine")
@@ -266,6 +278,8 @@ class Form:
         """
         if self.orientation == "point":
             return self.rounding(units)
+        if self.orientation == "fixed":
+            return 2.0 / math.sqrt(3.0) * ROTARY_SHARE * tolerance
         if self.rotary:
             reserve = axis_length * math.radians(self.rotary_tolerance(tolerance, axis_length) + self._angle_rounding)
             return 2.0 / math.sqrt(3.0) * reserve

@@ -1,0 +1,42 @@
+"""``cornersmooth controls``: which controls NC text can be written for."""
+
+from __future__ import annotations
+
+import click
+
+#: what the modes of a form are called for people
+_MODES = {
+    "vector": "tool vectors",
+    "point": "a second point on the tool axis",
+    "fixed": "tool parallel to Z",
+    "angles": "rotary words (--machine)",
+    "machine": "machine positions (--machine, --no-tcp)",
+}
+
+
+@click.command(
+    "controls",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
+)
+@click.argument("name", required=False, metavar="[NAME|FILE]")
+def command(name: str | None) -> int:
+    """List the controls with their forms, or check and describe one.
+
+    A TOML file of your own is like one of them and says only what is different; see docs/controls.md.
+
+    \b
+    Examples:
+      cornersmooth controls
+      cornersmooth controls siemens
+      cornersmooth controls mine.toml
+    """
+    from cornersmooth.nc import control_names, load_control
+
+    names = [name] if name else list(control_names())
+    for control in map(load_control, names):
+        click.echo(f"{control.name}: {control.description}" if control.description else control.name)
+        for form in control.forms.values():
+            click.echo(f"  -f {form.name}: {form.description}" if form.description else f"  -f {form.name}")
+            click.echo(f"     with {', '.join(_MODES[mode] for mode in form.modes)}")
+    return 0
