@@ -37,6 +37,10 @@ _LIMITS = (
     "angular_feed",
     "angular_accel",
     "angular_jerk",
+    "vector_jerk",
+    "turn_speed",
+    "turn_accel",
+    "turn_jerk",
     "period",
 )
 LAWS = ("direct_exact_stop", "direct_velocity_jump", "zhang2016", "proportional")
@@ -103,6 +107,14 @@ class Duration(click.ParamType[float]):
     "--angular-accel", type=float, default=150.0, show_default=True, metavar="DEG/S2", help="Their acceleration."
 )
 @click.option("--angular-jerk", type=float, default=3000.0, show_default=True, metavar="DEG/S3", help="Their jerk.")
+@click.option(
+    "--vector-jerk", type=float, metavar="MM/S3", help="Jerk of the tip in any direction. [default: no limit]"
+)
+@click.option(
+    "--turn-speed", type=float, metavar="DEG/S", help="Turning of the tool axis in all moves. [default: no limit]"
+)
+@click.option("--turn-accel", type=float, metavar="DEG/S2", help="Its acceleration. [default: no limit]")
+@click.option("--turn-jerk", type=float, metavar="DEG/S3", help="Its jerk. [default: no limit]")
 @options.shape
 @options.allocation
 @options.weights

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from cornersmooth.feedrate.compare import Comparison, compare
+from cornersmooth.feedrate.demands import AxisLimits
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.timelaw import States, TimeLaw
 
-__all__ = ["Comparison", "Limits", "States", "TimeLaw", "compare", "direct", "plan"]
+__all__ = ["AxisLimits", "Comparison", "Limits", "States", "TimeLaw", "compare", "direct", "plan"]

@@ -67,3 +67,15 @@ def _turned(normal: Floats, arm: Floats, angle: Floats) -> Floats:
     """Vectors across unit `normal` turned about it (Rodrigues)."""
     turned: Floats = np.cos(angle)[:, None] * arm + np.sin(angle)[:, None] * np.cross(normal, arm)
     return turned
+
+
+def jet(program: Program, moves: Ints, fraction: Floats) -> Floats:
+    """Taylor coefficients (4, k, 3) of the tip by the fraction of the way along the arcs into these poses, mm."""
+    rows = arc_rows(program, moves)
+    sweep, normal = program.arcs.sweep[rows][:, None], program.arcs.normal[rows]
+    arm = _turned(normal, _radii(program, moves), sweep[:, 0] * fraction)
+    across = np.cross(normal, arm)
+    rise = (_pitches(program, moves)[:, None] * sweep) * normal
+    return np.stack(
+        (points(program, moves, fraction), sweep * across + rise, -(sweep**2) * arm / 2.0, -(sweep**3) * across / 6.0)
+    )

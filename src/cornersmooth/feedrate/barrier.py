@@ -38,7 +38,7 @@ from cornersmooth.model import Bools, Floats, Ints
 #: the remaining duality gap over the time, at which the profile is taken
 GAP = 2e-4
 #: Newton steps after which the profile is taken as it is; it is feasible at every step
-MAX_STEPS = 200
+MAX_STEPS = 500
 #: part of the way to the nearest limit that a step may take
 TO_LIMIT = 0.95
 #: the profile that the iteration starts from, over the largest constant one that keeps the limits

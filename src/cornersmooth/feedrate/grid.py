@@ -65,7 +65,9 @@ class Grid:
         return np.append(self.first[1:], len(self.start)) - 1
 
 
-def make_grid(caps: Caps, runs: Ints, accel: Floats, jerk: Floats, resolution: Resolution | None = None) -> Grid:
+def make_grid(
+    caps: Caps, runs: Ints, accel: Floats, jerk: Floats, resolution: Resolution | None = None, more: Caps | None = None
+) -> Grid:
     """Cells for the given runs.
 
     Parameters
@@ -74,29 +76,33 @@ def make_grid(caps: Caps, runs: Ints, accel: Floats, jerk: Floats, resolution: R
     runs : (r,) int64
         Which runs, ascending.
     accel, jerk : (r,) float64
+    more : Caps, optional
+        More limits, over other intervals of the same path.
     """
     resolution = Resolution() if resolution is None else resolution
-    counts = caps.run[runs + 1] - caps.run[runs]
-    of_interval = np.repeat(np.arange(len(runs)), counts)
-    interval = np.arange(len(of_interval)) + np.repeat(caps.run[runs] - (np.cumsum(counts) - counts), counts)
-    cap = caps.cap[interval]
-    low = caps.edge[interval]
-    is_first = np.concatenate(([True], of_interval[1:] != of_interval[:-1]))
+    begin, end = caps.edge[caps.run[runs]], caps.edge[caps.run[runs + 1]]
+    rows = [_intervals(each, runs) for each in (caps, more) if each is not None]
+    run, low, cap, before = (np.concatenate([part[i] for part in rows]) for i in range(4))
+    highest = np.maximum.reduceat(cap[: len(rows[0][0])], np.flatnonzero(np.isnan(rows[0][3])))
+    cap, before = np.minimum(cap, highest[run]), np.minimum(before, highest[run])
+    low = np.clip(low, begin[run], end[run])
+    half_speed = cap**0.75 / (6.0 * np.sqrt(jerk[run]))
+    change = ~np.isnan(before) & (cap != before)
 
     # the cells next to the stops
-    begin, end = caps.edge[caps.run[runs]], caps.edge[caps.run[runs + 1]]
-    change = ~is_first & (cap != np.concatenate((cap[:1], cap[:-1])))
-    front, back = _end_cells(cap, of_interval, low - begin[of_interval], end[of_interval] - low, change, accel, jerk)
+    front, back = _end_cells(half_speed, run, low, change, begin, end, accel, jerk)
     front, back = resolution.end * front, resolution.end * back
 
     # places where the size of the cells is given: where the limit changes, and next to the end cells
-    slow = np.sqrt(np.minimum(cap, np.concatenate((cap[:1], cap[:-1]))))
-    size = resolution.part * slow**1.5 / np.sqrt(jerk[of_interval])
-    inner = np.clip(low, (begin + front)[of_interval], (end - back)[of_interval])[change]
+    slow = np.sqrt(np.minimum(cap, before))
+    size = (resolution.part * slow**1.5 / np.sqrt(jerk[run]))[change]
+    inner = np.clip(low, (begin + front)[run], (end - back)[run])[change]
     place = np.concatenate((begin + front, inner, end - back))
-    size = np.concatenate((resolution.growth * front, size[change], resolution.growth * back))
-    run = np.concatenate((np.arange(len(runs)), of_interval[change], np.arange(len(runs))))
-    order = np.argsort(run, kind="stable")
+    size = np.concatenate((resolution.growth * front, size, resolution.growth * back))
+    # in order along the path; the ends of a run enclose its changes
+    rank = np.repeat([0, 1, 2], (len(runs), len(inner), len(runs)))
+    run = np.concatenate((np.arange(len(runs)), run[change], np.arange(len(runs))))
+    order = np.lexsort((place, rank, run))
     place, size, run = place[order], size[order], run[order]
 
     g = resolution.growth
@@ -133,39 +139,64 @@ def make_grid(caps: Caps, runs: Ints, accel: Floats, jerk: Floats, resolution: R
     starts[np.cumsum(borders + 2) - 1] = False
     at_start = np.flatnonzero(starts)
     start, stop = edge[at_start], edge[at_start + 1]
-    owner = np.repeat(runs, cells + 2)
-    return Grid(start, stop - start, _smallest_cap(caps, start, stop, caps.run[owner], caps.run[owner + 1]), first)
+    grid = Grid(start, stop - start, np.full(len(start), np.inf), first)
+    for each in (caps, more):
+        if each is not None:
+            met = np.minimum.reduceat(np.append(each.cap, np.inf), cell_intervals(each, grid, runs))[::2]
+            np.minimum(grid.cap, met, out=grid.cap)
+    return grid
+
+
+def _intervals(caps: Caps, runs: Ints) -> tuple[Ints, Floats, Floats, Floats]:
+    """Of all intervals of the runs: number of the run, start, bound of v², and that of the interval before or NaN."""
+    counts = caps.run[runs + 1] - caps.run[runs]
+    of_interval = np.repeat(np.arange(len(runs)), counts)
+    begin = np.cumsum(counts) - counts
+    interval = np.arange(len(of_interval)) + np.repeat(caps.run[runs] - begin, counts)
+    cap = caps.cap[interval]
+    before = np.concatenate((cap[:1], cap[:-1]))
+    before[begin] = np.nan
+    return of_interval, caps.edge[interval], cap, before
 
 
 def _end_cells(
-    cap: Floats, run: Ints, from_begin: Floats, to_end: Floats, change: Bools, accel: Floats, jerk: Floats
+    half_speed: Floats,
+    run: Ints,
+    low: Floats,
+    change: Bools,
+    begin: Floats,
+    end: Floats,
+    accel: Floats,
+    jerk: Floats,
 ) -> tuple[Floats, Floats]:
     """Longest cells at the start and at the end of each run in which constant jerk loses no time.
 
-    That is the way from rest until the acceleration limit is reached, or half of a speed limit, or a quarter of the
-    time of the fastest motion from rest to rest; a speed limit further on matters when it is lower and near.
+    That is the way from rest until the acceleration limit is reached, or half of a speed limit (`half_speed`), or a
+    quarter of the time of the fastest motion from rest to rest; a limit further on matters when it is low and near.
     """
-    at_accel = accel**3 / (6.0 * jerk**2)
-    half_speed = cap**0.75 / (6.0 * np.sqrt(jerk[run]))
     cells = []
-    for distance in (from_begin, to_end):
-        cell = at_accel.copy()
+    for distance in (low - begin[run], end[run] - low):
+        cell = np.minimum(accel**3 / (6.0 * jerk**2), (end - begin) / 12.0)
         near = np.maximum(half_speed, distance / 12.0)
         np.minimum.at(cell, run[change], near[change])
         cells.append(cell)
-    first = np.concatenate(([True], run[1:] != run[:-1]))
-    last = np.append(first[1:], True)
-    length = (from_begin + to_end)[first] / 12.0
-    front = np.minimum(np.minimum(cells[0], half_speed[first]), length)
-    back = np.minimum(np.minimum(cells[1], half_speed[last]), length)
-    return front, back
+    outermost = np.full((2, len(begin)), np.inf)
+    at_begin = low <= begin[run]
+    np.minimum.at(outermost[0], run[at_begin], half_speed[at_begin])
+    last = np.append(run[1:] != run[:-1], True)
+    np.minimum.at(outermost[1], run[last], half_speed[last])
+    return np.minimum(cells[0], outermost[0]), np.minimum(cells[1], outermost[1])
 
 
-def _smallest_cap(caps: Caps, start: Floats, stop: Floats, begin: Ints, end: Ints) -> Floats:
-    """Smallest limit met in each cell among the intervals `begin` to `end` of its run."""
+def cell_intervals(caps: Caps, grid: Grid, runs: Ints) -> Ints:
+    """(2n,) pairs of the first interval met in each cell and the one after the last, for ``ufunc.reduceat``."""
+    cells = np.diff(np.append(grid.first, len(grid.start)))
+    owner = np.repeat(runs, cells)
+    return _met(caps, grid.start, grid.start + grid.width, caps.run[owner], caps.run[owner + 1])
+
+
+def _met(caps: Caps, start: Floats, stop: Floats, begin: Ints, end: Ints) -> Ints:
     slack = 1e-9 * (stop - start)  # so that a joint on a border counts for both cells
-    low = np.maximum(np.searchsorted(caps.edge, start - slack, side="right") - 1, begin)
-    high = np.minimum(np.searchsorted(caps.edge, stop + slack, side="left"), end)
-    pairs = np.stack((low, np.maximum(high, low + 1)), axis=1).ravel()
-    smallest: Floats = np.minimum.reduceat(np.append(caps.cap, np.inf), pairs)[::2]
-    return smallest
+    low = np.clip(np.searchsorted(caps.edge, start - slack, side="right") - 1, begin, end - 1)
+    high = np.clip(np.searchsorted(caps.edge, stop + slack, side="left"), low + 1, end)
+    return np.stack((low, high), axis=1).ravel()

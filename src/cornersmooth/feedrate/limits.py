@@ -6,7 +6,10 @@ import math
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+
 from cornersmooth.errors import SettingsError
+from cornersmooth.model import Floats
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,11 @@ class Limits:
         Their acceleration and jerk; None for those of feed moves.
     angular_feed, angular_accel, angular_jerk : float, deg/s, deg/s², deg/s³
         Limits of moves that only turn the axis.
+    vector_jerk : float or None, mm/s³
+        Jerk of the tip as a vector, across the path too; None for no limit. Transitions have curvature without jumps
+        but their curvature changes quickly, so this costs time at corners.
+    turn_speed, turn_accel, turn_jerk : float or None, deg/s, deg/s², deg/s³
+        Limits of the turning of the tool axis in all moves; None for no limit.
     period : float, s
         Interpolation period: a corner passed without a stop changes the velocity by at most ``accel · period``.
     """
@@ -43,6 +51,10 @@ class Limits:
     angular_feed: float = 30.0
     angular_accel: float = 150.0
     angular_jerk: float = 3000.0
+    vector_jerk: float | None = None
+    turn_speed: float | None = None
+    turn_accel: float | None = None
+    turn_jerk: float | None = None
     period: float = 0.002
 
     def __post_init__(self) -> None:
@@ -68,7 +80,17 @@ class Limits:
     @property
     def angular_limits(self) -> tuple[float, float, float]:
         """Speed, acceleration and jerk of pure rotations in rad/s, rad/s², rad/s³."""
-        return math.radians(self.angular_feed), math.radians(self.angular_accel), math.radians(self.angular_jerk)
+        _, turn = self.vector_limits
+        own = np.radians((self.angular_feed, self.angular_accel, self.angular_jerk))
+        speed, accel, jerk = np.minimum(own, turn).tolist()
+        return speed, accel, jerk
+
+    @property
+    def vector_limits(self) -> tuple[Floats, Floats]:
+        """Speed, acceleration and jerk of tip (mm) and tool axis (rad) as vectors; inf for none."""
+        tip = [math.inf, math.inf, math.inf if self.vector_jerk is None else self.vector_jerk]
+        turn = [math.inf if x is None else math.radians(x) for x in (self.turn_speed, self.turn_accel, self.turn_jerk)]
+        return np.array(tip), np.array(turn)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values with their units in the keys, for reports."""
@@ -83,5 +105,9 @@ class Limits:
             "angular_feed_deg_per_s": self.angular_feed,
             "angular_accel_deg_per_s2": self.angular_accel,
             "angular_jerk_deg_per_s3": self.angular_jerk,
+            "vector_jerk_mm_per_s3": self.vector_jerk,
+            "turn_speed_deg_per_s": self.turn_speed,
+            "turn_accel_deg_per_s2": self.turn_accel,
+            "turn_jerk_deg_per_s3": self.turn_jerk,
             "period_s": self.period,
         }

@@ -25,10 +25,17 @@ CRAWLING = 3
 FREE = 1e30
 
 
-def batch_of(grid: Grid, accel: Floats, jerk: Floats) -> Batch:
-    """The optimisation problem of all runs of a grid; `accel` and `jerk` (n,) per cell.
+def batch_of(grid: Grid, accel: Floats, jerk: Floats, demand: Floats | None = None) -> Batch:
+    """The optimisation problem of all runs of a grid.
 
     The cells of a run are its slots: the first and the last, next to the stops, are driven with constant jerk.
+
+    Parameters
+    ----------
+    accel, jerk : (n,) float64
+        Limits per cell.
+    demand : (5, n) float64, optional
+        Coefficients per cell as in `demands.Demands.rows`, besides those of the path speed.
     """
     n = len(grid.start)
     first, last = grid.first, grid.last
@@ -49,9 +56,18 @@ def batch_of(grid: Grid, accel: Floats, jerk: Floats) -> Batch:
     slope_after = np.append(slope[1:], 0.0)
     bend = np.where(cell, np.stack((slope, -slope - slope_after, slope_after)) / (2.0 * width), 0.0)
 
+    use = np.zeros((5, n)) if demand is None else demand.copy()
+    use[0] = np.maximum(use[0], 0.5 / accel)
+    use[2] = np.maximum(use[2], 1.0 / jerk)
+    at_node = np.maximum(use[:2], np.concatenate((use[:2, 1:], use[:2, -1:]), axis=1))
+    in_cell = np.where(cell, np.concatenate((use[2:, 1:], use[2:, -1:]), axis=1), 0.0)
+    in_cell[0] = np.where(cell, in_cell[0], 1.0 / jerk)
+
     node_cap = np.where(node, np.minimum(grid.cap, np.append(grid.cap[1:], np.inf)), FREE)
     for end, at in ((first, first), (last, last - 1)):
-        node_cap[at] = np.minimum(node_cap[at], np.cbrt(4.5 * jerk[end] * grid.width[end] ** 2) ** 2)
+        e = grid.width[end]
+        with_unit_speed = use[2, end] * (2.0 / 9.0) / e**2 + use[3, end] * (4.0 / 3.0) / e + use[4, end]
+        node_cap[at] = np.minimum(node_cap[at], np.cbrt(with_unit_speed) ** -2)
     cell_cap = grid.cap.copy()
     cell_cap[first] = FREE
     cell_cap[last] = FREE
@@ -68,11 +84,11 @@ def batch_of(grid: Grid, accel: Floats, jerk: Floats) -> Batch:
         bend=bend,
         node_cap=node_cap,
         cell_cap=cell_cap,
-        accel_level=np.zeros(n),
-        accel_slope=0.5 / accel,
-        jerk_level=np.zeros(n),
-        jerk_slope=np.zeros(n),
-        jerk_bend=1.0 / jerk,
+        accel_level=np.where(node, at_node[1], 0.0),
+        accel_slope=at_node[0],
+        jerk_level=in_cell[2],
+        jerk_slope=in_cell[1],
+        jerk_bend=in_cell[0],
         weight=weight,
         first=first,
         last=last,
@@ -134,6 +150,7 @@ def _part(batch: Batch, begin: int, end: int) -> Batch:
     cut_back = end - 1 not in batch.last
     near, far, slope = (array[begin:end].copy() for array in (batch.near, batch.far, batch.slope))
     bend, node_cap = batch.bend[:, begin:end].copy(), batch.node_cap[begin:end].copy()
+    levels = batch.accel_level[begin:end].copy(), batch.jerk_level[begin:end].copy(), batch.jerk_slope[begin:end].copy()
     frozen = np.zeros(end - begin, np.bool_)
     if cut_front:
         frozen[:2] = True
@@ -142,6 +159,9 @@ def _part(batch: Batch, begin: int, end: int) -> Batch:
         near[-1] = far[-1] = slope[-1] = 0.0
         bend[:, -2:] = 0.0
         node_cap[-1] = FREE
+        levels[0][-1] = 0.0
+        for level in levels[1:]:
+            level[-2:] = 0.0
     if len(runs):
         first, last = batch.first[runs] - begin, batch.last[runs] - begin
         first_ratio, last_ratio = batch.first_ratio[runs], batch.last_ratio[runs]
@@ -158,10 +178,10 @@ def _part(batch: Batch, begin: int, end: int) -> Batch:
         bend=bend,
         node_cap=node_cap,
         cell_cap=batch.cell_cap[begin:end],
-        accel_level=batch.accel_level[begin:end],
+        accel_level=levels[0],
         accel_slope=batch.accel_slope[begin:end],
-        jerk_level=batch.jerk_level[begin:end],
-        jerk_slope=batch.jerk_slope[begin:end],
+        jerk_level=levels[1],
+        jerk_slope=levels[2],
         jerk_bend=batch.jerk_bend[begin:end],
         weight=batch.weight[begin:end],
         first=first,

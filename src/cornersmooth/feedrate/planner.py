@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
 
 from cornersmooth.feedrate import lookahead, scurve
 from cornersmooth.feedrate.caps import Caps, speed_caps
-from cornersmooth.feedrate.grid import Grid, Resolution, make_grid
+from cornersmooth.feedrate.demands import AxisLimits, Demands, find_demands
+from cornersmooth.feedrate.grid import Grid, Resolution, cell_intervals, make_grid
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
-from cornersmooth.model import Floats, Ints, Program, SmoothProgram
+from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
 from cornersmooth.settings import Settings
 
 Baseline = Literal["exact_stop", "velocity_jump"]
@@ -24,6 +25,7 @@ def plan(
     smooth_program: SmoothProgram,
     limits: Limits | None = None,
     *,
+    axes: Sequence[AxisLimits] = (),
     resolution: Resolution | None = None,
     progress: Progress | None = None,
 ) -> TimeLaw:
@@ -38,6 +40,8 @@ def plan(
     ----------
     smooth_program : SmoothProgram
     limits : Limits, optional
+    axes : sequence of AxisLimits, optional
+        Limits of axes whose position is a function of tip and tool axis.
     resolution : Resolution, optional
         How fine the cells are that the speed is planned in.
     progress : callable, optional
@@ -50,7 +54,7 @@ def plan(
     """
     limits = Limits() if limits is None else limits
     path = build_path(smooth_program.program, smooth_program.corners, smooth_program.settings, limits)
-    return plan_path(path, limits, resolution, progress)
+    return plan_path(path, limits, axes=axes, resolution=resolution, progress=progress)
 
 
 def direct(
@@ -82,11 +86,16 @@ def direct(
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings
     path = build_path(program, None, settings, limits, stop_everywhere=baseline == "exact_stop")
-    return plan_path(path, limits, resolution, progress)
+    return plan_path(path, limits, resolution=resolution, progress=progress)
 
 
 def plan_path(
-    path: Path, limits: Limits, resolution: Resolution | None = None, progress: Progress | None = None
+    path: Path,
+    limits: Limits,
+    *,
+    axes: Sequence[AxisLimits] = (),
+    resolution: Resolution | None = None,
+    progress: Progress | None = None,
 ) -> TimeLaw:
     """Plan the motion along any path."""
     caps = speed_caps(path, limits)
@@ -103,10 +112,13 @@ def plan_path(
         level = lowest == highest
     else:
         level = np.zeros(0, np.bool_)
+    demands = find_demands(path, limits, caps, axes)
+    if demands is not None and runs:
+        level &= ~_demanding(demands, accel, jerk, lowest)
     parts = [_level_runs(caps, np.flatnonzero(level), accel, jerk)]
     uneven = np.flatnonzero(~level)
     if len(uneven):
-        parts.append(_uneven_runs(caps, uneven, accel, jerk, resolution, progress))
+        parts.append(_uneven_runs(caps, demands, uneven, accel, jerk, resolution, progress))
 
     run, duration, way, speed, begin, rate, constant = (np.concatenate([part[i] for part in parts]) for i in range(7))
     order = np.argsort(run, kind="stable")
@@ -150,8 +162,17 @@ def _level_runs(caps: Caps, runs: Ints, accel: Floats, jerk: Floats) -> tuple[Fl
     )
 
 
+def _demanding(demands: Demands, accel: Floats, jerk: Floats, cap: Floats) -> Bools:
+    """(r,) bool: runs in which vectors ask for more than the limits of the path speed."""
+    begin = demands.caps.run[:-1]
+    slope, level, bend, cross, cube = np.maximum.reduceat(demands.rows, begin, axis=1)
+    more: Bools = (slope > 0.5 / accel) | (bend > 1.0 / jerk) | (level > 0.0) | (cross > 0.0) | (cube > 0.0)
+    return more | (np.minimum.reduceat(demands.caps.cap, begin) < cap)
+
+
 def _uneven_runs(
     caps: Caps,
+    demands: Demands | None,
     runs: Ints,
     accel: Floats,
     jerk: Floats,
@@ -159,9 +180,14 @@ def _uneven_runs(
     progress: Progress | None,
 ) -> tuple[Floats | Ints, ...]:
     """Pieces of runs whose speed limit changes on the way: one per cell."""
-    grid: Grid = make_grid(caps, runs, accel[runs], jerk[runs], resolution)
+    more = None if demands is None else demands.caps
+    grid: Grid = make_grid(caps, runs, accel[runs], jerk[runs], resolution, more)
     of_cell = lookahead.run_of_cells(grid)
-    batch = lookahead.batch_of(grid, accel[runs][of_cell], jerk[runs][of_cell])
+    demand = None
+    if demands is not None:
+        rows = np.concatenate((demands.rows, np.zeros((5, 1))), axis=1)
+        demand = np.maximum.reduceat(rows, cell_intervals(demands.caps, grid, runs), axis=1)[:, ::2]
+    batch = lookahead.batch_of(grid, accel[runs][of_cell], jerk[runs][of_cell], demand)
     c = lookahead.solve_runs(batch, grid, progress)
     z, slope, bend = batch.forms(c)
     v, a = np.sqrt(z), 0.5 * slope  # at the end of each cell

@@ -1,0 +1,180 @@
+"""Limits of what moves along with the tip: its whole jerk, the turning of the tool axis, the axes of a machine.
+
+A vector q(s) on the path moves with q₁·√z, q₂·z + q₁·z′/2 and √z·(q₃·z + 3/2·q₂·z′ + q₁·z″/2) (see `barrier`). The
+lengths of q₁, q₂, q₃ bound these from above whatever their directions, and over a short piece of the path their largest
+values do; with several vectors the largest demand counts term by term. That is on the safe side, and keeps every limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.feedrate import halves
+from cornersmooth.feedrate.caps import Caps
+from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.motion import Derivatives, derivatives
+from cornersmooth.feedrate.path import Kind, Path
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.smoothing.neighbours import norm
+
+#: pieces of a line or arc
+PIECES = 4
+#: elements looked at together
+_BLOCK = 4096
+
+
+@dataclass(frozen=True)
+class AxisLimits:
+    """Limits of an axis, or of several as one vector.
+
+    Parameters
+    ----------
+    position : callable
+        Position as a function of tip and tool axis: takes their jets, two (4, m, 3) arrays of Taylor coefficients as in
+        `jets`, and returns the jet of the position, (4, m, d). With the operations of `jets` derivatives come by
+        themselves; for X, Y and Z of a three-axis machine it is ``lambda tip, axis: tip[..., [0]]`` and so on.
+    speed, accel, jerk : float
+        Limits of its length, per s, s² and s³; inf for none.
+    """
+
+    position: Callable[[Floats, Floats], Floats]
+    speed: float = math.inf
+    accel: float = math.inf
+    jerk: float = math.inf
+
+
+def _tip(tip: Floats, axis: Floats) -> Floats:
+    return tip
+
+
+def _tool_axis(tip: Floats, axis: Floats) -> Floats:
+    return axis
+
+
+@dataclass(frozen=True)
+class Demands:
+    """Coefficients over intervals of the path coordinate, in the names of `barrier.Batch`.
+
+    Parameters
+    ----------
+    caps : Caps
+        The intervals and their bounds of v², which keep the speed limits and, at steady speed, all others.
+    accel_slope, accel_level, jerk_bend, jerk_slope, jerk_level : (k,) float64
+    """
+
+    caps: Caps
+    accel_slope: Floats
+    accel_level: Floats
+    jerk_bend: Floats
+    jerk_slope: Floats
+    jerk_level: Floats
+
+    @property
+    def rows(self) -> Floats:
+        """(5, k) all coefficients."""
+        return np.stack((self.accel_slope, self.accel_level, self.jerk_bend, self.jerk_slope, self.jerk_level))
+
+
+def find_demands(path: Path, limits: Limits, caps: Caps, axes: Sequence[AxisLimits] = ()) -> Demands | None:
+    """Demands of the limits that go beyond those of the path speed; None where there are none.
+
+    Transitions between a motion of the tip and a turn on the spot are left out but for the jerk of the tip: by the way
+    of the tip the derivatives of everything else have no bound there.
+    """
+    if not len(path):
+        return None
+    steady = ~_stalling(path)
+    given = [
+        (AxisLimits(_tip, *limits.vector_limits[0]), ~path.turning),
+        (AxisLimits(_tool_axis, *limits.vector_limits[1]), ~path.turning & steady),
+        *((item, steady) for item in axes),
+    ]
+    given = [(item, where) for item, where in given if _limits(item)]
+    if not given:
+        return None
+    curved = (path.kind == Kind.CURVE) & ~path.turning
+    asked = np.logical_or.reduce([where for _, where in given])
+    count = np.where(asked, np.where(curved, halves.PIECES, PIECES), 1)
+    begin = np.concatenate(([0], np.cumsum(count)))
+    total = int(begin[-1])
+    width, cap = np.repeat(path.length, count), np.full(total, np.inf)
+    rows = np.zeros((5, total))
+    for curve in (True, False):
+        chosen = np.flatnonzero(asked & (curved == curve))
+        for at in range(0, len(chosen), _BLOCK):
+            element = chosen[at : at + _BLOCK]
+            borders, share = _borders(path, element, curve)
+            into = begin[element][:, None] + np.arange(borders.shape[1] - 1)
+            width[into] = share * path.length[element][:, None]
+            for item, where in given:
+                bound, row = _judge(path, element, borders, item)
+                counts = where[element][:, None]
+                cap[into] = np.minimum(cap[into], np.where(counts, bound, np.inf))
+                rows[:, into] = np.maximum(rows[:, into], np.where(counts, row, 0.0))
+    edge = np.concatenate(([0.0], np.cumsum(width)))
+    return Demands(Caps(edge=edge, cap=cap, run=begin[caps.element], element=caps.element), *rows)
+
+
+def _limits(item: AxisLimits) -> bool:
+    return math.isfinite(min(item.speed, item.accel, item.jerk))
+
+
+def _stalling(path: Path) -> Bools:
+    """(m,) bool: halves of transitions between a motion of the tip and a turn on the spot."""
+    stalling = np.zeros(len(path), np.bool_)
+    corners = path.corners
+    if corners is None:
+        return stalling
+    curves = np.flatnonzero((path.kind == Kind.CURVE) & ~path.turning)
+    row = path.corner[curves]
+    tip = path.program.tip
+    legs = (
+        (corners.trim_in[row], tip[corners.pose[row]] - tip[corners.before[row]]),
+        (corners.trim_out[row], tip[corners.after[row]] - tip[corners.pose[row]]),
+    )
+    for trim, step in legs:
+        stalling[curves] |= trim * norm(step) <= halves.STANDSTILL
+    return stalling
+
+
+def _borders(path: Path, element: Ints, curve: bool) -> tuple[Floats, Floats]:
+    """Parameters that divide elements, and the shares of their length between them."""
+    if not curve:
+        borders = np.tile(np.linspace(0.0, 1.0, PIECES + 1), (len(element), 1))
+        return borders, np.diff(borders, axis=1)
+    half = (path.span[element, 0] > 0.0).astype(np.int64)
+    corners = path.corners
+    if corners is None:
+        raise ValueError("a direct path has no curves")
+    tip, _ = halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
+    borders = halves.pieces(half)
+    lengths = halves.piece_lengths(tip, borders)
+    return borders, lengths / lengths.sum(axis=1, keepdims=True)
+
+
+def _judge(path: Path, element: Ints, borders: Floats, item: AxisLimits) -> tuple[Floats, Floats]:
+    """Bounds of v² (g, p) and coefficients (5, g, p) from samples at the ends and in the middle of every piece."""
+    middles = 0.5 * (borders[:, 1:] + borders[:, :-1])
+    share = np.concatenate((borders, middles), axis=1)
+    found = derivatives(path, np.repeat(element, share.shape[1]), share.ravel(), item.position)
+    one, two, three = _largest(found, share.shape, middles.shape[1])
+    speed, accel, jerk = item.speed, item.accel, item.jerk
+    with np.errstate(divide="ignore"):
+        steady = np.minimum(np.minimum((speed / one) ** 2, accel / two), np.cbrt(jerk / three) ** 2)
+    rows = np.stack((0.5 * one / accel, two / accel, one / jerk, 1.5 * two / jerk, three / jerk))
+    return steady, rows
+
+
+def _largest(vector: Derivatives, shape: tuple[int, ...], pieces: int) -> list[Floats]:
+    """Largest values in every piece; not at an end where the tip comes to a stand and they are infinite."""
+    largest = []
+    for order in vector:
+        values = order.reshape(shape)
+        values = np.where(np.isfinite(values), values, 0.0)
+        ends, middles = values[:, : pieces + 1], values[:, pieces + 1 :]
+        largest.append(np.maximum(np.maximum(ends[:, 1:], ends[:, :-1]), middles))
+    return largest

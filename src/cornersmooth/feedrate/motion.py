@@ -1,0 +1,109 @@
+"""Tip and tool axis on a path with their derivatives by the path coordinate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from cornersmooth.feedrate import arcs, halves, jets
+from cornersmooth.feedrate.path import Kind, Path
+from cornersmooth.model import Floats, Ints
+from cornersmooth.smoothing.neighbours import norm
+
+_BINOMIALS = np.array([[1, 1, 1, 1], [0, 1, 2, 3], [0, 0, 1, 3], [0, 0, 0, 1]], np.float64)
+_NO_SPEED = np.finfo(np.float64).tiny
+
+
+class Derivatives(NamedTuple):
+    """Lengths (m,) of the first three derivatives of a vector by the path coordinate."""
+
+    first: Floats
+    second: Floats
+    third: Floats
+
+
+def derivatives(path: Path, element: Ints, share: Floats, position: Callable[[Floats, Floats], Floats]) -> Derivatives:
+    """How fast something that depends on tip and tool axis changes along the path.
+
+    Parameters
+    ----------
+    path : Path
+    element : (m,) int64
+    share : (m,) float64
+        Place on each element: the part of its length for lines and arcs, the parameter t of its half for curves. Curves
+        of the paper's method are taken at v = u.
+    position : callable
+        From the jets of tip and unit tool axis, (4, m, 3) each, to that of the position, (4, m, d).
+
+    Returns
+    -------
+    Derivatives
+        Per mm, mm², mm³; per rad where the tip stands still; infinite where it comes to a stand.
+    """
+    count = len(element)
+    tip, lever, speed = np.zeros((jets.ORDERS, count, 3)), np.zeros((jets.ORDERS, count, 3)), np.zeros((3, count))
+    kind = path.kind[element]
+    rows = np.flatnonzero(kind == Kind.CURVE)
+    if len(rows):
+        tip[:, rows], lever[:, rows], speed[:, rows] = _curves(path, element[rows], share[rows])
+    rows = np.flatnonzero(kind != Kind.CURVE)
+    if len(rows):
+        tip[:, rows], lever[:, rows], speed[:, rows] = _lines(path, element[rows], share[rows])
+    with np.errstate(over="ignore", invalid="ignore"):  # the tip comes to a stand
+        found = [norm(order) for order in jets.by_way(position(tip, jets.normalised(lever)), speed)]
+    return Derivatives(*(np.where(np.isfinite(order), order, np.inf) for order in found))
+
+
+def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Floats]:
+    """Jets in t of tip and lever on halves of transitions, and of the speed of the coordinate."""
+    corners = path.corners
+    if corners is None:
+        raise ValueError("a direct path has no curves")
+    half = (path.span[element, 0] > 0.0).astype(np.int64)
+    powers = halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
+    shifts = np.stack([t**k for k in range(jets.ORDERS)])
+    curves = []
+    for curve in powers:
+        around = np.zeros((jets.ORDERS, len(t), 4))
+        for k in range(jets.ORDERS):
+            for power in range(k, jets.ORDERS):
+                around[k] += _BINOMIALS[k, power] * shifts[power - k][:, None] * curve[:, power]
+        curves.append(jets.divide(around[..., :3], around[..., 3:]))
+    tip, axis_point = curves
+    gone = jets.derivative(tip)
+    squared = jets.dot(gone, gone)
+    turning = path.turning[element]
+    moving = squared[0] > 0.0
+    squared[0] = np.where(moving, squared[0], 1.0)
+    speed = jets.root(squared)
+    speed[:, ~moving] = 0.0
+    speed[0, ~moving] = _NO_SPEED
+    speed[:, turning] = 0.0
+    speed[0, turning] = path.length[element[turning]]
+    return tip, axis_point - tip, speed
+
+
+def _lines(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
+    """Jets in the share of the length of tip and lever on lines and arcs, and of the speed of the coordinate."""
+    program = path.program
+    start, end = path.start[element], path.move[element]
+    span, axis_span = path.span[element], path.axis_span[element]
+    step = program.tip[end] - program.tip[start]
+    turn = path.settings.axis_length * (program.axis[end] - program.axis[start])
+    part, axis_part = (np.diff(limits, axis=1) for limits in (span, axis_span))
+    fraction, axis_fraction = span[:, :1] + share[:, None] * part, axis_span[:, :1] + share[:, None] * axis_part
+    tip = np.zeros((jets.ORDERS, len(element), 3))
+    lever = tip.copy()
+    tip[1] = part * step
+    lever[0] = (
+        path.settings.axis_length * program.axis[start] + axis_fraction * turn + (axis_fraction - fraction) * step
+    )
+    lever[1] = axis_part * turn + (axis_part - part) * step
+    bow = np.flatnonzero(path.kind[element] == Kind.ARC)
+    if len(bow):
+        tip[:, bow] = arcs.jet(program, end[bow], share[bow])
+    speed = np.zeros((3, len(element)))
+    speed[0] = path.length[element]
+    return tip, lever, speed

@@ -1,0 +1,163 @@
+"""Limits of vectors: the whole jerk of the tip, the turning of the tool axis, axes that are plugged in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from cornersmooth.feedrate import AxisLimits, Limits, jets, plan
+from cornersmooth.feedrate.motion import derivatives
+from cornersmooth.feedrate.path import build_path
+from cornersmooth.feedrate.timelaw import TimeLaw, poses
+from cornersmooth.model import Arcs, Floats, Move, Program
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+
+STEP = 2e-4  # s
+
+
+def sampled(law: TimeLaw) -> tuple[Floats, Floats]:
+    states = law.at(np.arange(0.0, law.total, STEP))
+    return states.tip, states.axis
+
+
+def largest(positions: Floats, order: int, outliers: int = 0) -> float:
+    """Largest length of differences over time; the third derivative has jumps, where few differences overshoot."""
+    found = np.sort(np.linalg.norm(np.diff(positions, n=order, axis=0), axis=1)) / STEP**order
+    return float(found[-1 - outliers])
+
+
+def test_jets_against_a_function() -> None:
+    """exp(2u)/(1 + u²) and its square root at u = 0.3, derivatives by hand from the series."""
+    u = 0.3
+    e = np.exp(2 * u) * np.array([1.0, 2.0, 2.0, 8.0 / 6.0])
+    p = np.array([1.0 + u * u, 2.0 * u, 1.0, 0.0])
+    found = jets.divide(e, p)
+    h = 1e-2
+
+    def value(x: float) -> float:
+        return float(np.exp(2 * x) / (1 + x * x))
+
+    y = np.array([value(u + k * h) for k in range(-3, 4)])
+    first = (-y[0] + 9 * y[1] - 45 * y[2] + 45 * y[4] - 9 * y[5] + y[6]) / (60 * h)
+    second = (2 * y[0] - 27 * y[1] + 270 * y[2] - 490 * y[3] + 270 * y[4] - 27 * y[5] + 2 * y[6]) / (180 * h * h)
+    third = (y[0] - 8 * y[1] + 13 * y[2] - 13 * y[4] + 8 * y[5] - y[6]) / (8 * h**3)
+    assert found == pytest.approx([y[3], first, second / 2, third / 6], rel=1e-5)
+    half = jets.root(found)
+    assert jets.multiply(half, half) == pytest.approx(found)
+    assert jets.derivative(found) == pytest.approx([found[1], 2 * found[2], 3 * found[3]])
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.8, 1.7)])
+def test_derivatives_of_a_path(chain: Callable[[int], Program], weights: tuple[float, float]) -> None:
+    """Against differences of poses along the way, where the curves are smooth."""
+    smoothed = smooth(chain(2), Settings(tolerance=0.05, weights=weights))
+    path = build_path(smoothed.program, smoothed.corners, smoothed.settings, Limits())
+    for element in np.flatnonzero(path.kind == 0)[:5]:
+        length = path.length[element]
+        h = 0.02 * length
+        way = 0.5 * length + h * np.arange(-2, 3)
+        _, axis, _ = poses(path, np.full(5, element), way)
+        found = derivatives(path, np.array([element]), np.array([0.5]), lambda tip, axis: axis)
+        first = np.linalg.norm(axis[0] - 8 * axis[1] + 8 * axis[3] - axis[4]) / (12 * h)
+        second = np.linalg.norm(-axis[0] + 16 * axis[1] - 30 * axis[2] + 16 * axis[3] - axis[4]) / (12 * h * h)
+        assert found.first[0] == pytest.approx(first, rel=1e-6)
+        assert found.second[0] == pytest.approx(second, rel=1e-4, abs=1e-9)
+    t = np.linspace(0.05, 0.95, 10)
+    for element in np.flatnonzero(path.kind == 1)[:6]:
+        where = np.full(len(t), element)
+        tip = derivatives(path, where, t, lambda tip, axis: tip)
+        assert tip.first == pytest.approx(1.0)
+        # curvature by the way: its own differences against the third derivative, |r‴|² = κ⁴ + κ′² in a plane
+        h = 1e-4
+        ahead = derivatives(path, where, t + h, lambda tip, axis: tip).second
+        behind = derivatives(path, where, t - h, lambda tip, axis: tip).second
+        x = halves_way(path, int(element), t, h)
+        slope = (ahead - behind) / x
+        assert tip.third == pytest.approx(np.hypot(tip.second**2, slope), rel=1e-4)
+
+
+def halves_way(path: object, element: int, t: Floats, h: float) -> Floats:
+    """Way between the parameters t − h and t + h of a half."""
+    from cornersmooth.feedrate import halves
+    from cornersmooth.feedrate.path import Path
+
+    assert isinstance(path, Path)
+    assert path.corners is not None
+    half = np.array([int(path.span[element, 0] > 0)])
+    tip, _ = halves.corner_halves(path.program, path.corners, path.corner[[element]], half, path.settings.axis_length)
+    ends = halves.evaluate(np.repeat(tip, len(t), axis=0), np.stack((t - h, t + h), axis=1))
+    return np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1)
+
+
+def test_derivatives_on_an_arc() -> None:
+    arcs = Arcs(
+        pose=np.array([1]),
+        centre=np.array([[0.0, 3.0, 0.0]]),
+        normal=np.array([[0.0, 0.0, 1.0]]),
+        sweep=np.array([np.pi / 2]),
+    )
+    kind = np.array([Move.LINEAR, Move.ARC], np.uint8)
+    program = Program.from_poses([[0, 0, 0], [3, 3, 0]], [[0, 0, 1]] * 2, kind=kind, feed=100.0, arcs=arcs)
+    path = build_path(program, None, Settings(), Limits())
+    found = derivatives(path, np.zeros(3, np.int64), np.array([0.0, 0.4, 1.0]), lambda tip, axis: tip)
+    assert found.first == pytest.approx(1.0)
+    assert found.second == pytest.approx(1.0 / 3.0)
+    assert found.third == pytest.approx(1.0 / 9.0)
+
+
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_vector_jerk_of_the_tip(chain: Callable[[int], Program], seed: int) -> None:
+    limits = Limits(vector_jerk=8000.0)
+    law = plan(smooth(chain(seed), Settings(tolerance=0.05)), limits)
+    tip, _ = sampled(law)
+    assert largest(tip, 3, outliers=10) <= 8000.0 * 1.005
+    assert law.total > plan(smooth(chain(seed), Settings(tolerance=0.05))).total
+
+
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_turning_of_the_tool_axis(chain: Callable[[int], Program], seed: int) -> None:
+    limits = Limits(turn_speed=20.0, turn_accel=200.0, turn_jerk=5000.0)
+    law = plan(smooth(chain(seed), Settings(tolerance=0.05)), limits)
+    _, axis = sampled(law)
+    assert np.degrees(largest(axis, 1)) <= 20.0 * 1.001
+    assert np.degrees(largest(axis, 2)) <= 200.0 * 1.005
+    assert np.degrees(largest(axis, 3, outliers=10)) <= 5000.0 * 1.01
+
+
+def test_axes_of_a_machine(chain: Callable[[int], Program]) -> None:
+    """A slow X axis, and one that leans with the tool."""
+    smoothed = smooth(chain(1), Settings(tolerance=0.05))
+    axes = (
+        AxisLimits(lambda tip, axis: tip[..., [0]], speed=25.0, accel=300.0, jerk=4000.0),
+        AxisLimits(lambda tip, axis: (tip + 50.0 * axis)[..., [1]], speed=40.0, accel=250.0),
+    )
+    law = plan(smoothed, Limits(), axes=axes)
+    tip, axis = sampled(law)
+    assert largest(tip[:, :1], 1) <= 25.0 * 1.001
+    assert largest(tip[:, :1], 2) <= 300.0 * 1.005
+    assert largest(tip[:, :1], 3, outliers=10) <= 4000.0 * 1.005
+    lean = (tip + 50.0 * axis)[:, 1:2]
+    assert largest(lean, 1) <= 40.0 * 1.001
+    assert largest(lean, 2) <= 250.0 * 1.005
+    assert largest(lean, 2) > 125.0  # the limit is used, not only kept
+    assert law.total > plan(smoothed).total
+
+
+def test_turn_on_the_spot_beside_lines() -> None:
+    """The tip stops on the transitions to the turn; the limits of the axis are kept in the turn itself."""
+    tip = [[0, 0, 0], [5, 0, 0], [5, 0, 0], [10, 0, 0]]
+    axis = [[0, 0, 1], [0, 0, 1], [0, 1, 1], [0, 1, 1]]
+    program = Program.from_poses(tip, axis, feed=3000.0)
+    for limits in (Limits(), Limits(turn_speed=10.0, turn_accel=100.0, turn_jerk=1000.0, vector_jerk=4000.0)):
+        law = plan(smooth(program, Settings(tolerance=0.2)), limits)
+        assert law.path.turning.sum() == 1
+        states = law.at(np.arange(0.0, law.total, 1e-3))
+        speed, accel, jerk = np.degrees(limits.angular_limits)
+        turning = states.turning
+        assert np.degrees(states.v[turning].max()) <= speed * 1.001
+        assert np.degrees(np.abs(states.a[turning]).max()) <= accel * 1.001
+        assert np.degrees(np.abs(states.j[turning]).max()) <= jerk * 1.001
+        assert law.total < 10.0
