@@ -107,10 +107,18 @@ def _inside_rounding(
         here: float = length[segment] + block.fraction[vertex] * (length[segment + 1] - length[segment])
         return here
 
-    for neighbour, pose_vertex, vertex, step in (
-        (move + 1, int(trail.last[move]), start, 1),
-        (move - 1, int(trail.last[move - 1]) if move else -1, end, -1),
+    def beyond(towards: int) -> int:
+        """Next move that leads anywhere: repeated poses are rounded as one."""
+        other = move + towards
+        while 0 < other < len(feed) and length[trail.last[other]] - length[trail.last[other - 1]] <= matcher.margin:
+            other += towards
+        return other
+
+    for pose_vertex, vertex, step in (
+        (int(trail.last[move]), start, 1),
+        (int(trail.last[move - 1]) if move else -1, end, -1),
     ):
+        neighbour = beyond(step)
         if not low < pose_vertex <= high or not 0 <= neighbour < len(feed):
             continue
         if not abs(feed[neighbour] - said) <= room:
