@@ -9,6 +9,22 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+DONE, USAGE, BAD_INPUT, BAD_OUTPUT = 0, 2, 3, 4
+OLD = b"old program\n"
+
+SMALL = b"""PARTNO CONTRACT
+UNITS/MM
+LOADTL/1
+SPINDL/12000,RPM,CLW
+RAPID
+GOTO/0,0,0,0,0,1
+FEDRAT/500,MMPM
+GOTO/10,0,0,0,0,1
+GOTO/10,10,0,0,0.1,1
+GOTO/20,10,0,0,0.1,1
+FINI
+"""
+
 SCRIPT = Path(sys.executable).parent / "cornersmooth"
 #: seconds after which a run counts as hanging
 PATIENCE = 120
@@ -70,3 +86,20 @@ def wait_for(condition: Callable[[], bool], seconds: float) -> bool:
             return True
         time.sleep(0.001)
     return False
+
+
+def quiet(stderr: bytes) -> bool:
+    """No trace of Python in what the user sees."""
+    return b"Traceback" not in stderr and b"Error(" not in stderr and b'File "' not in stderr
+
+
+def message(stderr: bytes) -> str:
+    """The one error line."""
+    lines = [line for line in stderr.decode().splitlines() if "error:" in line]
+    assert len(lines) == 1, stderr.decode()
+    return lines[0]
+
+
+def only(folder: Path, *names: str) -> bool:
+    """Whether the folder holds these names and nothing else."""
+    return sorted(os.listdir(folder)) == sorted(names)
