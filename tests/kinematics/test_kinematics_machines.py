@@ -142,3 +142,37 @@ def test_unknown_names_and_files(tmp_path: Path):
     binary.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SettingsError, match="not UTF-8 text"):
         load_machine(binary)
+
+
+DYNAMIC = PLAIN + "\n[dynamics.B]\njerk = 900\n[dynamics.X]\nvelocity = 6000\nacceleration = 2500\n"
+
+
+def test_dynamics_are_read_and_told():
+    machine = parse_machine(DYNAMIC)
+    assert [item.name for item in machine.dynamics] == ["X", "B"]
+    assert machine.dynamics[0].per_second == (100.0, 2500.0, np.inf)
+    assert machine.dynamics[1].per_second == (np.inf, np.inf, 900.0)
+    assert "X up to 6000 mm/min, 2500 mm/s2" in machine.describe()
+    assert "B up to 900 deg/s3" in machine.describe()
+    assert parse_machine(PLAIN).dynamics == ()
+    for name in machine_names():
+        built_in = load_machine(name)
+        assert [item.name for item in built_in.dynamics] == ["X", "Y", "Z", *built_in.names]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[dynamics.B]", "[dynamics.A]", "dynamics: unknown key 'A'; known keys are X, Y, Z, C, B"),
+        ("jerk = 900", "jerk = 0", "dynamics of B: jerk is 0; give a positive number"),
+        ("jerk = 900", "jerk = nan", "dynamics of B: jerk is nan; give a positive number"),
+        ("jerk = 900", 'jerk = "soft"', "dynamics of B: jerk is 'soft'; give a number"),
+        ("velocity", "velocty", "dynamics of X: unknown key 'velocty'; did you mean velocity?"),
+        ("[dynamics.B]\njerk", "[dynamics]\njerk", "dynamics is not a table per axis; write [dynamics.X]"),
+    ],
+)
+def test_what_is_wrong_in_dynamics_is_said(old: str, new: str, message: str):
+    assert old in DYNAMIC
+    with pytest.raises(SettingsError) as caught:
+        parse_machine(DYNAMIC.replace(old, new), file="m.toml")
+    assert message in str(caught.value)

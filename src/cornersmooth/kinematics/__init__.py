@@ -1,5 +1,6 @@
 """Machines and their rotary angles."""
 
+from cornersmooth.kinematics.dynamics import Dynamics
 from cornersmooth.kinematics.findings import axis_rates
 from cornersmooth.kinematics.insertion import FilledPath, Insertions, fill, insertions
 from cornersmooth.kinematics.machine import Machine, RotaryAxis
@@ -9,6 +10,7 @@ from cornersmooth.kinematics.position import inverse_time, machine_position, tip
 from cornersmooth.kinematics.route import RotaryPath, rapid_moves, rotary_angles
 
 __all__ = [
+    "Dynamics",
     "FilledPath",
     "Insertions",
     "Machine",

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics.dynamics import LINEAR, Dynamics
 from cornersmooth.model import Floats
 
 Vector = tuple[float, float, float]
@@ -108,6 +109,8 @@ class Machine:
         From the spindle nose to the tip; matters for heads without tool centre point control only.
     part_zero : (float, float, float), mm
         Where the zero of the part sits in the coordinates in which the points of the tables are given.
+    dynamics : tuple of Dynamics
+        Limits of any of the five axes; only the planning of the time asks for them.
     """
 
     name: str
@@ -117,6 +120,7 @@ class Machine:
     tool_direction: Vector = (0.0, 0.0, 1.0)
     tool_length: float = 0.0
     part_zero: Vector = (0.0, 0.0, 0.0)
+    dynamics: tuple[Dynamics, ...] = ()
 
     def __post_init__(self) -> None:
         where = f"machine {self.name}"
@@ -154,6 +158,10 @@ class Machine:
                 f"{where}: preferred names {self.preferred[0]!r}",
                 f"use {first.name}+, {first.name}-, {second.name}+ or {second.name}-",
             )
+        for item in self.dynamics:
+            if item.name not in (*LINEAR, *self.names):
+                known = ", ".join((*LINEAR, *self.names))
+                raise SettingsError("CS253", f"{where}: dynamics of {item.name}, which it has not", f"use {known}")
 
     @cached_property
     def tool(self) -> Floats:
@@ -190,6 +198,7 @@ class Machine:
             lines.append(f"  starts with {self.preferred[0]} {'positive' if self.preferred[1] > 0 else 'negative'}")
         if any(axis.carrier == "head" for axis in self.axes):
             lines.append(f"  tool length {self.tool_length:g} mm")
+        lines += [f"  {item.describe()}" for item in self.dynamics]
         return "\n".join(lines)
 
 

@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics.dynamics import LINEAR, Dynamics
 from cornersmooth.kinematics.machine import Machine, RotaryAxis
 
-_MACHINE_KEYS = ("name", "description", "preferred", "tool_direction", "tool_length", "part_zero", "axis")
+_MACHINE_KEYS = ("name", "description", "preferred", "tool_direction", "tool_length", "part_zero", "axis", "dynamics")
 _AXIS_KEYS = ("name", "direction", "carrier", "point", "positive", "limits")
+_DYNAMICS_KEYS = ("velocity", "acceleration", "jerk")
 
 
 def machine_names() -> tuple[str, ...]:
@@ -59,7 +61,9 @@ def parse_machine(text: str, *, file: str = "<machine>", name: str = "machine") 
     ----------
     text : str
         Keys: ``name``, ``description``, ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``part_zero``
-        and two tables ``[[axis]]`` with ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``.
+        and two tables ``[[axis]]`` with ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``; and for the
+        planning of the time tables ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min or
+        deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which may be left out.
     file : str
         For messages.
     name : str
@@ -90,6 +94,7 @@ def parse_machine(text: str, *, file: str = "<machine>", name: str = "machine") 
             tool_direction=_vector(table, "tool_direction", (0.0, 0.0, 1.0)),
             tool_length=_number(table.get("tool_length", 0.0), "tool_length"),
             part_zero=_vector(table, "part_zero", (0.0, 0.0, 0.0)),
+            dynamics=_dynamics(table, (*LINEAR, first.name, second.name)),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
@@ -114,6 +119,20 @@ def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
         positive=entry.get("positive", "tool"),
         limits=limits,
     )
+
+
+def _dynamics(table: dict[str, Any], names: tuple[str, ...]) -> tuple[Dynamics, ...]:
+    """Limits of the axes in the order of their names."""
+    given = table.get("dynamics", {})
+    if not isinstance(given, dict) or not all(isinstance(entry, dict) for entry in given.values()):
+        raise SettingsError("CS253", "dynamics is not a table per axis", "write [dynamics.X] and its numbers below")
+    _check_keys(given, names, "dynamics: ")
+    found = []
+    for name in (name for name in names if name in given):
+        where = f"dynamics of {name}: "
+        _check_keys(given[name], _DYNAMICS_KEYS, where)
+        found.append(Dynamics(name, **{key: _number(given[name][key], where + key) for key in given[name]}))
+    return tuple(found)
 
 
 def _check_keys(table: dict[str, Any], known: tuple[str, ...], where: str) -> None:

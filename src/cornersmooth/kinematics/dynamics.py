@@ -1,0 +1,52 @@
+"""How fast the axes of a machine may go."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cornersmooth.errors import SettingsError
+
+#: addresses of the linear axes
+LINEAR = ("X", "Y", "Z")
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """Limits of one axis of a machine, linear or rotary; infinite where there is none.
+
+    Parameters
+    ----------
+    name : {"X", "Y", "Z", "A", "B", "C"}
+    velocity : float, mm/min or deg/min
+    acceleration : float, mm/s² or deg/s²
+    jerk : float, mm/s³ or deg/s³
+    """
+
+    name: str
+    velocity: float = math.inf
+    acceleration: float = math.inf
+    jerk: float = math.inf
+
+    def __post_init__(self) -> None:
+        for key in ("velocity", "acceleration", "jerk"):
+            value = getattr(self, key)
+            if not value > 0.0:
+                raise SettingsError("CS253", f"dynamics of {self.name}: {key} is {value:g}", "give a positive number")
+
+    @property
+    def linear(self) -> bool:
+        """Whether lengths are meant, not angles."""
+        return self.name in LINEAR
+
+    @property
+    def per_second(self) -> tuple[float, float, float]:
+        """Velocity, acceleration and jerk in mm or degrees per s, s², s³."""
+        return self.velocity / 60.0, self.acceleration, self.jerk
+
+    def describe(self) -> str:
+        """One line for people."""
+        unit = "mm" if self.linear else "deg"
+        limits = ((self.velocity, "min"), (self.acceleration, "s2"), (self.jerk, "s3"))
+        told = ", ".join(f"{value:g} {unit}/{per}" for value, per in limits if math.isfinite(value))
+        return f"{self.name} up to {told}" if told else f"{self.name} without limits"
