@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.verify.careful import assign, doubtful_windows
 from cornersmooth.verify.ncprogram import NcProgram
 from cornersmooth.verify.stops import Stretches
-from cornersmooth.verify.trails import Original, Written, written_motion
+from cornersmooth.verify.trails import CHORD_SHARE, Original, Written, written_motion
 from cornersmooth.verify.walking import Lanes, Track, cut_lane, walk
 
 #: path elements in a block
@@ -97,6 +98,12 @@ class Matcher:
         return MARGIN_STEPS * max(self.nc.tip_step, axis_step)
 
     @property
+    def slack(self) -> float:
+        """Distance by which places on the trails may be wrong, mm: more than `margin` where they cut curves short."""
+        bare = len(self.original.trail) == len(self.original.pose) and not len(self.nc.curves) and not len(self.nc.arcs)
+        return self.margin if bare else self.margin + 2 * CHORD_SHARE * self.tolerance
+
+    @property
     def near(self) -> float:
         """Distance within which a written vertex is taken to be on its way, mm."""
         return 2.0 * self.tolerance + self.margin
@@ -169,7 +176,30 @@ class Matcher:
             index = np.repeat(np.arange(len(spans)), b - a + 1)
             vertex = np.repeat(a - np.cumsum(b - a + 1) + (b - a + 1), b - a + 1) + np.arange(len(index))
             number[vertex], low[vertex], high[vertex] = index, start[index], stop[index] - 1
+        self._look_again(six, number, segment, fraction, backward, distance)
         tail = spans[-1][1]
         block = Block(written, six, on, number, segment, fraction, backward, distance, low, high, not open_end)
         rest = (int(written.trail.owner[tail]), int(segment[tail]), float(fraction[tail]))
         return block, rest
+
+    def _look_again(
+        self, six: Floats, piece: Ints, segment: Ints, fraction: Floats, backward: Bools, distance: Floats
+    ) -> None:
+        """Assign anew, and with more care, what the walker has found too far away or in the wrong order."""
+        known = np.isfinite(distance)
+        doubtful = backward | (known & (distance > np.sqrt(2) * self.tolerance + self.margin))
+        for first, last in doubtful_windows(doubtful & (piece >= 0), piece):
+            part = slice(first, last + 1)
+            start, stop = (float(segment[k] + fraction[k]) for k in (first, last))
+            found = assign(six[part], self.track, start, stop, self.tolerance)
+            if found is None:
+                continue
+            row = self.track.row[found[0]]
+            away = six[part] - row[:, :6] - found[1][:, None] * row[:, 6:12]
+            off = np.sqrt(np.einsum("ij,ij->i", away, away))
+            if off[1:].max() <= distance[first + 1 : last + 1].max():
+                segment[part], fraction[part] = found[0], found[1]
+                distance[first + 1 : last + 1] = off[1:]
+                length = self.track.length[found[0] + 1] - self.track.length[found[0]]
+                behind = np.einsum("ij,ij->i", six[part] - row[:, :6], row[:, 6:12]) * row[:, 12]
+                backward[part] = found[2] & ((found[1] - np.clip(behind, 0.0, 1.0)) * length > self.margin)

@@ -17,7 +17,7 @@ from cornersmooth.verify.gaps import (
 )
 from cornersmooth.verify.hulls import hull_gaps
 from cornersmooth.verify.ncprogram import Problem
-from cornersmooth.verify.nearest import gap_between, nearest_segments
+from cornersmooth.verify.order import original_backwards, written_backwards
 from cornersmooth.verify.stops import ARITHMETIC, digit_errors
 
 #: rows of a block for which tip and axis point are looked at each on its own: at a time, and at most
@@ -25,9 +25,6 @@ _OWN_ROWS, _MOST_OWN_ROWS = 64, 2048
 
 #: neighbouring violations no farther apart on the original than this many segments are one problem
 _SAME_PROBLEM = 3.0
-
-#: segments looked at on either side for a vertex that seems to go backwards
-_BACK_REACH = 3
 
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 TOGETHER = 2.0
@@ -164,8 +161,9 @@ class Meter:
         result.pose_angle[pose], result.pose_nc_line[pose] = theirs.gap.angle[whole], nc_line[whole]
 
         self._check_exact(block, theirs, whole)
-        self._check_order(block, written)
-        self._check_their_order(block, theirs)
+        for found in (written_backwards(matcher, block, written), original_backwards(matcher, block, theirs)):
+            if found is not None:
+                result.violations.add(523, *found)
         return written
 
     def problems(self) -> list[Problem]:
@@ -255,63 +253,6 @@ class Meter:
                 original.program.line[pose[missed]],
                 matcher.nc.line[nearest[missed]],
                 amount[missed],
-            )
-
-    def _check_order(self, block: Block, written: Reached) -> None:
-        """Written vertices that would fit clearly better before the one in front of them."""
-        matcher, margin = self.matcher, self.matcher.margin
-        rows = np.flatnonzero(block.backward[written.vertex])
-        if not len(rows):
-            return
-        vertex = written.vertex[rows]
-        six, theirs = block.six[vertex], matcher.track.six
-        segment, at = nearest_segments(
-            six, theirs, block.segment[vertex], _BACK_REACH, block.low[vertex], block.high[vertex]
-        )
-        free = theirs[segment] + at[:, None] * (theirs[segment + 1] - theirs[segment])
-        held_segment, held_at = block.segment[vertex], block.fraction[vertex]
-        held = theirs[held_segment] + held_at[:, None] * (theirs[held_segment + 1] - theirs[held_segment])
-        gain = np.linalg.norm(six - held, axis=1) - np.linalg.norm(six - free, axis=1)
-        wrong = np.flatnonzero((gain > margin) & (segment + at < held_segment + held_at))
-        if len(wrong):
-            move = matcher.original.trail.owner[held_segment[wrong] + 1]
-            self.result.violations.add(
-                523,
-                (held_segment + held_at)[wrong],
-                matcher.original.program.line[matcher.original.pose[move]],
-                matcher.nc.line[block.written.trail.owner[vertex[wrong]]],
-                gain[wrong],
-            )
-
-    def _check_their_order(self, block: Block, theirs: Reached) -> None:
-        """Original vertices that are passed clearly nearer before the one in front of them."""
-        matcher, margin = self.matcher, self.matcher.margin
-        falls = np.flatnonzero((np.diff(theirs.place) < 0) & (np.diff(theirs.vertex) == 1)) + 1
-        if not len(falls):
-            return
-        before, here = theirs.place[falls - 1], theirs.place[falls]
-        trail = block.written.trail
-
-        def pose(place: Floats) -> tuple[Floats, Floats]:
-            segment = np.minimum(place.astype(np.int64), len(trail) - 2)
-            at = (place - segment)[:, None]
-            tip = trail.tip[segment] + at * (trail.tip[segment + 1] - trail.tip[segment])
-            return tip, trail.axis[segment] + at * (trail.axis[segment + 1] - trail.axis[segment])
-
-        back = gap_between(*pose(before), *pose(here), matcher.axis_length).larger
-        point = matcher.original.trail
-        vertex = theirs.vertex[falls]
-        held = gap_between(*pose(before), point.tip[vertex], point.axis[vertex], matcher.axis_length).larger
-        gain = np.minimum(back, held - theirs.gap.larger[falls])
-        wrong = np.flatnonzero(gain > margin)
-        if len(wrong):
-            segment = np.minimum(before[wrong].astype(np.int64) + 1, len(trail) - 1)
-            self.result.violations.add(
-                523,
-                vertex[wrong].astype(np.float64),
-                matcher.original.program.line[matcher.original.pose[point.owner[vertex[wrong]]]],
-                matcher.nc.line[trail.owner[segment]],
-                gain[wrong],
             )
 
 

@@ -72,7 +72,7 @@ def digit_errors(nc: NcProgram, element: Ints, tip: Floats, axis: Floats, axis_l
     else:  # only the direction of the axis point counts, and the tip's own rounding turns it too
         side = second - nc.tip[element]
         side -= np.linalg.norm(side, axis=1)[:, None] * axis
-        room = (nc.second_step + nc.tip_step) / 2 + ARITHMETIC
+        room = np.sqrt(3) * (nc.second_step + nc.tip_step) / 2 + ARITHMETIC
     exact &= (np.abs(side) <= room).all(axis=1)
     turned = off + axis_length * (directions(nc, nc.tip[element], second) - axis)
     return exact, np.maximum(np.linalg.norm(off, axis=1), np.linalg.norm(turned, axis=1))

@@ -36,11 +36,14 @@ class Track:
         Start (6), difference (6), inverse square of the length (0 where that is 0).
     length : (n + 1,) float64
         Path length up to every vertex, mm.
+    following : (n + 1,) int64
+        The next segment that has a length.
     """
 
     six: Floats
     row: Floats
     length: Floats
+    following: Ints
 
     @classmethod
     def of(cls, six: Floats) -> Track:
@@ -52,7 +55,9 @@ class Track:
         square = np.einsum("ij,ij->i", row[:, 6:12], row[:, 6:12])
         np.divide(1.0, square, out=row[:, 12], where=square > 0)
         length = np.concatenate(([0.0], np.cumsum(np.sqrt(square[:-1]))))
-        return cls(six, row, length)
+        moving = np.where(row[:, 12] > 0, np.arange(count + 1), count + 1)
+        following = np.append(np.minimum.accumulate(moving[::-1])[::-1][1:], count + 1)
+        return cls(six, row, length, following)
 
 
 @dataclass(frozen=True)
@@ -120,7 +125,8 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
             vertex, last, here, least, end = vertex[keep], last[keep], here[keep], least[keep], end[keep]
         point = six.take(vertex, axis=0)
         own = track.row.take(here, axis=0)
-        follow = track.row.take(np.minimum(here + 1, end), axis=0)
+        after = track.following.take(here)
+        follow = track.row.take(np.minimum(after, end), axis=0)
         away = point - own[:, :6]
         t = np.einsum("ij,ij->i", away, own[:, 6:12]) * own[:, 12]
         on = np.clip(t, least, 1.0)
@@ -130,15 +136,15 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
         s = np.clip(np.einsum("ij,ij->i", away, follow[:, 6:12]) * follow[:, 12], 0.0, 1.0)
         away -= s[:, None] * follow[:, 6:12]
         d_follow = np.sqrt(np.einsum("ij,ij->i", away, away))
-        more = here < end
+        more = after <= end
         ended = (t >= 1.0) | (own[:, 12] == 0)
         advance = more & ((ended & (d_follow <= d)) | (d_follow < d - margin))
-        jump = np.flatnonzero(more & ~advance & (d > lost))
-        if len(jump):
-            ahead = _look_ahead(point[jump], track, here[jump], end[jump], d[jump] - margin)
-            advance[jump] = ahead > here[jump]
-            here[jump] = np.maximum(ahead - 1, here[jump])
         behind = (least - t) > 0
+        jump = np.flatnonzero(more & ~advance & ((d > lost) | (behind & (d > margin))))
+        if len(jump):
+            ahead = _look_ahead(point[jump], track, here[jump], end[jump], d[jump] - margin, margin)
+            advance[jump] = ahead > here[jump]
+            after[jump] = np.where(ahead > here[jump], ahead, after[jump])
         place = ~advance
         at = vertex[place]
         segment[at], fraction[at], distance[at] = here[place], on[place], d[place]
@@ -146,15 +152,15 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
             back = (least - t) ** 2 > square_margin * own[:, 12]
             backward[at] = (behind & back & (own[:, 12] > 0))[place]
         least = np.where(place, on, 0.0)
-        here += advance
+        here = np.where(advance, after, here)
         vertex += place
         active = vertex <= last
 
 
-def _look_ahead(point: Floats, track: Track, here: Ints, end: Ints, beat: Floats) -> Ints:
-    """First of the next segments that begins a stretch nearer than `beat`; `here` where there is none."""
+def _look_ahead(point: Floats, track: Track, here: Ints, end: Ints, beat: Floats, margin: float) -> Ints:
+    """Nearest of the next segments, if nearer than `beat`, a later one only by a margin; `here` where there is none."""
     best = here.copy()
-    for step in range(2, LOOK_AHEAD + 1):
+    for step in range(1, LOOK_AHEAD + 1):
         row = track.row[np.minimum(here + step, end)]
         away = point - row[:, :6]
         t = np.clip(np.einsum("ij,ij->i", away, row[:, 6:12]) * row[:, 12], 0.0, 1.0)
@@ -162,7 +168,7 @@ def _look_ahead(point: Floats, track: Track, here: Ints, end: Ints, beat: Floats
         d = np.sqrt(np.einsum("ij,ij->i", away, away))
         nearer = (d < beat) & (here + step <= end)
         best[nearer] = here[nearer] + step
-        beat = np.where(nearer, d, beat)
+        beat = np.where(nearer, d - margin, beat)
     return best
 
 

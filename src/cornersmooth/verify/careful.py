@@ -1,0 +1,102 @@
+"""The best monotone correspondence of two short trails, for places where the walker may have gone astray.
+
+Every written vertex gets a segment of the original, never an earlier one than the vertex before; every original vertex
+that is passed on the way counts with its distance from the written segment on which it is passed. Among all such
+assignments the one with the least sum of powers of the distances is found by dynamic programming, a row at a time.
+The power is high, so that it is the largest distances that decide.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.verify.walking import Track
+
+#: of the squared distance, in tolerances
+_POWER = 3
+
+#: largest number of pairs that are looked at for one window, and of windows in a block
+MOST_PAIRS, MOST_WINDOWS = 4_000_000, 40
+
+#: written vertices around a doubtful one that are assigned anew with it
+AROUND = 60
+
+
+def doubtful_windows(doubtful: Bools, piece: Ints) -> list[tuple[int, int]]:
+    """First and last vertex of the windows to assign anew; both ends are taken to be right."""
+    rows = np.flatnonzero(doubtful)
+    if not len(rows):
+        return []
+    edges = np.flatnonzero(np.append(True, np.diff(piece) != 0))
+    ends = np.append(edges[1:], len(piece)) - 1
+    number = np.searchsorted(edges, rows, side="right") - 1
+    first = np.maximum(rows - AROUND, edges[number])
+    last = np.minimum(rows + AROUND, ends[number])
+    new = np.append(True, (first[1:] > last[:-1]) | (np.diff(number) != 0))
+    starts = np.flatnonzero(new)
+    stops = np.append(starts[1:], len(rows)) - 1
+    return list(zip(first[starts].tolist(), last[stops].tolist(), strict=True))[:MOST_WINDOWS]
+
+
+def assign(six: Floats, track: Track, start: float, stop: float, tolerance: float) -> tuple[Ints, Floats, Bools] | None:
+    """Assign the vertices of a window whose ends are at known places.
+
+    Parameters
+    ----------
+    six : (v, 6) float64
+        Written vertices.
+    track : Track
+    start, stop : float
+        Places (segment plus fraction) of the first and the last vertex.
+    tolerance : float, mm
+
+    Returns
+    -------
+    segment : (v,) int64
+    fraction : (v,) float64
+    backward : (v,) bool
+        Whether a vertex lies behind the one before it on its segment.
+        None where the window is too large.
+    """
+    low, high = int(start), max(int(np.ceil(stop)) - 1, int(start))
+    count = high - low + 1
+    if len(six) < 3 or len(six) * count > MOST_PAIRS:
+        return None
+    row = track.row[low : high + 1]
+    fraction, square = _project(six, row[:, :6], row[:, 6:12], row[:, 12])
+    cost = (square / tolerance**2) ** _POWER
+    # original vertices between the segments, against written segments
+    way = six[1:] - six[:-1]
+    size = np.einsum("ij,ij->i", way, way)
+    inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
+    _, passed = _project(row[1:, :6], six[:-1], way, inverse)
+    passing = np.concatenate(([np.zeros(len(way))], np.cumsum((passed / tolerance**2) ** _POWER, axis=0))).T
+    columns = np.arange(count)
+    best = np.where(columns == 0, 0.0, np.inf)
+    came = np.zeros((len(six), count), np.int32)
+    for k in range(1, len(six)):
+        reached = best - passing[k - 1]
+        least = np.minimum.accumulate(reached)
+        is_new = np.append(True, reached[1:] < least[:-1])
+        came[k] = np.maximum.accumulate(np.where(is_new, columns, 0))
+        best = least + passing[k - 1] + cost[k]
+    segment = np.zeros(len(six), np.int64)
+    segment[-1] = count - 1
+    for k in range(len(six) - 1, 0, -1):
+        segment[k - 1] = came[k, segment[k]]
+    at = fraction[np.arange(len(six)), segment]
+    at[0], at[-1] = start - low, stop - high
+    place = segment + at
+    held = np.maximum.accumulate(place)
+    backward = held > place
+    at = np.clip(held - segment, 0.0, 1.0)
+    return segment + low, at, backward
+
+
+def _project(point: Floats, start: Floats, way: Floats, inverse: Floats) -> tuple[Floats, Floats]:
+    """Fractions and squared distances (points, segments) of every point on every segment."""
+    along = point @ way.T - np.einsum("ij,ij->i", start, way)
+    fraction = np.clip(along * inverse, 0.0, 1.0)
+    away = point[:, None, :] - start[None, :, :] - fraction[:, :, None] * way[None, :, :]
+    return fraction, np.einsum("ijk,ijk->ij", away, away)

@@ -1,0 +1,117 @@
+"""Whether the path is run in order: no going back that the CL file does not have, even within the tolerance.
+
+Where the original turns round itself, going back along it is what it asks for; so only such stretches count that the
+other motion runs through without turning.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.blocks import Block, Matcher
+from cornersmooth.verify.gaps import Reached
+from cornersmooth.verify.nearest import nearest_segments
+
+#: segments looked at on either side
+_REACH = 3
+
+#: a stretch whose length is more than so many times the distance of its ends turns
+_STRAIGHT = 1.2
+
+Found = tuple[Floats, Ints, Ints, Floats]
+
+
+def written_backwards(matcher: Matcher, block: Block, written: Reached) -> Found | None:
+    """Written vertices that would fit clearly better before the one in front of them.
+
+    Returns
+    -------
+    place, cl_line, nc_line, amount
+        (k,) place on the original, lines, and mm gained; None where there are none.
+    """
+    vertex = written.vertex[block.backward[written.vertex]]
+    if not len(vertex):
+        return None
+    own, six, length = block.six[vertex], matcher.track.six, matcher.track.length
+    segment, at = nearest_segments(own, six, block.segment[vertex], _REACH, block.low[vertex], block.high[vertex])
+    free, held = segment + at, block.place[vertex]
+    gain = _distance(own, _on(six, held)) - _distance(own, _on(six, free))
+    wrong = (gain > matcher.slack) & (free < held)
+    wrong &= _way(length, free, held) <= _STRAIGHT * _distance(_on(six, held), _on(six, free)) + matcher.slack
+    if not wrong.any():
+        return None
+    original = matcher.original
+    move = original.trail.owner[block.segment[vertex[wrong]] + 1]
+    nc_line = matcher.nc.line[block.written.trail.owner[vertex[wrong]]]
+    return held[wrong], original.program.line[original.pose[move]], nc_line, gain[wrong]
+
+
+def original_backwards(matcher: Matcher, block: Block, theirs: Reached) -> Found | None:
+    """Neighbouring original vertices that the text clearly passes in reverse: part of the path is missing.
+
+    Returns
+    -------
+    As `written_backwards`.
+    """
+    falls = np.flatnonzero((np.diff(theirs.place) < 0) & (np.diff(theirs.vertex) == 1)) + 1
+    if not len(falls):
+        return None
+    six, trail = block.six, block.written.trail
+    before, here = theirs.place[falls - 1], theirs.place[falls]
+    length = np.concatenate(([0.0], np.cumsum(_distance(six[1:], six[:-1]))))
+    way = _way(length, here, before)
+    straight = way <= _STRAIGHT * _distance(_on(six, before), _on(six, here)) + matcher.slack
+    falls, before, here = falls[straight], before[straight], here[straight]
+    later = _cost(matcher, block, theirs.vertex[falls], here, before, forward=True)
+    earlier = _cost(matcher, block, theirs.vertex[falls - 1], before, here, forward=False)
+    gain = np.minimum(later, earlier)
+    wrong = np.flatnonzero(gain > matcher.slack)
+    if not len(wrong):
+        return None
+    original, vertex = matcher.original, theirs.vertex[falls[wrong]]
+    cl_line = original.program.line[original.pose[original.trail.owner[vertex]]]
+    nc_line = matcher.nc.line[trail.owner[np.minimum(before[wrong].astype(np.int64) + 1, len(trail) - 1)]]
+    return vertex.astype(np.float64), cl_line, nc_line, gain[wrong]
+
+
+def _cost(matcher: Matcher, block: Block, vertex: Ints, free: Floats, bound: Floats, *, forward: bool) -> Floats:
+    """How much farther the text is from original vertices when it may not pass them before, or behind, `bound`."""
+    own, six = matcher.track.six[vertex], block.six
+    middle = np.minimum(bound.astype(np.int64), len(six) - 2)
+    ends = np.flatnonzero(np.append(np.diff(block.piece) != 0, True))
+    piece = np.searchsorted(ends, middle)
+    first = np.concatenate(([0], ends[:-1] + 1))[piece]
+    last = np.maximum(ends[piece] - 1, middle)
+    # the segment that the bound lies on counts in part, those beyond it whole
+    segment, at = nearest_segments(own, six, middle, 0, middle, middle)
+    limited = np.maximum(at, bound - middle) if forward else np.minimum(at, bound - middle)
+    best = _distance(own, _on(six, middle + limited))
+    beyond = middle + (1 if forward else -1)
+    there = (beyond <= last) & (beyond >= first)
+    low, high = (beyond, np.maximum(last, beyond)) if forward else (np.minimum(first, beyond), beyond)
+    rows = np.flatnonzero(there)
+    segment, at = nearest_segments(own[rows], six, beyond[rows], _REACH, low[rows], high[rows])
+    best[rows] = np.minimum(best[rows], _distance(own[rows], _on(six, segment + at)))
+    return best - _distance(own, _on(six, free))
+
+
+def _on(six: Floats, place: Floats) -> Floats:
+    """(k, 6) points of a trail at segment plus fraction."""
+    segment = np.clip(place.astype(np.int64), 0, len(six) - 2)
+    start = six[segment]
+    point: Floats = start + (place - segment)[:, None] * (six[segment + 1] - start)
+    return point
+
+
+def _way(length: Floats, start: Floats, end: Floats) -> Floats:
+    """Path length between two places, `length` being that up to every vertex."""
+    vertices = np.arange(len(length))
+    way: Floats = np.interp(end, vertices, length) - np.interp(start, vertices, length)
+    return way
+
+
+def _distance(a: Floats, b: Floats) -> Floats:
+    away = a - b
+    distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
+    return distance
