@@ -78,13 +78,20 @@ def cli() -> None:
 
 def main() -> NoReturn:
     """Run the command line and leave with its exit code."""
-    signal.signal(signal.SIGTERM, _terminate)
-    sys.exit(run())
+    try:
+        signal.signal(signal.SIGTERM, terminate)
+        if sys.stderr is None:  # closed by the caller; what is said to it must not end up in the NC text
+            sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+        code = run()
+    except KeyboardInterrupt:
+        code = EXIT_INTERRUPTED
+    sys.exit(code)
 
 
 def run(args: list[str] | None = None) -> int:
     """Run the command line with the given arguments; returns the exit code."""
     from cornersmooth.cli.files import ClosedPipe
+    from cornersmooth.cli.job import EXIT_INTERNAL, internal_error
     from cornersmooth.errors import CornersmoothError
 
     try:
@@ -109,13 +116,18 @@ def run(args: list[str] | None = None) -> int:
         return 4
     except (click.exceptions.Abort, KeyboardInterrupt):
         return EXIT_INTERRUPTED
+    except Exception as failure:  # a fault of ours: said in a line, and never with the code of a broken promise
+        click.echo(internal_error(failure), err=True)
+        return EXIT_INTERNAL
 
 
-def _terminate(number: int, frame: object) -> NoReturn:
+def terminate(number: int, frame: object) -> NoReturn:
     """Leave by an exception, so that temporary files are removed."""
     raise SystemExit(128 + number)
 
 
 def _close_quietly() -> None:
     """Keep the interpreter from complaining about the closed pipe when it flushes at exit."""
+    if sys.stdout is None:
+        return
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import shutil
 import stat
 import sys
@@ -38,6 +39,8 @@ def read_input(path: str) -> tuple[bytes, str]:
         The file cannot be read.
     """
     if path == STANDARD:
+        if sys.stdin is None:
+            raise InputError("CS100", "standard input is closed", "name a file", file="<stdin>")
         return sys.stdin.buffer.read(), "<stdin>"
     try:
         return Path(path).read_bytes(), path
@@ -66,7 +69,7 @@ def check_output(path: str, inputs: list[str], *, force: bool, ours: bytes | Non
     if path == STANDARD:
         return
     for source in inputs:
-        if source != STANDARD and _same(path, source):
+        if _is_standard_input(path) if source == STANDARD else _same(path, source):
             raise SettingsError("CS220", f"{path} is the input", "choose another name for the output")
     if os.path.isdir(path):
         raise OutputError("CS401", "is a folder", "name a file, or use -d for a folder", file=path)
@@ -115,6 +118,8 @@ def open_output(path: str, *, hold: bool = False) -> Iterator[Output]:
         The reader of a pipe has gone.
     """
     standard = path == STANDARD
+    if standard and sys.stdout is None:
+        raise OutputError("CS406", "standard output is closed", "use -o", file="<stdout>")
     with _failing_as_output("<stdout>" if standard else path):
         if not standard and not (os.path.exists(path) and not stat.S_ISREG(os.stat(path).st_mode)):
             with _replacing(os.path.realpath(path)) as output:
@@ -137,28 +142,21 @@ def open_output(path: str, *, hold: bool = False) -> Iterator[Output]:
 @contextlib.contextmanager
 def _replacing(target: str) -> Iterator[Output]:
     folder, name = os.path.split(target)
-    handle, temporary = tempfile.mkstemp(prefix=f".{name}.", suffix=".part", dir=folder)
+    # named before it exists: a signal at any moment finds a name to remove
+    temporary = os.path.join(folder, f".{name}.{secrets.token_hex(4)}.part")
     try:
-        with os.fdopen(handle, "wb") as stream:
+        with open(temporary, "xb") as stream:
             output = Output(stream, temporary)
             yield output
             stream.flush()
-            os.fchmod(stream.fileno(), _mode_for(target))
+            if os.path.exists(target):
+                os.fchmod(stream.fileno(), stat.S_IMODE(os.stat(target).st_mode))
             os.fsync(stream.fileno())
         os.replace(temporary, target + REJECTED if output.rejected else target)
     except BaseException:
         with contextlib.suppress(OSError):
             os.unlink(temporary)
         raise
-
-
-def _mode_for(target: str) -> int:
-    """Permissions of the file that is replaced, else those of any new file."""
-    with contextlib.suppress(OSError):
-        return stat.S_IMODE(os.stat(target).st_mode)
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
 
 
 @contextlib.contextmanager
@@ -171,6 +169,14 @@ def _failing_as_output(path: str) -> Iterator[None]:
         raise OutputError(
             "CS404", f"cannot write it: {_reason(failure)}", "the old file, if any, is untouched", file=path
         ) from failure
+
+
+def _is_standard_input(path: str) -> bool:
+    """Whether the path names the file that standard input is redirected from."""
+    try:
+        return os.path.samestat(os.fstat(0), os.stat(path))
+    except OSError:
+        return False
 
 
 def _same(one: str, other: str) -> bool:

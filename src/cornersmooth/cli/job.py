@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from cornersmooth.cli.files import REJECTED, STANDARD, check_output, open_output, read_input
+from cornersmooth.cli.files import REJECTED, STANDARD, ClosedPipe, check_output, open_output, read_input
 from cornersmooth.errors import CornersmoothError, Finding, OutputError, SettingsError
 
 if TYPE_CHECKING:
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 #: how the reports of earlier runs begin; such files are replaced without being asked
 _OUR_JSON = b'{\n "schema": "cornersmooth-report/'
 _OUR_CSV = b"corner,line,x,y,z,tip_angle_deg,"
+
+#: exit code for a fault of the program itself
+EXIT_INTERNAL = 70
 
 #: problems of a rejected file that are printed
 _PROBLEMS_SHOWN = 5
@@ -146,7 +150,22 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     except MemoryError:
         outcome.exit_code = 3
         outcome.message = f"{job.source}: error: not enough memory for this file; cut it at a tool change"
+    except Exception as failure:
+        if isinstance(failure, ClosedPipe):
+            raise
+        outcome.exit_code = EXIT_INTERNAL
+        outcome.message = internal_error(failure, job.source)
     return outcome
+
+
+def internal_error(failure: Exception, source: str = "") -> str:
+    """Text for an error that is a fault of the program."""
+    last = traceback.extract_tb(failure.__traceback__)[-1]
+    place = f"{os.path.basename(last.filename)}:{last.lineno}"
+    return (
+        f"{source + ': ' if source else ''}error: internal error, {type(failure).__name__} at {place}: {failure}; "
+        "please report it with the input file"
+    )
 
 
 def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
@@ -206,21 +225,22 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
         with open_output(path) as output:
             texts = iter([report_json(contents)]) if path.lower().endswith(".json") else corners_csv(smoothed)
             for text in texts:
-                output.stream.write(text.encode("utf-8"))
+                output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8
     return contents
 
 
 def _say_rejected(job: Job, verification: dict[str, Any]) -> str:
     """Say what verification found, and where the text is now."""
+    source = "<stdin>" if job.source == STANDARD else job.source
     lines = [
-        f"{job.source}:{problem['cl_line']}: error: {problem['text']} (NC line {problem['nc_line']})"
+        f"{source}:{problem['cl_line']}: error: {problem['text']} (NC line {problem['nc_line']})"
         for problem in verification["problems"][:_PROBLEMS_SHOWN]
     ]
     more = verification["problem_count"] - len(lines)
     if more > 0:
-        lines.append(f"{job.source}: {more} more; a JSON report lists them")
+        lines.append(f"{source}: {more} more; a JSON report lists them")
     kept = "nothing was written" if job.target == STANDARD else f"the text is in {job.target}{REJECTED}"
-    lines.append(f"{job.source}: error: the written text breaks its promise; {kept}")
+    lines.append(f"{source}: error: the written text breaks its promise; {kept}")
     return "\n".join(lines)
 
 

@@ -21,7 +21,7 @@ def console() -> Console:
     """Console on standard error; rich itself honours NO_COLOR and a missing terminal."""
     from rich.console import Console
 
-    return Console(stderr=True, highlight=False, soft_wrap=True)
+    return Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 @contextmanager

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
 from typing import Any
 
 import click
 
-from cornersmooth.cli import options
+from cornersmooth.cli import options, terminate
 from cornersmooth.cli.files import STANDARD, read_input
 from cornersmooth.cli.job import Job, Outcome, Writing, check, make_folder, run_job
 from cornersmooth.cli.show import print_line, progress_bar, show_batch, show_findings, show_summary
@@ -106,19 +107,29 @@ def _run_all(jobs: list[Job], processes: int) -> Any:
         yield from map(run_job, jobs)
         return
     from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
+    from multiprocessing import active_children, get_context
 
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_leave_when_told) as pool:
         try:
             yield from pool.map(run_job, jobs)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for worker in active_children():
+                worker.terminate()
             raise
+
+
+def _leave_when_told() -> None:
+    """Let a worker leave by an exception, so that it removes its temporary file, and without a word."""
+    signal.signal(signal.SIGTERM, terminate)
+    signal.signal(signal.SIGINT, terminate)
 
 
 def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
     folder, output = given["directory"], given["output"]
+    if given["quiet"] and given["verbose"]:
+        raise click.UsageError("-q and -v exclude each other")
     if folder and output:
         raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
     if len(inputs) > 1 and not folder:
@@ -132,8 +143,6 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     reading = {name: given[name] for name in _READING} | {"format": given["input_format"]}
     writing = _writing(given)
     _try_settings(settings, writing, given)
-    if folder:
-        make_folder(folder)
     jobs = []
     for source in inputs:
         stem = "stdin" if source == STANDARD else os.path.splitext(os.path.basename(source))[0]
@@ -154,9 +163,14 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     by_target: dict[str, str] = {}
     for job in jobs:
         for path in (job.target, *job.reports):
-            if path != STANDARD and by_target.setdefault(path, job.source) != job.source:
+            if path == STANDARD:
+                continue
+            if path in by_target:
                 raise click.UsageError(f"{by_target[path]} and {job.source} would both be written to {path}")
+            by_target[path] = job.source
     _check_against_inputs(jobs)
+    if folder:
+        make_folder(folder)
     return jobs
 
 

@@ -25,7 +25,7 @@ _BEND_PER_CHORD = 1.0 / PAPER_ERROR
 _BLOCK = 16384
 
 #: most lines in one half of a transition and in one straight remainder
-_MOST_LINES = 400
+_MOST_LINES = 20_000
 
 
 @dataclass(frozen=True)
