@@ -88,7 +88,6 @@ def test_out_is_never_in(small: Path, tmp_path: Path, how: str) -> None:
         assert sorted(os.listdir(tmp_path)) == before
 
 
-@pytest.mark.xfail(strict=True, reason="the file behind standard input is not compared")
 def test_out_is_never_the_file_behind_standard_input(small: Path) -> None:
     with small.open("rb") as stream:
         result = subprocess.run(
@@ -98,7 +97,6 @@ def test_out_is_never_the_file_behind_standard_input(small: Path) -> None:
     assert result.returncode in (USAGE, BAD_OUTPUT)
 
 
-@pytest.mark.xfail(strict=True, reason="the report cannot encode the name")
 def test_names_that_are_no_text(small: Path, tmp_path: Path) -> None:
     odd = os.fsencode(tmp_path) + b"/b\xff.cls"
     os.rename(small, odd)
@@ -107,7 +105,6 @@ def test_names_that_are_no_text(small: Path, tmp_path: Path) -> None:
     json.loads((tmp_path / "r.json").read_bytes())
 
 
-@pytest.mark.xfail(strict=True, reason="leaves with 1 and Python's words, or writes nothing")
 @pytest.mark.parametrize("closed", [1, 2])
 def test_closed_streams(small: Path, tmp_path: Path, closed: int) -> None:
     """Without standard error the work is done in silence; without standard output there is nowhere to write to."""
@@ -239,7 +236,6 @@ def test_interruption_leaves_the_old_file(large: Path, tmp_path: Path, number: s
     assert interrupted >= 1
 
 
-@pytest.mark.xfail(reason="a signal between the making of the temporary file and the try leaves it behind")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interruption_as_the_temporary_file_appears(large: Path, tmp_path: Path, number: signal.Signals) -> None:
     out = tmp_path / "out.nc"
@@ -303,7 +299,6 @@ def test_the_table_at_the_end_names_every_file(several: list[Path], tmp_path: Pa
         assert path.name.encode() in result.stderr
 
 
-@pytest.mark.xfail(strict=True, reason="brackets in names are taken as markup")
 @pytest.mark.parametrize("name", ["red]b.cls", "/bold].cls"])
 def test_names_with_brackets_are_names(tmp_path: Path, name: str) -> None:
     """Where the name has a slash, the bracket opens in the name of a folder."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -106,7 +105,7 @@ def show_batch(outcomes: list[Outcome]) -> None:
     for heading in ("result", "corners", "rounded", "tip mm", "axis mm", "blocks"):
         table.add_column(heading, no_wrap=True)
     for outcome in outcomes:
-        name = os.path.basename(outcome.job.source)
+        name = outcome.job.source
         if not outcome.contents:
             table.add_row(name, f"failed ({outcome.exit_code})", "", "", "", "", "")
             continue
@@ -122,6 +121,8 @@ def show_batch(outcomes: list[Outcome]) -> None:
         )
     failed = sum(outcome.exit_code != 0 for outcome in outcomes)
     out = console()
+    if not out.is_terminal:  # in a file every name stands whole on its line
+        out.width = max(out.width, 60 + max(len(outcome.job.source) for outcome in outcomes))
     out.print(table)
     out.print(f"{len(outcomes)} files, {failed} failed" if failed else f"{len(outcomes)} files done")
 
