@@ -1,0 +1,76 @@
+"""The promise for every control and form: what each control makes of its text stays within ε, by the oracle."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.kinematics import load_machine
+from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from nc.reading import READERS
+from oracle.chains import AXIS_DECIMALS, Chain, cl_text, random_chains
+from oracle.judge import judge
+from oracle.motion import unit
+
+#: control, form, machine, tool tip control
+CASES = [
+    ("generic", "g1", "", True),
+    ("siemens", "g1", "", True),
+    ("siemens", "bspline", "", True),
+    ("siemens", "poly", "", True),
+    ("heidenhain", "g1", "", True),
+    ("fanuc", "g1", "table-ac", True),
+    ("fanuc", "g1", "table-ac", False),
+    ("fanuc", "g1", "table-bc", False),
+    ("mitsubishi", "g1", "head-table-bc", True),
+    ("siemens", "g1", "head-ac", True),
+    ("heidenhain", "g1", "table-bc", True),
+    ("haas", "g1", "table-bc", True),
+    ("haas", "g1", "nutated-bc", True),
+    ("linuxcnc", "g1", "xyzac-trt", True),
+    ("linuxcnc", "g1", "xyzbc-trt", True),
+]
+
+
+def tame(chain: Chain, machine: str) -> Chain:
+    """Chain with axes that the machine can reach, still through the pole and with large steps."""
+    if not machine:
+        return chain
+    x, y, z = chain.axis.T
+    flatter = 0.25 if machine.endswith("trt") else 1.0
+    axis = unit(np.stack((flatter * x, flatter * y, np.abs(z) + 0.2), axis=1))
+    return replace(chain, axis=np.round(axis, AXIS_DECIMALS))
+
+
+#: every case has one of them
+LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "machine", "tcp", "tolerance", "axis_length"),
+    [(*case, *LIMITS[index % len(LIMITS)]) for index, case in enumerate(CASES)],
+)
+def test_random_chains_keep_the_tolerance(
+    control: str, form: str, machine: str, tcp: bool, tolerance: float, axis_length: float
+) -> None:
+    chains = [tame(chain, machine) for chain in random_chains(len(control + form + machine), 48, corners=4)]
+    program = read(cl_text(chains)[0], name="chains.cls")
+    chosen = choose_form(control, form, machine=load_machine(machine) if machine else None, tcp=tcp)
+    settings = fit_settings(Settings(tolerance=tolerance, axis_length=axis_length), chosen, "mm")
+    smoothed = smooth(program, settings)
+    assert smoothed.corners.smoothed.mean() > 0.6
+    stream = io.BytesIO()
+    write(smoothed, stream, form=chosen)
+    reader = READERS[f"{control} {form}{'' if tcp else ' machine'}"](machine)
+    reading = reader.read(stream.getvalue().decode("ascii"), axis_length, tolerance)
+    originals = [
+        chain.original for chain in chains if np.ptp(chain.tip, axis=0).any() or np.ptp(chain.axis, axis=0).any()
+    ]
+    verdict = judge(reading.runs(axis_length), originals, axis_length, tolerance)
+    assert verdict.deviation.worst <= tolerance, verdict
