@@ -224,3 +224,28 @@ def test_nothing_to_compare():
     assert codes(found) == ["CS534"]
     with pytest.raises(SettingsError, match="tolerance"):
         verify(program, b"", tolerance=0.0)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "tip", "axis_point"),
+    [(0.078, (0.0729, 0.0780), (0.0780, 0.0767)), (0.15, (0.0729, 0.1265), (0.0790, 0.1307))],
+)
+def test_second_table_of_the_paper_is_measured_in_the_text(tolerance, tip, axis_point):
+    import io
+    from dataclasses import replace
+    from pathlib import Path
+
+    import cornersmooth
+    from cornersmooth.nc import choose_form
+
+    sample = Path(__file__).resolve().parents[2] / "samples" / "paper_table1.csv"
+    program = cornersmooth.read(sample)
+    program = replace(program, feed=np.full(len(program), 500.0))
+    settings = cornersmooth.Settings(tolerance=tolerance, method="zhang2016")
+    settings = cornersmooth.fit_settings(settings, choose_form("fanuc", "g6.2"), program.units)
+    stream = io.BytesIO()
+    cornersmooth.write(cornersmooth.smooth(program, settings), stream, control="fanuc", form="g6.2")
+    found = verify(program, stream.getvalue(), tolerance=tolerance, axis_length=10.0)
+    # four printed decimals, and half a step of the written numbers
+    assert found.pose_tip[1:3] == pytest.approx(tip, abs=1.2e-4)
+    assert found.pose_axis_point[1:3] == pytest.approx(axis_point, abs=1.2e-4)
