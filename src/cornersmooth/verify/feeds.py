@@ -107,21 +107,24 @@ def _inside_rounding(
         here: float = length[segment] + block.fraction[vertex] * (length[segment + 1] - length[segment])
         return here
 
-    def beyond(towards: int) -> int:
-        """Next move that leads anywhere: repeated poses are rounded as one."""
+    def beyond(towards: int) -> list[int]:
+        """Moves beyond the pose up to the next that leads anywhere: repeated poses are rounded as one."""
+        found = []
         other = move + towards
-        while 0 < other < len(feed) and length[trail.last[other]] - length[trail.last[other - 1]] <= matcher.margin:
+        while 0 <= other < len(feed):
+            found.append(other)
+            if length[trail.last[other]] - (length[trail.last[other - 1]] if other else 0.0) > matcher.margin:
+                break
             other += towards
-        return other
+        return found
 
     for pose_vertex, vertex, step in (
         (int(trail.last[move]), start, 1),
         (int(trail.last[move - 1]) if move else -1, end, -1),
     ):
-        neighbour = beyond(step)
-        if not low < pose_vertex <= high or not 0 <= neighbour < len(feed):
+        if not low < pose_vertex <= high:
             continue
-        if not abs(feed[neighbour] - said) <= room:
+        if not any(abs(feed[neighbour] - said) <= room for neighbour in beyond(step)):
             continue
         pose = length[pose_vertex]
         begin, other = length[trail.last[move - 1]], length[trail.last[move]]
