@@ -1,0 +1,66 @@
+"""Prints every position that LinuxCNC's interpreter makes of a program: kind, line, X Y Z in mm, A B C in degrees.
+
+Runs under Debian's Python, which has LinuxCNC's modules: ``python3 linuxcnc_canon.py FILE``. Exit code 1 and the
+interpreter's words for an error.
+"""
+
+import os
+import sys
+import tempfile
+
+import gcode
+
+MM_PER_INCH = 25.4
+
+
+class Canon:
+    """What the interpreter calls; names and arguments are its own."""
+
+    def __init__(self, parameters):
+        self.parameter_file = parameters
+        self.line = 0
+        self.scale = MM_PER_INCH
+
+    def next_line(self, state):
+        self.line = state.sequence_number
+
+    def _show(self, kind, numbers):
+        values = [value * self.scale for value in numbers[:3]] + list(numbers[3:6])
+        print(kind, self.line, *(repr(value) for value in values))
+
+    def straight_feed(self, *numbers):
+        self._show("feed", numbers)
+
+    def straight_traverse(self, *numbers):
+        self._show("rapid", numbers)
+
+    def get_tool(self, pocket):
+        return (-1,) + (0.0,) * 12 + (0,)
+
+    def get_axis_mask(self):
+        return 0x3F
+
+    def get_external_length_units(self):
+        return 1.0
+
+    def get_external_angular_units(self):
+        return 1.0
+
+    def get_block_delete(self):
+        return False
+
+    def check_abort(self):
+        return False
+
+    def __getattr__(self, name):
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return lambda *numbers: None
+
+
+with tempfile.TemporaryDirectory() as folder:
+    path = os.path.join(folder, "parameters.var")
+    open(path, "w").close()
+    result, last = gcode.parse(sys.argv[1], Canon(path), "G21", "")
+if result > gcode.MIN_ERROR:
+    sys.exit(f"line {last}: {gcode.strerror(result)}")

@@ -1,0 +1,201 @@
+"""LinuxCNC's interpreter as an independent reader: it takes our text, and finds the same positions and curves in it.
+
+Debian: ``apt-get install --no-install-recommends linuxcnc-uspace``. Its Python modules belong to Debian's own Python.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cornersmooth.cl import read
+from cornersmooth.kinematics import load_machine
+from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import nurbs, smooth
+from nc.reading import Reader, Reading, tool_direction
+from oracle.chains import cl_text, random_chains
+from oracle.judge import judge
+from oracle.motion import Path as Motion
+from oracle.motion import unit
+
+Floats = NDArray[np.float64]
+
+PYTHON = Path("/usr/bin/python3")
+CANON = Path(__file__).parent / "linuxcnc_canon.py"
+
+pytestmark = [
+    pytest.mark.linuxcnc,
+    pytest.mark.skipif(
+        shutil.which("rs274") is None, reason="LinuxCNC is not installed: apt-get install linuxcnc-uspace"
+    ),
+]
+
+
+def positions(text: str, folder: Path) -> list[tuple[str, Floats]]:
+    """Kind and X Y Z A B C of every move, in full precision."""
+    file = folder / "program.ngc"
+    # without the running controller its modules have no tool table; `accepted` lets the tools be loaded
+    file.write_text(re.sub(r"^(T\d+ M6|G43 H\d+)$", "", text, flags=re.MULTILINE))
+    result = subprocess.run([PYTHON, CANON, file], capture_output=True, text=True, check=False, timeout=120)
+    assert result.returncode == 0, result.stderr
+    rows = [line.split() for line in result.stdout.splitlines() if line.startswith(("feed ", "rapid "))]
+    return [(row[0], np.array([float(number) for number in row[2:]])) for row in rows]
+
+
+def accepted(text: str, folder: Path) -> None:
+    """Assert that the interpreter runs the program to its end."""
+    file, tools = folder / "program.ngc", folder / "tools.tbl"
+    file.write_text(text)
+    tools.write_text("".join(f"T{number} P{number} Z0 D0.001\n" for number in range(1, 60)))
+    result = subprocess.run(
+        ["rs274", "-t", tools, "-g", file], capture_output=True, text=True, check=False, timeout=120, cwd=folder
+    )
+    assert result.returncode == 0, result.stderr
+    assert "PROGRAM_END" in result.stdout
+
+
+def written(cl: bytes, machine: str, *, tcp: bool = True, tolerance: float = 0.01, feed: float = 500.0) -> str:
+    program = read(cl, name="part.cls")
+    program = type(program)(**{**vars(program), "feed": np.where(np.isnan(program.feed), feed, program.feed)})
+    chosen = choose_form("linuxcnc", machine=load_machine(machine), tcp=tcp)
+    smoothed = smooth(program, fit_settings(Settings(tolerance=tolerance), chosen, program.units))
+    stream = io.BytesIO()
+    write(smoothed, stream, form=chosen)
+    return stream.getvalue().decode("ascii")
+
+
+def flat(seed: int, count: int = 60) -> tuple[bytes, list]:  # type: ignore[type-arg]
+    """Random chains that a trunnion of limited travel can reach."""
+    chains = []
+    for chain in random_chains(seed, count):
+        x, y, z = chain.axis.T
+        axis = np.round(unit(np.stack((0.25 * x, 0.25 * y, np.abs(z) + 0.2), axis=1)), 9)
+        chains.append(type(chain)(chain.tip, axis, chain.feed))
+    return cl_text(chains)[0], chains
+
+
+@pytest.mark.parametrize("machine", ["xyzac-trt", "xyzbc-trt"])
+def test_positions_are_those_in_the_text(machine: str, tmp_path: Path) -> None:
+    text = written(flat(1)[0], machine)
+    accepted(text, tmp_path)
+    letters = "XYZAC" if "ac" in machine else "XYZBC"
+    ours = [
+        (line[:2], [float(number) for number in re.findall(r"[A-CX-Z](-?[\d.]+)", line)])
+        for line in text.splitlines()
+        if line.startswith(("G0 ", "G1 "))
+    ]
+    theirs = positions(text, tmp_path)
+    assert len(ours) == len(theirs) > 500
+    columns = ["XYZABC".index(letter) for letter in letters]
+    for (code, numbers), (kind, found) in zip(ours, theirs, strict=True):
+        assert (code == "G0") == (kind == "rapid")
+        np.testing.assert_allclose(found[columns], numbers, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("machine", ["xyzac-trt", "xyzbc-trt"])
+def test_tip_and_axis_by_its_own_formulas_keep_the_tolerance(machine: str, tmp_path: Path) -> None:
+    """The published kinematics of trtfuncs.c over the positions that the interpreter produces."""
+    cl, chains = flat(2)
+    axis_length, tolerance = 10.0, 0.01
+    reader = Reader(("X", "Y", "Z", *("AC" if "ac" in machine else "BC")), "", "angles", machine)
+    reader.step, reader.axis_length = 0.01, axis_length
+    columns = [0, 1, 2, 3 if "ac" in machine else 4, 5]
+    reading, before = Reading(), None
+    for number, (kind, place) in enumerate(positions(written(cl, machine, tolerance=tolerance), tmp_path)):
+        here = place[columns]
+        reading.pieces.append(reader.piece(number, kind == "rapid", here if before is None else before, here))
+        before = here
+    runs: list[Motion] = reading.runs(axis_length)
+    originals = [
+        chain.original for chain in chains if np.ptp(chain.tip, axis=0).any() or np.ptp(chain.axis, axis=0).any()
+    ]
+    verdict = judge(runs, originals, axis_length, tolerance)
+    assert verdict.deviation.worst <= tolerance, verdict
+
+
+@pytest.mark.parametrize("tcp", [True, False])
+def test_every_statement_and_feed_mode_is_accepted(tcp: bool, tmp_path: Path) -> None:
+    cl = (
+        b"UNITS/MM\nPARTNO ALL OF IT\nLOADTL/4\nSPINDL/5000,RPM,CLW\nCOOLNT/MIST\nCOOLNT/ON\nRAPID\n"
+        b"GOTO/0,0,50,0,0,1\nFEDRAT/800,MMPM\nGOTO/0,0,0,0,0,1\nGOTO/20,0,0,0,0.1,1\nGOTO/20,0,0,0,0.3,1\n"
+        b"GOTO/20,20,0,0.1,0.3,1\nDELAY/0.5\nSTOP\nOPSTOP\nFEDRAT/0.1,MMPR\nGOTO/0,20,0,0.1,0.3,1\nCOOLNT/OFF\n"
+        b"RAPID\nGOTO/0,20,50,0,0,1\nCYCLE/DRILL,FEDTO,10,RAPTO,2,MMPM,100,DWELL,1\nGOTO/5,5,0\nCYCLE/OFF\nSPINDL/OFF\n"
+        b"LOADTL/5\nSPINDL/5000,RPM,CCLW\nRAPID\nGOTO/0,0,50\nFINI\n"
+    )
+    cl = re.sub(rb"GOTO/(\d+,\d+,\d+),([\d.]+),([\d.]+),1\n", _normalised, cl)
+    accepted(written(cl, "xyzac-trt", tcp=tcp), tmp_path)
+
+
+def _normalised(match: re.Match[bytes]) -> bytes:
+    axis = np.array([float(match[2]), float(match[3]), 1.0])
+    return b"GOTO/%b,%b\n" % (match[1], ",".join(f"{n:.9f}" for n in axis / np.linalg.norm(axis)).encode())
+
+
+def test_real_files_are_accepted(corpus: Path, tmp_path: Path) -> None:
+    names = [
+        "hecc_flank_nx.cls",
+        "nx_clsf_coremill_steptools.cls",
+        "swcam_shimemcunha.apt",
+        "creo11_3x_inch_multiop.ncl",
+    ]
+    for name in names:
+        accepted(written((corpus / name).read_bytes(), "xyzac-trt"), tmp_path)
+
+
+def test_an_error_is_seen(tmp_path: Path) -> None:
+    """Whatever the interpreter does not know must not pass for accepted."""
+    with pytest.raises(AssertionError, match="Unknown g code"):
+        accepted("G21\nG43.5 H1\nM2\n", tmp_path)
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 1.3), (1.5, 0.5)])
+def test_its_splines_are_our_curves(weights: tuple[float, float], tmp_path: Path) -> None:
+    """G5.2 with L4 has our knots, and runs in the plane: each projection of both curves is a program of its own."""
+    rng = np.random.default_rng(5)
+    cl, _ = flat(7, 12)
+    smoothed = smooth(read(cl, name="chains.cls"), Settings(tolerance=0.5, weights=weights))
+    rows = rng.choice(np.flatnonzero(smoothed.corners.smoothed), 6, replace=False)
+    for points in nurbs.control_points(smoothed.program, smoothed.corners, rows, 10.0):
+        for curve in points:
+            for plane in ((0, 1), (1, 2), (2, 0)):
+                flat_points = np.round(curve[:, plane], 9)
+                found = _spline(flat_points, weights, tmp_path)
+                dense = nurbs.evaluate(
+                    np.pad(flat_points, ((0, 0), (0, 1)))[None], np.array([weights]), np.linspace(0, 1, 20001)
+                )[0, :, :2]
+                start, step = dense[:-1], np.diff(dense, axis=0)
+                for point in found:
+                    size = np.einsum("ij,ij->i", step, step)
+                    share = np.einsum("ij,ij->i", point - start, step) / np.where(size > 0, size, 1.0)
+                    foot = start + np.clip(share, 0, 1)[:, None] * step
+                    assert np.linalg.norm(foot - point, axis=1).min() < 1e-6
+
+
+def _spline(points: Floats, weights: tuple[float, float], folder: Path) -> Floats:
+    """Points that the interpreter makes of a curve."""
+    w1, w2 = weights
+    places = [f"X{x:.9f} Y{y:.9f}" for x, y in points.tolist()]
+    lines = ["G21 G90 G17 G94 F100", f"G1 {places[0]}"]
+    lines += [f"G5.2 {places[1]} P{w1} L4", f"{places[2]} P{w2}", f"{places[3]} P{w1}", f"{places[4]} P1", "G5.3", "M2"]
+    found = [place[:2] for _, place in positions("\n".join(lines) + "\n", folder)]
+    assert len(found) > 10
+    return np.array(found)
+
+
+def test_its_direction_of_the_tool_is_ours() -> None:
+    """Third column of the forward matrix in trtfuncs.c against the machine's own description."""
+    angles = {letter: np.array([10.0, -40.0, 77.0]) for letter in "ABC"}
+    for name in ("xyzac-trt", "xyzbc-trt"):
+        from cornersmooth.kinematics import tool_axis
+
+        machine = load_machine(name)
+        words = np.stack([angles[letter] for letter in machine.names], axis=1)
+        np.testing.assert_allclose(tool_axis(machine, words), tool_direction(name, angles), atol=1e-12)
