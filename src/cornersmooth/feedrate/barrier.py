@@ -37,6 +37,8 @@ from cornersmooth.model import Bools, Floats, Ints
 
 #: the remaining duality gap over the time, at which the profile is taken
 GAP = 2e-4
+#: change of the time in one step, over the time, below which the dual variables are taken to have arrived too
+SETTLED = 1e-3
 #: Newton steps after which the profile is taken as it is; it is feasible at every step
 MAX_STEPS = 500
 #: part of the way to the nearest limit that a step may take
@@ -192,7 +194,8 @@ def solve(batch: Batch, c: Floats) -> Floats:
         Strictly feasible coefficients; the time is within about `GAP` of the smallest on this grid.
     """
     slack, z = batch.slacks(c)
-    barrier = float((batch.weight / np.sqrt(c)).sum()) / slack.size
+    time = float((batch.weight / np.sqrt(c)).sum())
+    barrier = time / slack.size
     dual = barrier / slack
     for _ in range(MAX_STEPS):
         bites = [0.5 * values**-1.5 for values in z]  # −d(z^(−1/2))/dz
@@ -211,7 +214,9 @@ def solve(batch: Batch, c: Floats) -> Floats:
         dual += dual_length * dual_step
         gap = float((dual * slack).sum())
         worst = min(length, dual_length)
-        if worst > 0.5 and gap < GAP * float((batch.weight / np.sqrt(c)).sum()):
+        before, time = time, float((batch.weight / np.sqrt(c)).sum())
+        # the gap says how far the time is from the smallest only once the duals balance the forces
+        if worst > 0.5 and gap < GAP * time and abs(before - time) < SETTLED * time:
             break
         # lower the barrier only as fast as the steps arrive; raise it where they are cut short
         shrink = 0.2 if worst > 0.9 else 0.5 if worst > 0.6 else 1.0 if worst > 0.2 else 2.0
