@@ -15,14 +15,18 @@ import numpy as np
 
 from cornersmooth.feedrate import halves
 from cornersmooth.feedrate.caps import Caps
+from cornersmooth.feedrate.joints import Joints
 from cornersmooth.feedrate.limits import Limits
-from cornersmooth.feedrate.motion import Derivatives, derivatives
+from cornersmooth.feedrate.motion import derivatives
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.neighbours import norm
 
 #: pieces of a line or arc
 PIECES = 4
+#: pieces on either side of the nearest point to the pole of a machine, and the first of them over the way on which the
+#: pole is felt
+POLE_PIECES, FIRST_PIECE = 40, 0.05
 #: elements looked at together
 _BLOCK = 4096
 
@@ -79,7 +83,13 @@ class Demands:
         return np.stack((self.accel_slope, self.accel_level, self.jerk_bend, self.jerk_slope, self.jerk_level))
 
 
-def find_demands(path: Path, limits: Limits, caps: Caps, axes: Sequence[AxisLimits] = ()) -> Demands | None:
+#: first three derivatives (m, d) of d axes at places (m,) on elements (m,)
+Orders = Callable[[Ints, Floats], tuple[Floats, Floats, Floats]]
+
+
+def find_demands(
+    path: Path, limits: Limits, caps: Caps, axes: Sequence[AxisLimits] = (), joints: Joints | None = None
+) -> Demands | None:
     """Demands of the limits that go beyond those of the path speed; None where there are none.
 
     Transitions between a motion of the tip and a turn on the spot are left out but for the jerk of the tip: by the way
@@ -88,39 +98,62 @@ def find_demands(path: Path, limits: Limits, caps: Caps, axes: Sequence[AxisLimi
     if not len(path):
         return None
     steady = ~_stalling(path)
-    given = [
+    vectors = [
         (AxisLimits(_tip, *limits.vector_limits[0]), ~path.turning),
         (AxisLimits(_tool_axis, *limits.vector_limits[1]), ~path.turning & steady),
         *((item, steady) for item in axes),
     ]
-    given = [(item, where) for item, where in given if _limits(item)]
+    given: list[tuple[Orders, Floats, Bools]] = [
+        (_orders(path, item), np.array([[item.speed], [item.accel], [item.jerk]]), where) for item, where in vectors
+    ]
+    close = np.zeros(len(path), np.bool_)
+    if joints is not None:
+        given.append((_signless(joints), joints.limits, steady))
+        close = joints.near_pole() & steady
+    given = [(orders, bounds, where) for orders, bounds, where in given if np.isfinite(bounds).any()]
     if not given:
         return None
     curved = (path.kind == Kind.CURVE) & ~path.turning
-    asked = np.logical_or.reduce([where for _, where in given])
-    count = np.where(asked, np.where(curved, halves.PIECES, PIECES), 1)
+    asked = np.logical_or.reduce([where for _, _, where in given])
+    count = np.where(asked, np.where(close, 2 * POLE_PIECES, np.where(curved, halves.PIECES, PIECES)), 1)
     begin = np.concatenate(([0], np.cumsum(count)))
     total = int(begin[-1])
     width, cap = np.repeat(path.length, count), np.full(total, np.inf)
     rows = np.zeros((5, total))
     for curve in (True, False):
-        chosen = np.flatnonzero(asked & (curved == curve))
-        for at in range(0, len(chosen), _BLOCK):
-            element = chosen[at : at + _BLOCK]
-            borders, share = _borders(path, element, curve)
-            into = begin[element][:, None] + np.arange(borders.shape[1] - 1)
-            width[into] = share * path.length[element][:, None]
-            for item, where in given:
-                bound, row = _judge(path, element, borders, item)
-                counts = where[element][:, None]
-                cap[into] = np.minimum(cap[into], np.where(counts, bound, np.inf))
-                rows[:, into] = np.maximum(rows[:, into], np.where(counts, row, 0.0))
+        for near in (True, False):
+            chosen = np.flatnonzero(asked & (curved == curve) & (close == near))
+            for at in range(0, len(chosen), _BLOCK // 8 if near else _BLOCK):
+                element = chosen[at : at + (_BLOCK // 8 if near else _BLOCK)]
+                graded = _around(*joints.closest(element)) if joints is not None and near else None
+                borders, share = _borders(path, element, curve, graded)
+                into = begin[element][:, None] + np.arange(borders.shape[1] - 1)
+                width[into] = share * path.length[element][:, None]
+                for orders, bounds, where in given:
+                    counts = where[element][:, None]
+                    if not counts.any():
+                        continue
+                    bound, row = _judge(element, borders, orders, bounds)
+                    cap[into] = np.minimum(cap[into], np.where(counts, bound, np.inf))
+                    rows[:, into] = np.maximum(rows[:, into], np.where(counts, row, 0.0))
     edge = np.concatenate(([0.0], np.cumsum(width)))
     return Demands(Caps(edge=edge, cap=cap, run=begin[caps.element], element=caps.element), *rows)
 
 
-def _limits(item: AxisLimits) -> bool:
-    return math.isfinite(min(item.speed, item.accel, item.jerk))
+def _orders(path: Path, item: AxisLimits) -> Orders:
+    def orders(element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
+        one, two, three = derivatives(path, element, share, item.position)
+        return one[:, None], two[:, None], three[:, None]
+
+    return orders
+
+
+def _signless(joints: Joints) -> Orders:
+    def orders(element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
+        _, one, two, three = joints.orders(element, share)
+        return np.abs(one), np.abs(two), np.abs(three)
+
+    return orders
 
 
 def _stalling(path: Path) -> Bools:
@@ -141,39 +174,49 @@ def _stalling(path: Path) -> Bools:
     return stalling
 
 
-def _borders(path: Path, element: Ints, curve: bool) -> tuple[Floats, Floats]:
+def _around(closest: Floats, felt: Floats) -> Floats:
+    """Borders (g, p + 1) of pieces that grow on either side of the place nearest to the pole."""
+    smallest = FIRST_PIECE * felt[:, None]
+    steps = np.linspace(0.0, 1.0, POLE_PIECES + 1)
+    away = smallest * np.sinh(steps * np.arcsinh(1.0 / smallest))
+    both = np.concatenate((closest[:, None] - away[:, :0:-1], closest[:, None] + away), axis=1)
+    borders: Floats = np.clip(both, 0.0, 1.0)
+    return borders
+
+
+def _borders(path: Path, element: Ints, curve: bool, given: Floats | None) -> tuple[Floats, Floats]:
     """Parameters that divide elements, and the shares of their length between them."""
     if not curve:
-        borders = np.tile(np.linspace(0.0, 1.0, PIECES + 1), (len(element), 1))
+        borders = np.tile(np.linspace(0.0, 1.0, PIECES + 1), (len(element), 1)) if given is None else given
         return borders, np.diff(borders, axis=1)
     half = (path.span[element, 0] > 0.0).astype(np.int64)
     corners = path.corners
     if corners is None:
         raise ValueError("a direct path has no curves")
     tip, _ = halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
-    borders = halves.pieces(half)
+    borders = halves.pieces(half) if given is None else given
     lengths = halves.piece_lengths(tip, borders)
     return borders, lengths / lengths.sum(axis=1, keepdims=True)
 
 
-def _judge(path: Path, element: Ints, borders: Floats, item: AxisLimits) -> tuple[Floats, Floats]:
+def _judge(element: Ints, borders: Floats, orders: Orders, bounds: Floats) -> tuple[Floats, Floats]:
     """Bounds of v² (g, p) and coefficients (5, g, p) from samples at the ends and in the middle of every piece."""
     middles = 0.5 * (borders[:, 1:] + borders[:, :-1])
     share = np.concatenate((borders, middles), axis=1)
-    found = derivatives(path, np.repeat(element, share.shape[1]), share.ravel(), item.position)
+    found = orders(np.repeat(element, share.shape[1]), share.ravel())
     one, two, three = _largest(found, share.shape, middles.shape[1])
-    speed, accel, jerk = item.speed, item.accel, item.jerk
+    speed, accel, jerk = bounds
     with np.errstate(divide="ignore"):
         steady = np.minimum(np.minimum((speed / one) ** 2, accel / two), np.cbrt(jerk / three) ** 2)
     rows = np.stack((0.5 * one / accel, two / accel, one / jerk, 1.5 * two / jerk, three / jerk))
-    return steady, rows
+    return steady.min(axis=-1), rows.max(axis=-1)
 
 
-def _largest(vector: Derivatives, shape: tuple[int, ...], pieces: int) -> list[Floats]:
-    """Largest values in every piece; not at an end where the tip comes to a stand and they are infinite."""
+def _largest(orders: tuple[Floats, Floats, Floats], shape: tuple[int, ...], pieces: int) -> list[Floats]:
+    """Largest values (g, p, d) in every piece; not at an end where the tip comes to a stand and they are infinite."""
     largest = []
-    for order in vector:
-        values = order.reshape(shape)
+    for order in orders:
+        values = order.reshape(*shape, -1)
         values = np.where(np.isfinite(values), values, 0.0)
         ends, middles = values[:, : pieces + 1], values[:, pieces + 1 :]
         largest.append(np.maximum(np.maximum(ends[:, 1:], ends[:, :-1]), middles))

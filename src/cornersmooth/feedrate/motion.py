@@ -42,6 +42,17 @@ def derivatives(path: Path, element: Ints, share: Floats, position: Callable[[Fl
     Derivatives
         Per mm, mm², mm³; per rad where the tip stands still; infinite where it comes to a stand.
     """
+    tip, axis, speed = jets_along(path, element, share)
+    with np.errstate(over="ignore", invalid="ignore"):  # the tip comes to a stand
+        found = [norm(order) for order in jets.by_way(position(tip, axis), speed)]
+    return Derivatives(*(np.where(np.isfinite(order), order, np.inf) for order in found))
+
+
+def jets_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
+    """Jets of tip and unit tool axis, (4, m, 3) each, and of the speed of the coordinate, (3, m).
+
+    By the place on each element, which is `share` as in `derivatives`.
+    """
     count = len(element)
     tip, lever, speed = np.zeros((jets.ORDERS, count, 3)), np.zeros((jets.ORDERS, count, 3)), np.zeros((3, count))
     kind = path.kind[element]
@@ -51,9 +62,7 @@ def derivatives(path: Path, element: Ints, share: Floats, position: Callable[[Fl
     rows = np.flatnonzero(kind != Kind.CURVE)
     if len(rows):
         tip[:, rows], lever[:, rows], speed[:, rows] = _lines(path, element[rows], share[rows])
-    with np.errstate(over="ignore", invalid="ignore"):  # the tip comes to a stand
-        found = [norm(order) for order in jets.by_way(position(tip, jets.normalised(lever)), speed)]
-    return Derivatives(*(np.where(np.isfinite(order), order, np.inf) for order in found))
+    return tip, jets.normalised(lever), speed
 
 
 def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Floats]:
@@ -72,6 +81,8 @@ def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Float
                 around[k] += _BINOMIALS[k, power] * shifts[power - k][:, None] * curve[:, power]
         curves.append(jets.divide(around[..., :3], around[..., 3:]))
     tip, axis_point = curves
+    lever = axis_point - tip
+    tip[0] += path.program.tip[corners.pose[path.corner[element]]]  # halves are relative to the corner
     gone = jets.derivative(tip)
     squared = jets.dot(gone, gone)
     turning = path.turning[element]
@@ -82,7 +93,7 @@ def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Float
     speed[0, ~moving] = _NO_SPEED
     speed[:, turning] = 0.0
     speed[0, turning] = path.length[element[turning]]
-    return tip, axis_point - tip, speed
+    return tip, lever, speed
 
 
 def _lines(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
@@ -96,6 +107,7 @@ def _lines(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Fl
     fraction, axis_fraction = span[:, :1] + share[:, None] * part, axis_span[:, :1] + share[:, None] * axis_part
     tip = np.zeros((jets.ORDERS, len(element), 3))
     lever = tip.copy()
+    tip[0] = program.tip[start] + fraction * step
     tip[1] = part * step
     lever[0] = (
         path.settings.axis_length * program.axis[start] + axis_fraction * turn + (axis_fraction - fraction) * step

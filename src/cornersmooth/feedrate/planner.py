@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -11,9 +12,11 @@ from cornersmooth.feedrate import lookahead, scurve
 from cornersmooth.feedrate.caps import Caps, speed_caps
 from cornersmooth.feedrate.demands import AxisLimits, Demands, find_demands
 from cornersmooth.feedrate.grid import Grid, Resolution, cell_intervals, make_grid
+from cornersmooth.feedrate.joints import follow
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
+from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
 from cornersmooth.settings import Settings
 
@@ -26,6 +29,7 @@ def plan(
     limits: Limits | None = None,
     *,
     axes: Sequence[AxisLimits] = (),
+    machine: Machine | None = None,
     resolution: Resolution | None = None,
     progress: Progress | None = None,
 ) -> TimeLaw:
@@ -42,6 +46,8 @@ def plan(
     limits : Limits, optional
     axes : sequence of AxisLimits, optional
         Limits of axes whose position is a function of tip and tool axis.
+    machine : Machine, optional
+        Keep the limits of its five axes.
     resolution : Resolution, optional
         How fine the cells are that the speed is planned in.
     progress : callable, optional
@@ -50,11 +56,13 @@ def plan(
     Raises
     ------
     SettingsError
-        A feed move has no feed in mm/min and `Limits.feed` is not given.
+        A feed move has no feed in mm/min and `Limits.feed` is not given, or the machine has no dynamics.
+    InputError
+        The machine does not reach a tool axis.
     """
     limits = Limits() if limits is None else limits
     path = build_path(smooth_program.program, smooth_program.corners, smooth_program.settings, limits)
-    return plan_path(path, limits, axes=axes, resolution=resolution, progress=progress)
+    return plan_path(path, limits, axes=axes, machine=machine, resolution=resolution, progress=progress)
 
 
 def direct(
@@ -63,6 +71,7 @@ def direct(
     baseline: Baseline = "exact_stop",
     *,
     settings: Settings | None = None,
+    machine: Machine | None = None,
     resolution: Resolution | None = None,
     progress: Progress | None = None,
 ) -> TimeLaw:
@@ -77,16 +86,20 @@ def direct(
         that is a speed of at most ``accel · period / (2·sin(α/2))``.
     settings : Settings, optional
         Says which repeated poses are one.
+    machine : Machine, optional
+        Keep the limits of its five axes; at corners none jumps by more than its acceleration allows in one period.
 
     Raises
     ------
     SettingsError
-        A feed move has no feed in mm/min and `Limits.feed` is not given.
+        A feed move has no feed in mm/min and `Limits.feed` is not given, or the machine has no dynamics.
+    InputError
+        The machine does not reach a tool axis.
     """
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings
     path = build_path(program, None, settings, limits, stop_everywhere=baseline == "exact_stop")
-    return plan_path(path, limits, resolution=resolution, progress=progress)
+    return plan_path(path, limits, machine=machine, resolution=resolution, progress=progress)
 
 
 def plan_path(
@@ -94,10 +107,14 @@ def plan_path(
     limits: Limits,
     *,
     axes: Sequence[AxisLimits] = (),
+    machine: Machine | None = None,
     resolution: Resolution | None = None,
     progress: Progress | None = None,
 ) -> TimeLaw:
     """Plan the motion along any path."""
+    joints = None if machine is None else follow(machine, path)
+    if joints is not None:
+        path = replace(path, joint=np.minimum(path.joint, joints.jump_speeds(limits.period)))
     caps = speed_caps(path, limits)
     runs = len(caps.run) - 1
     lead = caps.element[:-1]  # first element of each run
@@ -112,7 +129,7 @@ def plan_path(
         level = lowest == highest
     else:
         level = np.zeros(0, np.bool_)
-    demands = find_demands(path, limits, caps, axes)
+    demands = find_demands(path, limits, caps, axes, joints)
     if demands is not None and runs:
         level &= ~_demanding(demands, accel, jerk, lowest)
     parts = [_level_runs(caps, np.flatnonzero(level), accel, jerk)]
@@ -134,6 +151,7 @@ def plan_path(
         path=path,
         limits=limits,
         edge=np.concatenate(([0.0], np.cumsum(path.length))),
+        joints=joints,
     )
 
 

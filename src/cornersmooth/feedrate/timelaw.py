@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.feedrate import arcs, halves
+from cornersmooth.feedrate.joints import Joints
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Kind, Path, line_axes
 from cornersmooth.model import Bools, Floats, Ints
@@ -68,6 +69,8 @@ class TimeLaw:
     limits : Limits
     edge : (m + 1,) float64
         Path coordinate of the elements' ends.
+    joints : Joints or None
+        The axes of the machine that it was planned for.
     """
 
     time: Floats
@@ -79,6 +82,7 @@ class TimeLaw:
     path: Path
     limits: Limits
     edge: Floats
+    joints: Joints | None = None
 
     @property
     def total(self) -> float:
@@ -151,6 +155,29 @@ class TimeLaw:
         line = path.program.line[path.move[element]]
         return States(t, s, v, a, j, np.where(turning, 0.0, kappa * v * v), turning, line, tip, axis)
 
+    def axes_at(self, t: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Position, speed, acceleration and jerk (m, 5) of the machine's axes at times t (m,), in mm, degrees and s.
+
+        From exact derivatives. On transitions of `zhang2016` the axis point is taken at the parameter of the tip.
+
+        Raises
+        ------
+        ValueError
+            The law was not planned for a machine.
+        """
+        if self.joints is None:
+            raise ValueError("the law was not planned for a machine")
+        x, v, a, j = (order[:, None] for order in self.kinematics(t))
+        path = self.path
+        if not len(path):
+            return (np.zeros((len(x), 5)),) * 4
+        element = np.clip(np.searchsorted(self.edge, x[:, 0], side="right") - 1, 0, len(path) - 1)
+        local = np.clip(x[:, 0] - self.edge[element], 0.0, path.length[element])
+        q, one, two, three = self.joints.orders(element, places(path, element, local))
+        # a tip that comes to a stand has no derivatives by its way
+        one, two, three = (np.where(np.isfinite(order), order, 0.0) for order in (one, two, three))
+        return q, one * v, two * v * v + one * a, three * v**3 + 3.0 * two * v * a + one * j
+
     def every_period(self) -> Floats:
         """Times at the multiples of the interpolation period, and the end, s."""
         period = self.limits.period
@@ -211,6 +238,20 @@ def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats, Flo
         kappa[rows[bow]] = arcs.curvature(program, end[bow])
     axis[rows] = line_axes(program, path.settings.axis_length, start, end, fraction, axis_fraction)
     return tip, axis, kappa
+
+
+def places(path: Path, element: Ints, local: Floats) -> Floats:
+    """Where (m,) a coordinate `local` from each element's start lies: share of the length, or parameter t on curves."""
+    share = local / np.maximum(path.length[element], np.finfo(np.float64).tiny)
+    corners = path.corners
+    rows = np.flatnonzero((path.kind[element] == Kind.CURVE) & ~path.turning[element])
+    if corners is not None and len(rows):
+        distinct, which = np.unique(element[rows], return_inverse=True)
+        half = (path.span[distinct, 0] > 0.0).astype(np.int64)
+        height = path.settings.axis_length
+        tip_half, _ = halves.corner_halves(path.program, corners, path.corner[distinct], half, height)
+        share[rows] = halves.parameters_at(tip_half, half, which, local[rows])
+    return share
 
 
 def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:

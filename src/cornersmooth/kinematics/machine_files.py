@@ -61,9 +61,9 @@ def parse_machine(text: str, *, file: str = "<machine>", name: str = "machine") 
     ----------
     text : str
         Keys: ``name``, ``description``, ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``part_zero``
-        and two tables ``[[axis]]`` with ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``; and for the
-        planning of the time tables ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min or
-        deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which may be left out.
+        and two tables ``[[axis]]`` with ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``; and
+        for the planning of the time tables ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min
+        or deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which may be left out.
     file : str
         For messages.
     name : str

@@ -1,0 +1,269 @@
+"""The five axes of a machine along a path: their positions with exact derivatives, and their limits.
+
+With rotary axes a₁ (nearest to the part) and a₂ the tool axis is k = R₁R₂k₀. At the rates ω₁ and ω₂ it moves with
+k′ = ω₁·a₁×k + ω₂·b×k, where b = R₁a₂. The product with b gives ω₁ = k′·b / ((a₁×k)·b), what is left gives ω₂, and
+b′ = ω₁·a₁×b: coefficient by coefficient these make the jets of the angles on either solution and for any two axes, and
+sines, cosines and turns of them make those of the linear axes.
+
+At the pole (a₁×k)·b vanishes. Within the cone in which a control may turn the first axis ahead of time
+(`cornersmooth.kinematics.route`) it is taken as at the edge of the cone: rates stay finite and the plan slows down.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.feedrate import jets
+from cornersmooth.feedrate.motion import jets_along
+from cornersmooth.feedrate.path import NO_TURN, Kind, Path
+from cornersmooth.kinematics import Machine, rapid_moves, rotary_angles, solutions
+from cornersmooth.kinematics.orientation import angle_between, continued
+from cornersmooth.model import Bools, Floats, Ints
+
+#: an element whose axis comes nearer to the pole than so many times its own turn is looked at closely there
+NEAR_POLE = 5.0
+#: places at which such an element is searched for its nearest point to the pole, and rounds of closer search
+_SEARCHED, _ROUNDS = 17, 4
+#: rotary angles may lie beyond the reach by so many times the cone: as many as `rotary_angles` lets pass
+_CONES = 2.0
+
+
+@dataclass(frozen=True)
+class Joints:
+    """The motion of a machine's axes along a path: X, Y, Z in mm, then the two rotary axes in degrees.
+
+    Parameters
+    ----------
+    machine : Machine
+    path : Path
+    angles : (n, 2) float64, degrees
+        Rotary angles at the poses of the program.
+    branch : (n,) int64
+        Solution that a move into a pose is on; -1 where it passes from one to the other.
+    cone : float, degrees
+    """
+
+    machine: Machine
+    path: Path
+    angles: Floats
+    branch: Ints
+    cone: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Addresses of the five axes."""
+        return ("X", "Y", "Z", *self.machine.names)
+
+    @property
+    def limits(self) -> Floats:
+        """(3, 5) speed, acceleration and jerk per s, s² and s³; inf for none."""
+        given = {item.name: item.per_second for item in self.machine.dynamics}
+        return np.array([given.get(name, (math.inf,) * 3) for name in self.names]).T
+
+    def orders(self, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Positions (m, 5) of the axes and their first three derivatives by the path coordinate.
+
+        Parameters
+        ----------
+        element : (m,) int64
+        share : (m,) float64
+            Place on each element as in `motion.derivatives`; infinite derivatives where the tip comes to a stand.
+        """
+        tip, axis, speed = jets_along(self.path, element, share)
+        position = self.positions(element, share, tip, axis)
+        with np.errstate(over="ignore", invalid="ignore"):
+            one, two, three = jets.by_way(position, speed)
+        one, two, three = (np.where(np.isfinite(order), order, np.inf) for order in (one, two, three))
+        return position[0], one, two, three
+
+    def positions(self, element: Ints, share: Floats, tip: Floats, axis: Floats) -> Floats:
+        """Jets (4, m, 5) of the axes from those of tip and tool axis, (4, m, 3) each."""
+        path = self.path
+        start, end = path.start[element], path.move[element]
+        part = _fractions(path, element, share)[:, None]
+        whole = self.angles[end] - self.angles[start]
+        guess = self.angles[start] + part * whole
+        value, _ = continued(self.machine, axis[0], guess, self.branch[end], self.cone)
+        rapid = path.rapid[element]
+        value[rapid] = guess[rapid]
+        turning = self._angle_jets(axis, np.radians(value))
+        # in a rapid all axes run evenly, back by whole turns too
+        turning[1:, rapid] = 0.0
+        turning[1, rapid] = np.radians(whole[rapid])
+        return np.concatenate((_linear_jets(self.machine, tip, turning), np.degrees(turning)), axis=-1)
+
+    def _angle_jets(self, axis: Floats, value: Floats) -> Floats:
+        """Jets (4, m, 2) of the rotary angles, rad."""
+        first, second = self.machine.axes
+        about = first.unit
+        gone = jets.derivative(axis)
+        b = np.zeros_like(axis)
+        b[0] = _turned(first.unit, _waves(first.sign * value[None, :, 0]), second.unit[None, None])[0]
+        smallest = math.sin(math.radians(self.cone)) * float(np.linalg.norm(np.cross(about, second.unit)))
+        lever = np.cross(about, axis)
+        rate = np.zeros((jets.ORDERS - 1, len(value)))
+        for k in range(jets.ORDERS - 1):
+            size = jets.dot(lever[: k + 1], b[: k + 1])
+            inside = np.abs(size[0]) < smallest
+            size[0] = np.where(inside, np.where(size[0] < 0.0, -smallest, smallest), size[0])
+            size[1:, inside] = 0.0
+            rate[k] = jets.divide(jets.dot(gone[: k + 1], b[: k + 1]), size)[k]
+            b[k + 1] = jets.multiply(rate[: k + 1, :, None], np.cross(about, b[: k + 1]))[k] / (k + 1)
+        rest = gone - jets.multiply(rate[..., None], lever[: len(rate)])
+        across = np.cross(b, axis)[: len(rate)]
+        other = jets.divide(jets.dot(rest, across), jets.dot(across, across))
+        found = np.zeros((jets.ORDERS, len(value), 2))
+        found[0] = value
+        order = np.arange(1, jets.ORDERS)[:, None]
+        found[1:, :, 0] = first.sign * rate / order
+        found[1:, :, 1] = second.sign * other / order
+        return found
+
+    def jump_speeds(self, accel_time: float) -> Floats:
+        """Speeds (m + 1,) at which sharp corners ask no axis for more than its acceleration allows in this time.
+
+        One at the start of every element and one at the end of the last; inf where nothing changes at once.
+        """
+        path = self.path
+        found = np.full(len(path) + 1, np.inf)
+        sharp = np.flatnonzero(np.isfinite(path.joint) & (path.joint > 0.0))
+        if len(sharp):
+            sides = [
+                self.orders(sharp + shift, np.full(len(sharp), share))[1] for shift, share in ((-1, 1.0), (0, 0.0))
+            ]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                allowed = self.limits[1] * accel_time / np.abs(sides[1] - sides[0])
+            found[sharp] = np.where(np.isnan(allowed), np.inf, allowed).min(axis=1)
+        return found
+
+    def near_pole(self) -> Bools:
+        """(m,) bool: elements on which the first rotary axis may turn fast over a small part of the length."""
+        path = self.path
+        axis = path.program.axis
+        start, end = path.start, path.move
+        turn = angle_between(axis[start], axis[end])
+        distance = solutions(self.machine, axis).pole_distance
+        near = np.minimum(distance[start], distance[end]) <= NEAR_POLE * turn
+        found: Bools = near & (turn > np.degrees(NO_TURN)) & ~path.rapid
+        return found
+
+    def closest(self, element: Ints) -> tuple[Floats, Floats]:
+        """Shares (m,) at which the axis is nearest to the pole on these elements, and how far (m,) it is felt there."""
+        about = self.machine.axes[0].unit
+        low, high = np.zeros(len(element)), np.ones(len(element))
+        rows = np.arange(len(element))
+        for _ in range(_ROUNDS):
+            share = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _SEARCHED)
+            _, axis, _ = jets_along(self.path, np.repeat(element, _SEARCHED), share.ravel())
+            aside = np.linalg.norm(np.cross(about, axis[0]), axis=-1).reshape(share.shape)
+            speed = np.linalg.norm(axis[1], axis=-1).reshape(share.shape)
+            at = aside.argmin(axis=1)
+            low, high = share[rows, np.maximum(at - 1, 0)], share[rows, np.minimum(at + 1, _SEARCHED - 1)]
+        distance = np.maximum(aside[rows, at], math.sin(math.radians(self.cone)))
+        felt: Floats = np.minimum(distance / np.maximum(speed[rows, at], distance), 1.0)
+        return share[rows, at], felt
+
+
+def follow(machine: Machine, path: Path) -> Joints:
+    """Rotary solutions along a path.
+
+    Raises
+    ------
+    InputError
+        The machine does not reach a tool axis, or not within the limits of its rotary axes.
+    SettingsError
+        The machine has no dynamics.
+    """
+    if not machine.dynamics:
+        raise SettingsError(
+            "CS263",
+            f"machine {machine.name} does not say how fast its axes may go",
+            "add [dynamics.X] with velocity, acceleration and jerk to its file, and the same for the other axes",
+        )
+    program, settings = path.program, path.settings
+    tolerance = math.degrees(settings.tolerance / settings.axis_length)
+    cone = tolerance / _CONES
+    rapid = rapid_moves(program.kind)
+    found = rotary_angles(
+        machine,
+        program.tip,
+        program.axis,
+        tolerance=tolerance,
+        rapid=rapid,
+        line=program.line,
+        file=program.source.name,
+    )
+    _, own = continued(machine, program.axis, found.angles, np.full(len(program), -1), cone)
+    branch = np.full(len(program), -1, np.int64)
+    start, end = path.start, path.move
+    one, other = own[start], own[end]
+    branch[end] = np.where(one == other, one, np.where(one < 0, other, np.where(other < 0, one, -1)))
+    return Joints(machine, path, found.angles, branch, cone)
+
+
+def _fractions(path: Path, element: Ints, share: Floats) -> Floats:
+    """Part of its move (m,) at which each place on an element lies, as good as a guess of angles needs it."""
+    span = path.span[element]
+    part = span[:, 0] + share * (span[:, 1] - span[:, 0])
+    curve = path.kind[element] == Kind.CURVE
+    corners = path.corners
+    if corners is not None and curve.any():
+        row = path.corner[element[curve]]
+        leaving = span[curve, 0] > 0.0
+        t = share[curve]
+        out, into = corners.axis_trim_out[row] * t, 1.0 - corners.axis_trim_in[row] * (1.0 - t)
+        part[curve] = np.where(leaving, out, into)
+    return part
+
+
+def _waves(angle: Floats) -> tuple[Floats, Floats]:
+    """Jets of cosine and sine of a jet: c′ = −s·q′, s′ = c·q′."""
+    cosine, sine = np.zeros_like(angle), np.zeros_like(angle)
+    cosine[0], sine[0] = np.cos(angle[0]), np.sin(angle[0])
+    for k in range(len(angle) - 1):
+        gone = jets.derivative(angle)[: k + 1]
+        cosine[k + 1] = -jets.multiply(sine[: k + 1], gone)[k] / (k + 1)
+        sine[k + 1] = jets.multiply(cosine[: k + 1], gone)[k] / (k + 1)
+    return cosine, sine
+
+
+def _turned(direction: Floats, waves: tuple[Floats, Floats], vectors: Floats) -> Floats:
+    """Jets of vectors turned about a unit direction (Rodrigues) by an angle given by its cosine and sine."""
+    cosine, sine = waves
+    along = (vectors @ direction)[..., None] * direction
+    found: Floats = along + (
+        jets.multiply(cosine[..., None], vectors - along) + jets.multiply(sine[..., None], np.cross(direction, vectors))
+    )
+    return found
+
+
+def _linear_jets(machine: Machine, tip: Floats, angles: Floats) -> Floats:
+    """Jets (4, m, 3) of `cornersmooth.kinematics.machine_position`."""
+    waves = [_waves(axis.sign * angles[..., index]) for index, axis in enumerate(machine.axes)]
+    zero = np.array(machine.part_zero)
+    position = tip.copy()
+    position[0] += zero
+    swing = np.zeros_like(tip)
+    for index, axis in enumerate(machine.axes):
+        if axis.carrier == "table":
+            cosine, sine = waves[index]
+            position = _about(axis.unit, np.array(axis.point), (cosine, -sine), position)
+    for index in (1, 0):
+        axis = machine.axes[index]
+        if axis.carrier == "head":
+            point = machine.tool_length * machine.tool + np.array(axis.point)
+            swing = _about(axis.unit, point, waves[index], swing)
+    position[0] -= zero
+    return position - swing
+
+
+def _about(direction: Floats, point: Floats, waves: tuple[Floats, Floats], points: Floats) -> Floats:
+    arm = points.copy()
+    arm[0] -= point
+    turned = _turned(direction, waves, arm)
+    turned[0] += point
+    return turned
