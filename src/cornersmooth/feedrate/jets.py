@@ -49,6 +49,12 @@ def dot(a: Floats, b: Floats) -> Floats:
     return product
 
 
+def cross(a: Floats, b: Floats) -> Floats:
+    """Vector product of two jets of vectors along the last axis."""
+    orders = min(len(a), len(b))
+    return np.stack([sum(np.cross(a[i], b[k - i]) for i in range(k + 1)) for k in range(orders)])
+
+
 def normalised(a: Floats) -> Floats:
     """Jet of vectors over their lengths."""
     return divide(a, root(dot(a, a))[..., None])

@@ -114,7 +114,7 @@ class Joints:
             rate[k] = jets.divide(jets.dot(gone[: k + 1], b[: k + 1]), size)[k]
             b[k + 1] = jets.multiply(rate[: k + 1, :, None], np.cross(about, b[: k + 1]))[k] / (k + 1)
         rest = gone - jets.multiply(rate[..., None], lever[: len(rate)])
-        across = np.cross(b, axis)[: len(rate)]
+        across = jets.cross(b, axis)[: len(rate)]
         other = jets.divide(jets.dot(rest, across), jets.dot(across, across))
         found = np.zeros((jets.ORDERS, len(value), 2))
         found[0] = value

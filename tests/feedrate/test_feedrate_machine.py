@@ -1,0 +1,225 @@
+"""Limits of the axes of a machine, measured from poses over time and the machine's kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path as FilePath
+
+import numpy as np
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.feedrate import Limits, direct, plan
+from cornersmooth.feedrate.joints import Joints, follow
+from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.timelaw import TimeLaw, places, poses
+from cornersmooth.kinematics import Dynamics, Machine, load_machine, machine_position, solutions, tool_axis
+from cornersmooth.model import Floats, Ints, Move, Program
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+
+MACHINES = ("table-ac", "head-ac", "nutated-bc", "xyzbc-trt", "head-table-bc")
+IMPELLER = FilePath(__file__).resolve().parents[2] / "samples" / "impeller.cls"
+STEP = 2e-4  # s
+#: overshoot of differences over time where the jerk has a step
+JUMPS = 12
+
+
+def offset(machine: Machine) -> Machine:
+    """The same machine with axes that miss the zero of the part, so that every axis has to move."""
+    first, second = machine.axes
+    return replace(
+        machine,
+        axes=(replace(first, point=(20.0, -15.0, 5.0)), replace(second, point=(-4.0, 30.0, -60.0))),
+        part_zero=(70.0, 40.0, 10.0),
+    )
+
+
+def observed(law: TimeLaw) -> tuple[Floats, Floats]:
+    """Times, and positions (m, 5) by the solution nearest to the one before: nothing of it is the planner's."""
+    assert law.joints is not None
+    machine = law.joints.machine
+    t = np.arange(0.0, law.total, STEP)
+    states = law.at(t)
+    near = solutions(machine, states.axis).angles
+    angles = np.empty((len(t), 2))
+    before = law.joints.angles[law.path.start[0]]
+    for i, both in enumerate(near):
+        turned = both + 360.0 * np.round((before - both) / 360.0)
+        before = angles[i] = turned[np.abs(turned - before).sum(axis=1).argmin()]
+    return t, np.concatenate((machine_position(machine, states.tip, angles), angles), axis=1)
+
+
+def used(law: TimeLaw, outliers: int = JUMPS) -> Floats:
+    """(3, 5) largest differences over time over the limits."""
+    assert law.joints is not None
+    _, q = observed(law)
+    found = [np.sort(np.abs(np.diff(q, n=k, axis=0)), axis=0) / STEP**k for k in (1, 2, 3)]
+    return np.stack((found[0][-1], found[1][-1], found[2][-1 - outliers])) / law.joints.limits
+
+
+def paths(program: Program, machine: Machine, settings: Settings) -> tuple[Path, Joints]:
+    smoothed = smooth(program, settings)
+    path = build_path(smoothed.program, smoothed.corners, smoothed.settings, Limits())
+    return path, follow(machine, path)
+
+
+def tilted(program: Program) -> Program:
+    """The program with its tool axis leaning away from the pole."""
+    return Program.from_poses(program.tip, program.axis + [0.5, 0.3, 0.0], feed=program.feed)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_derivatives_are_those_of_the_kinematics(chain: Callable[[int], Program], name: str) -> None:
+    machine = offset(load_machine(name))
+    path, joints = paths(tilted(chain(2)), machine, Settings(tolerance=0.05, weights=(0.8, 1.7)))
+    for kind, size in ((0, 0.02), (1, 0.01)):
+        for element in np.flatnonzero((path.kind == kind) & ~path.turning)[2:8]:
+            h = size * path.length[element]
+            way = 0.4 * path.length[element] + h * np.arange(-3, 4)
+            same: Ints = np.full(7, element)
+            tip, axis, _ = poses(path, same, way)
+            q, one, two, three = joints.orders(same, places(path, same, way))
+            assert tool_axis(machine, q[:, 3:]) == pytest.approx(axis, abs=1e-12)
+            assert machine_position(machine, tip, q[:, 3:]) == pytest.approx(q[:, :3], abs=1e-9)
+            for order, of in ((one, q), (two, one), (three, two)):
+                found = (-of[0] + 9 * of[1] - 45 * of[2] + 45 * of[4] - 9 * of[5] + of[6]) / (60 * h)
+                assert order[3] == pytest.approx(found, rel=1e-5, abs=1e-6 * np.abs(order).max()), (kind, element)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("seed", [1, 2, 5])
+def test_limits_hold_on_random_chains(chain: Callable[[int], Program], name: str, seed: int) -> None:
+    law = plan(
+        smooth(tilted(chain(seed)), Settings(tolerance=0.05)),
+        Limits(vector_jerk=2e5),
+        machine=offset(load_machine(name)),
+    )
+    peaks = used(law)
+    assert peaks[0].max() <= 1.001
+    assert peaks[1].max() <= 1.001
+    assert peaks[2].max() <= 1.005
+    assert peaks.max() > 0.9  # a limit is used, not only kept
+
+
+def test_limits_hold_on_the_fan(corpus: FilePath) -> None:
+    name = "hust_5x_toolpath_fan.txt"
+    program = read((corpus / name).read_bytes(), name=name, units="mm")
+    smoothed = smooth(program, Settings(tolerance=0.02, axis_length=50.0))
+    limits = Limits(feed=3000.0, accel=300.0, jerk=3000.0, period=0.001)
+    law = plan(smoothed, limits, machine=load_machine("table-ac"))
+    peaks = used(law)
+    assert peaks[:2].max() <= 1.001
+    assert 0.95 < peaks[2].max() <= 1.005
+    assert law.total > plan(smoothed, limits).total
+
+
+@pytest.mark.parametrize("name", ["table-ac", "head-ac"])
+def test_limits_hold_on_the_impeller(name: str) -> None:
+    """At every period, from the exact derivatives, which the test above holds against the kinematics."""
+    program = read(IMPELLER.read_bytes(), name=IMPELLER.name)
+    law = plan(smooth(program, Settings()), machine=load_machine(name))
+    assert law.joints is not None
+    _, *orders = law.axes_at(law.every_period())
+    peaks = np.stack([np.abs(order).max(axis=0) for order in orders]) / law.joints.limits
+    assert peaks[:2].max() <= 1.001
+    assert peaks[2].max() <= 1.005
+    assert peaks.max() > 0.9
+
+
+@pytest.mark.parametrize("aside", [0.3, 0.03, 0.003, 0.001])
+def test_passing_the_pole(aside: float) -> None:
+    """The nearer, the more the first axis slows the motion down; its speed is what limits it."""
+    lean = np.linspace(-0.2, 0.2, 9)
+    axis = np.stack((np.sin(lean), np.full(9, aside), np.cos(lean)), axis=1)
+    tip = np.stack((np.linspace(0.0, 40.0, 9), np.sin(np.linspace(0.0, 3.0, 9)), np.zeros(9)), axis=1)
+    smoothed = smooth(Program.from_poses(tip, axis, feed=3000.0), Settings())
+    law = plan(smoothed, machine=load_machine("table-ac"))
+    peaks = used(law)
+    assert peaks[:2].max() <= 1.001
+    assert peaks[2].max() <= 1.005
+    if aside < 0.1:
+        turn = np.degrees(2.0 * np.arctan(0.2 / aside))
+        assert law.total > turn / 180.0  # the way of C at its largest speed
+        assert law.total < turn / 180.0 + 3.0
+
+
+def test_through_the_pole_and_at_it(recwarn: pytest.WarningsRecorder) -> None:
+    """Straight through, the other solution goes on without a turn; a tool that stands upright turns nothing."""
+    tip = np.stack((np.linspace(0.0, 40.0, 9), np.zeros(9), np.zeros(9)), axis=1)
+    for lean in (np.linspace(-0.2, 0.2, 9), np.zeros(9)):
+        axis = np.stack((np.sin(lean), np.zeros(9), np.cos(lean)), axis=1)
+        smoothed = smooth(Program.from_poses(tip, axis, feed=3000.0), Settings())
+        law = plan(smoothed, machine=load_machine("table-ac"))
+        assert np.isfinite(law.total)
+        assert law.total == pytest.approx(plan(smoothed).total, rel=0.01)
+    # 1e-5 rad beside it the control may turn ahead of time: slower, but it neither stops for good nor divides by zero
+    lean = np.linspace(-0.2, 0.2, 9)
+    axis = np.stack((np.sin(lean), np.full(9, 1e-5), np.cos(lean)), axis=1)
+    law = plan(smooth(Program.from_poses(tip, axis, feed=3000.0), Settings()), machine=load_machine("table-ac"))
+    assert law.total < 5.0
+    assert all(np.isfinite(values).all() for values in law.axes_at(law.every_period()))
+    assert not recwarn.list
+
+
+def test_generous_limits_cost_nothing(chain: Callable[[int], Program]) -> None:
+    machine = load_machine("table-ac")
+    generous = replace(machine, dynamics=tuple(Dynamics(item.name, 1e12, 1e12, 1e12) for item in machine.dynamics))
+    for seed in (1, 2, 3):
+        program = chain(seed)
+        smoothed = smooth(program, Settings(tolerance=0.05))
+        assert plan(smoothed, machine=generous).total == pytest.approx(plan(smoothed).total, rel=2e-3)
+        for baseline in ("exact_stop", "velocity_jump"):
+            free = direct(program, None, baseline)  # type: ignore[arg-type]
+            bound = direct(program, None, baseline, machine=generous)  # type: ignore[arg-type]
+            assert bound.total == pytest.approx(free.total, rel=2e-3)
+
+
+def test_a_linear_axis_alone() -> None:
+    """Along X, with an upright tool, the limits of X are those of the path: times of an S-curve."""
+    program = Program.from_poses([[0, 0, 0], [50, 0, 0]], [[0, 0, 1]] * 2, feed=60000.0)
+    machine = replace(load_machine("table-ac"), dynamics=(Dynamics("X", 1800.0, 1000.0, 5000.0),))
+    smoothed = smooth(program, Settings())
+    law = plan(smoothed, Limits(accel=1e5, jerk=1e7), machine=machine)
+    assert law.total == pytest.approx(1.821586, rel=1e-3)
+    slow_y = replace(machine, dynamics=(Dynamics("Y", 1.0, 1.0, 1.0),))
+    assert plan(smoothed, machine=slow_y).total == pytest.approx(plan(smoothed).total, rel=1e-3)
+
+
+def test_a_rapid_takes_the_time_of_its_turn() -> None:
+    """C and A run evenly in a rapid: half a turn at 90 deg/s."""
+    kind = np.array([Move.RAPID, Move.RAPID], np.uint8)
+    axis = [[0.0, -0.5, 1.0], [0.0, 0.5, 1.0]]
+    program = Program.from_poses([[0, 0, 0], [1, 0, 0]], axis, kind=kind)
+    base = load_machine("table-ac")
+    first, second = base.axes
+    machine = replace(base, axes=(first, replace(second, limits=(0.0, 90.0))), dynamics=(Dynamics("C", 90.0 * 60.0),))
+    law = plan(smooth(program, Settings()), machine=machine)
+    assert law.total >= 2.0
+    assert law.total == pytest.approx(2.0, rel=0.25)
+    assert np.abs(law.axes_at(law.every_period())[1][:, 3]).max() <= 90.0 * 1.001
+
+
+def test_jumps_at_corners_keep_the_axes(chain: Callable[[int], Program]) -> None:
+    """No axis of the direct path jumps by more than its acceleration allows in one period."""
+    machine = offset(load_machine("table-ac"))
+    limits = Limits()
+    law = direct(tilted(chain(3)), limits, "velocity_jump", machine=machine)
+    corners = law.times_at(law.edge[1:-1])
+    before, after = (law.axes_at(corners + shift)[1] for shift in (-1e-9, 1e-9))
+    assert law.joints is not None
+    jumps = np.abs(after - before) / (law.joints.limits[1] * limits.period)
+    assert jumps.max() <= 1.001
+    assert jumps.max() > 0.5
+    assert law.total > direct(tilted(chain(3)), limits, "velocity_jump").total
+
+
+def test_refusals() -> None:
+    program = Program.from_poses([[0, 0, 0], [5, 0, 0]], [[0, 0, 1], [0, 0, -1]], feed=100.0)
+    smoothed = smooth(program, Settings())
+    with pytest.raises(InputError, match="its limit is"):
+        plan(smoothed, machine=load_machine("table-ac"))
+    with pytest.raises(SettingsError, match=r"does not say how fast its axes may go; add \[dynamics.X\]"):
+        plan(smoothed, machine=replace(load_machine("table-ac"), dynamics=()))
