@@ -83,7 +83,8 @@ def compile_baseline(folder: Path) -> Path:
 
 def compare(form: str, path: Path, folder: Path, programs: dict[str, Path], runs: int) -> None:
     """Time one output form and print its table."""
-    written = {name: folder / f"{name}-{form}.nc" for name in programs}
+    names = ("cornersmooth", "without verification", "baseline.c")
+    written = {name: folder / f"{number}-{form}.nc" for number, name in enumerate(names)}
     report = folder / "report.json"
     options: list[str | Path] = [
         "-e",
@@ -97,25 +98,31 @@ def compare(form: str, path: Path, folder: Path, programs: dict[str, Path], runs
         "--force",
         "-q",
     ]
+    smooth = [programs["cornersmooth"], "smooth", path, *options, "-o"]
     commands: dict[str, list[str | Path]] = {
-        "cornersmooth": [programs["cornersmooth"], "smooth", path, *options, "-o", written["cornersmooth"]],
+        "cornersmooth": [*smooth, written["cornersmooth"]],
+        "without verification": [*smooth, written["without verification"], "--no-verify"],
         "baseline.c": [programs["baseline.c"], path, written["baseline.c"], f"{TOLERANCE}", f"{AXIS_LENGTH}"],
     }
     if form == "g6.2":
         commands["baseline.c"].append("--g6.2")
     taken: dict[str, list[Run]] = {name: [] for name in commands}
+    seconds: dict[str, float] = {}
     for _ in range(runs):
         for name, command in commands.items():
             taken[name].append(run(command))
+            if name == "cornersmooth":
+                seconds = json.loads(report.read_text())["summary"]["seconds"]
 
     print(f"\n{form}: {'':17}    wall s   user+sys s   peak MB        lines")
     summary = {name: typical(one) for name, one in taken.items()}
     for name, one in summary.items():
         lines = count_lines(written[name])
         print(f"  {name:20}  {one.wall:8.2f}   {one.processor:10.2f}   {one.memory:7.0f}   {lines:10,}")
-    ours, plain = summary["cornersmooth"], summary["baseline.c"]
-    print(f"  {'ratio':20}  {ours.wall / plain.wall:8.2f}   {ours.processor / plain.processor:10.2f}")
-    seconds = json.loads(report.read_text())["summary"]["seconds"]
+    plain = summary["baseline.c"]
+    for name in names[:2]:
+        one = summary[name]
+        print(f"  {name + ', ratio':27} {one.wall / plain.wall:2.2f}   {one.processor / plain.processor:10.2f}")
     print("  stages of the last run: " + ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
 
 
