@@ -84,3 +84,46 @@ def test_shapes_leave_the_paper_alone(capsys: pytest.CaptureFixture[str]) -> Non
         seconds.append(json.loads(capsys.readouterr().out)["seconds"])
     assert seconds[0]["zhang2016"] == seconds[1]["zhang2016"]
     assert seconds[0]["proportional"] != seconds[1]["proportional"]
+
+
+def test_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Times grow, peaks keep the limits, and the axis columns of the CSV are those of the kinematics."""
+    from cornersmooth.kinematics import load_machine, machine_position, tool_axis
+
+    path = tmp_path / "motion.csv"
+    common = ["time", TABLE_1, *PAPER, "-e", "0.15", "--json"]
+    assert run(common) == 0
+    free = json.loads(capsys.readouterr().out)
+    assert run([*common, "--machine", "table-ac", "--csv", str(path)]) == 0
+    bound = json.loads(capsys.readouterr().out)
+    assert "axis_peaks" not in free
+    assert bound["machine"] == "table-ac"
+    for name, seconds in bound["seconds"].items():
+        assert seconds >= free["seconds"][name] * 0.999
+        assert set(bound["axis_peaks"][name]) == {"X", "Y", "Z", "A", "C"}
+        for peaks in bound["axis_peaks"][name].values():
+            for key in [key for key in peaks if not key.startswith("limit_")]:
+                assert peaks[key] <= peaks[f"limit_{key}"] * 1.005
+    assert bound["seconds"]["proportional"] > free["seconds"]["proportional"]
+    rows = list(csv.DictReader(io.StringIO(path.read_text())))
+    table = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    machine = load_machine("table-ac")
+    angles = np.column_stack((table["machine_c_deg"], table["machine_a_deg"]))
+    tip = np.column_stack((table["x_mm"], table["y_mm"], table["z_mm"]))
+    linear = np.column_stack([table[f"machine_{name}_mm"] for name in "xyz"])
+    assert tool_axis(machine, angles) == pytest.approx(np.column_stack((table["i"], table["j"], table["k"])), abs=1e-9)
+    assert machine_position(machine, tip, angles) == pytest.approx(linear, abs=1e-9)
+    assert run(["time", TABLE_1, *PAPER, "--machine", "table-ac"]) == 0
+    text = capsys.readouterr().out
+    assert "reached of the limits of table-ac, %" in text
+    assert "500 deg/s2" in text
+
+
+def test_machine_without_dynamics(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mill = tmp_path / "mill.toml"
+    mill.write_text(
+        '[[axis]]\nname = "C"\ncarrier = "table"\ndirection = [0, 0, 1]\n'
+        '[[axis]]\nname = "A"\ncarrier = "table"\ndirection = [1, 0, 0]\n'
+    )
+    assert run(["time", TABLE_1, *PAPER, "--machine", str(mill)]) == 2
+    assert "machine mill does not say how fast its axes may go; add [dynamics.X]" in capsys.readouterr().err

@@ -68,7 +68,7 @@ def paths(program: Program, machine: Machine, settings: Settings) -> tuple[Path,
 
 def tilted(program: Program) -> Program:
     """The program with its tool axis leaning away from the pole."""
-    return Program.from_poses(program.tip, program.axis + [0.5, 0.3, 0.0], feed=program.feed)
+    return Program.from_poses(program.tip, program.axis + np.array((0.5, 0.3, 0.0)), feed=program.feed)
 
 
 @pytest.mark.parametrize("name", MACHINES)

@@ -115,6 +115,13 @@ class Duration(click.ParamType[float]):
 )
 @click.option("--turn-accel", type=float, metavar="DEG/S2", help="Its acceleration. [default: no limit]")
 @click.option("--turn-jerk", type=float, metavar="DEG/S3", help="Its jerk. [default: no limit]")
+@click.option(
+    "--machine",
+    type=str,
+    metavar="NAME|FILE",
+    help="Keep the limits of this machine's five axes, too: a name that 'cornersmooth machines' lists (its numbers are "
+    "examples), or a TOML file with [dynamics.X] and so on.",
+)
 @options.shape
 @options.allocation
 @options.weights
@@ -142,6 +149,7 @@ def command(source: str, **given: Any) -> int:
       cornersmooth time part.cls -e 0.04
       cornersmooth time part.cls -e 0.04 --feed 1800 --accel 1000 --jerk 5000 --period 2ms --json
       cornersmooth time part.cls -e 0.04 --csv motion.csv --plot motion.svg
+      cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
     """
     form = _picture_form(given["plot"])
     for path in (given["csv"], given["plot"]):
@@ -180,15 +188,17 @@ def _picture_form(path: str | None) -> str:
 def _compare(source: str, given: dict[str, Any]) -> Comparison:
     from cornersmooth.cl import read
     from cornersmooth.feedrate import Limits, compare
+    from cornersmooth.kinematics import load_machine
     from cornersmooth.settings import Settings
 
+    machine = load_machine(given["machine"]) if given["machine"] else None
     limits = Limits(**{name: given[name] for name in _LIMITS})
     settings = Settings(**{name: given[name] for name in _SETTINGS})
     data, name = read_input(source)
     program = read(data, name=name, format=given["input_format"], **{key: given[key] for key in _READING})
     del data
     with progress_bar(given["quiet"]) as progress:
-        return compare(program, settings, limits, progress=progress)
+        return compare(program, settings, limits, machine=machine, progress=progress)
 
 
 def _tables(compared: Comparison) -> Iterator[str]:
@@ -215,6 +225,9 @@ def _tables(compared: Comparison) -> Iterator[str]:
             f"{_TITLES[name]:<24}{top.speed_mm_per_s:>12.3f}{top.accel_mm_per_s2:>12.1f}"
             f"{top.centripetal_mm_per_s2:>12.1f}{top.jerk_mm_per_s3:>14.1f}"
         )
+    if compared.machine is not None:
+        yield ""
+        yield from _axis_table(compared)
     for name in ("direct_velocity_jump", settings.method):
         yield ""
         yield f"where the time goes ({_TITLES[name]})"
@@ -224,3 +237,21 @@ def _tables(compared: Comparison) -> Iterator[str]:
                 f"{place.line:>8}{place.x:>12.3f}{place.y:>12.3f}{place.z:>12.3f}"
                 f"{place.seconds:>10.3f}{place.lost_seconds:>10.3f}{place.slowest_mm_per_s:>12.2f}"
             )
+
+
+def _axis_table(compared: Comparison) -> Iterator[str]:
+    """What each axis of the machine reaches of its speed, acceleration and jerk."""
+    from cornersmooth.feedrate import axis_peaks
+    from cornersmooth.kinematics.dynamics import LINEAR
+
+    machine = "" if compared.machine is None else compared.machine.name
+    found = {name: axis_peaks(law) for name, law in compared.laws.items()}
+    first = next(iter(found.values()))
+    yield f"reached of the limits of {machine}, %: speed, acceleration, jerk"
+    yield f"{'':<24}" + "".join(f"{peak.name:>17}" for peak in first)
+    for name, axes in found.items():
+        told = ("".join(f"{100.0 * used:>5.0f}" for used in peak.used) for peak in axes)
+        yield f"{_TITLES[name]:<24}" + "".join(f"{text:>17}" for text in told)
+    for order, per in enumerate(("s", "s2", "s3")):
+        units = (f"{peak.limits[order]:g} {'mm' if peak.name in LINEAR else 'deg'}/{per}" for peak in first)
+        yield f"{('limits' if not order else ''):<24}" + "".join(f"{text:>17}" for text in units)

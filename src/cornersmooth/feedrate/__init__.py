@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+from cornersmooth.feedrate.axispeaks import AxisPeaks, axis_peaks
 from cornersmooth.feedrate.compare import Comparison, compare
 from cornersmooth.feedrate.demands import AxisLimits
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.timelaw import States, TimeLaw
 
-__all__ = ["AxisLimits", "Comparison", "Limits", "States", "TimeLaw", "compare", "direct", "plan"]
+__all__ = [
+    "AxisLimits",
+    "AxisPeaks",
+    "Comparison",
+    "Limits",
+    "States",
+    "TimeLaw",
+    "axis_peaks",
+    "compare",
+    "direct",
+    "plan",
+]

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from cornersmooth.feedrate.axispeaks import axis_peaks
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.timelaw import TimeLaw
+from cornersmooth.kinematics import Machine
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
@@ -79,12 +81,15 @@ class Comparison:
     limits : Limits
     laws : mapping of str to TimeLaw
         ``direct_exact_stop``, ``direct_velocity_jump``, ``zhang2016``, ``proportional``.
+    machine : Machine or None
+        Whose axes keep their limits.
     """
 
     program: Program
     settings: Settings
     limits: Limits
     laws: Mapping[str, TimeLaw]
+    machine: Machine | None = None
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -109,7 +114,7 @@ class Comparison:
     def as_dict(self, places: int = 10) -> dict[str, Any]:
         """Everything, plain; keys carry their unit."""
         source = self.program.source
-        return {
+        contents: dict[str, Any] = {
             "schema": SCHEMA,
             "input": {"name": source.name, "format": source.format, "dialect": source.dialect},
             "settings": self.settings.as_dict(),
@@ -123,6 +128,12 @@ class Comparison:
             "peaks": {name: vars(peaks(law)) for name, law in self.laws.items()},
             "slowest": {name: [vars(place) for place in slowest(law, places)] for name, law in self.laws.items()},
         }
+        if self.machine is not None:
+            contents["machine"] = self.machine.name
+            contents["axis_peaks"] = {
+                name: {peak.name: peak.as_dict() for peak in axis_peaks(law)} for name, law in self.laws.items()
+            }
+        return contents
 
 
 def compare(
@@ -130,6 +141,7 @@ def compare(
     settings: Settings | None = None,
     limits: Limits | None = None,
     *,
+    machine: Machine | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
     """Plan a program four ways: directly with stops and with jumps of velocity, and smoothed by both methods.
@@ -139,13 +151,17 @@ def compare(
     program : Program
     settings : Settings, optional
     limits : Limits, optional
+    machine : Machine, optional
+        Keep the limits of its five axes, too.
     progress : callable, optional
         Called with (name of the law, work done, work in all).
 
     Raises
     ------
     SettingsError
-        A feed move has no feed in mm/min and `Limits.feed` is not given.
+        A feed move has no feed in mm/min and `Limits.feed` is not given, or the machine has no dynamics.
+    InputError
+        The machine does not reach a tool axis.
     """
     settings = Settings() if settings is None else settings
     limits = Limits() if limits is None else limits
@@ -154,16 +170,21 @@ def compare(
         return None if progress is None else lambda done, total: progress(name, done, total)
 
     laws = {
-        "direct_exact_stop": direct(program, limits, "exact_stop", settings=settings),
+        "direct_exact_stop": direct(program, limits, "exact_stop", settings=settings, machine=machine),
         "direct_velocity_jump": direct(
-            program, limits, "velocity_jump", settings=settings, progress=step("direct_velocity_jump")
+            program,
+            limits,
+            "velocity_jump",
+            settings=settings,
+            machine=machine,
+            progress=step("direct_velocity_jump"),
         ),
     }
     # the paper's method has one shape and one allocation
     paper = settings.but(method="zhang2016", shape="paper", allocation="half")
     for method, chosen in (("zhang2016", paper), ("proportional", settings.but(method="proportional"))):
-        laws[method] = plan(smooth(program, chosen), limits, progress=step(method))
-    return Comparison(program, settings, limits, laws)
+        laws[method] = plan(smooth(program, chosen), limits, machine=machine, progress=step(method))
+    return Comparison(program, settings, limits, laws, machine)
 
 
 def stops(law: TimeLaw) -> int:
