@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.model import Program, SmoothProgram, Units
+from cornersmooth.model import Ints, Program, SmoothProgram, Units
 from cornersmooth.nc.blocks import BlockWriter
 from cornersmooth.nc.choice import check_program, choose_form
 from cornersmooth.nc.circles import Circles, plan_circles
@@ -133,8 +133,9 @@ def write(
     motion = MotionWriter(program, writer, statements, notes)
     framing = (frame or Frame()).start(stream, chosen, program, smoothed.settings.tolerance)
     framing.head()
-    for rows in _one_ahead(_rows(smoothed, chosen, circles, notes)):
-        for text in motion.write(rows):
+    blocks = ((rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, notes))
+    for rows, ticks in _one_ahead(blocks):
+        for text in motion.write(rows, ticks):
             framing.write(text)
         if progress is not None and len(rows.move):
             progress(int(rows.move[-1]) + 1, len(program))
@@ -151,13 +152,13 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, notes: Notes) -
     return rotary_rows(rows, smoothed.program, smoothed.settings, form, notes) if form.rotary else rows
 
 
-def _one_ahead(blocks: Iterator[Rows]) -> Iterator[Rows]:
+def _one_ahead(blocks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:
     """Compute the next block of rows while the last one is written: numpy leaves the interpreter free meanwhile."""
     with ThreadPoolExecutor(1) as pool:
         coming = pool.submit(next, blocks, None)
-        while (rows := coming.result()) is not None:
+        while (block := coming.result()) is not None:
             coming = pool.submit(next, blocks, None)
-            yield rows
+            yield block
 
 
 def _tell_arcs(circles: Circles, program: Program, notes: Notes) -> None:

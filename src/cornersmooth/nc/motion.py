@@ -48,6 +48,7 @@ class MotionWriter:
     _last: NDArray[np.int64] | None = None  #: what was written last, a tool change or not
     _return_to: int = _NOWHERE  #: first pose behind a tool change, until it is reached
     _next_statement: int = 0
+    _ticks: Ints = field(init=False)  #: of the block that is written
     _said: tuple[Statement, ...] = field(init=False)
     _approach: Ints | None = field(init=False)
 
@@ -55,8 +56,9 @@ class MotionWriter:
         self._said = _with_starts(self.program)
         self._approach = approaches(self.program) if (self.program.kind == Move.HOLE).any() else None
 
-    def write(self, rows: Rows) -> Iterator[bytes]:
-        """Text of a block of rows and of the statements that stand before and between them."""
+    def write(self, rows: Rows, ticks: Ints) -> Iterator[bytes]:
+        """Text of a block of rows, with their numbers in ticks, and of the statements before and between them."""
+        self._ticks = ticks
         moves = rows.move
         waiting = self._statements_until(int(moves[-1])) if len(moves) else []
         start = 0
@@ -116,7 +118,7 @@ class MotionWriter:
     def _lines(self, rows: Rows, start: int, stop: int) -> Iterator[bytes]:
         part = slice(start, stop)
         move, program = rows.move[part], self.program
-        ticks = self.writer.ticks(rows.tip[part], rows.other[part])
+        ticks = self._ticks[part]
         arc = rows.arc[part] if rows.arc is not None else None
         yield from self._go_back(int(move[0]))
         if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start

@@ -12,7 +12,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import FilledPath, fill, insertions, inverse_time, rapid_moves, rotary_angles
-from cornersmooth.model import FeedMode, Floats, Ints, Program
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.control import TIP_SHARE, Form
 from cornersmooth.nc.notes import Notes
 from cornersmooth.settings import Settings
@@ -20,7 +20,7 @@ from cornersmooth.smoothing.neighbours import norm
 from cornersmooth.smoothing.sampling import Rows
 
 #: rows handed on at a time
-_BLOCK = 65536
+_BLOCK = 32768
 
 #: deg/min that no rotary axis exceeds where we time its blocks ourselves
 _FASTEST_TURN = 36_000.0
@@ -56,47 +56,73 @@ def rotary_rows(rows: Iterator[Rows], program: Program, settings: Settings, form
     path = rotary_angles(machine, tip, axis, tolerance=tolerance, rapid=rapid, line=line, file=file)
     for finding in path.findings:
         notes.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
-    more = insertions(
-        machine,
-        tip,
-        axis,
-        path.angles,
-        tolerance=tolerance,
-        rapid=rapid,
-        tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
-        max_step=settings.axis_step,
-        line=line,
-        file=file,
-    )
-    if len(more.unsolved):
-        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
-        notes.add("CS366", "warning", int(line[more.unsolved[0] + 1]), text, len(more.unsolved))
-    if len(more):
-        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
-        notes.add("CS367", "note", int(line[more.segment[0] + 1]), text, len(more))
-    filled = fill(tip, axis, path.angles, more)
-    rate = _rates(filled, move, program, settings, form)
-    move = move[filled.pose]
-    for begin in range(0, len(move), _BLOCK):
-        part = slice(begin, begin + _BLOCK)
-        count = len(move[part])
+    timed = _timed_cuts(path.angles, move, program) if form.orientation == "machine" else None
+    inserted, first_inserted, unsolved = 0, 0, []
+    for begin in range(0, max(len(move) - 1, 1), _BLOCK):
+        here = slice(begin, begin + _BLOCK + 1)  # the last row of a block is the start of the next
+        more = insertions(
+            machine,
+            tip[here],
+            axis[here],
+            path.angles[here],
+            tolerance=tolerance,
+            rapid=rapid[here],
+            tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
+            max_step=settings.axis_step,
+            line=line[here],
+            file=file,
+        )
+        if len(more) and not inserted:
+            first_inserted = int(line[here][more.segment[0] + 1])
+        inserted += len(more)
+        unsolved += line[here][more.unsolved + 1].tolist()
+        filled = fill(tip[here], axis[here], path.angles[here], more)
+        rate = _rates(filled, move[here], None if timed is None else timed[here], program, settings, form)
+        own = slice(1 if begin else 0, None)
+        count = len(filled.pose[own])
         yield Rows(
-            tip=filled.tip[part],
-            other=filled.angles[part],
-            move=move[part],
+            tip=filled.tip[own],
+            other=filled.angles[own],
+            move=move[here][filled.pose[own]],
             curve=np.zeros(count, np.int8),
             joined=np.zeros(count, np.bool_),
-            rate=None if rate is None else rate[part],
+            rate=None if rate is None else rate[own],
         )
+    if unsolved:
+        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
+        notes.add("CS366", "warning", unsolved[0], text, len(unsolved))
+    if inserted:
+        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
+        notes.add("CS367", "note", first_inserted, text, inserted)
 
 
-def _rates(path: FilledPath, move: Ints, program: Program, settings: Settings, form: Form) -> Floats | None:
+def _cuts(move: Ints, program: Program) -> Bools:
+    """(n,) rows of cuts with a feed per minute."""
+    cuts: Bools = ~rapid_moves(program.kind)[move] & (program.feed_mode[move] == FeedMode.PER_MINUTE)
+    return cuts
+
+
+def _timed_cuts(angles: Floats, move: Ints, program: Program) -> Bools:
+    """(n,) rows of cuts in which a rotary axis turns: a whole cut is timed in one way."""
+    cut = _cuts(move, program)
+    begins = cut & ~np.concatenate(([False], cut[:-1]))
+    run = np.cumsum(begins) - 1
+    turning = np.zeros(max(int(begins.sum()), 1), np.bool_)
+    turns = cut & (np.abs(np.diff(angles, axis=0, prepend=angles[:1])).max(axis=1) > _NO_TURN)
+    turning[run[turns]] = True
+    timed: Bools = cut & turning[np.maximum(run, 0)]
+    return timed
+
+
+def _rates(
+    path: FilledPath, move: Ints, timed: Bools | None, program: Program, settings: Settings, form: Form
+) -> Floats | None:
     """(m,) moves per minute where blocks are timed by us, NaN elsewhere; None where none is.
 
-    Without tool tip control that is every cut in which a rotary axis turns; for controls that ask for it every block in
-    which only rotary axes turn. Where the tip stands still, the axis point runs with the feed.
+    `timed` says which rows without inserted ones; else it is every block in which only rotary axes turn, for controls
+    that want it. Where the tip stands still, the axis point runs with the feed.
     """
-    if not (form.orientation == "machine" or form.mode.timed_turns):
+    if timed is None and not form.mode.timed_turns:
         return None
     own = move[path.pose]
     step = np.diff(path.tip, axis=0, prepend=path.tip[:1])
@@ -104,23 +130,11 @@ def _rates(path: FilledPath, move: Ints, program: Program, settings: Settings, f
     length = norm(step)
     still = length < form.rounding(program.units)
     turn = np.abs(np.diff(path.angles, axis=0, prepend=path.angles[:1])).max(axis=1)
-    cut = ~rapid_moves(program.kind)[own] & (program.feed_mode[own] == FeedMode.PER_MINUTE)
-    turning = cut & (turn > _NO_TURN)
-    if form.orientation == "machine":  # a whole cut is timed in one way
-        first = np.flatnonzero(np.diff(cut, prepend=False) & cut)
-        if len(first):
-            run = np.cumsum(np.diff(cut, prepend=False) & cut) - 1
-            any_turn = np.zeros(len(first), np.bool_)
-            np.logical_or.at(any_turn, run[turning], True)
-            timed = cut & any_turn[np.maximum(run, 0)]
-        else:
-            timed = cut
-    else:
-        timed = turning & still
-    if not timed.any():
+    chosen = _cuts(own, program) & still & (turn > _NO_TURN) if timed is None else timed[path.pose]
+    if not chosen.any():
         return None
-    rate = np.full(len(own), np.nan)
     way = np.where(still, norm(swing), length)
-    rate[timed] = inverse_time(way[timed], program.feed[own[timed]], turn[timed], _FASTEST_TURN)
+    rate = np.full(len(own), np.nan)
+    rate[chosen] = inverse_time(way[chosen], program.feed[own[chosen]], turn[chosen], _FASTEST_TURN)
     rate[~np.isfinite(rate)] = np.nan
     return rate
