@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,10 @@ PIECES = 4
 #: pieces on either side of the nearest point to the pole of a machine, and the first of them over the way on which the
 #: pole is felt
 POLE_PIECES, FIRST_PIECE = 40, 0.05
+#: the cone in which demands do without exact derivatives, over that of the machine: its edge lies outside for certain
+WITHIN = 0.5
+#: places inside every piece at which derivatives are looked at
+_INNER = np.array([0.25, 0.5, 0.75])
 #: elements looked at together
 _BLOCK = 4096
 
@@ -108,6 +112,7 @@ def find_demands(
     ]
     close = np.zeros(len(path), np.bool_)
     if joints is not None:
+        joints = replace(joints, cone=WITHIN * joints.cone)
         given.append((_signless(joints), joints.limits, steady))
         close = joints.near_pole() & steady
     given = [(orders, bounds, where) for orders, bounds, where in given if np.isfinite(bounds).any()]
@@ -200,11 +205,12 @@ def _borders(path: Path, element: Ints, curve: bool, given: Floats | None) -> tu
 
 
 def _judge(element: Ints, borders: Floats, orders: Orders, bounds: Floats) -> tuple[Floats, Floats]:
-    """Bounds of v² (g, p) and coefficients (5, g, p) from samples at the ends and in the middle of every piece."""
-    middles = 0.5 * (borders[:, 1:] + borders[:, :-1])
-    share = np.concatenate((borders, middles), axis=1)
+    """Bounds of v² (g, p) and coefficients (5, g, p) from samples at the ends and inside every piece."""
+    step = np.diff(borders, axis=1)
+    inner = borders[:, :-1, None] + step[..., None] * _INNER
+    share = np.concatenate((borders, inner.reshape(len(borders), -1)), axis=1)
     found = orders(np.repeat(element, share.shape[1]), share.ravel())
-    one, two, three = _largest(found, share.shape, middles.shape[1])
+    one, two, three = _largest(found, share.shape, step.shape[1])
     speed, accel, jerk = bounds
     with np.errstate(divide="ignore"):
         steady = np.minimum(np.minimum((speed / one) ** 2, accel / two), np.cbrt(jerk / three) ** 2)
@@ -218,6 +224,7 @@ def _largest(orders: tuple[Floats, Floats, Floats], shape: tuple[int, ...], piec
     for order in orders:
         values = order.reshape(*shape, -1)
         values = np.where(np.isfinite(values), values, 0.0)
-        ends, middles = values[:, : pieces + 1], values[:, pieces + 1 :]
-        largest.append(np.maximum(np.maximum(ends[:, 1:], ends[:, :-1]), middles))
+        ends, inner = values[:, : pieces + 1], values[:, pieces + 1 :]
+        inside = inner.reshape(len(values), pieces, len(_INNER), -1).max(axis=2)
+        largest.append(np.maximum(np.maximum(ends[:, 1:], ends[:, :-1]), inside))
     return largest
