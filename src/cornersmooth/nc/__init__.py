@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,6 +19,7 @@ from cornersmooth.nc.framing import Frame
 from cornersmooth.nc.motion import MotionWriter
 from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.rotary import rotary_rows
+from cornersmooth.nc.rotary_curves import rotary_curve_rows
 from cornersmooth.nc.statements import StatementWriter
 from cornersmooth.nc.tables import control_names, load_control
 from cornersmooth.settings import Settings
@@ -131,21 +132,24 @@ def write(
     _tell_arcs(circles, program, notes)
     writer = BlockWriter(chosen, program, statements, notes, circles)
     motion = MotionWriter(program, writer, statements, notes)
-    framing = (frame or Frame()).start(stream, chosen, program, smoothed.settings.tolerance)
-    framing.head()
-    blocks = ((rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, notes))
-    for rows, ticks in _one_ahead(blocks):
-        for text in motion.write(rows, ticks):
+    with _Behind(stream) as behind:
+        framing = (frame or Frame()).start(behind, chosen, program, smoothed.settings.tolerance)
+        framing.head()
+        blocks = ((rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, notes))
+        for rows, ticks in _one_ahead(blocks):
+            for text in motion.write(rows, ticks):
+                framing.write(text)
+            if progress is not None and len(rows.move):
+                progress(int(rows.move[-1]) + 1, len(program))
+        for text in motion.finish():
             framing.write(text)
-        if progress is not None and len(rows.move):
-            progress(int(rows.move[-1]) + 1, len(program))
-    for text in motion.finish():
-        framing.write(text)
-    framing.tail(statements.end_motion())
+        framing.tail(statements.end_motion())
     return Written(framing.blocks + motion.blocks + writer.blocks, notes.findings())
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, notes: Notes) -> Iterator[Rows]:
+    if form.curves and form.rotary:
+        return rotary_curve_rows(smoothed, form, notes)
     if form.curves:
         return curve_rows(smoothed, divide=form.curve in _TURNING)
     rows = dense_rows(smoothed, circles.pieces)
@@ -159,6 +163,50 @@ def _one_ahead(blocks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints
         while (block := coming.result()) is not None:
             coming = pool.submit(next, blocks, None)
             yield block
+
+
+class _Behind:
+    """A stream that is written to while the next text is made; an error shows with one of the next writes.
+
+    Parameters
+    ----------
+    stream : Stream
+    """
+
+    #: bytes gathered before they are handed on
+    _PIECE = 1 << 18
+
+    def __init__(self, stream: Stream) -> None:
+        self._stream = stream
+        self._pool = ThreadPoolExecutor(1)
+        self._waiting: list[bytes] = []
+        self._size = 0
+        self._done: Future[object] | None = None
+
+    def __enter__(self) -> _Behind:
+        return self
+
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
+        try:
+            if kind is None:
+                self._hand_on()
+            if self._done is not None and kind is None:
+                self._done.result()
+        finally:
+            self._pool.shutdown()
+
+    def write(self, data: bytes, /) -> None:
+        """Take the bytes; wait for those before the last piece."""
+        self._waiting.append(data)
+        self._size += len(data)
+        if self._size >= self._PIECE:
+            self._hand_on()
+
+    def _hand_on(self) -> None:
+        if self._done is not None:
+            self._done.result()
+        self._done = self._pool.submit(self._stream.write, b"".join(self._waiting))
+        self._waiting, self._size = [], 0
 
 
 def _tell_arcs(circles: Circles, program: Program, notes: Notes) -> None:
