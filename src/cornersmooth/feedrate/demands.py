@@ -113,7 +113,7 @@ def find_demands(
     close = np.zeros(len(path), np.bool_)
     if joints is not None:
         joints = replace(joints, cone=WITHIN * joints.cone)
-        given.append((_signless(joints), joints.limits, steady))
+        given.append((_signed(joints), joints.limits, steady))
         close = joints.near_pole() & steady
     given = [(orders, bounds, where) for orders, bounds, where in given if np.isfinite(bounds).any()]
     if not given:
@@ -153,10 +153,9 @@ def _orders(path: Path, item: AxisLimits) -> Orders:
     return orders
 
 
-def _signless(joints: Joints) -> Orders:
+def _signed(joints: Joints) -> Orders:
     def orders(element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
-        _, one, two, three = joints.orders(element, share)
-        return np.abs(one), np.abs(two), np.abs(three)
+        return joints.orders(element, share)[1:]
 
     return orders
 
@@ -219,12 +218,20 @@ def _judge(element: Ints, borders: Floats, orders: Orders, bounds: Floats) -> tu
 
 
 def _largest(orders: tuple[Floats, Floats, Floats], shape: tuple[int, ...], pieces: int) -> list[Floats]:
-    """Largest values (g, p, d) in every piece; not at an end where the tip comes to a stand and they are infinite."""
+    """Largest amounts (g, p, d) in every piece; not at an end where the tip comes to a stand and they are infinite.
+
+    Between two samples a smooth function exceeds them by at most an eighth of its second difference.
+    """
     largest = []
     for order in orders:
         values = order.reshape(*shape, -1)
-        values = np.where(np.isfinite(values), values, 0.0)
-        ends, inner = values[:, : pieces + 1], values[:, pieces + 1 :]
-        inside = inner.reshape(len(values), pieces, len(_INNER), -1).max(axis=2)
-        largest.append(np.maximum(np.maximum(ends[:, 1:], ends[:, :-1]), inside))
+        ends, inner = (
+            values[:, : pieces + 1, None],
+            values[:, pieces + 1 :].reshape(len(values), pieces, len(_INNER), -1),
+        )
+        along = np.concatenate((ends[:, :-1], inner, ends[:, 1:]), axis=2)
+        known = np.isfinite(along).all(axis=2)
+        along = np.where(np.isfinite(along), along, 0.0)
+        between = np.abs(np.diff(along, n=2, axis=2)).max(axis=2) / 8.0
+        largest.append(np.abs(along).max(axis=2) + np.where(known, between, 0.0))
     return largest
