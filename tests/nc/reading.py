@@ -290,6 +290,58 @@ class SiemensPolynomials:
         return end
 
 
+class RotarySplines:
+    """FANUC's G6.2 (B-63324EN/03 4.17) with rotary axes on the curve: as many knots as points and four more."""
+
+    def __init__(self) -> None:
+        self.points: list[Floats] = []
+        self.weights: list[float] = []
+        self.knots: list[float] = []
+
+    def __call__(
+        self, reader: Reader, line: str, number: int, position: Floats | None, reading: Reading
+    ) -> Floats | None:
+        words = " ".join(
+            rf"{word}(-?(?:0|[1-9]\d*)\.\d{{{d}}})" for word, d in zip(reader.words, reader.decimals, strict=True)
+        )
+        if match := re.fullmatch(rf"(G6\.2 P4 )?K(\d+\.\d{{0,3}}) {words} R(\d+\.\d{{0,3}})", line):
+            values = np.array([float(group) for group in match.groups()[2:7]])
+            if match[1]:
+                if self.points or position is None or (values != position).any():
+                    raise TextError(f"{number}: PS1009, not at the first control point")
+            elif not self.points:
+                raise TextError(f"{number}: control point outside of a curve")
+            self.points.append(values)
+            self.knots.append(float(match[2]))
+            self.weights.append(float(match[8]))
+            return values
+        if not (match := re.fullmatch(r"K(\d+\.\d{0,3})", line)):
+            if self.points:
+                raise TextError(f"{number}: {line!r} inside a curve")
+            return None
+        self.knots.append(float(match[1]))
+        if len(self.knots) == len(self.points) + 4:
+            self.finish(reader, number, reading)
+        return position
+
+    def finish(self, reader: Reader, number: int, reading: Reading) -> None:
+        knots, weights = np.array(self.knots), np.array(self.weights)
+        if not (np.diff(knots) >= 0).all() or len(set(self.knots[:4])) > 1 or len(set(self.knots[-4:])) > 1:
+            raise TextError(f"{number}: PS1007, knots {self.knots}")
+        homogeneous = np.concatenate((np.array(self.points) * weights[:, None], weights[:, None]), axis=1)
+        spline = BSpline(knots, homogeneous, 3)
+
+        def at(share: Floats) -> tuple[Floats, Floats]:
+            values = spline(share * knots[-1])
+            values = values[:, :5] / values[:, 5:]
+            return values[:, :3], tool_direction(
+                reader.machine, dict(zip(reader.words[3:], values[:, 3:].T, strict=True))
+            )
+
+        reading.pieces.append(Piece(number, False, at, 96 + 8 * len(self.points)))
+        self.points, self.weights, self.knots = [], [], []
+
+
 ISO = (
     r"\([^()]*\)|%|O\d{4}|G2[01] G90 G94 G17 G40( G49)? G80|T\d+ M6|T\d+|S[\d.]+ M[34]|M(?:0|1|5|7|8|9|19|30)|G4 P\d+|"
     r"G9[345]"
@@ -309,6 +361,14 @@ READERS: dict[str, Callable[[str], Reader]] = {
         "machine",
         machine,
         decimals=(4, 4, 4, 5, 5),
+    ),
+    "fanuc g6.2": lambda machine: Reader(
+        ("X", "Y", "Z", *sorted(machine_letters(machine))),
+        ISO + r"|G43\.4 H\d+|G49",
+        "angles",
+        machine,
+        decimals=(4, 4, 4, 5, 5),
+        extra=RotarySplines(),
     ),
     "mitsubishi g1": lambda machine: READERS["fanuc g1"](machine),
     "haas g1": lambda machine: Reader(

@@ -170,7 +170,7 @@ class BlockWriter:
                 chosen[given[changed]] = len(table) + which.reshape(-1)
                 table += [f" {motion.feed}{self._feed_digits(value)}\n".encode() for value in values.tolist()]
                 self._feed = int(keys[-1])
-        if run.weights is not None and (run.curve > 0).any():
+        if (run.curve > 0).any():
             self._curves.add_suffixes(run, table, chosen)
         if run.dwell is not None and run.dwell.any():
             blocks = self.statements.dwell(dwell)

@@ -90,6 +90,39 @@ class KnotBlocks(NoCurves):
         chosen[curved] = base + which + np.where(run.curve[curved] == 5, len(ends), 0)
 
 
+class RotaryKnotBlocks(NoCurves):
+    """The same with any number of control points and knots of their own, for curves with rotary axes."""
+
+    def __init__(self, weight_decimals: int) -> None:
+        self._decimals = weight_decimals
+
+    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """Knots."""
+        assert run.spline is not None
+        curved = run.curve > 0
+        knots, which = np.unique(run.spline[curved, 0], return_inverse=True)
+        base = len(table)
+        words = [self._knot(knot) + b" " for knot in knots.tolist()]
+        table += words
+        table += [b"G6.2 P4 " + word for word in words]
+        chosen[curved] = base + which.reshape(-1) + np.where(run.curve[curved] == 1, len(words), 0)
+        return 4 * int(np.count_nonzero(run.spline[:, 2] > 0.0))
+
+    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
+        """Weights, and the last knots."""
+        assert run.spline is not None
+        curved = run.curve > 0
+        pairs, which = np.unique(run.spline[curved, 1:], axis=0, return_inverse=True)
+        base = len(table)
+        for weight, last in pairs.tolist():
+            end = b" R" + format_number(weight, self._decimals, trim=True).encode() + b"\n"
+            table.append(end + 4 * (self._knot(last) + b"\n") if last > 0.0 else end)
+        chosen[curved] = base + which.reshape(-1)
+
+    def _knot(self, knot: float) -> bytes:
+        return b"K" + format_number(knot, self._decimals, trim=True).encode()
+
+
 class SplineBlocks(NoCurves):
     """Siemens' BSPLINE: the first control point is where the block before ended; knot intervals PL and weights PW.
 
@@ -196,7 +229,7 @@ def curves_for(form: Form, units: Units) -> Curves:
     """Way to write curves of a form."""
     decimals = form.table.digits.weight
     if form.curve == "g6.2":
-        return KnotBlocks(decimals)
+        return RotaryKnotBlocks(decimals) if form.rotary else KnotBlocks(decimals)
     if form.curve == "bspline":
         return SplineBlocks(decimals)
     if form.curve == "poly":

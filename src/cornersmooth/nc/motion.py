@@ -139,6 +139,7 @@ class MotionWriter:
             weights=rows.weights[part] if rows.weights is not None else None,
             arc=arc,
             halves=self.writer.halves(rows.tip[part], rows.other[part], rows.curve[part]),
+            spline=rows.spline[part] if rows.spline is not None else None,
         )
         before = len(run)
         run = self._moving(run)

@@ -90,7 +90,7 @@ def rotary_rows(rows: Iterator[Rows], program: Program, settings: Settings, form
         )
     if unsolved:
         text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
-        notes.add("CS366", "warning", unsolved[0], text, len(unsolved))
+        notes.add("CS369", "warning", unsolved[0], text, len(unsolved))
     if inserted:
         text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
         notes.add("CS367", "note", first_inserted, text, inserted)

@@ -34,6 +34,8 @@ class Run:
         Where the tool waits after the block.
     halves : (r, 4, c) float64 or None
         Bézier points of the halves of curves, in units of the text, for polynomials.
+    spline : (r, 3) float64 or None
+        As in `Rows`.
     """
 
     ticks: Ints
@@ -46,6 +48,7 @@ class Run:
     arc: Ints | None = None
     dwell: Bools | None = None
     halves: Floats | None = None
+    spline: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.ticks)

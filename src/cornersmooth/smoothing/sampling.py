@@ -44,6 +44,9 @@ class Rows:
         straight; None where the program has no such rows.
     rate : (r,) float64 or None
         Moves per minute (inverse time) of rows that are timed so, NaN for the others; None where none is.
+    spline : (r, 3) float64 or None
+        Of control points of curves that are not the five-point curve: knot, weight and, in the last row of a curve, the
+        last knot.
     """
 
     tip: Floats
@@ -54,6 +57,7 @@ class Rows:
     weights: Floats | None = None
     arc: Ints | None = None
     rate: Floats | None = None
+    spline: Floats | None = None
 
 
 @dataclass(frozen=True)
