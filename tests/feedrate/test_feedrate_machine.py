@@ -164,6 +164,12 @@ def test_through_the_pole_and_at_it(recwarn: pytest.WarningsRecorder) -> None:
     assert not recwarn.list
 
 
+def test_the_fastest_profile_is_found_beside_near_standstills(chain: Callable[[int], Program]) -> None:
+    """Sharp turns of the tip and a tool close to the pole: the solver once stopped at a profile of 234 s."""
+    smoothed = smooth(chain(2), Settings(tolerance=0.05))
+    assert plan(smoothed, machine=load_machine("table-ac")).total < 9.0
+
+
 def test_generous_limits_cost_nothing(chain: Callable[[int], Program]) -> None:
     machine = load_machine("table-ac")
     generous = replace(machine, dynamics=tuple(Dynamics(item.name, 1e12, 1e12, 1e12) for item in machine.dynamics))
