@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.kinematics import load_machine
+from cornersmooth.kinematics import Machine, load_machine
+from cornersmooth.model import Move, Program
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from nc.reading import READERS
 from oracle.chains import AXIS_DECIMALS, Chain, cl_text, random_chains
 from oracle.judge import judge
-from oracle.motion import unit
+from oracle.library import original_motion
+from oracle.motion import Original, unit
 
 #: control, form, machine, tool tip control
 CASES = [
@@ -77,3 +81,69 @@ def test_random_chains_keep_the_tolerance(
     ]
     verdict = judge(reading.runs(axis_length), originals, axis_length, tolerance)
     assert verdict.deviation.worst <= tolerance, verdict
+
+
+#: files with changing axes, and one with arcs and a fixed axis
+FILES = [
+    "hecc_flank_nx.cls",
+    "hust_5x_impeller_yelun.cls",
+    "nx_clsf_varcontour5x_ust_a.cls",
+    "cnclite_tulsyan_altintas.apt",
+    "nx_clsf_helix_times_gohome.cls",
+]
+
+
+@pytest.mark.corpus
+@pytest.mark.parametrize("name", FILES)
+def test_real_files_keep_the_tolerance(name: str, corpus: Path) -> None:
+    tolerance, axis_length = 0.02, 20.0
+    program = read((corpus / name).read_bytes(), name=name)
+    originals = runs_of(program, tolerance)
+    for control, form, machine, tcp in CASES:
+        if len(program.arcs) and not machine and form == "g1":
+            continue  # circular blocks are `test_nc_arcs`'
+        if machine == "nutated-bc":
+            continue  # it does not reach below the horizontal
+        chosen = choose_form(control, form, machine=endless(machine) if machine else None, tcp=tcp)
+        settings = fit_settings(Settings(tolerance=tolerance, axis_length=axis_length), chosen, "mm")
+        stream = io.BytesIO()
+        write(smooth(program, settings), stream, form=chosen)
+        reader = READERS[f"{control} {form}{'' if tcp else ' machine'}"](machine)
+        reading = reader.read(stream.getvalue().decode("ascii"), axis_length, tolerance)
+        verdict = judge(reading.runs(axis_length), originals, axis_length, tolerance)
+        assert verdict.deviation.worst <= tolerance, (control, form, machine, verdict)
+
+
+def endless(name: str) -> Machine:
+    """Machine without limits: the files were made for others."""
+    machine = load_machine(name)
+    first, second = (replace(axis, limits=None) for axis in machine.axes)
+    return replace(machine, axes=(first, second))
+
+
+def runs_of(program: Program, limit: float) -> list[Original]:
+    """Feed motion between rapids."""
+    cuts = [*np.flatnonzero(program.kind == Move.RAPID).tolist(), len(program)]
+    runs = []
+    for begin, end in pairwise([0, *cuts] if cuts[0] else cuts):
+        part = np.arange(begin, end)
+        if (program.kind[part] == Move.FROM).all():
+            continue
+        arcs = np.flatnonzero((program.arcs.pose > begin) & (program.arcs.pose < end))
+        run = original_motion(
+            replace(
+                program,
+                **{name: getattr(program, name)[part] for name in ("tip", "axis", "kind", "feed", "line")},
+                **{name: getattr(program, name)[part] for name in ("feed_mode", "keep")},
+                arcs=replace(
+                    program.arcs,
+                    pose=program.arcs.pose[arcs] - begin,
+                    **{name: getattr(program.arcs, name)[arcs] for name in ("centre", "normal", "sweep")},
+                ),
+                statements=(),
+            ),
+            limit,
+        )
+        if len(run) > 1 and (np.ptp(run.tip, axis=0).any() or np.ptp(run.axis, axis=0).any()):
+            runs.append(run)
+    return runs
