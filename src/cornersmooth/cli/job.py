@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from cornersmooth.cli.files import REJECTED, STANDARD, ClosedPipe, check_output, open_output, read_input
-from cornersmooth.errors import CornersmoothError, Finding, OutputError, SettingsError
+from cornersmooth.errors import CornersmoothError, Finding, InputError, OutputError, SettingsError
 
 if TYPE_CHECKING:
     from cornersmooth.nc import Form, Frame
@@ -183,7 +183,7 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
         return None if progress is None else lambda done, total: progress(stage, done, total)
 
     form = job.writing.choose()
-    verifying = job.verify and form.readable
+    unread = form.unreadable if job.verify else "not asked for"
     with _timed(seconds, "read"):
         data, name = read_input(job.source)
         program = read(data, name=name, **job.reading)
@@ -194,26 +194,31 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
     with _timed(seconds, "smooth"):
         smoothed = smooth(program, settings, progress=step("smoothing"))
     verification: dict[str, Any] | None = None
-    with open_output(job.target, hold=verifying) as output:
+    with open_output(job.target, hold=not unread) as output:
         with _timed(seconds, "write"):
             written = write(smoothed, output.stream, form=form, frame=job.writing.frame(), progress=step("writing"))
             output.stream.flush()
-        if verifying:
+        if not unread:
             from cornersmooth.verify import verify
 
             with _timed(seconds, "verify"):
-                verified = verify(
-                    program,
-                    output.path,
-                    tolerance=settings.verified_tolerance,
-                    axis_length=settings.axis_length,
-                    control=form.control,
-                )
-            verification = verified.to_dict()
-            output.rejected = not verified.passed
+                try:
+                    verified = verify(
+                        program,
+                        output.path,
+                        tolerance=settings.verified_tolerance,
+                        axis_length=settings.axis_length,
+                        control=form.control,
+                    )
+                    verification = verified.to_dict()
+                    output.rejected = not verified.passed
+                except InputError as failure:
+                    if not (job.writing.header or job.writing.footer):
+                        raise
+                    unread = f"{failure.what} in line {failure.line}; header and footer may hold any words"
     findings = written.findings
-    if job.verify and not verifying:
-        findings += (Finding("CS509", "note", 0, f"the text is not read back: {form.unreadable}"),)
+    if job.verify and unread:
+        findings += (Finding("CS509", "note", 0, f"the text is not read back: {unread}"),)
     contents = report(
         smoothed,
         blocks_out=written.blocks,

@@ -237,11 +237,6 @@ class Form:
         return "" if self.control == "fanuc" else f"the verification does not know the text of {self.control}"
 
     @property
-    def readable(self) -> bool:
-        """Whether `cornersmooth.verify` can read the text back."""
-        return not self.unreadable
-
-    @property
     def rotary(self) -> bool:
         """Whether the words behind the tip are angles."""
         return self.orientation in ("angles", "machine")

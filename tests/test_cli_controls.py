@@ -1,0 +1,130 @@
+"""Controls and machines on the command line, through the installed command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from oracle.command import run
+
+CL = (
+    b"UNITS/MM\nLOADTL/3\nRAPID\nGOTO/0,0,50,0,0.6,0.8\nFEDRAT/800,MMPM\nGOTO/0,0,0\nGOTO/20,0,0,0.6,0,0.8\n"
+    b"GOTO/20,20,0\nFINI\n"
+)
+
+
+def lines_of(*options: str | Path, data: bytes = CL) -> list[str]:
+    result = run("smooth", "-", "-e", "0.05", "-q", *options, data=data)
+    assert result.returncode == 0, result.stderr.decode()
+    return result.stdout.decode("ascii").splitlines()
+
+
+def refusal(*options: str | Path, data: bytes = CL) -> tuple[int, str]:
+    result = run("smooth", "-", "-e", "0.05", *options, data=data)
+    assert result.stdout == b""
+    return result.returncode, result.stderr.decode().strip()
+
+
+def test_controls_are_listed_with_their_forms() -> None:
+    text = run("controls").stdout.decode()
+    for word in ("fanuc:", "siemens:", "-f bspline:", "-f poly:", "heidenhain:", "linuxcnc:", "mitsubishi:", "haas:"):
+        assert word in text
+    assert run("controls", "haas").stdout.decode().splitlines()[0].startswith("haas: ")
+    failed = run("controls", "hass")
+    assert failed.returncode == 2
+    assert "did you mean haas?" in failed.stderr.decode()
+
+
+def test_machines_are_listed_and_described() -> None:
+    text = run("machines").stdout.decode()
+    for name in ("xyzac-trt", "xyzbc-trt", "table-ac", "table-bc", "head-table-bc", "head-ac", "nutated-bc"):
+        assert f"{name}: " in text
+    described = run("machines", "xyzac-trt").stdout.decode()
+    assert "C in the table" in described
+    assert "from -100 to 50 deg" in described
+    assert run("machines", "table-xy").returncode == 2
+
+
+def test_control_form_and_machine_are_chosen() -> None:
+    assert "TRAORI" in lines_of("--control", "siemens")
+    assert [line for line in lines_of("--control", "siemens", "-f", "bspline") if line.startswith("BSPLINE SD=3 ")]
+    assert "G43.4 H3" in lines_of("--machine", "table-ac")
+    assert "G93" in lines_of("--machine", "table-ac", "--no-tcp")
+    assert "G234 H3" in lines_of("--control", "haas", "--machine", "table-bc")
+
+
+def test_own_tables_are_taken_from_files(tmp_path: Path) -> None:
+    control, machine = tmp_path / "mine.toml", tmp_path / "mill.toml"
+    control.write_text('like = "siemens"\n[layout]\ntail = ["M17"]\n')
+    machine.write_text(
+        'name = "mill"\n[[axis]]\nname = "C"\ncarrier = "table"\ndirection = [0, 0, 1]\n'
+        '[[axis]]\nname = "B"\ncarrier = "table"\ndirection = [0, 1, 0]\nlimits = [-10, 110]\n'
+    )
+    lines = lines_of("--control", control, "--machine", machine)
+    assert lines[-1] == "M17"
+    assert any(" B" in line and " C" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "message"),
+    [
+        (
+            ("--control", "haas"),
+            2,
+            "haas form g1 has no tool vectors, only rotary words; name your machine with --mach",
+        ),
+        (("--no-tcp",), 2, "machine positions need a machine; name it with --machine"),
+        (("--machine", "table-xy"), 2, "unknown machine 'table-xy'"),
+        (("--control", "siemens", "-f", "g6.2"), 2, "siemens has no form 'g6.2'; choose one of g1, bspline, poly"),
+        (("--control", "none.toml"), 2, "none.toml: error: control file cannot be read"),
+        (
+            ("--control", "siemens", "-f", "poly", "--weights", "1,2"),
+            2,
+            "siemens form poly holds curves with weights 1",
+        ),
+        (("--control", "mitsubishi", "-f", "g6.2"), 3, "<stdin>:4: error: the tool is not parallel to Z"),
+        (
+            ("-f", "g6.2", "--machine", "table-ac", "--method", "zhang2016"),
+            2,
+            "method zhang2016 has no curves in rotary",
+        ),
+        (("--header", "none.txt"), 3, "none.txt: error: cannot read it"),
+    ],
+)
+def test_refusals_come_before_anything_is_written(options: tuple[str, ...], code: int, message: str) -> None:
+    found, said = refusal(*options)
+    assert found == code
+    assert said.removeprefix("error: ").startswith(message)
+
+
+def test_axis_out_of_reach_names_line_axis_and_limit() -> None:
+    code, said = refusal("--control", "linuxcnc", "--machine", "xyzac-trt", data=CL.replace(b"0.6,0,0.8", b"0,0,-1"))
+    assert code == 3
+    assert said.startswith("<stdin>:7: error: A would have to go to ")
+    assert "its limit is" in said
+
+
+def test_frame_of_the_text(tmp_path: Path) -> None:
+    header, footer = tmp_path / "head.txt", tmp_path / "foot.txt"
+    header.write_text("({program} IN {units})\nG54\n")
+    footer.write_text("G91 G28 Z0.\n")
+    options = ("--header", header, "--footer", footer, "--program-name", "O0815", "--block-numbers")
+    lines = lines_of(*options)
+    assert lines[1:5] == ["N10 O0815", "N20 G21 G90 G94 G17 G40 G49 G80", "N30 (O0815 IN G21)", "N40 G54"]
+    assert [line.partition(" ")[2] for line in lines[-3:-1]] == ["G91 G28 Z0.", "M30"]
+
+
+def test_text_that_cannot_be_read_back_says_so(tmp_path: Path) -> None:
+    report = tmp_path / "report.json"
+    lines_of("--control", "siemens", "--report", report)
+    findings = json.loads(report.read_text())["findings"]
+    assert [finding["text"] for finding in findings if finding["code"] == "CS509"] == [
+        "the text is not read back: the verification does not know the text of siemens"
+    ]
+    lines_of("--report", tmp_path / "other.json")
+    assert "CS509" not in (tmp_path / "other.json").read_text()
+    (tmp_path / "foot.txt").write_text("G91 G28 Z0.\n")
+    lines_of("--footer", tmp_path / "foot.txt", "--report", tmp_path / "foot.json")
+    assert "not read back: G91 is not understood in line" in (tmp_path / "foot.json").read_text()
