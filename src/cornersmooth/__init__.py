@@ -7,8 +7,8 @@ The whole program in three calls::
     with open("part.nc", "wb") as stream:
         cornersmooth.write(smoothed, stream)
 
-`cornersmooth.verify.verify` measures NC text against a program, `cornersmooth.report.report` tells the whole story as a
-dictionary, `cornersmooth.feedrate.plan` says how long a machine takes. Nothing is imported before it is used, so that the
+`cornersmooth.verify.verify` measures NC text against a program, `cornersmooth.report.report` tells the whole story as
+a dictionary, `cornersmooth.plan` says how long a machine takes. Nothing is imported before it is used, so that the
 command line answers at once.
 """
 
