@@ -182,6 +182,16 @@ def test_planes_change_only_when_they_must() -> None:
     assert [line[:2] for line in lines if re.match("G[23] ", line)] == ["G3", "G3", "G3", "G2", "G2"]
 
 
+def test_no_other_plane_under_cutter_compensation() -> None:
+    lines, written = text_of_cl(
+        "UNITS/MM\nFEDRAT/100,MMPM\nRAPID\nGOTO/5,0,0\nCUTCOM/LEFT,XYPLAN\nGOTO/5,5,0\nCIRCLE/0,5,0,0,1,0,5\n"
+        "GOTO/0,5,-5\nCIRCLE/0,0,-5,0,0,1,5\nGOTO/-5,0,-5\nCUTCOM/OFF\nGOTO/0,9,0\nFINI\n"
+    )
+    assert codes(written) == {"CS313": 1, "CS314": 1, "CS319": 1}
+    assert not [line for line in lines if line in PLANE]
+    assert "G3 X-5.0000 Y0.0000 Z-5.0000 R5.0000" in lines
+
+
 def test_arc_after_a_tool_change_is_approached() -> None:
     """A circular block starts where the tool is, and after a tool change nobody knows where."""
     lines, _ = text_of_cl(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints, Program
+from cornersmooth.model import Bools, Floats, Ints, Keep, Program
 from cornersmooth.nc.control import Form
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.arcs import arc_points, arc_radii, divided
@@ -85,6 +85,8 @@ def plan_circles(program: Program, settings: Settings, form: Form) -> Circles:
         & (radius < _LARGEST_RADIUS)
         & (ticks > 0)
         & (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1)
+        # the plane of cutter compensation must not change under it, and it is XY
+        & ((plane == 0) | (program.keep[arcs.pose] != Keep.CUTTER_COMPENSATION))
     )
     pieces = np.where(fits, np.ceil(arcs.sweep / _LARGEST_SWEEP - 1e-9), 0.0).astype(np.int64)
     if fits.any():
