@@ -175,6 +175,12 @@ class Reader:
                 raise TextError(f"{number}: not a block of this control: {whole!r}")
         return reading
 
+    def direction(self, values: Floats) -> Floats:
+        """Tool direction of rotary words, or straight up where there are none."""
+        if self.turn == "fixed":
+            return np.broadcast_to((0.0, 0.0, 1.0), (len(values), 3))
+        return tool_direction(self.machine, dict(zip(self.words[3:], values[:, 3:].T, strict=True)))
+
     def piece(self, number: int, rapid: bool, start: Floats, end: Floats) -> Piece:
         """Straight block."""
 
@@ -184,11 +190,14 @@ class Reader:
             values = straight(start, end, share)
             if self.turn == "point":
                 return values[:, :3], values[:, 3:] - values[:, :3]
-            angles = dict(zip(self.words[3:], values[:, 3:].T, strict=True))
-            direction = tool_direction(self.machine, angles)
-            return (tip_of(self.machine, values[:, :3], angles) if self.turn == "machine" else values[:, :3]), direction
+            if self.turn == "machine":
+                angles = dict(zip(self.words[3:], values[:, 3:].T, strict=True))
+                return tip_of(self.machine, values[:, :3], angles), self.direction(values)
+            return values[:, :3], self.direction(values)
 
-        if self.turn in ("angles", "machine"):
+        if self.turn == "fixed":
+            turn = 0.0
+        elif self.turn in ("angles", "machine"):
             turn = np.radians(np.abs(end[3:] - start[3:]).max())
         elif self.turn == "point":
             turn = float(angle_between(start[3:] - start[:3], end[3:] - end[:3]))
@@ -290,6 +299,34 @@ class SiemensPolynomials:
         return end
 
 
+class HeidenhainSplines:
+    """SPL: X(t) = K3·t³ + K2·t² + K1·t + X with t from 1 to 0; it starts within a micrometre of the last end."""
+
+    def __call__(
+        self, reader: Reader, line: str, number: int, position: Floats | None, reading: Reading
+    ) -> Floats | None:
+        ends = " ".join(rf"{word}([+-]\d+\.\d{{{d}}})" for word, d in zip(reader.words, reader.decimals, strict=True))
+        factor = r"([+-]\d\.\d{7}|[+-][1-9]\.\d{9}E[+-]\d{3})"
+        factors = " ".join(f"K{power}{word}{factor}" for word in reader.words for power in (3, 2, 1))
+        match = re.fullmatch(f"SPL {ends} {factors}", line)
+        if match is None:
+            return None
+        assert position is not None
+        count = len(reader.words)
+        end = np.array([float(group) for group in match.groups()[:count]])
+        cube, square, slope = np.array([float(group) for group in match.groups()[count:]]).reshape(count, 3).T
+        if np.abs(end + slope + square + cube - position).max() > 1e-3:
+            raise TextError(f"{number}: the spline does not start where the block before ended")
+
+        def at(share: Floats) -> tuple[Floats, Floats]:
+            t = 1.0 - share[:, None]
+            values = end + t * (slope + t * (square + t * cube))
+            return values[:, :3], reader.direction(values)
+
+        reading.pieces.append(Piece(number, False, at, 48))
+        return end
+
+
 class RotarySplines:
     """FANUC's G6.2 (B-63324EN/03 4.17) with rotary axes on the curve: as many knots as points and four more."""
 
@@ -304,8 +341,8 @@ class RotarySplines:
         words = " ".join(
             rf"{word}(-?(?:0|[1-9]\d*)\.\d{{{d}}})" for word, d in zip(reader.words, reader.decimals, strict=True)
         )
-        if match := re.fullmatch(rf"(G6\.2 P4 )?K(\d+\.\d{{0,3}}) {words} R(\d+\.\d{{0,3}})", line):
-            values = np.array([float(group) for group in match.groups()[2:7]])
+        if match := re.fullmatch(rf"(G6\.2 P4 )?K(\d+\.\d{{0,3}}) {words} R(\d+\.\d{{0,4}})", line):
+            values = np.array([float(group) for group in match.groups()[2:-1]])
             if match[1]:
                 if self.points or position is None or (values != position).any():
                     raise TextError(f"{number}: PS1009, not at the first control point")
@@ -313,7 +350,7 @@ class RotarySplines:
                 raise TextError(f"{number}: control point outside of a curve")
             self.points.append(values)
             self.knots.append(float(match[2]))
-            self.weights.append(float(match[8]))
+            self.weights.append(float(match.groups()[-1]))
             return values
         if not (match := re.fullmatch(r"K(\d+\.\d{0,3})", line)):
             if self.points:
@@ -333,10 +370,8 @@ class RotarySplines:
 
         def at(share: Floats) -> tuple[Floats, Floats]:
             values = spline(share * knots[-1])
-            values = values[:, :5] / values[:, 5:]
-            return values[:, :3], tool_direction(
-                reader.machine, dict(zip(reader.words[3:], values[:, 3:].T, strict=True))
-            )
+            values = values[:, :-1] / values[:, -1:]
+            return values[:, :3], reader.direction(values)
 
         reading.pieces.append(Piece(number, False, at, 96 + 8 * len(self.points)))
         self.points, self.weights, self.knots = [], [], []
@@ -400,6 +435,22 @@ READERS: dict[str, Callable[[str], Reader]] = {
     ),
     "siemens poly": lambda machine: Reader(
         ("X", "Y", "Z", "XH=", "YH=", "ZH="), SIEMENS, "point", decimals=(4,) * 6, extra=SiemensPolynomials()
+    ),
+    "heidenhain spl": lambda machine: Reader(
+        ("X", "Y", "Z", *(sorted(machine_letters(machine)) if machine else ())),
+        HEIDENHAIN,
+        "angles" if machine else "fixed",
+        machine,
+        rapid="L",
+        feed="L",
+        rapid_end=" FMAX",
+        decimals=(4, 4, 4, *((4, 4) if machine else ())),
+        signs=True,
+        number="{number} ",
+        extra=HeidenhainSplines(),
+    ),
+    "mitsubishi g6.2": lambda machine: Reader(
+        ("X", "Y", "Z"), ISO + r"|G43 H\d+|G49|G5 P10000|G5 P0", "fixed", decimals=(4, 4, 4), extra=RotarySplines()
     ),
     "heidenhain g1": lambda machine: Reader(
         ("X", "Y", "Z", *(sorted(machine_letters(machine)) if machine else ("TX", "TY", "TZ"))),

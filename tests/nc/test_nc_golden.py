@@ -29,6 +29,7 @@ TEXTS = [
     ("corner", "siemens", "poly", "", True),
     ("corner", "siemens", "g1", "head-ac", True),
     ("corner", "heidenhain", "g1", "table-bc", True),
+    ("corner", "heidenhain", "spl", "table-bc", True),
     ("corner", "haas", "g1", "table-bc", True),
     ("corner", "linuxcnc", "g1", "xyzac-trt", True),
     ("corner", "mitsubishi", "g1", "", True),

@@ -38,6 +38,9 @@ CASES = [
     ("mitsubishi", "g1", "head-table-bc", True),
     ("siemens", "g1", "head-ac", True),
     ("heidenhain", "g1", "table-bc", True),
+    ("heidenhain", "spl", "table-bc", True),
+    ("heidenhain", "spl", "", True),
+    ("mitsubishi", "g6.2", "", True),
     ("haas", "g1", "table-bc", True),
     ("haas", "g1", "nutated-bc", True),
     ("linuxcnc", "g1", "xyzac-trt", True),
@@ -55,6 +58,11 @@ def tame(chain: Chain, machine: str) -> Chain:
     return replace(chain, axis=np.round(axis, AXIS_DECIMALS))
 
 
+def upright(chain: Chain) -> Chain:
+    """Chain with the tool parallel to Z."""
+    return replace(chain, axis=np.broadcast_to((0.0, 0.0, 1.0), chain.axis.shape))
+
+
 #: every case has one of them
 LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
 
@@ -66,7 +74,13 @@ LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
 def test_random_chains_keep_the_tolerance(
     control: str, form: str, machine: str, tcp: bool, tolerance: float, axis_length: float
 ) -> None:
-    chains = [tame(chain, machine) for chain in random_chains(len(control + form + machine), 48, corners=4)]
+    fixed = (
+        choose_form(control, form, machine=load_machine(machine) if machine else None, tcp=tcp).orientation == "fixed"
+    )
+    chains = [
+        upright(chain) if fixed else tame(chain, machine)
+        for chain in random_chains(len(control + form + machine), 48, corners=4)
+    ]
     program = read(cl_text(chains)[0], name="chains.cls")
     chosen = choose_form(control, form, machine=load_machine(machine) if machine else None, tcp=tcp)
     settings = fit_settings(Settings(tolerance=tolerance, axis_length=axis_length), chosen, "mm")
@@ -104,7 +118,10 @@ def test_real_files_keep_the_tolerance(name: str, corpus: Path) -> None:
             continue  # circular blocks are `test_nc_arcs`'
         if machine == "nutated-bc":
             continue  # it does not reach below the horizontal
+        upright_tool = (program.axis == (0.0, 0.0, 1.0)).all()
         chosen = choose_form(control, form, machine=endless(machine) if machine else None, tcp=tcp)
+        if chosen.orientation == "fixed" and not upright_tool:
+            continue
         settings = fit_settings(Settings(tolerance=tolerance, axis_length=axis_length), chosen, "mm")
         stream = io.BytesIO()
         write(smooth(program, settings), stream, form=chosen)

@@ -17,8 +17,9 @@ from cornersmooth.kinematics import machine_position
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.control import INVERSE_TIME, Form
-from cornersmooth.nc.curves import Curves, curves_for, halves_of
+from cornersmooth.nc.curves import Curves, RowWriter
 from cornersmooth.nc.notes import Notes
+from cornersmooth.nc.polynomials import curves_for, pieces_of
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.statements import StatementWriter
 from cornersmooth.text import RowFormat, format_number, to_ticks
@@ -66,11 +67,11 @@ class BlockWriter:
         ticks: Ints = to_ticks(self._numbers(tip, other), self._format.decimals)
         return ticks
 
-    def halves(self, tip: Floats, other: Floats, curve: NDArray[np.int8]) -> Floats | None:
-        """`Run.halves` where the form writes polynomials."""
+    def pieces(self, tip: Floats, other: Floats, curve: NDArray[np.int8]) -> Floats | None:
+        """`Run.pieces` where the form writes polynomials."""
         if self._curves.format is None or not (curve > 0).any():
             return None
-        return halves_of(self._numbers(tip, other), curve)
+        return pieces_of(self._numbers(tip, other), curve)
 
     def _numbers(self, tip: Floats, other: Floats) -> Floats:
         """Numbers of rows in units of the text, (r, c)."""
@@ -91,7 +92,7 @@ class BlockWriter:
         prefix, prefix_id, extra = self._prefixes(run)
         suffix, suffix_id = self._suffixes(run, dwell)
         self.blocks += len(run) + extra
-        apart: list[tuple[Bools, RowFormat, Ints]] = []  # rows with words of their own
+        apart: list[tuple[Bools, RowWriter, Ints]] = []  # rows with words of their own
         if run.arc is not None and (circular := run.arc >= 0).any():
             numbers = np.column_stack((run.ticks[circular, :3], self.circles.radius[run.arc[circular]]))
             apart.append((circular, self._arc_format, numbers))

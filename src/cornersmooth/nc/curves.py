@@ -1,16 +1,25 @@
-"""How transitions are written as curves: five rows of control points become the blocks of each control."""
+"""How transitions are written as splines: rows of control points become the blocks of each control."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cornersmooth.model import Bools, Floats, Ints, Units
-from cornersmooth.nc.control import Form
+from cornersmooth.model import Bools, Ints
 from cornersmooth.nc.run import Run
-from cornersmooth.text import RowFormat, format_number, to_ticks
+from cornersmooth.text import format_number
+
+
+class RowWriter(Protocol):
+    """What writes rows that have words of their own: `RowFormat`, or the like of it."""
+
+    def rows(
+        self, ticks: Ints, prefix: Sequence[bytes], prefix_id: Ints, suffix: Sequence[bytes], suffix_id: Ints
+    ) -> tuple[bytes, Ints]:
+        """Text, and where each row starts in it."""
+        ...
 
 
 class Curves(Protocol):
@@ -20,7 +29,7 @@ class Curves(Protocol):
     `numbers`.
     """
 
-    format: RowFormat | None
+    format: RowWriter | None
 
     def prepare(self, run: Run) -> Run:
         """Return the run with only the rows that become blocks, and remember what follows."""
@@ -42,7 +51,7 @@ class Curves(Protocol):
 class NoCurves:
     """Forms of lines only."""
 
-    format: RowFormat | None = None
+    format: RowWriter | None = None
 
     def prepare(self, run: Run) -> Run:
         """Return the run as it is."""
@@ -160,81 +169,6 @@ class SplineBlocks(NoCurves):
                 weight = format_number(value, self._decimals, trim=True).rstrip(".").encode()
                 table.append(b" PL=" + interval + b" PW=" + weight + b"\n")
         chosen[curved] = base + (run.curve[curved] - 2) * len(values) + which
-
-
-class PolynomialBlocks(NoCurves):
-    """Siemens' POLY: both halves of the curves as cubic polynomials ``PO[X]=(end, a2, a3)`` of the parameter 0 to 1.
-
-    The control takes a0 from where the block before ended and a1 = end − a0 − a2 − a3. Only for weights 1: the
-    denominator of POLY acts on the geometry axes alone. The halves are Bézier cubics, found by subdivision.
-    """
-
-    def __init__(self, form: Form, units: Units) -> None:
-        digits, tip = form.table.digits, form.tip_decimals(units)
-        letters = [word.rstrip("=") for word in (*form.mode.motion.coordinates, *form.other_words)]
-        words = []
-        for index, letter in enumerate(letters):
-            words += [f"{') ' if index else ''}PO[{letter}]=(".encode(), b",", b","]
-        self._decimals = (tip, digits.coefficient, digits.coefficient) * len(letters)
-        self.format = RowFormat(words=tuple(words), decimals=self._decimals)
-
-    def prepare(self, run: Run) -> Run:
-        """Leave the third and the last row of each curve: its halves."""
-        return run.only((run.curve == 0) | (run.curve == 3) | (run.curve == 5))
-
-    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
-        """``POLY``."""
-        chosen[run.curve > 0] = len(table)
-        table.append(b"POLY ")
-        return 0
-
-    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
-        """Length of the parameter interval."""
-        chosen[run.curve > 0] = len(table)
-        table.append(b") PL=1\n")
-
-    def numbers(self, run: Run, curved: Bools) -> Ints:
-        """End point and coefficients of each half, axis by axis."""
-        assert run.halves is not None
-        start, first, second, end = np.moveaxis(run.halves[curved].reshape(int(curved.sum()), 4, -1), 1, 0)
-        square, cube = 3.0 * (start - 2.0 * first + second), end - 3.0 * second + 3.0 * first - start
-        numbers = np.stack((end, square, cube), axis=2).reshape(len(end), -1)
-        return to_ticks(numbers, self._decimals)
-
-
-def halves_of(points: Floats, curve: NDArray[np.int8]) -> Floats:
-    """Bézier points of both halves of curves with weights 1, in the third and the fifth row of each; zero elsewhere.
-
-    Parameters
-    ----------
-    points : (r, c) float64
-        Control points, five rows for each curve.
-    curve : (r,) int8
-        As in `Rows`.
-
-    Returns
-    -------
-    (r, 4, c) float64
-    """
-    halves = np.zeros((len(points), 4, points.shape[1]))
-    first = np.flatnonzero(curve == 1)
-    p0, p1, p2, p3, p4 = (points[first + k] for k in range(5))
-    middle = (p1 + 2.0 * p2 + p3) / 4.0
-    halves[first + 2] = np.stack((p0, p1, (p1 + p2) / 2.0, middle), axis=1)
-    halves[first + 4] = np.stack((middle, (p2 + p3) / 2.0, p3, p4), axis=1)
-    return halves
-
-
-def curves_for(form: Form, units: Units) -> Curves:
-    """Way to write curves of a form."""
-    decimals = form.table.digits.weight
-    if form.curve == "g6.2":
-        return RotaryKnotBlocks(decimals) if form.rotary else KnotBlocks(decimals)
-    if form.curve == "bspline":
-        return SplineBlocks(decimals)
-    if form.curve == "poly":
-        return PolynomialBlocks(form, units)
-    return NoCurves()
 
 
 def _weights(run: Run, curved: Bools) -> tuple[list[float], Ints]:

@@ -138,7 +138,7 @@ class MotionWriter:
             curve=rows.curve[part],
             weights=rows.weights[part] if rows.weights is not None else None,
             arc=arc,
-            halves=self.writer.halves(rows.tip[part], rows.other[part], rows.curve[part]),
+            pieces=self.writer.pieces(rows.tip[part], rows.other[part], rows.curve[part]),
             spline=rows.spline[part] if rows.spline is not None else None,
         )
         before = len(run)

@@ -32,8 +32,8 @@ class Run:
     arc : (r,) int64 or None
     dwell : (r,) bool or None
         Where the tool waits after the block.
-    halves : (r, 4, c) float64 or None
-        Bézier points of the halves of curves, in units of the text, for polynomials.
+    pieces : (r, 4, c) float64 or None
+        Bézier points of the knot intervals of curves, in units of the text, for polynomials.
     spline : (r, 3) float64 or None
         As in `Rows`.
     """
@@ -47,7 +47,7 @@ class Run:
     weights: Floats | None = None
     arc: Ints | None = None
     dwell: Bools | None = None
-    halves: Floats | None = None
+    pieces: Floats | None = None
     spline: Floats | None = None
 
     def __len__(self) -> int:
