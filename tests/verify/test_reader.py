@@ -155,12 +155,12 @@ def test_runs_and_single_lines_give_the_same(form, tmp_path):
 
 
 def test_chunks_make_no_difference(monkeypatch):
-    from cornersmooth.verify import words
+    from cornersmooth.verify import runs
 
     tip, axis = wavy(60)
     text = simple_text(tip, axis, 0.02, 10.0, "g6.2")
     whole = read_nc(text)
-    monkeypatch.setattr(words, "CHUNK", 500)
+    monkeypatch.setattr(runs, "CHUNK", 500)
     pieces = read_nc(text)
     assert np.array_equal(whole.tip, pieces.tip)
     assert np.array_equal(whole.curves.knot, pieces.curves.knot)

@@ -15,7 +15,8 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.verify.motion import Modal, Piece, execute
 from cornersmooth.verify.ncprogram import Curves, Event, NcArcs, NcProgram, Problem, Second
-from cornersmooth.verify.words import Line, Table, motion_row, read_lines, table_of
+from cornersmooth.verify.runs import read_lines
+from cornersmooth.verify.words import Line, Table, motion_row, table_of
 
 Form = Literal["g1", "g6.2"]
 

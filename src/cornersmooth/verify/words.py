@@ -1,43 +1,30 @@
-"""NC text to words: line by line where it matters, whole runs of motion blocks at once where nothing else stands.
+"""Blocks of an NC text as words: the table that a run of motion blocks becomes, and the single line.
 
 A *motion block* consists of axis, vector, knot, weight and feed words with at most one G word of group 01. Runs of
-them make up nearly all of a file; they become the columns of a `Table`. Every other line is given out on its own.
+them make up nearly all of a file and are read by `runs`; every other line is taken apart here on its own.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Floats, Ints
-from cornersmooth.text import NumberError, parse_numbers
-from cornersmooth.verify.fixed import MARGIN, read_column, words_of
 
 #: letters of a motion block; N is a block number and says nothing
 MOTION_LETTERS = "GXYZIJKUVWFRPN"
 
 #: letters that make a block move the tool or belong to a curve
-_PLACE_LETTERS = frozenset("XYZUVWIJK")
+PLACE_LETTERS = frozenset("XYZUVWIJK")
 
 #: G words of group 01 that a run may contain
 MOTION_CODES = (0.0, 1.0, 2.0, 3.0, 6.2)
 
-#: bytes read at a time
-CHUNK = 1 << 20
-
-_TO_BLANKS = bytes(32 if chr(code).isalpha() or code == 13 else code for code in range(128)) + bytes(range(128, 256))
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _COMMENT = re.compile(r"\(([^)]*)\)|;(.*)$")
-
-#: bytes that are no part of a number and no blank between words
-_SPEAKS = bytes(code not in b"0123456789.-+ \t\r" for code in range(256))
-
-_LINE_END, _BLANK = 10, 32
 
 
 @dataclass(frozen=True)
@@ -80,28 +67,6 @@ class Line:
     comments: tuple[str, ...]
 
 
-def read_lines(data: bytes | memoryview, name: str | None) -> Iterator[Table | Line]:
-    """Give out the text in order, as runs of motion blocks and as other lines.
-
-    Raises
-    ------
-    InputError
-        CS501 where a line is not made of words.
-    """
-    signatures = _Signatures()
-    number = 1
-    start = 0
-    size = len(data)
-    while start < size:
-        stop = _cut(data, start, size)
-        chunk = bytes(data[start:stop])
-        if not chunk.endswith(b"\n"):
-            chunk += b"\n"
-        yield from _read_chunk(chunk, number, signatures, name)
-        number += chunk.count(b"\n")
-        start = stop
-
-
 def tokenise(text: bytes, number: int, name: str | None) -> Line:
     """Take one line apart.
 
@@ -136,7 +101,7 @@ def motion_row(line: Line) -> dict[str, float] | None:
     """Words of a motion block as a dict, or None where the line is something else."""
     row = {letter: value for letter, value, _ in line.words}
     letters = set(row)
-    if len(row) != len(line.words) or not letters <= set(MOTION_LETTERS) or not letters & _PLACE_LETTERS:
+    if len(row) != len(line.words) or not letters <= set(MOTION_LETTERS) or not letters & PLACE_LETTERS:
         return None
     if "G" in row and row["G"] not in MOTION_CODES:
         return None
@@ -150,173 +115,3 @@ def table_of(rows: list[tuple[int, dict[str, float]]]) -> Table:
         np.array([number for number, _ in rows], np.int64),
         {letter: np.array([row.get(letter, np.nan) for _, row in rows]) for letter in letters},
     )
-
-
-def _cut(data: bytes | memoryview, start: int, size: int) -> int:
-    """End of the chunk from `start`: in front of a block with a G word, so that no curve is cut in two."""
-    stop = start + CHUNK
-    while stop < size:
-        piece = bytes(data[start:stop])
-        cut = piece.rfind(b"\nG")
-        if cut >= 0:
-            return start + cut + 1
-        stop += CHUNK
-    return size
-
-
-class _Signatures:
-    """The letter sequences of lines met so far, and whether such lines can be read in runs."""
-
-    def __init__(self) -> None:
-        self.letters: list[bytes] = []
-        self.bulk: list[bool] = []
-
-    def classify(self, letters: NDArray[np.uint8], start: Ints, end: Ints) -> Ints:
-        """Index into `letters` for every line; the lines' letters are ``letters[start:end]``."""
-        length = end - start
-        head = np.where(length > 0, letters[np.minimum(start, len(letters) - 1)], 0)
-        index = np.full(len(start), -1, np.int64)
-        tried = 0
-        while True:
-            for known in range(tried, len(self.letters)):
-                self._match(known, letters, start, length, head, index)
-            tried = len(self.letters)
-            missing = np.flatnonzero(index < 0)
-            if not len(missing):
-                return index
-            first = missing[0]
-            self._learn(letters[start[first] : end[first]].tobytes())
-
-    def _match(
-        self, known: int, letters: NDArray[np.uint8], start: Ints, length: Ints, head: NDArray[np.uint8], index: Ints
-    ) -> None:
-        pattern = np.frombuffer(self.letters[known], np.uint8)
-        same = length == len(pattern)
-        if len(pattern):
-            same &= head == pattern[0]
-        same &= index < 0
-        rows = np.flatnonzero(same)
-        if len(rows) and len(pattern) > 1:
-            found = letters[start[rows][:, None] + np.arange(1, len(pattern))]
-            rows = rows[(found == pattern[1:]).all(axis=1)]
-        index[rows] = known
-
-    def _learn(self, signature: bytes) -> None:
-        text = signature.decode("latin-1")
-        self.letters.append(signature)
-        self.bulk.append(
-            len(set(text)) == len(text) and set(text) <= set(MOTION_LETTERS) and bool(set(text) & _PLACE_LETTERS)
-        )
-
-
-@dataclass(frozen=True)
-class _Chunk:
-    """Lines of a chunk, and where the letters and numbers of each are.
-
-    Parameters
-    ----------
-    raw : (n,) uint8
-        The text behind `MARGIN` line ends.
-    place : (p,) int64
-        Every byte that is no digit, point, sign or blank: letters, line ends, anything strange.
-    first, last : (l,) int64
-        Each line's letters are ``place[first:last]``; ``place[last]`` is its end.
-    index : (l,) int64
-        Signature of each line.
-    """
-
-    raw: NDArray[np.uint8]
-    place: Ints
-    first: Ints
-    last: Ints
-    index: Ints
-
-    def text(self, row: int, stop: int) -> bytes:
-        """Lines ``row`` to ``stop`` (excluded) as written."""
-        begin = int(self.place[self.last[row - 1]]) + 1 if row else MARGIN
-        return self.raw[begin : int(self.place[self.last[stop - 1]]) + 1].tobytes()
-
-
-def _read_chunk(chunk: bytes, number: int, signatures: _Signatures, name: str | None) -> Iterator[Table | Line]:
-    raw = np.frombuffer(b"\n" * MARGIN + chunk, np.uint8)
-    place = np.flatnonzero(np.frombuffer(chunk.translate(_SPEAKS), np.bool_)) + MARGIN
-    letters = raw[place]
-    last = np.flatnonzero(letters == _LINE_END)
-    first = np.concatenate(([0], last[:-1] + 1))
-    found = _Chunk(raw, place, first, last, signatures.classify(letters, first, last))
-    bulk = np.array(signatures.bulk)[found.index]
-    edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
-    for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        if bulk[start]:
-            columns = _read_run(found, start, stop, signatures)
-            if columns is not None:
-                yield Table(np.arange(number + start, number + stop), columns)
-                continue
-        for row in range(start, stop):
-            yield tokenise(found.text(row, row + 1), number + row, name)
-
-
-def _read_run(chunk: _Chunk, start: int, stop: int, signatures: _Signatures) -> dict[str, Floats] | None:
-    """Columns of a run of lines with known letters; None where the numbers are not what the letters promise."""
-    index = chunk.index[start:stop]
-    patterns = {k: signatures.letters[k].decode() for k in np.flatnonzero(np.bincount(index)).tolist()}
-    fields = _fields(chunk, start, stop, index, patterns)
-    if fields is None:
-        return None
-    columns: dict[str, Floats] = {}
-    for rows, pattern, numbers in fields:
-        for letter, values in zip(pattern, numbers, strict=True):
-            if len(patterns) == 1:
-                columns[letter] = values
-            else:
-                column = columns.setdefault(letter, np.full(stop - start, np.nan))
-                column[rows] = values
-    if "G" in columns:
-        code = columns["G"]
-        if not (np.isnan(code) | np.isin(code, MOTION_CODES)).all():
-            return None
-    return columns
-
-
-_Fields = list[tuple[Ints, str, list[Floats]]]
-
-
-def _fields(chunk: _Chunk, start: int, stop: int, index: Ints, patterns: dict[int, str]) -> _Fields | None:
-    """Numbers of every signature's lines, column by column; all at once where the columns are not regular."""
-    raw, words = chunk.raw, words_of(chunk.raw)
-    first = chunk.first[start:stop]
-    found: _Fields = []
-    for k, pattern in patterns.items():
-        rows = np.flatnonzero(index == k)
-        own = first[rows]
-        numbers: list[Floats] = []
-        for column in range(len(pattern)):
-            begin = chunk.place[own + column] + 1
-            end = chunk.place[own + column + 1]
-            end = end - (raw[end - 1] <= _BLANK)
-            values = read_column(raw, words, begin, end)
-            if values is None:
-                return _irregular_fields(chunk, start, stop, index, patterns)
-            numbers.append(values)
-        found.append((rows, pattern, numbers))
-    return found
-
-
-def _irregular_fields(chunk: _Chunk, start: int, stop: int, index: Ints, patterns: dict[int, str]) -> _Fields | None:
-    text = chunk.text(start, stop)
-    raw = np.frombuffer(text, np.uint8)
-    if ((raw[:-1] >= ord("A")) & (raw[1:] <= _BLANK)).any():  # a letter without its number right behind it
-        return None
-    try:
-        values = parse_numbers(text.translate(_TO_BLANKS))
-    except NumberError:
-        return None
-    count = chunk.last[start:stop] - chunk.first[start:stop]
-    if len(values) != count.sum():
-        return None
-    first = np.cumsum(count) - count
-    found: _Fields = []
-    for k, pattern in patterns.items():
-        rows = np.flatnonzero(index == k)
-        found.append((rows, pattern, [values[first[rows] + column] for column in range(len(pattern))]))
-    return found
