@@ -166,3 +166,23 @@ def test_chunks_make_no_difference(monkeypatch):
     assert np.array_equal(whole.curves.knot, pieces.curves.knot)
     assert np.array_equal(whole.curves.element, pieces.curves.element)
     assert pieces.problems == ()
+
+
+def test_digits_before_the_first_word_are_none():
+    with pytest.raises(InputError, match=":4: error"):
+        read_nc(b"G43.5 H1\nG0 X0. Y0. Z0. I0. J0. K1.\nG1 X0.5 F100.\n3 X1.0\nX2.0\n")
+
+
+def test_block_numbers_make_no_difference(monkeypatch):
+    from cornersmooth.verify import runs
+
+    tip, axis = wavy(60)
+    text = simple_text(tip, axis, 0.02, 10.0, "g6.2")
+    numbered = b"\n".join(
+        b"N%d %b" % (i, line) if line[:1] in b"GK" else line for i, line in enumerate(text.split(b"\n"))
+    )
+    monkeypatch.setattr(runs, "CHUNK", 500)
+    plain, other = read_nc(text), read_nc(numbered)
+    assert np.array_equal(plain.tip, other.tip)
+    assert np.array_equal(plain.curves.point, other.curves.point)
+    assert other.problems == ()

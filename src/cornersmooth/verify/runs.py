@@ -11,32 +11,42 @@ from numpy.typing import NDArray
 from cornersmooth.model import Floats, Ints
 from cornersmooth.text import NumberError, parse_numbers
 from cornersmooth.verify.fixed import MARGIN, read_column, words_of
-from cornersmooth.verify.words import MOTION_CODES, MOTION_LETTERS, PLACE_LETTERS, Line, Table, tokenise
+from cornersmooth.verify.spelling import Spelling
+from cornersmooth.verify.words import Line, Table
 
 #: bytes read at a time
 CHUNK = 1 << 20
 
-_TO_BLANKS = bytes(32 if chr(code).isalpha() or code == 13 else code for code in range(128)) + bytes(range(128, 256))
+_TO_BLANKS = bytes(32 if chr(code).isalpha() or code in b"\r," else code for code in range(128)) + b" " * 128
 #: bytes that are no part of a number and no blank between words
 _SPEAKS = bytes(code not in b"0123456789.-+ \t\r" for code in range(256))
 
 _LINE_END, _BLANK = 10, 32
 
 
-def read_lines(data: bytes | memoryview, name: str | None) -> Iterator[Table | Line]:
+def read_lines(data: bytes | memoryview, name: str | None, spelling: Spelling | None = None) -> Iterator[Table | Line]:
     """Give out the text in order, as runs of motion blocks and as other lines.
+
+    Parameters
+    ----------
+    data : bytes or memoryview
+    name : str or None
+        For messages.
+    spelling : Spelling, optional
+        Of the control; single letters by default.
 
     Raises
     ------
     InputError
         CS501 where a line is not made of words.
     """
-    signatures = _Signatures()
+    spelling = spelling or Spelling()
+    signatures = _Signatures(spelling)
     number = 1
     start = 0
     size = len(data)
     while start < size:
-        stop = _cut(data, start, size)
+        stop = _cut(data, start, size, spelling)
         chunk = bytes(data[start:stop])
         if not chunk.endswith(b"\n"):
             chunk += b"\n"
@@ -45,24 +55,24 @@ def read_lines(data: bytes | memoryview, name: str | None) -> Iterator[Table | L
         start = stop
 
 
-def _cut(data: bytes | memoryview, start: int, size: int) -> int:
-    """End of the chunk from `start`: in front of a block with a G word, so that no curve is cut in two."""
+def _cut(data: bytes | memoryview, start: int, size: int, spelling: Spelling) -> int:
+    """End of the chunk from `start`: where no curve is cut in two."""
     stop = start + CHUNK
     while stop < size:
-        piece = bytes(data[start:stop])
-        cut = piece.rfind(b"\nG")
-        if cut >= 0:
-            return start + cut + 1
+        cut = spelling.cut(bytes(data[start:stop]))
+        if cut:
+            return start + cut
         stop += CHUNK
     return size
 
 
 class _Signatures:
-    """The letter sequences of lines met so far, and whether such lines can be read in runs."""
+    """The letter sequences of lines met so far, and the columns of those that can be read in runs."""
 
-    def __init__(self) -> None:
+    def __init__(self, spelling: Spelling) -> None:
+        self.spelling = spelling
         self.letters: list[bytes] = []
-        self.bulk: list[bool] = []
+        self.columns: list[tuple[str, ...] | None] = []
 
     def classify(self, letters: NDArray[np.uint8], start: Ints, end: Ints) -> Ints:
         """Index into `letters` for every line; the lines' letters are ``letters[start:end]``."""
@@ -95,11 +105,8 @@ class _Signatures:
         index[rows] = known
 
     def _learn(self, signature: bytes) -> None:
-        text = signature.decode("latin-1")
         self.letters.append(signature)
-        self.bulk.append(
-            len(set(text)) == len(text) and set(text) <= set(MOTION_LETTERS) and bool(set(text) & PLACE_LETTERS)
-        )
+        self.columns.append(self.spelling.columns(signature))
 
 
 @dataclass(frozen=True)
@@ -131,29 +138,39 @@ class _Chunk:
 
 
 def _read_chunk(chunk: bytes, number: int, signatures: _Signatures, name: str | None) -> Iterator[Table | Line]:
-    raw = np.frombuffer(b"\n" * MARGIN + chunk, np.uint8)
-    place = np.flatnonzero(np.frombuffer(chunk.translate(_SPEAKS), np.bool_)) + MARGIN
+    spelling = signatures.spelling
+    text = spelling.respell(chunk)
+    raw = np.frombuffer(b"\n" * MARGIN + text, np.uint8)
+    place = np.flatnonzero(np.frombuffer(text.translate(_SPEAKS), np.bool_)) + MARGIN
     letters = raw[place]
     last = np.flatnonzero(letters == _LINE_END)
     first = np.concatenate(([0], last[:-1] + 1))
     found = _Chunk(raw, place, first, last, signatures.classify(letters, first, last))
-    bulk = np.array(signatures.bulk)[found.index]
+    bulk = np.array([columns is not None for columns in signatures.columns])[found.index]
     edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
+    written: list[bytes] = []
     for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         if bulk[start]:
-            columns = _read_run(found, start, stop, signatures)
-            if columns is not None:
-                yield Table(np.arange(number + start, number + stop), columns)
+            table = _read_run(found, start, stop, signatures, number)
+            if table is not None:
+                yield table
                 continue
+        if text is not chunk and not written:
+            written = chunk.split(b"\n")
         for row in range(start, stop):
-            yield tokenise(found.text(row, row + 1), number + row, name)
+            line = written[row] if written else found.text(row, row + 1)
+            yield spelling.line(line, number + row, name)
 
 
-def _read_run(chunk: _Chunk, start: int, stop: int, signatures: _Signatures) -> dict[str, Floats] | None:
-    """Columns of a run of lines with known letters; None where the numbers are not what the letters promise."""
+def _read_run(chunk: _Chunk, start: int, stop: int, signatures: _Signatures, number: int) -> Table | None:
+    """Run of lines with known letters; None where the numbers are not what the letters promise."""
+    if not _begin_with_letters(chunk, start, stop, numbered=signatures.spelling.numbered):
+        return None
     index = chunk.index[start:stop]
-    patterns = {k: signatures.letters[k].decode() for k in np.flatnonzero(np.bincount(index)).tolist()}
+    patterns = {k: signatures.columns[k] or () for k in np.flatnonzero(np.bincount(index)).tolist()}
     fields = _fields(chunk, start, stop, index, patterns)
+    if fields is None:
+        fields = _irregular_fields(chunk, start, stop, index, patterns, numbered=signatures.spelling.numbered)
     if fields is None:
         return None
     columns: dict[str, Floats] = {}
@@ -164,18 +181,32 @@ def _read_run(chunk: _Chunk, start: int, stop: int, signatures: _Signatures) -> 
             else:
                 column = columns.setdefault(letter, np.full(stop - start, np.nan))
                 column[rows] = values
-    if "G" in columns:
-        code = columns["G"]
-        if not (np.isnan(code) | np.isin(code, MOTION_CODES)).all():
-            return None
-    return columns
+    return signatures.spelling.table(Table(np.arange(number + start, number + stop), columns))
 
 
-_Fields = list[tuple[Ints, str, list[Floats]]]
+def _begin_with_letters(chunk: _Chunk, start: int, stop: int, *, numbered: bool) -> bool:
+    """Whether lines begin with their first letter, or with a number and a blank before it."""
+    begin = _line_starts(chunk, start, stop)
+    end = chunk.place[chunk.first[start:stop]]
+    if not numbered:
+        return bool((begin == end).all())
+    if not ((end - begin >= 2) & (chunk.raw[end - 1] == _BLANK)).all():
+        return False
+    return read_column(chunk.raw, words_of(chunk.raw), begin, end - 1) is not None
 
 
-def _fields(chunk: _Chunk, start: int, stop: int, index: Ints, patterns: dict[int, str]) -> _Fields | None:
-    """Numbers of every signature's lines, column by column; all at once where the columns are not regular."""
+def _line_starts(chunk: _Chunk, start: int, stop: int) -> Ints:
+    """First byte of lines."""
+    ends = chunk.place[chunk.last[max(start - 1, 0) : stop - 1]] + 1
+    return ends if start else np.concatenate(([MARGIN], ends))
+
+
+_Patterns = dict[int, tuple[str, ...]]
+_Fields = list[tuple[Ints, tuple[str, ...], list[Floats]]]
+
+
+def _fields(chunk: _Chunk, start: int, stop: int, index: Ints, patterns: _Patterns) -> _Fields | None:
+    """Numbers of every signature's lines, column by column; None where the columns are not regular."""
     raw, words = chunk.raw, words_of(chunk.raw)
     first = chunk.first[start:stop]
     found: _Fields = []
@@ -189,13 +220,16 @@ def _fields(chunk: _Chunk, start: int, stop: int, index: Ints, patterns: dict[in
             end = end - (raw[end - 1] <= _BLANK)
             values = read_column(raw, words, begin, end)
             if values is None:
-                return _irregular_fields(chunk, start, stop, index, patterns)
+                return None
             numbers.append(values)
         found.append((rows, pattern, numbers))
     return found
 
 
-def _irregular_fields(chunk: _Chunk, start: int, stop: int, index: Ints, patterns: dict[int, str]) -> _Fields | None:
+def _irregular_fields(
+    chunk: _Chunk, start: int, stop: int, index: Ints, patterns: _Patterns, *, numbered: bool
+) -> _Fields | None:
+    """Numbers of all lines at once."""
     text = chunk.text(start, stop)
     raw = np.frombuffer(text, np.uint8)
     if ((raw[:-1] >= ord("A")) & (raw[1:] <= _BLANK)).any():  # a letter without its number right behind it
@@ -204,10 +238,10 @@ def _irregular_fields(chunk: _Chunk, start: int, stop: int, index: Ints, pattern
         values = parse_numbers(text.translate(_TO_BLANKS))
     except NumberError:
         return None
-    count = chunk.last[start:stop] - chunk.first[start:stop]
+    count = chunk.last[start:stop] - chunk.first[start:stop] + numbered
     if len(values) != count.sum():
         return None
-    first = np.cumsum(count) - count
+    first = np.cumsum(count) - count + numbered
     found: _Fields = []
     for k, pattern in patterns.items():
         rows = np.flatnonzero(index == k)
