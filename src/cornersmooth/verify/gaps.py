@@ -194,38 +194,41 @@ def search_elements(
     """
     nc, length = matcher.nc, matcher.axis_length
     rows, width = elements.shape
-
-    def look(element: Ints, fraction: Floats) -> tuple[Floats, Floats, Floats]:
-        shape = element.shape
-        tip, axis = written_at(nc, element.ravel(), fraction.ravel())
-        six = np.hstack((tip, tip + length * axis)).reshape(*shape, 6)
-        off = six[..., column] - point[:, None, column]
-        return tip.reshape(*shape, 3), axis.reshape(*shape, 3), np.sqrt(np.einsum("...i,...i->...", off, off))
-
-    grid = np.linspace(0.0, 1.0, _SAMPLES)
-    element = np.repeat(elements, _SAMPLES, axis=1)
-    fraction = np.tile(grid, (rows, width))
-    tip, axis, distance = look(element, fraction)
     here = np.arange(rows)
-    best = np.argmin(distance, axis=1)
-    chosen, at = element[here, best], fraction[here, best]
+
+    def look(place: Floats) -> tuple[Floats, Floats, Floats]:
+        """Poses at places (k, m): which of a row's elements, plus the fraction of it; and their distances."""
+        which = np.minimum(place.astype(np.int64), width - 1)
+        element = np.take_along_axis(elements, which, axis=1)
+        tip, axis = written_at(nc, element.ravel(), (place - which).ravel())
+        six = np.hstack((tip, tip + length * axis)).reshape(*place.shape, 6)
+        off = six[..., column] - point[:, None, column]
+        return (
+            tip.reshape(*place.shape, 3),
+            axis.reshape(*place.shape, 3),
+            np.sqrt(np.einsum("...i,...i->...", off, off)),
+        )
+
+    grid = np.linspace(0.0, width, width * (_SAMPLES - 1) + 1)
+    at = grid[np.argmin(look(np.broadcast_to(grid, (rows, len(grid))))[2], axis=1)]
     step = grid[1]
     for _ in range(_ROUNDS):
-        fraction = np.clip(at[:, None] + np.linspace(-step, step, _ZOOM), 0.0, 1.0)
-        distance = look(np.repeat(chosen[:, None], _ZOOM, axis=1), fraction)[2]
-        at = fraction[here, np.argmin(distance, axis=1)]
+        place = np.clip(at[:, None] + np.linspace(-step, step, _ZOOM), 0.0, width)
+        at = place[here, np.argmin(look(place)[2], axis=1)]
         step *= 2.0 / (_ZOOM - 1)
-    # so close together the motion is straight: project on it
-    fraction = np.clip(at[:, None] + np.array([-step, step]), 0.0, 1.0)
-    tip, axis, _ = look(np.repeat(chosen[:, None], 2, axis=1), fraction)
+    # so close together the motion is straight, but for a joint: project on both sides
+    joint = np.round(at)
+    split = np.where(np.abs(joint - at) < step, joint, at)
+    ends = np.clip(np.stack((at - step, split, at + step), axis=1), 0.0, width)
+    tip, axis, _ = look(ends)
     six = np.concatenate((tip, tip + length * axis), axis=2)[..., column]
-    way = six[:, 1] - six[:, 0]
-    size = np.einsum("ij,ij->i", way, way)
-    share = np.einsum("ij,ij->i", point[:, column] - six[:, 0], way)
-    share = np.clip(np.divide(share, size, out=np.full(rows, 0.5), where=size > 0), 0.0, 1.0)
-    at = fraction[:, 0] + share * (fraction[:, 1] - fraction[:, 0])
-    tip, axis, distance = look(chosen[:, None], at[:, None])
-    return tip[:, 0], axis[:, 0], distance[:, 0]
+    way = np.diff(six, axis=1)
+    size = np.einsum("kmi,kmi->km", way, way)
+    share = np.einsum("kmi,kmi->km", point[:, None, column] - six[:, :-1], way)
+    share = np.clip(np.divide(share, size, out=np.full((rows, 2), 0.5), where=size > 0), 0.0, 1.0)
+    tip, axis, distance = look(np.hstack((ends[:, :-1] + share * np.diff(ends, axis=1), at[:, None])))
+    best = np.argmin(distance, axis=1)
+    return tip[here, best], axis[here, best], distance[here, best]
 
 
 def own_gaps_of_written(matcher: Matcher, block: Block, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
