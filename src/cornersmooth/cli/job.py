@@ -219,8 +219,10 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
     findings = written.findings
     if job.verify and unread:
         findings += (Finding("CS509", "note", 0, f"the text is not read back: {unread}"),)
+    dense = not form.curve
     contents = report(
         smoothed,
+        dense=dense,
         blocks_out=written.blocks,
         seconds=seconds,
         findings=findings,
@@ -228,7 +230,9 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
     )
     for path in job.reports:
         with open_output(path) as output:
-            texts = iter([report_json(contents)]) if path.lower().endswith(".json") else corners_csv(smoothed)
+            texts = (
+                iter([report_json(contents)]) if path.lower().endswith(".json") else corners_csv(smoothed, dense=dense)
+            )
             for text in texts:
                 output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8
     return contents

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.errors import Finding
-from cornersmooth.model import Floats, LimitedBy, Move, SmoothProgram, Status
+from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status
 from cornersmooth.report.corners import STATUS_NAMES, corner_table, worst_corners
 from cornersmooth.smoothing.neighbours import norm
 
@@ -23,6 +23,7 @@ _CSV_BLOCK = 4096
 def report(
     smoothed: SmoothProgram,
     *,
+    dense: bool = True,
     blocks_out: int | None = None,
     seconds: Mapping[str, float] | None = None,
     findings: tuple[Finding, ...] = (),
@@ -32,6 +33,8 @@ def report(
 
     Parameters
     ----------
+    dense : bool
+        Whether transitions are written as lines, not as curves: where their legs are unequal, errors differ.
     blocks_out : int, optional
         NC blocks written.
     seconds : mapping, optional
@@ -46,6 +49,7 @@ def report(
     program, corners = smoothed.program, smoothed.corners
     done = corners.smoothed
     chains = program.chains
+    worst = worst_corners(smoothed, dense=dense)
     summary: dict[str, Any] = {
         "corners": len(corners),
         "smoothed": int(done.sum()),
@@ -57,8 +61,8 @@ def report(
             for status in Status
             if status != Status.SMOOTHED and (count := int((corners.status == status).sum()))
         },
-        "max_tip_error_mm": _largest(corners.tip_error),
-        "max_axis_error_mm": _largest(corners.axis_error),
+        "max_tip_error_mm": worst.tip_error,
+        "max_axis_error_mm": worst.axis_error,
         "max_orientation_error_deg": float(np.degrees(_largest(corners.orientation_error))),
         "length_mm": _feed_length(smoothed),
         "blocks_in": int(np.count_nonzero(program.kind != Move.FROM)),
@@ -95,7 +99,7 @@ def report(
             }
             for finding in (*smoothed.findings, *findings)
         ],
-        "worst": _records(smoothed),
+        "worst": _records(smoothed, worst.rows, dense=dense),
     }
     if verification is not None:
         contents["verification"] = dict(verification)
@@ -107,11 +111,11 @@ def report_json(contents: Mapping[str, Any]) -> str:
     return json.dumps(_plain(contents), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def corners_csv(smoothed: SmoothProgram) -> Iterator[str]:
-    """The table of corners as CSV text, a block of rows at a time."""
+def corners_csv(smoothed: SmoothProgram, *, dense: bool = True) -> Iterator[str]:
+    """The table of corners as CSV text, a block of rows at a time; `dense` as for `report`."""
     count = len(smoothed.corners)
     for start in range(0, max(count, 1), _CSV_BLOCK):
-        table = corner_table(smoothed, np.arange(start, min(start + _CSV_BLOCK, count)))
+        table = corner_table(smoothed, np.arange(start, min(start + _CSV_BLOCK, count)), dense=dense)
         if start == 0:
             yield ",".join(table) + "\n"
         columns = [column.tolist() for column in table.values()]
@@ -119,8 +123,8 @@ def corners_csv(smoothed: SmoothProgram) -> Iterator[str]:
         yield "".join(form % row + "\n" for row in zip(*columns, strict=True))
 
 
-def _records(smoothed: SmoothProgram) -> list[dict[str, Any]]:
-    table = {name: column.tolist() for name, column in corner_table(smoothed, worst_corners(smoothed)).items()}
+def _records(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> list[dict[str, Any]]:
+    table = {name: column.tolist() for name, column in corner_table(smoothed, rows, dense=dense).items()}
     return [dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)]
 
 

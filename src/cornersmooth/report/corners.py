@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.smoothing.separation import separations
 from cornersmooth.smoothing.synchronise import angle_between
 
 STATUS_NAMES = {
@@ -34,13 +37,19 @@ Column = Floats | Ints | NDArray[np.str_]
 _CURVATURE_AT = np.array([0.2, 0.3, 0.38, 0.44, 0.48, 0.5, 0.52, 0.56, 0.62, 0.7, 0.8])
 
 
-def corner_table(smoothed: SmoothProgram, rows: Ints) -> dict[str, Column]:
+#: corners whose errors are found together
+_TOGETHER = 4096
+
+
+def corner_table(smoothed: SmoothProgram, rows: Ints, *, dense: bool = True) -> dict[str, Column]:
     """Columns of the table for some corners.
 
     Parameters
     ----------
     rows : (g,) int64
         Rows of `smoothed.corners`.
+    dense : bool
+        Whether transitions are written as lines, not as curves.
 
     Returns
     -------
@@ -56,6 +65,7 @@ def corner_table(smoothed: SmoothProgram, rows: Ints) -> dict[str, Column]:
     turn_out = settings.axis_length * (program.axis[after] - program.axis[pose])
     turn_out[corners.after[rows] < 0] = 0.0
     axis_in, axis_out = tip_in + turn_in, tip_out + turn_out
+    tip_error, axis_error = separations(smoothed, rows, dense=dense)
     columns: dict[str, Column] = {
         "corner": pose.astype(np.int64),
         "line": program.line[pose],
@@ -68,8 +78,8 @@ def corner_table(smoothed: SmoothProgram, rows: Ints) -> dict[str, Column]:
         "tip_length_out_mm": norm(tip_out) * corners.trim_out[rows],
         "axis_length_in_mm": norm(axis_in) * corners.axis_trim_in[rows],
         "axis_length_out_mm": norm(axis_out) * corners.axis_trim_out[rows],
-        "tip_error_mm": corners.tip_error[rows],
-        "axis_error_mm": corners.axis_error[rows],
+        "tip_error_mm": tip_error,
+        "axis_error_mm": axis_error,
         "orientation_error_deg": np.degrees(corners.orientation_error[rows]),
         "curvature_max_per_mm": _largest_curvature(smoothed, rows),
         "limited_by": _names(LIMIT_NAMES, corners.limited_by[rows]),
@@ -100,8 +110,43 @@ def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:
     return curvature
 
 
-def worst_corners(smoothed: SmoothProgram, count: int = 20) -> Ints:
-    """Rows of the smoothed corners nearest to the tolerance, the worst first; ties in path order."""
-    rows = np.flatnonzero(smoothed.corners.smoothed)
-    error = np.maximum(smoothed.corners.tip_error[rows], smoothed.corners.axis_error[rows])
-    return rows[np.argsort(-error, kind="stable")[:count]]
+@dataclass(frozen=True)
+class Worst:
+    """The largest errors, and the smoothed corners nearest to the tolerance.
+
+    Parameters
+    ----------
+    tip_error, axis_error : float, mm
+        The largest of all corners.
+    rows : (g,) int64
+        Rows of the corners, the worst first; ties in path order.
+    """
+
+    tip_error: float
+    axis_error: float
+    rows: Ints
+
+
+def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = True) -> Worst:
+    """Find the `count` worst corners; most corners are settled by what bounds their errors."""
+    corners = smoothed.corners
+    rows = np.flatnonzero(corners.smoothed)
+    bound = np.maximum(corners.tip_error[rows], corners.axis_error[rows])
+    order = np.argsort(-bound, kind="stable")
+    rows, bound = rows[order], bound[order]
+    seen = np.zeros(0, np.int64)
+    tip, axis_point, larger = np.zeros((3, 0))
+    for begin in range(0, len(rows), _TOGETHER):
+        least = min(
+            np.sort(larger)[-count] if len(larger) >= count else -np.inf,
+            tip.max(initial=-np.inf),
+            axis_point.max(initial=-np.inf),
+        )
+        if bound[begin] < least:
+            break
+        more = rows[begin : begin + _TOGETHER]
+        more_tip, more_axis_point = separations(smoothed, more, dense=dense)
+        seen, tip, axis_point = np.append(seen, more), np.append(tip, more_tip), np.append(axis_point, more_axis_point)
+        larger = np.maximum(tip, axis_point)
+    best = np.lexsort((seen, -larger))[:count]
+    return Worst(float(tip.max(initial=0.0)), float(axis_point.max(initial=0.0)), seen[best])

@@ -146,37 +146,43 @@ def _divide(settings: Settings, layout: Layout, poses: Ints, chord: Floats) -> N
 
 def lines_per_half(smoothed: SmoothProgram) -> Ints:
     """(k,) lines per half of every transition: n for nodes (j/n)^(2/3), −n for nodes j/n; 0 where not smoothed."""
-    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
-    lines = np.zeros(len(corners), np.int64)
-    rows = np.flatnonzero(corners.smoothed)
+    lines = np.zeros(len(smoothed.corners), np.int64)
+    rows = np.flatnonzero(smoothed.corners.smoothed)
     for block in np.array_split(rows, max(1, len(rows) // _BLOCK)):
-        pose, before, after = corners.pose[block], corners.before[block], corners.after[block]
-        tip_in, tip_out = program.tip[pose] - program.tip[before], program.tip[after] - program.tip[pose]
-        turn_in = settings.axis_length * (program.axis[pose] - program.axis[before])
-        turn_out = settings.axis_length * (program.axis[after] - program.axis[pose])
-        bends = (
-            tip_out * corners.trim_out[block][:, None] - tip_in * corners.trim_in[block][:, None],
-            (tip_out + turn_out) * corners.axis_trim_out[block][:, None]
-            - (tip_in + turn_in) * corners.axis_trim_in[block][:, None],
-        )
-        more_bend, more_turn = shape_factors(corners.weights[block], corners.ratio[block])
-        bend = np.sqrt(np.maximum(_square(bends[0]), _square(bends[1]))) * more_bend
-        by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
-        number = np.ceil(by_chord - 1e-9)
-
-        by_turn = np.zeros(len(block))
-        for turn, reach in (
-            (turn_in, np.maximum(corners.axis_trim_in[block], corners.trim_in[block])),
-            (turn_out, np.maximum(corners.axis_trim_out[block], corners.trim_out[block])),
-        ):
-            half = np.arcsin(np.minimum(np.sqrt(_square(turn)) / (2.0 * settings.axis_length), 1.0))
-            turned = 2.0 * half * reach + corners.orientation_error[block]  # on this side of the middle
-            by_turn = np.maximum(by_turn, turned * more_turn / _turn_limit(settings, half))
-        graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
-        even = np.maximum(np.ceil(1.5 * by_chord), np.ceil(by_turn - 1e-9))
-        chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))
-        lines[block] = np.clip(chosen, -_MOST_LINES, _MOST_LINES).astype(np.int64)
+        lines[block] = lines_of(smoothed, block)
     return lines
+
+
+def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
+    """(g,) lines per half of the transitions of some smoothed corners, as in `lines_per_half`."""
+    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
+    tip_in, tip_out = program.tip[pose] - program.tip[before], program.tip[after] - program.tip[pose]
+    turn_in = settings.axis_length * (program.axis[pose] - program.axis[before])
+    turn_out = settings.axis_length * (program.axis[after] - program.axis[pose])
+    bends = (
+        tip_out * corners.trim_out[rows][:, None] - tip_in * corners.trim_in[rows][:, None],
+        (tip_out + turn_out) * corners.axis_trim_out[rows][:, None]
+        - (tip_in + turn_in) * corners.axis_trim_in[rows][:, None],
+    )
+    more_bend, more_turn = shape_factors(corners.weights[rows], corners.ratio[rows])
+    bend = np.sqrt(np.maximum(_square(bends[0]), _square(bends[1]))) * more_bend
+    by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
+    number = np.ceil(by_chord - 1e-9)
+
+    by_turn = np.zeros(len(rows))
+    for turn, reach in (
+        (turn_in, np.maximum(corners.axis_trim_in[rows], corners.trim_in[rows])),
+        (turn_out, np.maximum(corners.axis_trim_out[rows], corners.trim_out[rows])),
+    ):
+        half = np.arcsin(np.minimum(np.sqrt(_square(turn)) / (2.0 * settings.axis_length), 1.0))
+        turned = 2.0 * half * reach + corners.orientation_error[rows]  # on this side of the middle
+        by_turn = np.maximum(by_turn, turned * more_turn / _turn_limit(settings, half))
+    graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
+    even = np.maximum(np.ceil(1.5 * by_chord), np.ceil(by_turn - 1e-9))
+    chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))
+    number_of_lines: Ints = np.clip(chosen, -_MOST_LINES, _MOST_LINES).astype(np.int64)
+    return number_of_lines
 
 
 def _square(vectors: Floats) -> Floats:

@@ -192,7 +192,7 @@ def _fill_arcs(
     return arc
 
 
-def _nodes(lines: int) -> Floats:
+def nodes(lines: int) -> Floats:
     """Parameters u of the points of a transition after its first: both halves, the middle, the end."""
     number = abs(lines)
     s = (np.arange(1, number + 1) / number) ** (2.0 / 3.0 if lines > 0 else 1.0)
@@ -209,7 +209,7 @@ def _fill_transitions(smoothed: SmoothProgram, layout: Layout, block: _Block, ha
     number = halves[rows]
     for lines in np.unique(number):
         chosen = np.flatnonzero(number == lines)
-        u = _nodes(int(lines))
+        u = nodes(int(lines))
         points, levers = points_of(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
         block.tip[where], block.other[where] = points[:, 1:], _unit(levers[:, 1:])

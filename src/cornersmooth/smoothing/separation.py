@@ -1,0 +1,171 @@
+"""How far the written path is from the original at each corner: what a measurement of the text finds.
+
+`Corners.tip_error` and `Corners.axis_error` compare both motions at a common parameter, which is what the construction
+promises. The paths themselves are as near or nearer: where the legs of a transition are unequal, the curve passes the
+corner nearest beside u = ½, on the side of the shorter leg.
+
+The corner itself is what decides. The written path runs on the inner side of the corner and turns all the way in one
+sense, from the direction of one leg to that of the other; so a tangent at any of its points, which the corner lies
+beyond, is no nearer to the corner than the point is to the nearer leg.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints, SmoothProgram
+from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.layout import lines_of
+from cornersmooth.smoothing.legs import dot, legs_at
+from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.smoothing.sampling import nodes
+
+#: corners looked at together
+_BLOCK = 4096
+
+#: points of the first look at a curve, rounds of looking closer, and points of each
+_FIRST, _ROUNDS, _CLOSER = 17, 5, 7
+
+#: cosine between the path at u = ½ and the way to the corner below which that is the nearest point
+_SQUARE = 1e-5
+
+
+@dataclass(frozen=True)
+class _Transitions:
+    """Transitions of g corners, seen from the corners.
+
+    Parameters
+    ----------
+    tip, turn : (g, 2, 3) float64, mm
+        Trimmed legs of the tip, and of the lever H·axis.
+    lever : (g, 3) float64, mm
+        H·axis of the corner.
+    weights : (g, 2) float64
+    ratio : (g,) float64
+    height : float, mm
+    """
+
+    tip: Floats
+    turn: Floats
+    lever: Floats
+    weights: Floats
+    ratio: Floats
+    height: float
+
+    @classmethod
+    def of(cls, smoothed: SmoothProgram, rows: Ints) -> _Transitions:
+        corners, height = smoothed.corners, smoothed.settings.axis_length
+        pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
+        legs = legs_at(smoothed.program, height, pose, before, after)
+        trim = np.stack((corners.trim_in[rows], corners.trim_out[rows]), axis=1)[..., None]
+        return cls(
+            np.stack((legs.tip_in, legs.tip_out), axis=1) * trim,
+            np.stack((legs.turn_in, legs.turn_out), axis=1) * trim,
+            height * legs.axis,
+            corners.weights[rows],
+            corners.ratio[rows],
+            height,
+        )
+
+    def only(self, rows: Ints) -> _Transitions:
+        return _Transitions(
+            self.tip[rows], self.turn[rows], self.lever[rows], self.weights[rows], self.ratio[rows], self.height
+        )
+
+    def at(self, u: Floats) -> tuple[Floats, Floats]:
+        """Tips less the corner and levers, (g, m, 3), at parameters (m,) or (g, m)."""
+        shares = nurbs.leg_coefficients(np.broadcast_to(u, (len(self.ratio), u.shape[-1])), self.weights, self.ratio)
+        tip, lever = shares[..., 1:] @ self.tip, self.lever[:, None, :] + shares[..., 1:] @ self.turn
+        return tip, lever * (self.height / norm(lever))[..., None]
+
+    def axis_point(self, u: Floats) -> Floats:
+        """Axis points less the axis point of the corner, (g, m, 3)."""
+        tip, lever = self.at(u)
+        return tip + lever - self.lever[:, None, :]
+
+
+def separations(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple[Floats, Floats]:
+    """Distances of the written tip path and axis-point path from the original ones at some corners.
+
+    Parameters
+    ----------
+    smoothed : SmoothProgram
+    rows : (g,) int64
+        Rows of `SmoothProgram.corners`.
+    dense : bool
+        Whether transitions are written as lines, not as curves.
+
+    Returns
+    -------
+    tip, axis_point : (g,) float64, mm
+        As for `Corners.tip_error` and `Corners.axis_error`, zero where the corner is not smoothed. For the paper's
+        method they are the errors by its equation (10), where legs are equal.
+    """
+    corners = smoothed.corners
+    tip, axis_point = corners.tip_error[rows].copy(), corners.axis_error[rows].copy()
+    if smoothed.settings.method == "zhang2016":
+        return tip, axis_point
+    for begin in range(0, len(rows), _BLOCK):
+        chosen = begin + np.flatnonzero(corners.smoothed[rows[begin : begin + _BLOCK]])
+        if not len(chosen):
+            continue
+        transitions = _Transitions.of(smoothed, rows[chosen])
+        lines = lines_of(smoothed, rows[chosen]) if dense else None
+        tip[chosen] = _passing(transitions, lines, tip[chosen], whole=False)
+        axis_point[chosen] = _passing(transitions, lines, axis_point[chosen], whole=True)
+    return tip, axis_point
+
+
+def _passing(transitions: _Transitions, lines: Ints | None, common: Floats, *, whole: bool) -> Floats:
+    """How near tip path or (`whole`) axis-point path pass the corner, no farther than at the common parameter."""
+
+    def place(some: _Transitions, u: Floats) -> Floats:
+        return some.axis_point(u) if whole else some.at(u)[0]
+
+    near = place(transitions, np.array([0.5 - 1e-5, 0.5, 0.5 + 1e-5]))
+    along, off = near[:, 2] - near[:, 0], near[:, 1]
+    aslant = np.flatnonzero(np.abs(dot(along, off)) > _SQUARE * norm(along) * norm(off))
+    passing = common.copy()
+    if lines is None:
+        some = transitions.only(aslant)
+        passing[aslant] = np.minimum(common[aslant], _nearest_on_curve(lambda u: place(some, u), len(aslant)))
+        return passing
+    for number in np.unique(lines[aslant]):
+        chosen = aslant[lines[aslant] == number]
+        some = transitions.only(chosen)
+        tip, lever = some.at(np.concatenate(([0.0], nodes(int(number)))))
+        passing[chosen] = np.minimum(common[chosen], _nearest_on_lines(some, tip, lever, whole=whole))
+    return passing
+
+
+def _nearest_on_curve(place: Callable[[Floats], Floats], count: int) -> Floats:
+    """(count,) least distance of curves from their corners; `place` takes parameters (count, m) to points."""
+    low, step, points = np.zeros(count), 1.0 / (_FIRST - 1), _FIRST
+    for _ in range(_ROUNDS):
+        point = place(low[:, None] + step * np.arange(points))
+        square = dot(point, point)
+        best = np.clip(square.argmin(axis=1), 1, points - 2)
+        low, step, points = low + (best - 1) * step, 2.0 * step / (_CLOSER - 1), _CLOSER
+    before, middle, behind = (np.take_along_axis(square, (best + k)[:, None], axis=1)[:, 0] for k in (-1, 0, 1))
+    bend = before - 2.0 * middle + behind
+    # the vertex of the parabola through the three
+    drop = np.divide((before - behind) ** 2, 8.0 * bend, out=np.zeros(count), where=bend > 0.0)
+    return np.sqrt(np.maximum(np.minimum(np.minimum(before, behind), middle - drop), 0.0))
+
+
+def _nearest_on_lines(transitions: _Transitions, tip: Floats, lever: Floats, *, whole: bool) -> Floats:
+    """(g,) least distance of lines between tips and levers (g, m, 3) from the corners."""
+    point = tip + lever - transitions.lever[:, None, :] if whole else tip
+    start, way = point[:, :-1], np.diff(point, axis=1)
+    size = dot(way, way)
+    share = np.clip(np.divide(-dot(start, way), size, out=np.zeros_like(size), where=size > 0), 0.0, 1.0)[..., None]
+    place = start + share * way
+    if whole:  # the control turns the tool between the ends of a line
+        turned = lever[:, :-1] + share * np.diff(lever, axis=1)
+        turned *= (transitions.height / norm(turned))[..., None]
+        place = tip[:, :-1] + share * np.diff(tip, axis=1) + turned - transitions.lever[:, None, :]
+    least: Floats = norm(place).min(axis=1)
+    return least

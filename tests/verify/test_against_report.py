@@ -1,0 +1,119 @@
+"""What verification measures in the text is what the report calculates from the construction."""
+
+from __future__ import annotations
+
+import io
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.errors import CornersmoothError
+from cornersmooth.model import Program
+from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.report import report
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from cornersmooth.smoothing.separation import separations
+from cornersmooth.verify import read_nc, verify
+
+SAMPLES = Path(__file__).parents[2] / "samples"
+
+FORMS = ("g1", "g6.2")
+LIMITS = ((0.001, 10.0), (0.04, 10.0), (0.15, 50.0))
+
+
+def differences(program: Program, form: str, tolerance: float, axis_length: float) -> tuple[float, float, float]:
+    """Measured less calculated at tip and axis point, and the printed digit, mm."""
+    chosen = choose_form("fanuc", form)
+    smoothed = smooth(
+        program, fit_settings(Settings(tolerance=tolerance, axis_length=axis_length), chosen, program.units)
+    )
+    stream = io.BytesIO()
+    write(smoothed, stream, form=chosen)
+    text = read_nc(stream.getvalue())
+    measured = verify(program, text, tolerance=tolerance, axis_length=axis_length)
+    said = report(smoothed, dense=not chosen.curve)["summary"]
+    return (
+        measured.max_tip_deviation_mm - said["max_tip_error_mm"],
+        measured.max_axis_point_deviation_mm - said["max_axis_error_mm"],
+        text.tip_step,
+    )
+
+
+def room(step: float) -> float:
+    """Half a printed digit in each of three coordinates, and what only arithmetic may do."""
+    return math.sqrt(3) / 2 * step + 1e-6
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", ["paper_table1.csv", "impeller.cls", "impeller.aptsource"])
+def test_samples(name: str, form: str) -> None:
+    program = read((SAMPLES / name).read_bytes(), name=name)
+    for tolerance, axis_length in LIMITS:
+        tip, axis_point, step = differences(program, form, tolerance, axis_length)
+        assert max(abs(tip), abs(axis_point)) <= room(step), (tolerance, axis_length, tip, axis_point)
+
+
+@pytest.mark.corpus
+@pytest.mark.parametrize("form", FORMS)
+def test_real_files(form: str, corpus: Path) -> None:
+    looked_at = 0
+    for path in sorted(corpus.glob("*.*")):
+        try:
+            program = read(path.read_bytes(), name=path.name)
+            found = [differences(program, form, *limits) for limits in LIMITS]
+        except CornersmoothError:  # not a CL file, or a form without words for it
+            continue
+        looked_at += 1
+        for tip, axis_point, step in found:
+            assert max(abs(tip), abs(axis_point)) <= room(step), (path.name, tip, axis_point)
+    assert looked_at >= 20
+
+
+@pytest.mark.parametrize("dense", [True, False])
+def test_unequal_legs_pass_nearer_than_the_construction_says(dense: bool) -> None:
+    """By brute force: the curve in 20,001 points, or its chords."""
+    rng = np.random.default_rng(3)
+    tip = np.cumsum(rng.normal(size=(60, 3)) * rng.choice([0.3, 3.0], (60, 1)), axis=0)
+    axis = np.array([0.0, 0.0, 1.0]) + np.cumsum(0.1 * rng.normal(size=(60, 3)), axis=0)
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    rows = [",".join(f"{number:.9f}" for number in row) for row in np.hstack((tip, axis)).tolist()]
+    program = read(("x,y,z,i,j,k\n" + "\n".join(rows) + "\n").encode(), name="chain.csv")
+    smoothed = smooth(program, Settings(tolerance=0.1))
+    all_rows = np.flatnonzero(smoothed.corners.smoothed)
+    near_tip, near_axis = separations(smoothed, all_rows, dense=dense)
+    assert (near_tip < 0.8 * smoothed.corners.tip_error[all_rows]).sum() > 5
+    for k, row in enumerate(all_rows.tolist()):
+        tips, tops = _path(smoothed, row, dense)
+        pose = smoothed.corners.pose[row]
+        corner = program.tip[pose]
+        assert near_tip[k] == pytest.approx(np.linalg.norm(tips - corner, axis=1).min(), abs=2e-6)
+        top = corner + 10.0 * program.axis[pose]
+        assert near_axis[k] == pytest.approx(np.linalg.norm(tops - top, axis=1).min(), abs=2e-6)
+
+
+def _path(smoothed, row: int, dense: bool):  # type: ignore[no-untyped-def]
+    """Tips and axis points of one transition, close together."""
+    from cornersmooth.smoothing import nurbs
+    from cornersmooth.smoothing.layout import lines_of
+    from cornersmooth.smoothing.sampling import nodes
+
+    corners = smoothed.corners
+    tip_curve, axis_curve = nurbs.control_points(smoothed.program, corners, np.array([row]), 10.0)
+    u = np.linspace(0, 1, 20001)
+    if dense:
+        u = np.concatenate(([0.0], nodes(int(lines_of(smoothed, np.array([row]))[0]))))
+    weights = corners.weights[[row]]
+    tips, tops = (nurbs.evaluate(curve, weights, u)[0] for curve in (tip_curve, axis_curve))
+    axes = tops - tips
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    if dense:
+        share = np.linspace(0, 1, 4001)[:, None]
+        tips = np.concatenate([a + share * (b - a) for a, b in pairwise(tips)])
+        axes = np.concatenate([a + share * (b - a) for a, b in pairwise(axes)])
+        axes /= np.linalg.norm(axes, axis=1)[:, None]
+    return tips, tips + 10.0 * axes
