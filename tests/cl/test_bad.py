@@ -52,9 +52,9 @@ def test_every_error_has_a_file() -> None:
 
 @pytest.mark.parametrize("data", [b"", b"\n \n", b"\x1a", b"\xef\xbb\xbf"])
 def test_empty(data: bytes) -> None:
-    with pytest.raises(InputError, match=r"^<stdin>: error: holds no tool positions;") as caught:
+    with pytest.raises(InputError, match=r"^<stdin>:1: error: holds no tool positions;") as caught:
         read(data, name="<stdin>")
-    assert (caught.value.code, caught.value.line) == ("CS101", None)
+    assert (caught.value.code, caught.value.line) == ("CS101", 1)
 
 
 @pytest.mark.parametrize("data", [b"\x7fELF\x00\x01" * 9, b"\xff\xfe\x00", b"GOTO/1,2,3\n\x00"])

@@ -201,9 +201,9 @@ UNIT = "0,0,0,0,0,1\n"
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", "path.csv: error: no poses in the file; give one pose a line: x y z, or x y z i j k"),
-        ("# nothing\n\n", "path.csv: error: no poses"),
-        ("x,y,z,i,j,k\n", "path.csv: error: no poses"),
+        ("", "path.csv:1: error: no poses in the file; give one pose a line: x y z, or x y z i j k"),
+        ("# nothing\n\n", "path.csv:1: error: no poses"),
+        ("x,y,z,i,j,k\n", "path.csv:1: error: no poses"),
         (UNIT + "\n1,2,3,0,0\n", "path.csv:3: error: 5 columns where 6 are expected; give every line the same"),
         (UNIT + "1,2,3,0,0,1,4\n", "path.csv:2: error: 7 columns where 6 are expected"),
         (UNIT + "1,2,3,0,0\n1,2,3,0,0,1,4\n", "path.csv:2: error: 5 columns"),

@@ -37,7 +37,6 @@ def read(
     units: Units | None = None,
     arc_rule: ArcRule | None = None,
     lenient: bool = False,
-    axis_length: float | None = None,
 ) -> Program:
     """Read a tool path.
 
@@ -57,8 +56,6 @@ def read(
         Sense of rotation of CIRCLE about its normal; None for what the dialect means.
     lenient : bool
         Go on where that is safe, and say so in the findings.
-    axis_length : float or None, mm
-        Accepted for symmetry with `Settings`; readers of vectors need none.
 
     Returns
     -------
@@ -72,7 +69,6 @@ def read(
     SettingsError
         CS230 for a format, dialect, unit or rule that does not exist.
     """
-    del axis_length
     for what, value, choices in (
         ("format", format, FORMATS),
         ("dialect", dialect, DIALECTS),

@@ -77,7 +77,7 @@ def read_apt(
     _run(data, machine, decode, fast)
     end(machine)
     if not builder.n:
-        raise error("CS101", name, None)
+        raise error("CS101", name, 1)
     return _program(machine, units)
 
 

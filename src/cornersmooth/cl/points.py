@@ -94,7 +94,7 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
     layout = _layout(text, name)
     values, line = table.numbers(text, layout, name)
     if not len(values):
-        raise error("CS150", name, None)
+        raise error("CS150", name, 1)
     rows = _Rows(name, values, line, layout)
     far = np.flatnonzero(np.abs(rows.take(layout.wanted)).max(axis=1) > FARTHEST)
     if len(far):
@@ -122,7 +122,7 @@ def _layout(text: table.PointText, name: str) -> Layout:
     if text.header is not None and text.header_certain:
         return columns.from_header(text.header, name, text.header_line)
     if not text.width:
-        raise error("CS150", name, None)
+        raise error("CS150", name, 1)
     if text.header is not None:
         layout = columns.from_header(text.header, name, text.header_line)
         if layout.width == text.width:

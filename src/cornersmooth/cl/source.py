@@ -67,7 +67,7 @@ def clean(data: bytes, name: str) -> bytes:
     if data.endswith(_CTRL_Z):
         data = data.rstrip(_CTRL_Z)
     if not data or data.isspace():
-        raise error("CS101", name, None)
+        raise error("CS101", name, 1)
     if (at := data.find(b"\0")) >= 0:
         raise error("CS102", name, data.count(b"\n", 0, at) + 1)
     return data if data.endswith(b"\n") else data + b"\n"
