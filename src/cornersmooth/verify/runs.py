@@ -8,9 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.errors import InputError
 from cornersmooth.model import Floats, Ints
 from cornersmooth.text import NumberError, parse_numbers
 from cornersmooth.verify.fixed import MARGIN, read_column, words_of
+from cornersmooth.verify.layouts import Layouts, lines_of
+from cornersmooth.verify.pool import ahead
 from cornersmooth.verify.spelling import Spelling
 from cornersmooth.verify.words import Line, Table
 
@@ -41,29 +44,40 @@ def read_lines(data: bytes | memoryview, name: str | None, spelling: Spelling | 
         CS501 where a line is not made of words.
     """
     spelling = spelling or Spelling()
-    signatures = _Signatures(spelling)
-    number = 1
-    start = 0
-    size = len(data)
+    layouts = Layouts(spelling.columns, numbered=spelling.numbered)
+
+    def read(piece: tuple[bytes, int]) -> tuple[list[Table | Line], InputError | None]:
+        """Read a chunk; an error waits until what stands before it has been given out."""
+        found: list[Table | Line] = []
+        try:
+            found.extend(_read_chunk(*piece, spelling, layouts, name))
+        except InputError as error:
+            return found, error
+        return found, None
+
+    for found, error in ahead(read, _chunks(data, spelling)):
+        yield from found
+        if error is not None:
+            raise error
+
+
+def _chunks(data: bytes | memoryview, spelling: Spelling) -> Iterator[tuple[bytes, int]]:
+    """Pieces of the text, cut where no curve is cut in two, each with the number of its first line."""
+    number, start, size = 1, 0, len(data)
     while start < size:
-        stop = _cut(data, start, size, spelling)
-        chunk = bytes(data[start:stop])
+        chunk, stop = b"", start
+        while stop < size:
+            chunk = bytes(data[start : stop + CHUNK])
+            stop = start + len(chunk)
+            cut = spelling.cut(chunk) if stop < size else 0
+            if cut:
+                chunk, stop = chunk[:cut], start + cut
+                break
         if not chunk.endswith(b"\n"):
             chunk += b"\n"
-        yield from _read_chunk(chunk, number, signatures, name)
-        number += chunk.count(b"\n")
+        yield chunk, number
+        number += int(np.count_nonzero(np.frombuffer(chunk, np.uint8) == _LINE_END))
         start = stop
-
-
-def _cut(data: bytes | memoryview, start: int, size: int, spelling: Spelling) -> int:
-    """End of the chunk from `start`: where no curve is cut in two."""
-    stop = start + CHUNK
-    while stop < size:
-        cut = spelling.cut(bytes(data[start:stop]))
-        if cut:
-            return start + cut
-        stop += CHUNK
-    return size
 
 
 class _Signatures:
@@ -137,9 +151,31 @@ class _Chunk:
         return self.raw[begin : int(self.place[self.last[stop - 1]]) + 1].tobytes()
 
 
-def _read_chunk(chunk: bytes, number: int, signatures: _Signatures, name: str | None) -> Iterator[Table | Line]:
-    spelling = signatures.spelling
+def _read_chunk(
+    chunk: bytes, number: int, spelling: Spelling, layouts: Layouts, name: str | None
+) -> Iterator[Table | Line]:
     text = spelling.respell(chunk)
+    lines = lines_of(text, layouts)
+    if lines is None:
+        yield from _read_carefully(chunk, text, number, _Signatures(spelling), name)
+        return
+    bulk = lines.bulk()
+    edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
+    for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        if bulk[start]:
+            table = spelling.table(Table(np.arange(number + start, number + stop), lines.columns(start, stop)))
+            if table is not None:
+                yield table
+                continue
+        written = chunk.split(b"\n") if text is not chunk else []
+        for row in range(start, stop):
+            yield spelling.line(written[row] if written else lines.text(row), number + row, name)
+
+
+def _read_carefully(
+    chunk: bytes, text: bytes, number: int, signatures: _Signatures, name: str | None
+) -> Iterator[Table | Line]:
+    spelling = signatures.spelling
     raw = np.frombuffer(b"\n" * MARGIN + text, np.uint8)
     place = np.flatnonzero(np.frombuffer(text.translate(_SPEAKS), np.bool_)) + MARGIN
     letters = raw[place]

@@ -1,0 +1,345 @@
+"""Lines of one layout: the same letters, with numbers of the same shape behind them, in the same places of the line.
+
+What posts write is regular: few layouts make up a text, and a line's layout is known from where its digits are and
+from what stands between them. Once a layout is understood, its numbers are read where they must stand, eight digits
+at a time: without the point they fit one machine word, and the value is that integer over a power of ten: exactly
+what `float` gives. Every byte that is no digit is compared with the layout's; a chunk in which anything is not
+regular is left to the careful reading in `runs`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.model import Floats, Ints
+
+Bytes = NDArray[np.uint8]
+Words = NDArray[np.uint64]
+
+#: line ends that must stand before and behind a chunk, so that words beyond its ends can be fetched
+MARGIN: Final = 24
+
+#: bits of a word that can be had from any bit on, and words that tell the digits of a line
+_BITS: Final = 57
+_MOST_WORDS: Final = 4
+
+#: longest line, its end included, that is read in runs
+LONGEST: Final = 224
+
+#: a chunk with fewer lines for each layout than this is read otherwise, unless it has few layouts at all
+_FEWEST_LINES: Final = 8
+_FEW_LAYOUTS: Final = 256
+
+_LINE_END: Final = 10
+#: bytes that are part of numbers, or blanks between words
+SILENT: Final = b"0123456789.-+ \t\r"
+_TO_ZERO: Final = bytes(ord("0") if code in b"0123456789" else code for code in range(256))
+_FIELD: Final = re.compile(rb"[^-+.0 \t\r](?P<minus>-?)(?:(?P<whole>0+)(?P<point>\.?)|(?=\.0))(?P<part>\.?0*)[ \t\r]*")
+_NUMBER: Final = re.compile(rb"0{1,8} ")
+
+#: digits that one word holds
+_DIGITS: Final = 8
+
+_ONE = np.uint64(1)
+_NIBBLES = 0x0F0F0F0F0F0F0F0F
+#: digits as numbers: the last k bytes of a word
+_KEEP = np.array([(((1 << (8 * k)) - 1) << (64 - 8 * k)) & _NIBBLES for k in range(9)], np.uint64)
+#: the bytes behind the point, for so many decimals; all where there is no point
+_BEHIND = np.array([((1 << (8 * k)) - 1) << (64 - 8 * k) for k in range(9)] + [(1 << 64) - 1], np.uint64)
+#: the first bits of a word
+_LOW_BITS = np.array([(1 << k) - 1 for k in range(_BITS + 1)], np.uint64)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the lines of one layout have in common.
+
+    Parameters
+    ----------
+    names : tuple of str or None
+        Column of each number; None for lines that are read on their own.
+    literal, care : bytes
+        The bytes of the line with its end, and 255 for those that are no digits; `LONGEST` of either.
+    fields : bytes
+        For each column four int64: where in the line the number ends, its digits, its decimals (-1 without a point)
+        and 1 with a minus sign.
+    """
+
+    names: tuple[str, ...] | None
+    literal: bytes
+    care: bytes
+    fields: bytes
+
+
+class Layouts:
+    """The layouts of a text met so far.
+
+    Parameters
+    ----------
+    columns : callable
+        Names of the columns for the letters of a line, or None.
+    numbered : bool
+        Whether lines begin with a bare number.
+    """
+
+    def __init__(self, columns: Callable[[bytes], tuple[str, ...] | None], *, numbered: bool) -> None:
+        self._columns, self._numbered = columns, numbered
+        self._known: dict[bytes, Layout | None] = {}
+
+    def of(self, line: bytes) -> Layout | None:
+        """Layout of a line without its end; None where its numbers are not of a kind that is read here."""
+        shape = line.translate(_TO_ZERO)
+        if shape not in self._known:
+            self._known[shape] = self._make(shape)
+        return self._known[shape]
+
+    def _make(self, shape: bytes) -> Layout | None:
+        names = self._columns(shape.translate(None, SILENT))
+        fields: list[tuple[int, int, int, bool]] = []
+        if names is not None:
+            start = _NUMBER.match(shape) if self._numbered else None
+            place = start.end() if start else 0
+            if self._numbered and not start:
+                return None
+            while place < len(shape):
+                found = _FIELD.match(shape, place)
+                if found is None:
+                    return None
+                whole, part = len(found["whole"] or b""), found["part"]
+                point = bool(found["point"]) or part[:1] == b"."
+                if found["point"] and part[:1] == b".":
+                    return None
+                decimals = len(part) - (part[:1] == b".") if point else -1
+                digits = whole + max(decimals, 0)
+                if not 1 <= digits <= _DIGITS:
+                    return None
+                fields.append((found.end("part"), digits, decimals, bool(found["minus"])))
+                place = found.end()
+            if len(fields) != len(names):
+                return None
+        literal = shape + b"\n"
+        care = bytes(0 if code == ord("0") else 255 for code in literal)
+        return Layout(
+            names,
+            literal.ljust(LONGEST, b"\0"),
+            care.ljust(LONGEST, b"\0"),
+            np.array(fields, np.int64).tobytes(),
+        )
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Lines of a chunk, each with its layout.
+
+    Parameters
+    ----------
+    raw : (n,) uint8
+        The text between line ends, `MARGIN` before it.
+    pairs : (n - 15,) of 16 bytes
+        What stands from every place of it on: two words.
+    start, stop : (l,) int64
+        First byte of every line, and its end.
+    label : (l,) int64
+        Row of `layouts`.
+    layouts : list of Layout
+    """
+
+    raw: Bytes
+    pairs: NDArray[np.void]
+    start: Ints
+    stop: Ints
+    label: Ints
+    layouts: list[Layout]
+
+    def text(self, row: int) -> bytes:
+        """Return a line as written, with its end."""
+        return self.raw[int(self.start[row]) : int(self.stop[row]) + 1].tobytes()
+
+    def bulk(self) -> NDArray[np.bool_]:
+        """(l,) whether each line can be read in a run."""
+        return np.array([layout.names is not None for layout in self.layouts])[self.label]
+
+    def columns(self, first: int, last: int) -> dict[str, Floats]:
+        """Numbers of lines ``first`` to ``last`` (excluded), all of them of a run; NaN where a line has none."""
+        label = self.label[first:last]
+        used = np.flatnonzero(np.bincount(label, minlength=len(self.layouts))).tolist()
+        names = list(dict.fromkeys(self.layouts[k].names for k in used))
+        kind = np.zeros(len(self.layouts), np.int64)
+        place = np.zeros(len(self.layouts), np.int64)
+        columns: dict[str, Floats] = {}
+        of_name: dict[tuple[str, ...] | None, list[int]] = {name: [] for name in names}
+        for k in used:
+            mine = of_name[self.layouts[k].names]
+            kind[k], place[k] = names.index(self.layouts[k].names), len(mine)
+            mine.append(k)
+        kinds = kind[label] if len(names) > 1 else None
+        for number, (name, mine) in enumerate(of_name.items()):
+            assert name is not None
+            table = np.frombuffer(b"".join([self.layouts[k].fields for k in mine]), np.int64).reshape(-1, len(name), 4)
+            if kinds is None:
+                numbers = self._numbers(self.start[first:last], place[label], table)
+                columns.update(zip(name, numbers, strict=True))
+                continue
+            rows = np.flatnonzero(kinds == number)
+            numbers = self._numbers(self.start[first + rows], place[label[rows]], table)
+            for letter, values in zip(name, numbers, strict=True):
+                column = columns.get(letter)
+                if column is None:
+                    column = columns[letter] = np.full(last - first, np.nan)
+                column[rows] = values
+        return columns
+
+    def _numbers(self, start: Ints, label: Ints, table: Ints) -> list[Floats]:
+        """Numbers of lines with the same letters, one array for each of them; `table` as in `Layout.fields`."""
+        found: list[Floats] = []
+        at, spare = np.empty(len(start), np.int64), np.empty(len(start), np.uint64)
+        for end, digits, decimals, minus in table.transpose(1, 2, 0):
+            np.add(start, _each(end - 2 * _DIGITS, label), out=at)
+            pair = self.pairs[at].view(np.uint64).reshape(-1, 2)
+            before, word = pair[:, 0], pair[:, 1]
+            size = digits + (decimals >= 0)
+            if (size <= 4).all() and (size == size[0]).all() and (minus == minus[0]).all():
+                np.right_shift(word, np.uint64(64 - 8 * (int(size[0]) + int(minus[0]))), out=spare)
+                if (spare == spare[0]).all():
+                    last = int(at[0]) + 2 * _DIGITS
+                    text = self.raw[last - int(size[0]) : last].tobytes()
+                    found.append(np.full(len(at), -float(text) if minus[0] else float(text)))
+                    continue
+            if (decimals >= 0).any():  # close the gap that the point leaves
+                behind = _each(_BEHIND[decimals], label)
+                np.left_shift(word, _EIGHT, out=spare)
+                if (size > _DIGITS).any():
+                    before >>= _REST
+                    spare |= before
+                word = np.bitwise_and(word, behind, out=pair[:, 1])
+                spare &= ~behind
+                spare |= word
+            else:
+                np.copyto(spare, word)
+            spare &= _each(_KEEP[digits], label)
+            # eight decimal digits to an integer: pairs, then fours, then all (first digit in the lowest byte)
+            high = at.view(np.uint64)
+            for factor, shift, mask in _STEPS:
+                np.right_shift(spare, shift, out=high)
+                spare *= factor
+                spare += high
+                spare &= mask
+            divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]
+            found.append(np.divide(spare.view(np.int64), _each(divisor, label)))
+        return found
+
+
+def _each(values: NDArray[Any], label: Ints) -> Any:
+    """Value for every line, or the one of all."""
+    return values[0] if (values == values[0]).all() else values.take(label)
+
+
+_TENS = np.array([10.0**k for k in range(9)])
+_EIGHT, _REST = np.uint64(8), np.uint64(56)
+_STEPS = (
+    (np.uint64(10), np.uint64(8), np.uint64(0x00FF00FF00FF00FF)),
+    (np.uint64(100), np.uint64(16), np.uint64(0x0000FFFF0000FFFF)),
+    (np.uint64(10000), np.uint64(32), np.uint64(0x00000000FFFFFFFF)),
+)
+
+
+def lines_of(text: bytes, layouts: Layouts) -> Lines | None:
+    """Lines of a chunk.
+
+    Parameters
+    ----------
+    text : bytes
+        Ends with a line end.
+    layouts : Layouts
+
+    Returns
+    -------
+    Lines or None
+        None where anything in the chunk is not regular.
+    """
+    raw = np.frombuffer(b"".join((b"\n" * MARGIN, text, b"\n" * LONGEST)), np.uint8)
+    ends = np.flatnonzero(raw[: MARGIN + len(text)] == _LINE_END)[MARGIN - 1 :]
+    start, stop = ends[:-1] + 1, ends[1:]
+    size = stop - start + 1
+    width = int(size.max())
+    if width > LONGEST:
+        return None
+    pairs = np.ndarray((len(raw) - 15,), "V16", buffer=raw.data, strides=(1,))
+    keys = _digit_keys(raw, start, size, -(-width // _BITS))
+    mixed = keys[0]
+    for key in keys[1:]:
+        mixed = mixed * np.uint64(0x9E3779B97F4A7C15) ^ key
+    head = np.flatnonzero(np.append(True, mixed[1:] != mixed[:-1]))
+    _, first, inverse = np.unique(mixed[head], return_index=True, return_inverse=True)
+    if len(first) > max(_FEW_LAYOUTS, len(start) // _FEWEST_LINES):
+        return None
+    label = np.repeat(inverse, np.diff(np.append(head, len(start))))
+    return _labelled(raw, pairs, start, stop, label, head[first], keys, layouts, width)
+
+
+def _digit_keys(raw: Bytes, start: Ints, size: Ints, count: int) -> list[Words]:
+    """Bits of every line that say which of its bytes are no digits, `_BITS` in a word."""
+    other = raw - np.uint8(ord("0")) > np.uint8(9)
+    packed = np.append(np.packbits(other, bitorder="little"), np.zeros(8 * _MOST_WORDS, np.uint8))
+    words = np.ndarray((len(packed) - 7,), np.dtype("<u8"), buffer=packed.data, strides=(1,))
+    keys = []
+    for k in range(count):
+        bit = start + k * _BITS if k else start
+        key = words[bit >> 3]
+        key >>= (bit & 7).view(np.uint64)
+        key &= _LOW_BITS[np.clip(size - k * _BITS, 0, _BITS)]
+        keys.append(key)
+    return keys
+
+
+def _labelled(
+    raw: Bytes,
+    pairs: NDArray[np.void],
+    start: Ints,
+    stop: Ints,
+    label: Ints,
+    sample: Ints,
+    keys: list[Words],
+    layouts: Layouts,
+    width: int,
+) -> Lines | None:
+    """Give every line the layout of the line that stands for its label, or a new label where it differs."""
+    wide = -(-width // 8)
+    windows = np.ndarray((len(raw) - 8 * wide,), f"V{8 * wide}", buffer=raw.data, strides=(1,))
+    known: list[Layout] = []
+    rows: Ints | None = None
+    stands = sample[:0]
+    while len(sample):
+        stands = np.append(stands, sample)
+        for row in sample.tolist():
+            layout = layouts.of(raw[int(start[row]) : int(stop[row])].tobytes())
+            if layout is None:
+                return None
+            known.append(layout)
+        if len(known) > max(_FEW_LAYOUTS, len(start) // _FEWEST_LINES):
+            return None
+        literal, care = (
+            np.frombuffer(b"".join([text[: 8 * wide] for text in texts]), f"V{8 * wide}")
+            for texts in ([layout.literal for layout in known], [layout.care for layout in known])
+        )
+        mine = label if rows is None else label[rows]
+        found = windows[start if rows is None else start[rows]].view(np.uint64)
+        found ^= literal[mine].view(np.uint64)
+        found &= care[mine].view(np.uint64)
+        differs = found.reshape(-1, wide).any(axis=1) if found.any() else np.zeros(len(mine), np.bool_)
+        for key in keys:
+            differs |= (key if rows is None else key[rows]) != key[stands][mine]
+        wrong = np.flatnonzero(differs)
+        if not len(wrong):
+            break
+        rows = wrong if rows is None else rows[wrong]
+        _, first, inverse = np.unique(label[rows], return_index=True, return_inverse=True)
+        label[rows] = len(known) + inverse
+        sample = rows[first]
+    return Lines(raw, pairs, start, stop, label, known)
