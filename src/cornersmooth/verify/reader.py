@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import mmap
+import io
 import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import BinaryIO, Final, Literal
 
 import numpy as np
 
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.model import MM_PER_UNIT, Units
-from cornersmooth.verify.motion import Modal, Piece, execute
-from cornersmooth.verify.ncprogram import Curves, Event, NcArcs, NcProgram, Problem, Second
+from cornersmooth.verify.motion import Modal, execute
+from cornersmooth.verify.ncprogram import Event, NcProgram, Problem, Second
+from cornersmooth.verify.pile import Pile
 from cornersmooth.verify.runs import read_lines
 from cornersmooth.verify.words import Line, Table, motion_row, table_of
 
@@ -65,28 +66,27 @@ def read_nc(data: bytes | str | os.PathLike[str], *, control: str = "fanuc", nam
     if control not in CONTROLS:
         raise SettingsError("CS204", f"unknown control {control!r}", f"use one of {', '.join(CONTROLS)}")
     if isinstance(data, bytes):
-        return _read(data, name)
+        return _read(io.BytesIO(data), name)
     path = Path(data)
     label = name if name is not None else str(path)
     try:
         with path.open("rb") as file:
-            if os.fstat(file.fileno()).st_size == 0:
-                return _read(b"", label)
-            with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as mapped, memoryview(mapped) as view:
-                return _read(view, label)
+            return _read(file, label)
     except OSError as error:
         raise InputError("CS500", f"cannot read: {error.strerror}", "check name and rights", file=label) from error
 
 
-def _read(data: bytes | memoryview, name: str | None) -> NcProgram:
+def _read(file: BinaryIO, name: str | None) -> NcProgram:
     reader = _Reader(name)
-    for item in read_lines(data, name):
+    steps = _steps(file.read(_DIGITS_SAMPLE))
+    file.seek(0)
+    for item in read_lines(file, name):
         if isinstance(item, Table):
             reader.rows(item)
         else:
             reader.line(item)
     reader.flush()
-    return reader.result(*_steps(data))
+    return reader.result(*steps)
 
 
 class _Reader:
@@ -95,7 +95,7 @@ class _Reader:
     def __init__(self, name: str | None) -> None:
         self.name = name
         self.modal = Modal()
-        self.pieces: list[tuple[Piece, float]] = []
+        self.pile = Pile()
         self.waiting: list[Table | tuple[int, dict[str, float]]] = []
         self.events: list[Event] = []
         self.comments: list[tuple[int, str]] = []
@@ -130,7 +130,7 @@ class _Reader:
             return
         for table in _joined(self.waiting):
             piece, self.modal = execute(table, self.modal)
-            self.pieces.append((piece, MM_PER_UNIT[self.units]))
+            self.pile.add(piece, MM_PER_UNIT[self.units])
             self.elements += len(piece.kind)
             self.problems.extend(piece.problems)
         self.waiting = []
@@ -211,47 +211,15 @@ class _Reader:
         """Put all pieces together, in millimetres."""
         second_is: Second = "point" if self.modal.points else "vector"
         scale = MM_PER_UNIT[self.units]
-        pieces = [piece for piece, _ in self.pieces]
-        unit = [factor for _, factor in self.pieces]
-        second_unit = unit if second_is == "point" else [1.0] * len(unit)
-        first_element = _offsets([len(piece.kind) for piece in pieces])
-        points = _joined_arrays([piece.curve_points for piece in pieces], np.int64)
-        order = _joined_arrays([piece.curve_order for piece in pieces], np.int64)
-        curves = Curves(
-            element=_joined_arrays(
-                [piece.curve_element + first for piece, first in zip(pieces, first_element, strict=True)], np.int64
-            ),
-            order=order,
-            points=points,
-            first_point=np.cumsum(points) - points,
-            first_knot=np.cumsum(points + order) - points - order,
-            point=_scaled([piece.control for piece in pieces], unit, 6),
-            weight=_joined_arrays([piece.weight for piece in pieces], np.float64),
-            knot=_joined_arrays([piece.knot for piece in pieces], np.float64),
-        )
-        arcs = NcArcs(
-            element=_joined_arrays(
-                [piece.arc_element + first for piece, first in zip(pieces, first_element, strict=True)], np.int64
-            ),
-            centre=_scaled([piece.arc_centre for piece in pieces], unit),
-            normal=_scaled([piece.arc_normal for piece in pieces], [1.0] * len(unit)),
-            sweep=_joined_arrays([piece.arc_sweep for piece in pieces], np.float64),
-        )
-        feed = [piece.feed * factor for piece, factor in zip(pieces, unit, strict=True)]
-        line = _joined_arrays([piece.line for piece in pieces], np.int64)
-        place = np.searchsorted(line, [number for number, _ in self.comments])
+        elements, curves, arcs = self.pile.whole(points=second_is == "point")
+        place = np.searchsorted(elements["line"], [number for number, _ in self.comments])
         self.events.extend(
             Event(int(element), number, "(", 0.0, text)
             for element, (number, text) in zip(place, self.comments, strict=True)
         )
         self.events.sort(key=lambda event: event.line)
         return NcProgram(
-            kind=_joined_arrays([piece.kind for piece in pieces], np.uint8),
-            tip=_scaled([piece.tip for piece in pieces], unit),
-            second=_scaled([piece.second for piece in pieces], second_unit),
-            line=line,
-            feed=_joined_arrays(feed, np.float64),
-            per_revolution=_joined_arrays([piece.per_revolution for piece in pieces], np.bool_),
+            **elements,
             curves=curves,
             arcs=arcs,
             events=tuple(self.events),
@@ -291,25 +259,10 @@ def _closed(table: Table) -> bool:
     return first is not None and not np.isnan(first[0])
 
 
-def _offsets(sizes: list[int]) -> list[int]:
-    return (np.cumsum([0, *sizes])[:-1]).tolist() if sizes else []
-
-
-def _joined_arrays(parts: list[Any], dtype: type) -> Any:
-    return np.concatenate([np.zeros(0, dtype), *parts]).astype(dtype, copy=False)
-
-
-def _scaled(parts: list[Any], unit: list[float], width: int = 3) -> Any:
-    """Stack (r, width) parts in millimetres; a factor of one leaves the numbers untouched."""
-    if not parts:
-        return np.zeros((0, width))
-    return np.concatenate([part if factor == 1.0 else part * factor for part, factor in zip(parts, unit, strict=True)])
-
-
-def _steps(data: bytes | memoryview) -> tuple[float, float]:
+def _steps(sample: bytes) -> tuple[float, float]:
     """Value of the last printed digit of X Y Z and of I J K or U V W, from a sample of the text."""
     decimals = {b"XYZ": 0, b"IJUVW": 0}
-    for letter, fraction in _FRACTION.findall(_BRACKETS.sub(b"", bytes(data[:_DIGITS_SAMPLE]))):
+    for letter, fraction in _FRACTION.findall(_BRACKETS.sub(b"", sample)):
         for letters in decimals:
             if letter in letters:
                 decimals[letters] = max(decimals[letters], len(fraction))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +29,12 @@ _SPEAKS = bytes(code not in b"0123456789.-+ \t\r" for code in range(256))
 _LINE_END, _BLANK = 10, 32
 
 
-def read_lines(data: bytes | memoryview, name: str | None, spelling: Spelling | None = None) -> Iterator[Table | Line]:
+def read_lines(data: bytes | BinaryIO, name: str | None, spelling: Spelling | None = None) -> Iterator[Table | Line]:
     """Give out the text in order, as runs of motion blocks and as other lines.
 
     Parameters
     ----------
-    data : bytes or memoryview
+    data : bytes or file, open at its start
     name : str or None
         For messages.
     spelling : Spelling, optional
@@ -61,23 +63,23 @@ def read_lines(data: bytes | memoryview, name: str | None, spelling: Spelling | 
             raise error
 
 
-def _chunks(data: bytes | memoryview, spelling: Spelling) -> Iterator[tuple[bytes, int]]:
+def _chunks(data: bytes | BinaryIO, spelling: Spelling) -> Iterator[tuple[bytes, int]]:
     """Pieces of the text, cut where no curve is cut in two, each with the number of its first line."""
-    number, start, size = 1, 0, len(data)
-    while start < size:
-        chunk, stop = b"", start
-        while stop < size:
-            chunk = bytes(data[start : stop + CHUNK])
-            stop = start + len(chunk)
-            cut = spelling.cut(chunk) if stop < size else 0
-            if cut:
-                chunk, stop = chunk[:cut], start + cut
-                break
+    file = io.BytesIO(data) if isinstance(data, bytes) else data
+    number, rest = 1, b""
+    while True:
+        more = file.read(CHUNK)
+        chunk = rest + more
+        if not chunk:
+            return
+        cut = spelling.cut(chunk) if more else len(chunk)
+        chunk, rest = chunk[:cut], chunk[cut:]
+        if not cut:
+            continue
         if not chunk.endswith(b"\n"):
             chunk += b"\n"
         yield chunk, number
         number += int(np.count_nonzero(np.frombuffer(chunk, np.uint8) == _LINE_END))
-        start = stop
 
 
 class _Signatures:
