@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import (
     FilledPath,
+    Insertions,
     Machine,
     RotaryAxis,
     fill,
@@ -104,6 +107,97 @@ def test_tip_stays_on_its_line_without_control_of_it(name: str, seed: int):
     bare = fill(tip, axis, angles, insertions(machine, tip, axis, angles, tolerance=180.0))
     assert not bare.inserted.any()
     assert len(more) == 0 or tip_error(machine, bare, walked(bare)).max() > 0.009
+
+
+def large_turns(seed: int, count: int = 40) -> tuple[np.ndarray, np.ndarray]:
+    """Tip and axis of segments whose axis turns by 60 to 179 degrees, some by way of the pole or close to it."""
+    rng = np.random.default_rng(seed)
+    axis = [unit(rng.normal(size=3) * [1, 1, 0.3] + [0, 0, 0.5])]
+    for number in range(count):
+        side = unit(np.cross(axis[-1], rng.normal(size=3)))
+        if number % 3 == 0:  # straight over the pole but for a little
+            side = unit(
+                np.array([0, 0, 1.0]) - axis[-1][2] * axis[-1] + rng.normal(size=3) * 10.0 ** rng.uniform(-9, 0)
+            )
+            side = unit(side - (side @ axis[-1]) * axis[-1])
+        turn = np.radians(rng.uniform(60, 179))
+        axis.append(unit(np.cos(turn) * axis[-1] + np.sin(turn) * side))
+    size = np.where(rng.random((count + 1, 1)) < 0.2, 1e-4, 10.0)
+    return np.cumsum(rng.uniform(0, 1, (count + 1, 3)) * size, axis=0), np.array(axis)
+
+
+def walk(tip: np.ndarray, axis: np.ndarray, angles: np.ndarray, more: Insertions, segment: int, steps: int):
+    """Words, tips at their ends and fractions of the blocks of one segment, densely: (blocks, steps + 1, ...)."""
+    own = more.segment == segment
+    fraction = np.concatenate(([0.0], more.fraction[own], [1.0]))
+    words = np.concatenate((angles[segment][None], more.angles[own], angles[segment + 1][None]))
+    share = np.linspace(0, 1, steps + 1)[:, None]
+    dense = words[:-1, None] * (1 - share) + words[1:, None] * share
+    place = fraction[:-1, None] * (1 - share[:, 0]) + fraction[1:, None] * share[:, 0]
+    return fraction, words, dense, place
+
+
+@pytest.mark.parametrize("name", [name for name in machine_names() if name != "nutated-bc"])
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("tolerance", [0.5, 0.01])
+def test_large_turns_keep_the_tolerance_everywhere(name: str, seed: int, tolerance: float):
+    """Every step between the places that were looked at counts: the division is proved, not sampled."""
+    plain = load_machine(name)
+    machine = replace(plain, axes=tuple(replace(item, limits=None) for item in plain.axes))
+    tip, axis = large_turns(seed)
+    angles = rotary_angles(machine, tip, axis, tolerance=tolerance).angles
+    more = insertions(machine, tip, axis, angles, tolerance=tolerance)
+    assert len(more.unsolved) == 0
+    worst = 0.0
+    for segment in range(len(tip) - 1):
+        _, _, words, place = walk(tip, axis, angles, more, segment, 40)
+        wanted = unit(axis[segment] * (1 - place[:, :, None]) + axis[segment + 1] * place[:, :, None])
+        got = tool_axis(machine, words.reshape(-1, 2)).reshape(wanted.shape)
+        worst = max(worst, angle_between(got, wanted).max())
+    assert worst <= tolerance * (1 + 1e-9)
+    assert worst > 0.5 * tolerance  # and no finer than need be
+
+
+@pytest.mark.parametrize("name", ["table-ac", "head-ac", "head-table-bc"])
+@pytest.mark.parametrize("seed", range(3))
+def test_large_turns_keep_the_tip_too(name: str, seed: int):
+    plain = load_machine(name)
+    axes = tuple(replace(item, limits=None, point=(13.0, -7.0, 160.0)) for item in plain.axes)
+    machine = replace(plain, axes=axes, tool_length=90.0, part_zero=(40.0, 25.0, 10.0))
+    tip, axis = large_turns(seed, 12)
+    angles = rotary_angles(machine, tip, axis, tolerance=0.05).angles
+    more = insertions(machine, tip, axis, angles, tolerance=0.05, tip_tolerance=0.01)
+    assert len(more.unsolved) == 0
+    share = np.linspace(0, 1, 41)[:, None]
+    for segment in range(len(tip) - 1):
+        fraction, ends, words, place = walk(tip, axis, angles, more, segment, 40)
+        stops = tip[segment] + fraction[:, None] * (tip[segment + 1] - tip[segment])
+        joints = machine_position(machine, stops, ends)
+        joints = joints[:-1, None] * (1 - share) + joints[1:, None] * share
+        real = tip_position(machine, joints.reshape(-1, 3), words.reshape(-1, 2)).reshape(joints.shape)
+        way = np.diff(stops, axis=0)[:, None]
+        square = np.maximum((way**2).sum(axis=2), 1e-300)
+        along = np.clip(((real - stops[:-1, None]) * way).sum(axis=2) / square, 0, 1)
+        off = np.linalg.norm(real - stops[:-1, None] - along[:, :, None] * way, axis=2)
+        assert off.max() <= 0.01 * (1 + 1e-6)
+        # the axis is that of the ruled motion where the tip is, or where the words are
+        errors = []
+        got = tool_axis(machine, words.reshape(-1, 2)).reshape(*words.shape[:2], 3)
+        for at in (place, fraction[:-1, None] + along * np.diff(fraction)[:, None]):
+            wanted = unit(axis[segment] * (1 - at[:, :, None]) + axis[segment + 1] * at[:, :, None])
+            errors.append(angle_between(got, wanted).max(axis=1))
+        assert np.minimum(*errors).max() <= 0.05 * (1 + 1e-6)
+
+
+def test_an_exact_reversal_of_the_axis_is_told():
+    """No rotary axes follow a ruled motion that jumps: the segment is unsolved, without a warning of numpy's."""
+    machine = load_machine("table-ac")
+    axis = unit(np.array([[0.3, 0.2, 1.0], [-0.3, -0.2, -1.0]]))
+    tip = np.array([[0.0, 0, 0], [10, 0, 0]])
+    machine = replace(machine, axes=tuple(replace(item, limits=None) for item in machine.axes))
+    angles = rotary_angles(machine, tip, axis, tolerance=0.05).angles
+    more = insertions(machine, tip, axis, angles, tolerance=0.05)
+    assert more.unsolved.tolist() == [0]
 
 
 def test_few_points_where_the_motion_is_smooth():

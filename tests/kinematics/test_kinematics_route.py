@@ -13,10 +13,13 @@ from cornersmooth.errors import InputError
 from cornersmooth.kinematics import (
     Machine,
     fill,
+    findings,
     insertions,
     load_machine,
     machine_names,
+    orientation,
     rotary_angles,
+    route,
     tool_axis,
 )
 from cornersmooth.kinematics.orientation import angle_between
@@ -329,6 +332,29 @@ def test_random_walks(seed: int):
         assert angle_between(tool_axis(machine, path.angles), axis).max() <= TOLERANCE
         more = insertions(machine, tip, axis, path.angles, tolerance=TOLERANCE)
         assert len(more.unsolved) == 0
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 64])
+@pytest.mark.parametrize("seed", range(6))
+def test_blocks_change_nothing(size: int, seed: int, monkeypatch: pytest.MonkeyPatch):
+    """Rows are worked on some at a time: whatever stands at an edge between blocks, the result is the same."""
+    rng = np.random.default_rng(seed)
+    n = 300
+    walk = np.cumsum(rng.normal(size=(n, 2)) * [0.6, 0.05, 0.003][seed % 3], axis=0) * [1, 0.3]
+    walk[rng.random(n) < 0.2] = 0.0  # at the pole
+    axis = unit(np.column_stack((np.sin(walk), np.ones(n))))
+    tip = np.cumsum(rng.uniform(0, 0.2, (n, 3)), axis=0)
+    rapid = rng.random(n) < 0.03
+    machine = limited("table-ac", (-720, 720), (-100, 100)) if seed % 2 else load_machine("table-ac")
+    whole = rotary_angles(machine, tip, axis, tolerance=TOLERANCE, rapid=rapid, line=np.arange(n))
+    for module in (route, findings, orientation):
+        monkeypatch.setattr(module, "BLOCK", size)
+    parts = rotary_angles(machine, tip, axis, tolerance=TOLERANCE, rapid=rapid, line=np.arange(n))
+    np.testing.assert_array_equal(parts.angles, whole.angles)
+    np.testing.assert_array_equal(parts.branch, whole.branch)
+    np.testing.assert_array_equal(parts.deviation, whole.deviation)
+    assert parts.findings == whole.findings
+    assert (whole.branch < 0).any()
 
 
 def test_empty_and_single():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import time
 from dataclasses import replace
@@ -17,6 +18,7 @@ from cornersmooth.kinematics import Machine, load_machine, machine_names, tool_a
 from cornersmooth.kinematics.refinement import SPANS, refinement, weight_factors
 from cornersmooth.kinematics.rotary_curves import CurveGroup, RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.model import Move, Program, SmoothProgram, Status
+from cornersmooth.nc import choose_form, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
 from cornersmooth.smoothing.layout import lay_out
@@ -416,6 +418,26 @@ def test_sharp_corners_rapids_and_repeated_poses():
     assert len(repeated) == 3
     np.testing.assert_array_equal(np.flatnonzero(~written), [0, *repeated])  # FROM is not written either
     np.testing.assert_allclose(tool_axis(machine, curves.pose_angles[written]), axis[written], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [name for name in machine_names() if name != "nutated-bc"])
+@pytest.mark.parametrize("aside", [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 0.01])
+def test_axis_that_turns_over(name: str, aside: float):
+    """Half a turn of the axis in one segment: followed where a way round can be told, else said, never a warning."""
+    machine = endless(name)
+    axis = np.array([[0.3, 0.1, 1], [0.3, 0.2, 1], [-0.3, -0.2, -1], [-0.3, -0.1, -1], [0, 0.1, -1]])
+    axis[2] += aside * np.array([0.5, -0.3, 0.2])
+    tip = np.array([[0, 0, 0], [10, 1, 0], [20, 0, 0], [30, 2, 0], [40, 1, 0.0]])
+    smoothed = smooth(Program.from_poses(tip, unit(axis)), reserved())
+    curves = rotary(smoothed, machine)
+    if aside < 1e-7:
+        assert curves.inserted.unsolved.tolist() == [2]
+    else:
+        assert_straight(smoothed, machine, curves)
+    assert_curves(smoothed, machine, curves)
+    chosen = choose_form("fanuc", "g6.2", machine=machine)
+    told = write(smoothed, io.BytesIO(), form=chosen).findings
+    assert [finding.count for finding in told if finding.code == "CS369"] == ([1] if aside < 1e-7 else [])
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])

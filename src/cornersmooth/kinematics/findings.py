@@ -6,12 +6,15 @@ import numpy as np
 
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.orientation import pole_distance
 from cornersmooth.model import Bools, Floats, Ints
 
 #: A cut counts as near the pole where the first rotary axis turns by so many times what the tool axis turns by.
 NEAR_POLE = 20.0
 #: Turns of a rotary axis below this (degrees) are rounding.
 NO_TURN = 1e-6
+#: Poses looked at at a time.
+BLOCK = 1 << 15
 
 
 def axis_rates(angles: Floats, tip: Floats) -> Floats:
@@ -75,44 +78,45 @@ def limit_error(
 
 
 def pole_finding(
-    machine: Machine,
-    tip: Floats,
-    axis: Floats,
-    angles: Floats,
-    pole_distance: Floats,
-    rapid: Bools,
-    line: Ints,
+    machine: Machine, tip: Floats, axis: Floats, angles: Floats, rapid: Bools, line: Ints
 ) -> tuple[Finding, ...]:
     """Cuts near the pole, where the first rotary axis turns fast: where, how close, how fast."""
-    turn = np.abs(np.diff(angles[:, 0]))
-    tilt = np.linalg.norm(np.diff(axis, axis=0), axis=1)
-    fast = (turn > NO_TURN) & (turn > NEAR_POLE * np.degrees(tilt)) & ~rapid[1:]
-    if not fast.any():
+    found = []
+    for begin in range(0, len(axis) - 1, BLOCK):
+        here = slice(begin, begin + BLOCK + 1)
+        turn = np.abs(np.diff(angles[here, 0]))
+        tilt = np.linalg.norm(np.diff(axis[here], axis=0), axis=1)
+        fast = (turn > NO_TURN) & (turn > NEAR_POLE * np.degrees(tilt)) & ~rapid[here][1:]
+        found.append(begin + np.flatnonzero(fast))
+    edges = np.concatenate(found) if found else np.zeros(0, np.int64)
+    if not len(edges):
         return ()
-    rates = axis_rates(angles, tip)[:, 0]
-    begins = fast & ~np.concatenate(([False], fast[:-1]))
-    edges = np.flatnonzero(fast)
-    worst = int(edges[np.argmax(rates[edges])])
-    closest = float(np.minimum(pole_distance[edges], pole_distance[edges + 1]).min())
+    turns = np.abs(angles[edges + 1, 0] - angles[edges, 0])
+    lengths = np.linalg.norm(tip[edges + 1] - tip[edges], axis=1)
+    rates = np.where(lengths > 0, turns / np.where(lengths > 0, lengths, 1.0), np.inf)
+    worst = int(np.argmax(rates))
+    closest = float(min(pole_distance(machine, axis[edges]).min(), pole_distance(machine, axis[edges + 1]).min()))
     name = machine.names[0]
     speed = f"{rates[worst]:.4g} deg/mm" if np.isfinite(rates[worst]) else "with the tip standing still"
     text = (
         f"the tool axis comes within {closest:.3g} deg of the pole of {name}, which turns fast there: "
-        f"{turn[worst]:.4g} deg in one move, {speed}"
+        f"{turns[worst]:.4g} deg in one move, {speed}"
     )
-    return (Finding("CS363", "warning", int(line[worst + 1]), text, int(begins.sum())),)
+    passages = 1 + int(np.count_nonzero(np.diff(edges) > 1))
+    return (Finding("CS363", "warning", int(line[edges[worst] + 1]), text, passages),)
 
 
 def rewind_finding(machine: Machine, angles: Floats, rapid: Bools, line: Ints) -> tuple[Finding, ...]:
     """Rapids in which an axis turns back by whole turns to stay inside its limits."""
-    step = np.diff(angles, axis=0)
-    turned = (np.abs(step) > 180 + NO_TURN) & rapid[1:, None]
+    rapids = np.flatnonzero(rapid[1:])
+    step = angles[rapids + 1] - angles[rapids]
+    turned = np.abs(step) > 180 + NO_TURN
     findings = []
     for axis, name in enumerate(machine.names):
         moves = np.flatnonzero(turned[:, axis])
         if len(moves):
             text = f"{name} turns back by {abs(step[moves[0], axis]):.4g} deg in a rapid, to stay inside its limits"
-            findings.append(Finding("CS364", "warning", int(line[moves[0] + 1]), text, len(moves)))
+            findings.append(Finding("CS364", "warning", int(line[rapids[moves[0]] + 1]), text, len(moves)))
     return tuple(findings)
 
 

@@ -18,6 +18,10 @@ from cornersmooth.model import Bools, Floats, Ints
 
 #: A machine has a pole where k can lie along a₁; sides that differ by less (rad) meet there up to rounding.
 POLE_MATCH = 1e-9
+#: Chords of unit vectors are known to this.
+ROUNDING = 1e-7
+#: Axes that are solved at a time: what is computed on the way stays in the processor's cache.
+BLOCK = 1 << 13
 
 
 @dataclass(frozen=True)
@@ -75,8 +79,27 @@ def solutions(machine: Machine, axis: Floats) -> Solutions:
     `tool_axis` of either solution gives the axis back to 1e-15, near the pole too.
     """
     frame = _Frame.of(machine)
+    n = len(axis)
+    angles, distance, beyond = np.empty((n, 2, 2)), np.empty(n), np.empty(n)
+    for begin in range(0, n, BLOCK):
+        here = slice(begin, begin + BLOCK)
+        rho1 = _solve(frame, axis[here], angles[here])
+        distance[here] = frame.pole_distance(rho1)
+        beyond[here] = frame.beyond(rho1)
+    return Solutions(angles, distance, beyond)
+
+
+def pole_distance(machine: Machine, axis: Floats) -> Floats:
+    """Angle between tool axes and the nearest pole, as in `Solutions`: (n, 3) -> (n,) degrees."""
+    frame = _Frame.of(machine)
     x, y, z = (axis @ frame.first).T
-    rho1 = np.arctan2(np.hypot(x, y), z)
+    return frame.pole_distance(np.arctan2(np.hypot(x, y), z))
+
+
+def _solve(frame: _Frame, axis: Floats, angles: Floats) -> Floats:
+    """Put both pairs of angles (n, 2, 2) into `angles`; return ρ₁ (n,)."""
+    x, y, z = (axis @ frame.first).T
+    rho1: Floats = np.arctan2(np.hypot(x, y), z)
     sigma, rho2 = frame.sigma, frame.rho
     half = (sigma + rho1 + rho2) / 2
     rising = np.sqrt(np.maximum(np.sin(half - sigma) * np.sin(half - rho2), 0.0))
@@ -91,17 +114,10 @@ def solutions(machine: Machine, axis: Floats) -> Solutions:
             2 * np.sin(rho2) * sine * cosine, np.sin(sigma - rho2) + 2 * np.sin(rho2) * np.cos(sigma) * sine**2
         )
     target = np.arctan2(y, x)
-    angles = np.empty((len(axis), 2, 2))
     for branch, side in enumerate((1.0, -1.0)):
-        angles[:, branch, 0] = frame.signs[0] * np.degrees(target + side * azimuth)
-        angles[:, branch, 1] = frame.signs[1] * np.degrees(side * 2 * phi_half - frame.zero)
-    nearest = abs(sigma - rho2)
-    farthest = np.pi - abs(np.pi - sigma - rho2)
-    return Solutions(
-        angles=wrap(angles),
-        pole_distance=frame.pole_distance(rho1),
-        beyond=np.degrees(np.maximum(np.maximum(nearest - rho1, rho1 - farthest), 0.0)),
-    )
+        angles[:, branch, 0] = wrap(frame.signs[0] * np.degrees(target + side * azimuth))
+        angles[:, branch, 1] = wrap(frame.signs[1] * np.degrees(side * 2 * phi_half - frame.zero))
+    return rho1
 
 
 def closest_second(machine: Machine, axis: Floats, first_angle: Floats) -> Floats:
@@ -167,16 +183,20 @@ def passes_pole(machine: Machine, start: Floats, end: Floats, cone: float) -> Bo
     (n,) bool
         False where the nearest point is one of the ends.
     """
-    frame = _Frame.of(machine)
     passes = np.zeros(len(start), np.bool_)
-    normal = np.cross(start, end)
-    length = np.linalg.norm(normal, axis=1)
-    turning = length > 0
-    for pole in frame.poles(machine):
-        height = np.abs(normal @ pole)
-        ahead = np.einsum("ij,ij->i", np.cross(start, pole[None, :]), normal) > 0
-        behind = np.einsum("ij,ij->i", np.cross(pole[None, :], end), normal) > 0
-        passes |= turning & ahead & behind & (height <= np.sin(np.radians(cone)) * length)
+    step = end - start
+    step = np.sqrt(np.einsum("ij,ij->i", step, step)) + np.radians(cone) + ROUNDING
+    for pole in _Frame.of(machine).poles(machine):
+        # On a way that is shorter than the distance of its start nothing comes near: chords obey the triangle too.
+        near = np.flatnonzero(2.0 - 2.0 * (start @ pole) <= step * step)
+        if len(near):
+            one, two = start[near], end[near]
+            normal = np.cross(one, two)
+            length = np.linalg.norm(normal, axis=1)
+            ahead = np.einsum("ij,ij->i", np.cross(one, pole[None, :]), normal) > 0
+            behind = np.einsum("ij,ij->i", np.cross(pole[None, :], two), normal) > 0
+            close = np.abs(normal @ pole) <= np.sin(np.radians(cone)) * length
+            passes[near] |= (length > 0) & ahead & behind & close
     return passes
 
 
@@ -185,6 +205,13 @@ def angle_between(one: Floats, other: Floats) -> Floats:
     apart = np.linalg.norm(one - other, axis=-1)
     angle: Floats = np.degrees(2 * np.arcsin(np.minimum(apart / 2, 1.0)))
     return angle
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors along the last axis brought to unit length; none becomes a vector of no length, 60 degrees off all."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    units: Floats = vectors / np.where(length > 0, length, 1.0)
+    return units
 
 
 def wrap(angles: Floats) -> Floats:
@@ -251,6 +278,13 @@ class _Frame:
         if self.pole_behind:
             distance = np.minimum(distance, np.pi - rho1)
         degrees: Floats = np.degrees(distance)
+        return degrees
+
+    def beyond(self, rho1: Floats) -> Floats:
+        """Degrees outside of the reach of the machine."""
+        nearest = abs(self.sigma - self.rho)
+        farthest = np.pi - abs(np.pi - self.sigma - self.rho)
+        degrees: Floats = np.degrees(np.maximum(np.maximum(nearest - rho1, rho1 - farthest), 0.0))
         return degrees
 
 

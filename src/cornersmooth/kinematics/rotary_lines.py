@@ -8,8 +8,8 @@ import numpy as np
 
 from cornersmooth.kinematics.insertion import fill, insertions
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.orientation import continued
-from cornersmooth.kinematics.rotary_motion import RotaryMotion, unit
+from cornersmooth.kinematics.orientation import continued, unit
+from cornersmooth.kinematics.rotary_motion import RotaryMotion
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.layout import lines_per_half

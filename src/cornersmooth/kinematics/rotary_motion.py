@@ -15,7 +15,7 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.kinematics.insertion import Insertions, insertions
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.orientation import angle_between, continued, solutions, tool_axis, wrap
+from cornersmooth.kinematics.orientation import angle_between, continued, solutions, tool_axis, unit, wrap
 from cornersmooth.kinematics.route import rapid_moves, rotary_angles
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
@@ -323,9 +323,3 @@ def _ruled(smoothed: SmoothProgram, machine: Machine, layout: Layout, even: Bool
     slope[pose] = (behind - before) / (2 * DIFFERENCE)
     bend[pose] = (behind - 2 * here + before) / DIFFERENCE**2
     return Ends(side.place, side.angles, slope, bend)
-
-
-def unit(vectors: Floats) -> Floats:
-    """Vectors along the last axis, brought to unit length."""
-    units: Floats = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return units

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,6 @@ from cornersmooth.kinematics.choice import LIMIT_SLACK, PREFERENCE_COST, NoChoic
 from cornersmooth.kinematics.findings import limit_error, pole_finding, reach_error, rewind_finding, swap_finding
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.orientation import (
-    Solutions,
     angle_between,
     closest_second,
     passes_pole,
@@ -25,6 +25,8 @@ from cornersmooth.model import Bools, Floats, Ints, Move
 WIDE_STEP = 90.0
 #: So many points are looked at on the way.
 WIDE_STEP_POINTS = 15
+#: Poses worked on at a time, so that memory is needed for their angles and little else.
+BLOCK = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,15 @@ class RotaryPath:
     deviation : (n,) float64, degrees
         Angle between the axis that the angles give and the one asked for: 0 but for poses at the pole, where it stays
         within the tolerance given.
+    branch : (n,) int8
+        Which of `Solutions.angles` they are, -1 at the pole.
     findings : tuple of Finding
         Passages near the pole, rewinds, changes of solution.
     """
 
     angles: Floats
     deviation: Floats
+    branch: NDArray[np.int8]
     findings: tuple[Finding, ...]
 
 
@@ -84,35 +89,35 @@ def rotary_angles(
     line = np.zeros(n, np.int64) if line is None else line
     rapid = np.zeros(n, np.bool_) if rapid is None else rapid
     if n == 0:
-        return RotaryPath(np.zeros((0, 2)), np.zeros(0), ())
-    found = solutions(machine, axis)
-    if (outside := found.beyond > tolerance).any():
-        pose = int(np.argmax(outside))
-        raise reach_error(machine, axis[pose], float(found.beyond[pose]), int(line[pose]), file)
-    # Half of the tolerance as cone: two axes inside it are then within the tolerance of each other.
-    cone = found.pole_distance <= tolerance / 2
+        return RotaryPath(np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int8), ())
+    poses = _sorted_poses(machine, axis, tolerance, line, file)
     run: Ints = np.cumsum(rapid, dtype=np.int64)
-    steady = np.flatnonzero(~cone)
-    swaps = np.zeros(0, np.int64)
-    if len(steady):
-        angles = np.full((n, 2), np.nan)
-        angles[steady], swaps = _steady_angles(machine, axis, found, steady, run, tolerance, line, file)
-        _fill_cone(machine, tip, axis, angles, np.flatnonzero(cone), steady, run)
+    branch, swaps = np.full(n, -1, np.int8), np.zeros(0, np.int64)
+    if len(poses.steady):
+        angles, branch[poses.steady], swaps = _steady_angles(machine, axis, poses, run, tolerance, line, file)
+        if len(poses.cone):
+            steady, angles = angles, np.full((n, 2), np.nan)
+            angles[poses.steady] = steady
+            length = _lengths(tip)
+            for here in _blocks(len(poses.cone)):
+                _fill_cone(machine, length, axis, angles, poses.cone[here], poses.steady, run)
     else:
         angles = np.zeros((n, 2))
         angles[:, 0] = np.clip(0.0, *machine.limits[0])
-        angles[:, 1] = closest_second(machine, axis, angles[:, 0])
-    poses = np.flatnonzero(cone)
-    angles[poses] = _into_limits(angles[poses], machine.limits)
+        for here in _blocks(n):
+            angles[here, 1] = closest_second(machine, axis[here], angles[here, 0])
+    angles[poses.cone] = _into_limits(angles[poses.cone], machine.limits)
     deviation = np.zeros(n)
-    off = np.flatnonzero(cone | (found.beyond > 0))
-    deviation[off] = angle_between(tool_axis(machine, angles[off]), axis[off])
-    if (over := deviation > tolerance).any():
-        pose = int(np.argmax(over))
-        raise limit_error(machine, found.angles[pose], machine.limits, None, int(line[pose]), 0, file)
-    findings = pole_finding(machine, tip, axis, angles, found.pole_distance, rapid, line)
+    for off in (poses.cone, poses.beyond):
+        for here in _blocks(len(off)):
+            deviation[off[here]] = angle_between(tool_axis(machine, angles[off[here]]), axis[off[here]])
+            if (over := deviation[off[here]] > tolerance).any():
+                pose = int(off[here][np.argmax(over)])
+                both = solutions(machine, axis[pose : pose + 1]).angles[0]
+                raise limit_error(machine, both, machine.limits, None, int(line[pose]), 0, file)
+    findings = pole_finding(machine, tip, axis, angles, rapid, line)
     findings += rewind_finding(machine, angles, rapid, line) + swap_finding(machine, swaps, line)
-    return RotaryPath(angles, deviation, findings)
+    return RotaryPath(angles, deviation, branch, findings)
 
 
 def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
@@ -126,61 +131,117 @@ def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
     return rapid
 
 
+@dataclass(frozen=True)
+class _Poses:
+    """Poses by what their axes are.
+
+    Parameters
+    ----------
+    cone, steady : (c,) and (s,) int64
+        In the cone of the pole, and outside of it.
+    angles : (s, 2, 2) float64, degrees
+        ``[pose, branch, axis]`` of the steady ones, in (-180, 180] until they are unwrapped.
+    beyond : (b,) int64
+        Just out of reach of the machine.
+    """
+
+    cone: Ints
+    steady: Ints
+    angles: Floats
+    beyond: Ints
+
+
+def _sorted_poses(machine: Machine, axis: Floats, tolerance: float, line: Ints, file: str | None) -> _Poses:
+    """Both solutions of all poses outside of the cone.
+
+    Half of the tolerance is the cone: two axes inside it are within the tolerance of each other.
+    """
+    n, count = len(axis), 0
+    angles, steady = np.empty((n, 2, 2)), np.empty(n, np.int64)
+    cone, beyond = [], []
+    for here in _blocks(n):
+        found = solutions(machine, axis[here])
+        if (outside := found.beyond > tolerance).any():
+            pose = here.start + int(np.argmax(outside))
+            raise reach_error(machine, axis[pose], float(found.beyond[pose - here.start]), int(line[pose]), file)
+        inside = found.pole_distance <= tolerance / 2
+        own = np.flatnonzero(~inside)
+        angles[count : count + len(own)] = found.angles[own] if len(own) < len(inside) else found.angles
+        steady[count : count + len(own)] = here.start + own
+        count += len(own)
+        cone.append(here.start + np.flatnonzero(inside))
+        beyond.append(here.start + np.flatnonzero(found.beyond > 0))
+    return _Poses(np.concatenate(cone), steady[:count], angles[:count], np.concatenate(beyond))
+
+
 def _steady_angles(
-    machine: Machine,
-    axis: Floats,
-    found: Solutions,
-    steady: Ints,
-    run: Ints,
-    tolerance: float,
-    line: Ints,
-    file: str | None,
-) -> tuple[Floats, Ints]:
-    """Angles of the poses outside the cone, (s, 2), and the poses before which a rapid changes the solution."""
-    start, end = steady[:-1], steady[1:]
-    free = run[start] != run[end]
-    through = ~free & ((end - start > 1) | passes_pole(machine, axis[start], axis[end], tolerance / 2))
-    angles = found.angles[steady]  # [pose, branch, axis]
-    turns = _turns_inside(machine, axis, steady, angles, free | through)
-    first = np.concatenate(([0], 1 + np.flatnonzero(free | through)))
-    piece = np.zeros(len(steady), np.int64)
-    piece[first[1:]] = 1
-    piece = np.cumsum(piece)
-    unwrapped = angles + 360 * (turns - turns[first][piece])
+    machine: Machine, axis: Floats, poses: _Poses, run: Ints, tolerance: float, line: Ints, file: str | None
+) -> tuple[Floats, NDArray[np.int8], Ints]:
+    """Angles (s, 2) and branches (s,) of the poses outside the cone, and poses before which a rapid changes branch."""
+    steady, unwrapped = poses.steady, poses.angles
+    dislike = _dislike(machine, unwrapped[0])
+    free, first = [np.ones(1, np.bool_)], [np.zeros(1, np.int64)]
+    for here in _blocks(len(steady)):
+        rows = slice(max(here.start, 1), here.stop)
+        start, end = steady[rows.start - 1 : rows.stop - 1], steady[rows]
+        rests = run[start] != run[end]
+        broken = rests | (end - start > 1) | passes_pole(machine, axis[start], axis[end], tolerance / 2)
+        _unwrap(machine, axis, start, end, unwrapped[rows.start - 1 : rows.stop], broken)
+        breaks = np.flatnonzero(broken)
+        first.append(rows.start + breaks)
+        free.append(rests[breaks])
+    begins = np.concatenate(first)
     pieces = Pieces(
-        first=unwrapped[first],
-        last=unwrapped[np.append(first[1:], len(steady)) - 1],
-        low=np.minimum.reduceat(unwrapped, first, axis=0),
-        high=np.maximum.reduceat(unwrapped, first, axis=0),
-        free=np.concatenate(([True], free[first[1:] - 1])),
-        dislike=_dislike(machine, angles[0]),
+        first=unwrapped[begins],
+        last=unwrapped[np.append(begins[1:], len(steady)) - 1],
+        low=np.minimum.reduceat(unwrapped, begins, axis=0),
+        high=np.maximum.reduceat(unwrapped, begins, axis=0),
+        free=np.concatenate(free),
+        dislike=dislike,
     )
+    piece = np.repeat(np.arange(len(begins)), np.diff(begins, append=len(steady)))
     try:
-        branch, extra = choose(pieces, machine.limits)
+        branch, turns = choose(pieces, machine.limits)
     except NoChoiceError as stuck:
-        raise _stuck_error(machine, stuck, piece, unwrapped, found, steady, run, line, file) from stuck
-    solution = branch[piece]
-    swaps = end[free & (solution[1:] != solution[:-1])]
-    return unwrapped[np.arange(len(steady)), solution] + 360 * extra[piece], swaps
+        raise _stuck_error(machine, stuck, piece, axis, unwrapped, steady, run, line, file) from stuck
+    angles = np.empty((len(steady), 2))
+    for here in _blocks(len(steady)):
+        own = piece[here]
+        angles[here] = unwrapped[here][np.arange(len(own)), branch[own]] + 360 * turns[own]
+    swaps = begins[1:][pieces.free[1:] & (branch[1:] != branch[:-1])]
+    return angles, branch.astype(np.int8)[piece], steady[swaps]
 
 
-def _turns_inside(machine: Machine, axis: Floats, steady: Ints, angles: Floats, broken: Bools) -> Floats:
-    """Whole turns that make both branches continuous where nothing breaks the path: (s, 2, 2), from 0."""
+def _unwrap(machine: Machine, axis: Floats, start: Ints, end: Ints, angles: Floats, broken: Bools) -> None:
+    """Make both branches continuous from the first row on, in place, where nothing breaks the path.
+
+    Parameters
+    ----------
+    start, end : (e,) int64
+        Poses before and behind each step.
+    angles : (e + 1, 2, 2) float64, degrees
+        The first row is unwrapped already; after a break the turns are counted from 0 again.
+    """
     step = np.diff(angles, axis=0)
     change = -np.round(step / 360)
     wide = np.flatnonzero(~broken & (np.abs(step + 360 * change).max(axis=(1, 2)) > WIDE_STEP))
     if len(wide):
         # A wide step: the sum of the short ones on the way says which way round it goes.
         share = (np.arange(1, WIDE_STEP_POINTS + 1) / (WIDE_STEP_POINTS + 1))[:, None, None]
-        between = axis[steady[wide]] * (1 - share) + axis[steady[wide + 1]] * share
+        between = axis[start[wide]] * (1 - share) + axis[end[wide]] * share
         length = np.linalg.norm(between, axis=2, keepdims=True)
-        between = np.where(length > 0, between / np.where(length > 0, length, 1.0), axis[steady[wide]])
+        between = np.where(length > 0, between / np.where(length > 0, length, 1.0), axis[start[wide]])
         on_way = solutions(machine, between.reshape(-1, 3)).angles.reshape(WIDE_STEP_POINTS, -1, 2, 2)
         steps = np.diff(np.concatenate((angles[wide][None], on_way, angles[wide + 1][None])), axis=0)
         steps -= 360 * np.round(steps / 360)
         change[wide] = np.round((steps.sum(axis=0) - step[wide]) / 360)
-    change[broken] = 0
-    return np.concatenate((np.zeros((1, 2, 2)), np.cumsum(change, axis=0)))
+    if not change.any():
+        return
+    turns = np.cumsum(change, axis=0)
+    if broken.any():
+        base = np.maximum.accumulate(np.where(broken, np.arange(len(broken)), -1))
+        turns -= np.where(base[:, None, None] >= 0, turns[base], 0.0)
+    angles[1:] += 360 * turns
 
 
 def _dislike(machine: Machine, start: Floats) -> Floats:
@@ -193,15 +254,13 @@ def _dislike(machine: Machine, start: Floats) -> Floats:
 
 
 def _fill_cone(
-    machine: Machine, tip: Floats, axis: Floats, angles: Floats, poses: Ints, steady: Ints, run: Ints
+    machine: Machine, length: Floats, axis: Floats, angles: Floats, poses: Ints, steady: Ints, run: Ints
 ) -> None:
-    """Angles of the poses inside the cone, in place.
+    """Angles of poses inside the cone, in place; `length` is that of the path up to each pose.
 
     Between two poses outside, the first angle goes evenly with the length of the path from the one's to the other's;
     towards the end of a cut it stays, and before the start of one it waits already. The second follows the axis.
     """
-    if not len(poses):
-        return
     after = np.searchsorted(steady, poses)
     before = np.maximum(after - 1, 0)
     left, right = steady[before], steady[np.minimum(after, len(steady) - 1)]
@@ -210,8 +269,7 @@ def _fill_cone(
     # Waiting angle of a cut without any pose outside: where the axis stands after the last one, or will stand first.
     left_angles = angles[np.where(left < poses, left, right)]
     right_angles = angles[right]
-    length = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))))
-    start, end = np.minimum(left + 1, len(tip) - 1), np.maximum(right - 1, 0)
+    start, end = np.minimum(left + 1, len(length) - 1), np.maximum(right - 1, 0)
     span, gone = length[end] - length[start], length[poses] - length[start]
     count = end - start
     even = np.where(count > 0, (poses - start) / np.maximum(count, 1), 0.5)
@@ -234,8 +292,8 @@ def _stuck_error(
     machine: Machine,
     stuck: NoChoiceError,
     piece: Ints,
+    axis: Floats,
     unwrapped: Floats,
-    found: Solutions,
     steady: Ints,
     run: Ints,
     line: Ints,
@@ -253,4 +311,19 @@ def _stuck_error(
             furthest, words = first, path[first]
     pose = int(steady[members[furthest]])
     start = int(np.searchsorted(run, run[pose]))
-    return limit_error(machine, found.angles[pose], limits, words, int(line[pose]), int(line[start]), file)
+    both = solutions(machine, axis[pose : pose + 1]).angles[0]
+    return limit_error(machine, both, limits, words, int(line[pose]), int(line[start]), file)
+
+
+def _lengths(tip: Floats) -> Floats:
+    """Length of the path up to each pose: (n, 3) -> (n,) mm."""
+    step = np.zeros(len(tip))
+    for here in _blocks(len(tip) - 1):
+        step[here.start + 1 : here.stop + 1] = np.linalg.norm(np.diff(tip[here.start : here.stop + 1], axis=0), axis=1)
+    length: Floats = np.cumsum(step)
+    return length
+
+
+def _blocks(n: int) -> Iterator[slice]:
+    """Rows 0 to n - 1, some at a time."""
+    return (slice(begin, min(begin + BLOCK, n)) for begin in range(0, n, BLOCK))

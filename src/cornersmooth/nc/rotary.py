@@ -6,6 +6,7 @@ once here.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 
 import numpy as np
@@ -47,10 +48,9 @@ def rotary_rows(rows: Iterator[Rows], program: Program, settings: Settings, form
     machine = form.machine
     if machine is None:
         raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
-    blocks = [(block.tip, block.other, block.move) for block in rows]
-    if not blocks:
+    tip, axis, move = _whole(rows)
+    if not len(move):
         return
-    tip, axis, move = (np.concatenate(column) for column in zip(*blocks, strict=True))
     rapid, line, file = rapid_moves(program.kind)[move], program.line[move], program.source.name
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_length)
     path = rotary_angles(machine, tip, axis, tolerance=tolerance, rapid=rapid, line=line, file=file)
@@ -94,6 +94,26 @@ def rotary_rows(rows: Iterator[Rows], program: Program, settings: Settings, form
     if inserted:
         text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
         notes.add("CS367", "note", first_inserted, text, inserted)
+
+
+def _whole(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:
+    """Tip, axis and move of all rows; what they were gathered in is given back piece by piece."""
+    tips: deque[Floats] = deque()
+    axes: deque[Floats] = deque()
+    moves: deque[Ints] = deque()
+    for block in rows:
+        tips.append(block.tip)
+        axes.append(block.other)
+        moves.append(block.move)
+    total = sum(map(len, moves))
+    tip, axis, move = np.empty((total, 3)), np.empty((total, 3)), np.empty(total, np.int64)
+    for whole, pieces in ((tip, tips), (axis, axes), (move, moves)):
+        begin = 0
+        while pieces:
+            piece = pieces.popleft()
+            whole[begin : begin + len(piece)] = piece
+            begin += len(piece)
+    return tip, axis, move
 
 
 def _cuts(move: Ints, program: Program) -> Bools:

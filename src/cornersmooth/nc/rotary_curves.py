@@ -47,6 +47,13 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, notes: Notes) -> Iter
     )
     for finding in found.findings:
         notes.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
+    jumps = np.union1d(found.inserted.unsolved, smoothed.corners.pose[found.lines.unsolved])
+    if len(jumps):
+        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
+        notes.add("CS369", "warning", int(program.line[jumps[0]]), text, len(jumps))
+    if len(found.inserted):
+        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
+        notes.add("CS367", "note", int(program.line[found.inserted.segment.min()]), text, len(found.inserted))
     if any(len(group) for group in found.groups):
         text = "G6.2 with rotary axes under tool tip control is the machine builder's to allow; ask before running it"
         notes.add("CS370", "warning", 0, text)

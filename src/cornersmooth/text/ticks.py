@@ -131,10 +131,12 @@ def format_number(value: float, decimals: int, *, trim: bool = False, plus: bool
     OutputError
         CS301, as `to_ticks`.
     """
-    ticks = int(to_ticks(value, decimals))
-    digits = str(abs(ticks)).rjust(decimals + 1, "0")
-    sign = "-" if ticks < 0 else "+" if plus else ""
-    whole, part = digits[: len(digits) - decimals], digits[len(digits) - decimals :]
+    if not abs(value) * 10.0**decimals < TICK_LIMIT:
+        to_ticks(value, decimals)  # says what is wrong
+    digits = f"{abs(value):.{decimals}f}"  # rounds as `to_ticks` does, at a fraction of its cost for one number
+    sign = "+" if plus else ""
+    if value < 0 and digits.strip("0."):
+        sign = "-"
     if trim:
-        return f"{sign}{whole}.{part.rstrip('0')}"
-    return f"{sign}{whole}.{part}" if decimals else sign + whole
+        return f"{sign}{digits.rstrip('0')}" if decimals else f"{sign}{digits}."
+    return sign + digits
