@@ -104,7 +104,7 @@ class Pile:
         }
         control, centre = self.control.whole(), self.arc_centre.whole()
         ends = [*self._units[1:], (len(self), len(control), len(centre), 1.0)]
-        for (*begin, unit), (*end, _) in zip(self._units, ends, strict=True):
+        for (*begin, unit), (*end, _) in zip(self._units, ends, strict=bool(self._units)):
             if unit != 1.0:  # a factor of one leaves the numbers untouched
                 of_elements, of_points, of_arcs = (slice(a, b) for a, b in zip(begin, end, strict=True))
                 for name in ("tip", "second", "feed") if points else ("tip", "feed"):
