@@ -84,7 +84,7 @@ def test_own_tables_are_taken_from_files(tmp_path: Path) -> None:
             2,
             "siemens form poly holds curves with weights 1",
         ),
-        (("--control", "mitsubishi", "-f", "g6.2"), 3, "<stdin>:4: error: the tool is not parallel to Z"),
+        (("--control", "mitsubishi", "-f", "g6.2"), 2, "<stdin>:4: error: the tool is not parallel to Z"),
         (
             ("-f", "g6.2", "--machine", "table-ac", "--method", "zhang2016"),
             2,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Form, Frame, choose_form, control_names, fit_settings, load_control, write
 from cornersmooth.nc.tables import parse_control
@@ -94,7 +94,7 @@ def test_a_tilted_tool_is_refused_where_no_word_can_say_it() -> None:
     chosen = choose_form("mitsubishi", "g6.2")
     assert "G5 P10000" in text_of(chosen)
     tilted = CL.replace("GOTO/20,20,0", "GOTO/20,20,0,0,0.6,0.8")
-    with pytest.raises(InputError, match=r"part.cls:11: error: the tool is not parallel to Z"):
+    with pytest.raises(SettingsError, match=r"part.cls:11: error: the tool is not parallel to Z"):
         text_of(chosen, tilted)
 
 

@@ -20,7 +20,9 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
-from nc.reading import Reader, Reading, tool_direction
+from nc.grammars import reader
+from nc.reading import Reading
+from nc.rotations import tool_direction
 from oracle.chains import cl_text, random_chains
 from oracle.judge import judge
 from oracle.motion import Path as Motion
@@ -105,13 +107,13 @@ def test_tip_and_axis_by_its_own_formulas_keep_the_tolerance(machine: str, tmp_p
     """The published kinematics of trtfuncs.c over the positions that the interpreter produces."""
     cl, chains = flat(2)
     axis_length, tolerance = 10.0, 0.01
-    reader = Reader(("X", "Y", "Z", *("AC" if "ac" in machine else "BC")), "", "angles", machine)
-    reader.step, reader.axis_length = 0.01, axis_length
+    control = reader("linuxcnc", "g1", machine)
+    control.step, control.mode = 0.01, "G94"
     columns = [0, 1, 2, 3 if "ac" in machine else 4, 5]
     reading, before = Reading(), None
     for number, (kind, place) in enumerate(positions(written(cl, machine, tolerance=tolerance), tmp_path)):
         here = place[columns]
-        reading.pieces.append(reader.piece(number, kind == "rapid", here if before is None else before, here))
+        reading.pieces.append(control.piece(number, kind == "rapid", here if before is None else before, here))
         before = here
     runs: list[Motion] = reading.runs(axis_length)
     originals = [

@@ -24,7 +24,7 @@ def said(cl: str, *, start: str = "UNITS/MM\n") -> tuple[list[str], dict[str, in
         # spindle: the words in any order
         ("SPINDL/12000,RPM,CLW", ["S12000 M3"]),
         ("SPINDL/RPM,1000.000000,CLW", ["S1000 M3"]),
-        ("SPINDL/CCLW,RPM,2546.479", ["S2546.479 M4"]),
+        ("SPINDL/CCLW,RPM,2546.479", ["S2546 M4"]),
         ("SPINDL/  500.0000,RPM, CLW", ["S500 M3"]),
         ("SPINDL/1200", ["S1200 M3"]),
         ("SPINDL/1200,CCLW\nSPINDL/OFF\nSPINDL/ON", ["S1200 M4", "M5", "M4"]),
@@ -167,7 +167,7 @@ def test_cutter_compensation_names_register_and_plane() -> None:
     )
     lines, written = text_of_cl(cl)
     kept = [line for line in lines if line[:3] in ("G40", "G41", "G42", "G18", "G17")]
-    assert kept == ["G41 D4", "G40", "G18", "G42 D14", "G40"]
+    assert kept == ["G41 D4", "G40", "G18", "G42 D14", "G40", "G17"]
     assert codes(written) == {"CS319": 2}
     assert "G1 X5.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000" in lines
 

@@ -20,7 +20,8 @@ _MODES = {
     epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]")
-def command(name: str | None) -> int:
+@click.option("--table", is_flag=True, help="Print the table of a control: what a TOML file of your own starts from.")
+def command(name: str | None, table: bool) -> int:
     """List the controls with their forms, or check and describe one.
 
     A TOML file of your own is like one of them and says only what is different; see docs/controls.md.
@@ -29,14 +30,22 @@ def command(name: str | None) -> int:
     Examples:
       cornersmooth controls
       cornersmooth controls siemens
+      cornersmooth controls siemens --table > mine.toml
       cornersmooth controls mine.toml
     """
-    from cornersmooth.nc import control_names, load_control
+    from cornersmooth.nc import control_names, control_table, load_control
 
+    if table:
+        if name is None:
+            raise click.UsageError("--table needs the name of a control")
+        click.echo(control_table(name), nl=False)
+        return 0
     names = [name] if name else list(control_names())
     for control in map(load_control, names):
         click.echo(f"{control.name}: {control.description}" if control.description else control.name)
         for form in control.forms.values():
             click.echo(f"  -f {form.name}: {form.description}" if form.description else f"  -f {form.name}")
             click.echo(f"     with {', '.join(_MODES[mode] for mode in form.modes)}")
+        for extra in control.extras.values():
+            click.echo(f"  --with {extra.name}: {extra.description}" if extra.description else f"  --with {extra.name}")
     return 0

@@ -43,20 +43,26 @@ class Writing:
         Name or TOML file.
     tcp : bool
         Whether the control keeps the tool tip.
+    extras : tuple of str
+        Functions of the control that are switched on.
     program : str or None
         Name of the NC program.
     header, footer : tuple of str
         Lines behind the head and before the tail.
+    comments : bool
+        Whether what the CL file says in words is written.
     """
 
     control: str = "fanuc"
     form: str | None = None
     machine: str | None = None
     tcp: bool = True
+    extras: tuple[str, ...] = ()
     program: str | None = None
     block_numbers: bool = False
     header: tuple[str, ...] = ()
     footer: tuple[str, ...] = ()
+    comments: bool = True
 
     def choose(self) -> Form:
         """Form of the control.
@@ -70,13 +76,13 @@ class Writing:
         from cornersmooth.nc import choose_form
 
         machine = load_machine(self.machine) if self.machine else None
-        return choose_form(self.control, self.form, machine=machine, tcp=self.tcp)
+        return choose_form(self.control, self.form, machine=machine, tcp=self.tcp, extras=self.extras)
 
     def frame(self) -> Frame:
         """What stands around the motion."""
         from cornersmooth.nc import Frame
 
-        return Frame(self.program, self.block_numbers, self.header, self.footer)
+        return Frame(self.program, self.block_numbers, self.header, self.footer, self.comments)
 
 
 @dataclass(frozen=True)

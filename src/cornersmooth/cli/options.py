@@ -173,6 +173,15 @@ header = click.option(
 footer = click.option("--footer", type=click.Path(), metavar="FILE", help="Lines to write before the tail.")
 program_name = click.option("--program-name", type=str, metavar="TEXT", help="Name or number of the NC program.")
 block_numbers = click.option("--block-numbers", is_flag=True, help="Number the blocks.")
+extras = click.option(
+    "--with",
+    "extras",
+    type=str,
+    metavar="NAME",
+    multiple=True,
+    help="Switch a function of the control on, such as cycle832; 'cornersmooth controls' lists them. May be repeated.",
+)
+no_comments = click.option("--no-comments", is_flag=True, help="Leave out what the CL file says in words.")
 reports = click.option(
     "--report",
     "reports",
@@ -207,7 +216,9 @@ def reading(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def writing(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that writes NC text, besides its form."""
-    return _apply(function, (control, machine, no_tcp, program_name, header, footer, block_numbers))
+    return _apply(
+        function, (control, machine, no_tcp, extras, program_name, header, footer, block_numbers, no_comments)
+    )
 
 
 def smoothing(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -185,6 +185,8 @@ def _writing(given: dict[str, Any]) -> Writing:
         form=given["form"],
         machine=given["machine"],
         tcp=not given["no_tcp"],
+        extras=given["extras"],
+        comments=not given["no_comments"],
         program=given["program_name"],
         block_numbers=given["block_numbers"],
         **texts,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,15 +16,16 @@ from cornersmooth.nc.blocks import BlockWriter
 from cornersmooth.nc.choice import check_program, choose_form
 from cornersmooth.nc.circles import Circles, plan_circles
 from cornersmooth.nc.control import Control, Form
-from cornersmooth.nc.framing import Frame
+from cornersmooth.nc.framing import BLEND_SHARE, Frame, blend_word
 from cornersmooth.nc.motion import MotionWriter
 from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.rotary import rotary_rows
 from cornersmooth.nc.rotary_curves import rotary_curve_rows
 from cornersmooth.nc.statements import StatementWriter
-from cornersmooth.nc.tables import control_names, load_control
+from cornersmooth.nc.tables import control_names, control_table, load_control
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
+from cornersmooth.text import format_number
 
 __all__ = [
     "Control",
@@ -32,6 +34,7 @@ __all__ = [
     "Written",
     "choose_form",
     "control_names",
+    "control_table",
     "fit_settings",
     "load_control",
     "write",
@@ -43,6 +46,10 @@ _POLYNOMIAL = ("poly", "spl")
 
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
 _TURNING = ("bspline", "poly")
+
+
+#: decimals of an orientation tolerance, degrees
+_TURN_DECIMALS = 5
 
 
 class Stream(Protocol):
@@ -127,13 +134,14 @@ def write(
     chosen = form if isinstance(form, Form) else choose_form(control, form)
     program, notes = smoothed.program, Notes()
     check_program(chosen, program, smoothed.settings)
-    statements = StatementWriter(chosen, program, notes)
+    frame = frame or Frame()
+    statements = StatementWriter(chosen, program, notes, _values(program, smoothed.settings), comments=frame.comments)
     circles = plan_circles(program, smoothed.settings, chosen)
     _tell_arcs(circles, program, notes)
     writer = BlockWriter(chosen, program, statements, notes, circles)
     motion = MotionWriter(program, writer, statements, notes)
     with _Behind(stream) as behind:
-        framing = (frame or Frame()).start(behind, chosen, program, smoothed.settings.tolerance)
+        framing = frame.start(behind, chosen, program, smoothed.settings.tolerance)
         framing.head()
         blocks = ((rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, notes))
         for rows, ticks in _one_ahead(blocks):
@@ -143,8 +151,17 @@ def write(
                 progress(int(rows.move[-1]) + 1, len(program))
         for text in motion.finish():
             framing.write(text)
-        framing.tail(statements.end_motion())
+        framing.tail(motion.end())
     return Written(framing.blocks + motion.blocks + writer.blocks, notes.findings())
+
+
+def _values(program: Program, settings: Settings) -> dict[str, str]:
+    """What stands for braces in blocks that switch functions of the control on."""
+    turn = math.degrees(BLEND_SHARE * settings.tolerance / settings.axis_length)
+    return {
+        "blend": blend_word(settings.tolerance / program.mm_per_unit),
+        "turn": format_number(max(turn, 10.0**-_TURN_DECIMALS), _TURN_DECIMALS),
+    }
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, notes: Notes) -> Iterator[Rows]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.kinematics import machine_position
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
-from cornersmooth.nc.circles import Circles
+from cornersmooth.nc.circles import FIRST_PLANE, Circles
 from cornersmooth.nc.control import INVERSE_TIME, Form
 from cornersmooth.nc.curves import Curves, RowWriter
 from cornersmooth.nc.notes import Notes
@@ -51,16 +51,35 @@ class BlockWriter:
     _format: RowFormat = field(init=False)
     _arc_format: RowFormat = field(init=False)
     _curves: Curves = field(init=False)
+    _blank: str = field(init=False)
 
     def __post_init__(self) -> None:
         motion = self.form.mode.motion
+        self._blank = " " if motion.spaces else ""
         words = [word.encode() for word in (*motion.coordinates, *self.form.other_words)]
         decimals = self.form.decimals(self.program.units)
-        spaced = (words[0], *(b" " + word for word in words[1:]))
-        self._format = RowFormat(words=spaced, decimals=decimals, plus=motion.signs)
-        radius = f" {motion.radius}".encode()
-        self._arc_format = RowFormat((*spaced[:3], radius), decimals[:3] + decimals[:1], plus=motion.signs)
+        spaced = (words[0], *(self._blank.encode() + word for word in words[1:]))
+        self._format = self._row_format(spaced, decimals)
+        radius = f"{self._blank}{motion.radius}".encode()
+        self._arc_format = self._row_format((*spaced[:3], radius), decimals[:3] + decimals[:1])
         self._curves = curves_for(self.form, self.program.units)
+
+    def _row_format(self, words: tuple[bytes, ...], decimals: tuple[int, ...]) -> RowFormat:
+        motion = self.form.mode.motion
+        return RowFormat(
+            words, decimals, plus=motion.signs, trim=not motion.trailing_zeros, leading_zero=motion.leading_zeros
+        )
+
+    def end(self) -> list[str]:
+        """Blocks that bring feed mode and plane back to where they were at the start."""
+        words, blocks = self.statements.words, []
+        if self._mode != FeedMode.PER_MINUTE:
+            blocks += [words.feed_mode[key] for key in (int(FeedMode.PER_MINUTE),) if key in words.feed_mode]
+            self._mode = FeedMode.PER_MINUTE
+        if self.statements.plane != FIRST_PLANE:
+            blocks += [words.plane[key] for key in (FIRST_PLANE,) if key in words.plane]
+            self.statements.plane = FIRST_PLANE
+        return blocks
 
     def ticks(self, tip: Floats, other: Floats) -> Ints:
         """Numbers of rows in steps of their last digit, (r, c), from `Rows.tip` and `Rows.other`."""
@@ -113,7 +132,8 @@ class BlockWriter:
     def _prefixes(self, run: Run) -> tuple[list[bytes], Ints, int]:
         """Table of what stands before the numbers, an entry for each row, and the blocks hidden in the prefixes."""
         motion = self.form.mode.motion
-        table = [f"{word} ".encode() for word in (motion.line, motion.rapid, motion.clockwise, motion.counterclockwise)]
+        starts = (motion.line, motion.rapid, motion.clockwise, motion.counterclockwise)
+        table = [f"{word}{self._blank}".encode() for word in starts]
         chosen = run.rapid.astype(np.int64)
         before: dict[int, bytes] = {}  # blocks before some rows
         feeding = np.flatnonzero(~run.rapid)
@@ -159,6 +179,8 @@ class BlockWriter:
                 self._count_missing(run.move[feeding[missing]])
             inverse = run.mode[feeding] == INVERSE_TIME
             unit = np.where(missing, 0.0, feed) / np.where(inverse, 1.0, self.program.mm_per_unit)
+            if motion.inch_feed != 1 and self.program.units == "inch":
+                unit[run.mode[feeding] == FeedMode.PER_MINUTE] *= motion.inch_feed
             ticks = to_ticks(unit, digits.feed)[~missing]
             given = feeding[~missing]
             # F is given again with its unit: the same number per minute and per revolution is not the same feed
@@ -169,7 +191,8 @@ class BlockWriter:
             if len(changed):
                 values, which = np.unique(ticks[changed], return_inverse=True)
                 chosen[given[changed]] = len(table) + which.reshape(-1)
-                table += [f" {motion.feed}{self._feed_digits(value)}\n".encode() for value in values.tolist()]
+                word = f"{self._blank}{motion.feed}"
+                table += [f"{word}{self._feed_digits(value)}\n".encode() for value in values.tolist()]
                 self._feed = int(keys[-1])
         if (run.curve > 0).any():
             self._curves.add_suffixes(run, table, chosen)

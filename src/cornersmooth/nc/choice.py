@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
-from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Move, Program
-from cornersmooth.nc.control import ROTARY_SHARE, Control, Form, FormTable, Orientation
+from cornersmooth.nc.control import ROTARY_SHARE, Control, Extra, Form, FormTable, Orientation
 from cornersmooth.nc.tables import load_control
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.neighbours import norm
@@ -21,6 +22,7 @@ def choose_form(
     *,
     machine: Machine | None = None,
     tcp: bool = True,
+    extras: Iterable[str] = (),
 ) -> Form:
     """Return the form of a control by name; the control's default where `form` is None.
 
@@ -32,6 +34,8 @@ def choose_form(
         For rotary words instead of tool vectors.
     tcp : bool
         Whether the control keeps the tool tip itself; without, the words are positions of the machine's axes.
+    extras : iterable of str
+        Names of functions of the control to be switched on.
 
     Raises
     ------
@@ -43,15 +47,28 @@ def choose_form(
     if name not in table.forms:
         raise SettingsError("CS211", f"{table.name} has no form {name!r}", f"choose one of {', '.join(table.forms)}")
     chosen = table.forms[name]
-    if machine is None and not tcp:
+    if machine is None and not tcp and "machine" in chosen.modes:
         raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
     wanted: tuple[Orientation, ...] = ("vector", "point", "fixed")
-    if machine is not None:
-        wanted = ("angles",) if tcp else ("machine",)
+    if not tcp:
+        wanted = ("machine",)
+    elif machine is not None:
+        wanted = ("angles",)
     for orientation in wanted:
         if orientation in chosen.modes:
-            return Form(table, name, chosen.curve, orientation, chosen.modes[orientation], machine)
-    raise _refusal(table, chosen, wanted)
+            asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
+            return Form(table, name, chosen.curve, orientation, chosen.modes[orientation], machine, asked)
+    raise _refusal(table, chosen, wanted, machine)
+
+
+def _extra(table: Control, form: str, name: str) -> Extra:
+    if name not in table.extras:
+        known = f"choose one of {', '.join(table.extras)}" if table.extras else "leave it out"
+        raise SettingsError("CS218", f"{table.name} has no function {name!r}", known)
+    extra = table.extras[name]
+    if extra.forms and form not in extra.forms:
+        raise SettingsError("CS218", f"{name} is not for {table.name} form {form}", f"use -f {extra.forms[0]}")
+    return extra
 
 
 def check_program(form: Form, program: Program, settings: Settings) -> None:
@@ -59,7 +76,7 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
 
     Raises
     ------
-    InputError
+    SettingsError
         The tool is not parallel to Z and the form has no words for that.
     """
     if form.orientation != "fixed":
@@ -68,16 +85,19 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
     tilt[program.kind == Move.FROM] = 0.0
     tilted = np.flatnonzero(settings.axis_length * tilt > ROTARY_SHARE * settings.tolerance)
     if len(tilted):
-        raise InputError(
-            "CS368",
+        straight = [name for name, other in form.table.forms.items() if "vector" in other.modes]
+        raise SettingsError(
+            "CS219",
             f"the tool is not parallel to Z, and {form.control} form {form.name} has no words for its axis",
-            "use -f g1",
+            f"use -f {straight[0]}" if straight else "name your machine with --machine",
             file=program.source.name,
             line=int(program.line[tilted[0]]),
         )
 
 
-def _refusal(table: Control, form: FormTable, wanted: tuple[Orientation, ...]) -> SettingsError:
+def _refusal(
+    table: Control, form: FormTable, wanted: tuple[Orientation, ...], machine: Machine | None
+) -> SettingsError:
     here = f"{table.name} form {form.name}"
     others = [name for name, other in table.forms.items() if any(mode in other.modes for mode in wanted)]
     instead = f"use -f {others[0]}" if others else ""
@@ -85,6 +105,8 @@ def _refusal(table: Control, form: FormTable, wanted: tuple[Orientation, ...]) -
         what = f"{here} cannot run without tool tip control"
         if form.curve:
             what += ": its curves are refused at inverse time feed (G93)"
+        if instead and machine is None:
+            instead += " and name your machine with --machine"
         return SettingsError("CS215", what, instead or "leave out --no-tcp")
     if "angles" in wanted:
         return SettingsError("CS215", f"{here} has no rotary words", instead or "leave out --machine")

@@ -7,6 +7,9 @@ import unicodedata
 #: characters of a comment's text in one block; controls truncate or refuse long ones
 _LONGEST = 120
 
+#: brackets end a comment, ``%`` a file, ``;`` a block on some controls; ``~`` lets a block go on in the next line
+_REPLACED = str.maketrans("()%;~", "[]/,-")
+
 _SPELLED = {"ß": "ss", "Ø": "O", "ø": "o", "Æ": "AE", "æ": "ae", "Œ": "OE", "œ": "oe", "đ": "d", "Đ": "D", "ł": "l"}
 
 
@@ -17,14 +20,23 @@ def plain_text(text: str) -> str:
     kept = "".join(letter for letter in decomposed if not unicodedata.combining(letter))
     ascii_text = kept.encode("ascii", "replace").decode("ascii")
     printable = "".join(letter if letter.isprintable() else " " for letter in ascii_text)
-    return " ".join(printable.translate(str.maketrans("()%", "[]/")).split())
+    return " ".join(printable.translate(_REPLACED).split())
 
 
-def comment_lines(text: str, marks: tuple[str, str] = ("(", ")")) -> list[str]:
-    """Text as one or more comments between marks; none for an empty text."""
+def comment_lines(text: str, marks: tuple[str, str] = ("(", ")"), orders: tuple[str, ...] = ()) -> list[str]:
+    """Text as one or more comments between marks; none for an empty text.
+
+    Parameters
+    ----------
+    orders : tuple of str
+        First words that the control would obey.
+    """
     rest = plain_text(text)
     lines = []
     while rest:
-        lines.append(f"{marks[0]}{rest[:_LONGEST]}{marks[1]}".rstrip())
+        piece = rest[:_LONGEST]
         rest = rest[_LONGEST:].lstrip()
+        if piece.upper().startswith(orders):
+            piece = f"- {piece}"
+        lines.append(f"{marks[0]}{piece}{marks[1]}".rstrip())
     return lines

@@ -88,6 +88,10 @@ class Motion:
         Whether a whole feed is written with a point.
     signs : bool
         Whether numbers that are not negative have a plus.
+    spaces, leading_zeros, trailing_zeros : bool
+        Whether words stand apart; ``0.5`` rather than ``.5``; ``2.5000`` rather than ``2.5``.
+    inch_feed : int
+        What one inch per minute is written as: 10 where F counts tenths.
     """
 
     rapid: str = "G0"
@@ -100,11 +104,15 @@ class Motion:
     feed: str = "F"
     feed_point: bool = True
     signs: bool = False
+    spaces: bool = True
+    leading_zeros: bool = True
+    trailing_zeros: bool = True
+    inch_feed: int = 1
 
 
 @dataclass(frozen=True)
 class Digits:
-    """Digits after the point; `mm` and `inch` for lengths, `feed` and `coefficient` at most."""
+    """Digits after the point; `mm` and `inch` for lengths, `feed`, `speed` and `coefficient` at most."""
 
     mm: int = 4
     inch: int = 5
@@ -113,6 +121,7 @@ class Digits:
     feed: int = 4
     weight: int = 3
     coefficient: int = 7
+    speed: int = 0
 
 
 @dataclass(frozen=True)
@@ -148,25 +157,39 @@ class Layout:
     ----------
     program : str
         Name or number of the program.
+    program_pattern : str
+        Regular expression of the names that the control takes; empty for any.
     head, tail : tuple of str
         Blocks; with ``{program}``, ``{units}`` and, in the head, ``{blend}``, a tenth of ε.
     units : mapping
         What ``{units}`` stands for.
     comment : (str, str)
         What stands before and behind a comment.
+    comment_orders : tuple of str
+        First words by which a comment would be an order to the control; they get a mark before them.
     block_number : str
         With ``{number}``; empty where blocks have none unless asked for.
-    number_start, number_step : int
+    number_start, number_step, number_last : int
+        After the last the first follows again; 0 for no last.
+    longest_block : int
+        Characters that a line may have; 0 for any number.
+    continuation : str
+        What a line ends with whose block goes on in the next; empty where blocks cannot.
     """
 
     program: str = "O0001"
+    program_pattern: str = ""
     head: Blocks = ()
     tail: Blocks = ()
     units: Mapping[Units, str] = field(default_factory=dict)
     comment: tuple[str, str] = ("(", ")")
+    comment_orders: Blocks = ()
     block_number: str = ""
     number_start: int = 10
     number_step: int = 10
+    number_last: int = 0
+    longest_block: int = 0
+    continuation: str = ""
 
 
 @dataclass(frozen=True)
@@ -180,6 +203,30 @@ class FormTable:
 
 
 @dataclass(frozen=True)
+class Extra:
+    """Blocks that are written when they are asked for by name: a function of the control that not every one has.
+
+    Parameters
+    ----------
+    name, description : str
+    on, off : tuple of str
+        Blocks around the motion, with ``{blend}``, a tenth of ε, and ``{turn}``, the degrees that are worth as much at
+        the axis point.
+    outside : bool
+        Whether they stand before tool tip control is switched on and behind its end, or within.
+    forms : tuple of str
+        Forms that they go with; empty for all.
+    """
+
+    name: str = ""
+    description: str = ""
+    on: Blocks = ()
+    off: Blocks = ()
+    outside: bool = False
+    forms: Blocks = ()
+
+
+@dataclass(frozen=True)
 class Control:
     """A control as its table describes it; the first form is the default."""
 
@@ -189,6 +236,7 @@ class Control:
     layout: Layout
     words: Words
     forms: Mapping[str, FormTable]
+    extras: Mapping[str, Extra] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -205,6 +253,8 @@ class Form:
     mode : Mode
     machine : Machine or None
         For rotary words.
+    extras : tuple of Extra
+        Functions of the control that were asked for.
     """
 
     table: Control
@@ -213,6 +263,7 @@ class Form:
     orientation: Orientation
     mode: Mode
     machine: Machine | None = None
+    extras: tuple[Extra, ...] = ()
 
     @property
     def control(self) -> str:

@@ -75,24 +75,26 @@ class KnotBlocks(NoCurves):
     The first control point is the current position (B-63324EN/03 4.17). Knots {0, 0, 0, 0, 1/2, 1, 1, 1, 1}.
     """
 
-    _knots = (b"K0. ", b"K0. ", b"K0. ", b"K0. ", b"K0.5 ")
+    _knots = (b"K0.", b"K0.", b"K0.", b"K0.", b"K0.5")
     _last_knots = b"K1.\n" * 4
 
-    def __init__(self, weight_decimals: int) -> None:
-        self._decimals = weight_decimals
+    def __init__(self, weight_decimals: int, blank: bytes = b" ") -> None:
+        self._decimals, self._blank = weight_decimals, blank
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
         """Knots."""
         curved = run.curve > 0
         chosen[curved] = len(table) - 1 + run.curve[curved]
-        table += [b"G6.2 P4 " + self._knots[0], *self._knots[1:]]
+        first, *others = (knot + self._blank for knot in self._knots)
+        table += [b"G6.2" + self._blank + b"P4" + self._blank + first, *others]
         return 4 * int(np.count_nonzero(run.curve == 5))
 
     def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
         """Weights, and the last knots."""
         curved = run.curve > 0
         values, which = _weights(run, curved)
-        ends = [b" R" + format_number(value, self._decimals, trim=True).encode() + b"\n" for value in values]
+        word = self._blank + b"R"
+        ends = [word + format_number(value, self._decimals, trim=True).encode() + b"\n" for value in values]
         base = len(table)
         table += ends
         table += [end + self._last_knots for end in ends]
@@ -102,8 +104,8 @@ class KnotBlocks(NoCurves):
 class RotaryKnotBlocks(NoCurves):
     """The same with any number of control points and knots of their own, for curves with rotary axes."""
 
-    def __init__(self, weight_decimals: int) -> None:
-        self._decimals = weight_decimals
+    def __init__(self, weight_decimals: int, blank: bytes = b" ") -> None:
+        self._decimals, self._blank = weight_decimals, blank
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
         """Knots."""
@@ -111,9 +113,9 @@ class RotaryKnotBlocks(NoCurves):
         curved = run.curve > 0
         knots, which = np.unique(run.spline[curved, 0], return_inverse=True)
         base = len(table)
-        words = [self._knot(knot) + b" " for knot in knots.tolist()]
+        words = [self._knot(knot) + self._blank for knot in knots.tolist()]
         table += words
-        table += [b"G6.2 P4 " + word for word in words]
+        table += [b"G6.2" + self._blank + b"P4" + self._blank + word for word in words]
         chosen[curved] = base + which.reshape(-1) + np.where(run.curve[curved] == 1, len(words), 0)
         return 4 * int(np.count_nonzero(run.spline[:, 2] > 0.0))
 
@@ -124,7 +126,7 @@ class RotaryKnotBlocks(NoCurves):
         pairs, which = np.unique(run.spline[curved, 1:], axis=0, return_inverse=True)
         base = len(table)
         for weight, last in pairs.tolist():
-            end = b" R" + format_number(weight, self._decimals, trim=True).encode() + b"\n"
+            end = self._blank + b"R" + format_number(weight, self._decimals, trim=True).encode() + b"\n"
             table.append(end + 4 * (self._knot(last) + b"\n") if last > 0.0 else end)
         chosen[curved] = base + which.reshape(-1)
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from cornersmooth.errors import SettingsError
+import numpy as np
+
+from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Program
-from cornersmooth.nc.control import Form
+from cornersmooth.nc.control import Form, Layout
 from cornersmooth.text import format_number
 
 #: share of the tolerance that a control may blend lines with, where it is told so
-_BLEND_SHARE = 0.1
+BLEND_SHARE = 0.1
 
 #: decimals of that
 _BLEND_DECIMALS = 5
@@ -36,13 +39,16 @@ class Frame:
     block_numbers : bool
         Whether blocks are numbered where the control does not ask for it.
     header, footer : tuple of str
-        Lines behind the head and before the tail, with ``{program}`` and ``{units}``.
+        Lines behind the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``.
+    comments : bool
+        Whether what the CL file says in words is written.
     """
 
     program: str | None = None
     block_numbers: bool = False
     header: tuple[str, ...] = ()
     footer: tuple[str, ...] = ()
+    comments: bool = True
 
     def start(self, stream: Stream, form: Form, program: Program, tolerance: float) -> Framing:
         """Frame for one text.
@@ -53,17 +59,29 @@ class Frame:
             A line of header or footer has unknown braces or characters that NC text cannot hold.
         """
         layout = form.table.layout
-        blend = format_number(_BLEND_SHARE * tolerance / program.mm_per_unit, _BLEND_DECIMALS)
-        values = {"program": self.program or layout.program, "units": layout.units[program.units], "blend": blend}
+        if self.program is not None and not re.fullmatch(layout.program_pattern or ".*", self.program):
+            raise SettingsError(
+                "CS216", f"{form.control} takes no program name {self.program!r}", f"use one like {layout.program}"
+            )
+        values = {
+            "program": self.program or layout.program,
+            "units": layout.units[program.units],
+            "blend": blend_word(tolerance / program.mm_per_unit),
+        }
         number = layout.block_number or ("N{number} " if self.block_numbers else "")
         return Framing(
             stream,
             before=[*_filled(layout.head, values), *_filled(self.header, values)],
             after=[*_filled(self.footer, values), *_filled(layout.tail, values)],
             number=number,
+            layout=layout,
             next_number=layout.number_start,
-            step=layout.number_step,
         )
+
+
+def blend_word(tolerance: float) -> str:
+    """A tenth of ε; never zero, which would lift all limits."""
+    return format_number(max(BLEND_SHARE * tolerance, 10.0**-_BLEND_DECIMALS), _BLEND_DECIMALS)
 
 
 @dataclass
@@ -82,8 +100,8 @@ class Framing:
     before: list[str]
     after: list[str]
     number: str
+    layout: Layout
     next_number: int
-    step: int
     blocks: int = 0  #: in head and tail
 
     def head(self) -> None:
@@ -96,7 +114,12 @@ class Framing:
 
     def write(self, text: bytes) -> None:
         """Write whole lines."""
-        self.stream.write(self._numbered(text) if self.number else text)
+        if self.number:
+            text = self._numbered(text)
+        longest = self.layout.longest_block
+        if longest and _longest_line(text) > longest:
+            text = b"".join(self._folded(line) for line in text.splitlines(keepends=True))
+        self.stream.write(text)
 
     def _write_lines(self, lines: list[str]) -> None:
         self.blocks += len(lines)
@@ -108,15 +131,42 @@ class Framing:
         head, tail = before.encode(), behind.encode()
         lines = text.splitlines(keepends=True)
         pieces = []
-        number = self.next_number
+        number, step, last = self.next_number, self.layout.number_step, self.layout.number_last
         for line in lines:
             if line in (b"%\n", b"\n"):
                 pieces.append(line)
             else:
                 pieces.append(b"%b%d%b%b" % (head, number, tail, line))
-                number += self.step
+                number += step
+                if last and number > last:
+                    number = self.layout.number_start
         self.next_number = number
         return b"".join(pieces)
+
+    def _folded(self, line: bytes) -> bytes:
+        """Line in pieces that are short enough, where the control knows such."""
+        longest, end = self.layout.longest_block, self.layout.continuation.encode()
+        if len(line) - 1 <= longest:
+            return line
+        if not end:
+            raise OutputError(
+                "CS302",
+                f"a block of {len(line) - 1} characters is too long for the control, which takes {longest}",
+                "shorten it: " + line[:40].decode("ascii") + " ...",
+            )
+        pieces = []
+        rest = line[:-1]
+        while len(rest) > longest:
+            at = rest.rfind(b" ", 0, longest - len(end) + 1)
+            pieces.append(rest[:at] + end)
+            rest = rest[at + 1 :]
+        return b"\n".join([*pieces, rest]) + b"\n"
+
+
+def _longest_line(text: bytes) -> int:
+    """Characters of the longest line, without its end."""
+    ends = np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n"))
+    return int(np.diff(ends, prepend=-1).max()) - 1 if len(ends) else 0
 
 
 def _filled(lines: Sequence[str], values: dict[str, str]) -> list[str]:

@@ -81,6 +81,10 @@ class MotionWriter:
             text = "move of zero length in the written digits left out"
             self.notes.add("CS312", "note", 0, text, self._repeated)
 
+    def end(self) -> list[str]:
+        """Blocks that cancel what is still on when the program ends."""
+        return [*self.statements.end_compensation(), *self.writer.end(), *self.statements.end_motion()]
+
     def _statements_until(self, pose: int) -> Sequence[Statement]:
         begin = self._next_statement
         said = self._said

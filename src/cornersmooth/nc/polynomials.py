@@ -22,7 +22,8 @@ def curves_for(form: Form, units: Units) -> Curves:
     """Way to write curves of a form."""
     decimals = form.table.digits.weight
     if form.curve == "g6.2":
-        return RotaryKnotBlocks(decimals) if form.rotary else KnotBlocks(decimals)
+        blank = b" " if form.mode.motion.spaces else b""
+        return RotaryKnotBlocks(decimals, blank) if form.rotary else KnotBlocks(decimals, blank)
     if form.curve == "bspline":
         return SplineBlocks(decimals)
     if form.curve == "poly":
@@ -139,7 +140,7 @@ class _SplFormat:
         value = ticks / 10.0**self._digits
         if abs(value) < 10.0:
             return format_number(value, self._digits, plus=True)
-        mantissa, exponent = f"{value:+.9E}".split("E")
+        mantissa, exponent = f"{value:+.8E}".split("E")
         return f"{mantissa}E{exponent[0]}{int(exponent[1:]):03d}"
 
 

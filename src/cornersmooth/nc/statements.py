@@ -8,7 +8,7 @@ is not understood becomes a comment and a counted warning, never an NC word by g
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from cornersmooth.model import Move, Program, Statement
@@ -46,14 +46,21 @@ class StatementWriter:
     program : Program
     notes : Notes
         Takes what is noticed.
+    values : mapping
+        What stands for braces in the blocks of extras.
+    comments : bool
+        Whether comments are written.
     """
 
     form: Form
     program: Program
     notes: Notes
+    values: Mapping[str, str] = field(default_factory=dict)
+    comments: bool = True
     plane: int = 17  #: the plane selected, kept by who writes the motion
     changed: bool = False  #: a tool change left the machine elsewhere
     cycle: Cycle | None = None  #: the hole cycle in force, None where it is not understood
+    _compensated: bool = False
     _tool: int | None = None
     _offset: int = 1
     _tip_control: bool = False
@@ -98,18 +105,40 @@ class StatementWriter:
         if self._tip_control:
             return []
         self._tip_control = True
-        return [block.format(offset=self._offset) for block in self.form.mode.on]
+        return [
+            *self._extras("on", outside=True),
+            *(block.format(offset=self._offset) for block in self.form.mode.on),
+            *self._extras("on", outside=False),
+        ]
 
     def end_motion(self) -> list[str]:
         """Blocks that switch tool tip control off, where it is on."""
         if not self._tip_control:
             return []
         self._tip_control = False
-        return list(self.form.mode.off)
+        return [*self._extras("off", outside=False), *self.form.mode.off, *self._extras("off", outside=True)]
+
+    def _extras(self, side: str, *, outside: bool) -> list[str]:
+        extras = self.form.extras if side == "on" else self.form.extras[::-1]
+        return [
+            block.format(**self.values)
+            for extra in extras
+            if extra.outside is outside
+            for block in getattr(extra, side)
+        ]
+
+    def end_compensation(self) -> list[str]:
+        """Blocks that switch cutter compensation off, where it is on."""
+        blocks = list(self.words.compensation_off) if self._compensated else []
+        self._compensated = False
+        return blocks
 
     def comment(self, text: str) -> list[str]:
         """Comments that hold a text."""
-        return comment_lines(text, self.form.table.layout.comment)
+        if not self.comments:
+            return []
+        layout = self.form.table.layout
+        return comment_lines(text, layout.comment, layout.comment_orders)
 
     def _not_understood(self, statement: Statement) -> None:
         text = f"{statement.word} is not translated; written as a comment"
@@ -189,7 +218,7 @@ class StatementWriter:
         if speed is None:
             return [direction]
         self._speed = speed
-        digits = format_number(speed, 3, trim=True).rstrip(".")
+        digits = format_number(speed, self.form.table.digits.speed, trim=True).rstrip(".")
         return [block.format(speed=digits, direction=direction) for block in self.words.spindle_speed]
 
     def coolant(self, statement: Statement) -> list[str] | None:
@@ -224,6 +253,7 @@ class StatementWriter:
         """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF."""
         words, numbers = _words(statement), _numbers(statement)
         if words[:1] in (["OFF"], ["NOMORE"]):
+            self._compensated = False
             return list(self.words.compensation_off) or None
         planes = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
         side = {"LEFT": self.words.compensation_left, "RIGHT": self.words.compensation_right}.get((words or [""])[0])
@@ -237,6 +267,7 @@ class StatementWriter:
             "cutter compensation is left to the control, which offsets the path in the plane and not along the tool; "
             "see that it may be used with tool tip control, and that the register holds what the CAM system meant",
         )
+        self._compensated = True
         blocks = []
         plane = planes[words[1]] if len(words) > 1 else 17
         if plane != self.plane:

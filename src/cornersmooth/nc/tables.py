@@ -20,6 +20,7 @@ from cornersmooth.nc.control import (
     Control,
     CurveStyle,
     Digits,
+    Extra,
     FormTable,
     Layout,
     Mode,
@@ -29,9 +30,9 @@ from cornersmooth.nc.control import (
 )
 
 Table = dict[str, Any]
-Record = TypeVar("Record", Digits, Layout, Words, Motion)
+Record = TypeVar("Record", Digits, Layout, Words, Motion, Extra)
 
-_CONTROL_KEYS = ("name", "like", "description", "digits", "layout", "words", "motion", "forms")
+_CONTROL_KEYS = ("name", "like", "description", "digits", "layout", "words", "motion", "forms", "extras")
 _FORM_KEYS = ("description", "curve", *get_args(Orientation))
 _MODE_KEYS = ("words", "on", "off", "circles", "timed_turns", *(item.name for item in fields(Motion)))
 _PLANES = {"xy": 17, "zx": 18, "yz": 19}
@@ -53,6 +54,8 @@ _PLACES: dict[str, Table] = {
     "tail": {"program": "O1", "units": "G21"},
     "block_number": {"number": 10},
 }
+#: the same in blocks of extras
+_EXTRA_PLACES: Table = {"blend": "0.001", "turn": "0.01"}
 
 
 def control_names() -> tuple[str, ...]:
@@ -81,7 +84,7 @@ def load_control(name_or_path: str | Path) -> Control:
                 "CS212", f"control file cannot be read: {reason}", "check the name", file=given
             ) from error
         return parse_control(text, file=given, name=Path(name_or_path).stem)
-    return parse_control(_built_in(given), file=f"{given}.toml", name=given)
+    return parse_control(control_table(given), file=f"{given}.toml", name=given)
 
 
 def parse_control(text: str, *, file: str = "<control>", name: str = "control") -> Control:
@@ -108,12 +111,20 @@ def parse_control(text: str, *, file: str = "<control>", name: str = "control") 
             layout=_layout(table.get("layout", {})),
             words=_words(table.get("words", {})),
             forms=_forms(table),
+            extras=_extras(table.get("extras", {})),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
 
 
-def _built_in(name: str) -> str:
+def control_table(name: str) -> str:
+    """Text of the table of a control that comes with the program.
+
+    Raises
+    ------
+    SettingsError
+        The name is unknown.
+    """
     known = control_names()
     if name not in known:
         close = difflib.get_close_matches(name, known, n=1)
@@ -139,7 +150,7 @@ def _resolved(table: Table) -> Table:
         return table
     if not isinstance(like, str):
         raise SettingsError("CS213", f"like is {like!r}", "name one of the built-in controls")
-    base = _resolved(_parsed(_built_in(like)))
+    base = _resolved(_parsed(control_table(like)))
     return _merged(base, {key: value for key, value in table.items() if key != "like"})
 
 
@@ -212,6 +223,17 @@ def _form(name: str, entry: Table, motion: Table) -> FormTable:
     return FormTable(name, _text(entry, "description", ""), curve, modes)
 
 
+def _extras(table: Any) -> dict[str, Extra]:
+    if not isinstance(table, dict):
+        raise SettingsError("CS213", f"extras is {table!r}", "write a table for each, as in [extras.cycle832]")
+    extras = {}
+    for name, entry in table.items():
+        if not isinstance(entry, dict):
+            raise SettingsError("CS213", f"extras.{name} is {entry!r}", 'give a table, as in { on = ["G5.1 Q1"] }')
+        extras[name] = _record(Extra, {**entry, "name": name}, f"extras.{name}")
+    return extras
+
+
 def _mode(entry: Table, motion: Table, where: str) -> Mode:
     _check_keys(entry, _MODE_KEYS, f"{where}.")
     own = {item.name for item in fields(Motion)}
@@ -261,7 +283,7 @@ def _strings(table: Any, where: str, keys: tuple[str, ...]) -> dict[str, str]:
 def _string(value: object, where: str) -> str:
     if not isinstance(value, str) or not value.isascii() or not (value.isprintable()):
         raise SettingsError("CS213", f"{where} is {value!r}", "give ASCII text without line ends")
-    places = _PLACES.get(where.rpartition(".")[2], {})
+    places = _EXTRA_PLACES if where.startswith("extras.") else _PLACES.get(where.rpartition(".")[2], {})
     if "{" in value or "}" in value:
         try:
             value.format(**places)

@@ -12,11 +12,8 @@ import numpy as np
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.verify.ncprogram import Event, Problem
 
-#: decimals of a spindle speed that count
-SPEED_DECIMALS = 3
-
-#: decimals of a spindle speed that count
-SPEED_DECIMALS = 3
+#: decimals of a spindle speed that count: FANUC's S takes whole numbers only
+SPEED_DECIMALS = 0
 
 #: cutting speeds in mm per minute
 _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}

@@ -1,0 +1,78 @@
+"""Every control in every form, with and without a machine, with and without tool tip control."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics import Machine, load_machine
+from cornersmooth.nc import Form, choose_form, control_names, load_control
+
+MACHINES = ("table-ac", "table-bc", "xyzac-trt", "xyzbc-trt", "head-table-bc", "head-ac", "nutated-bc")
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is asked for on the command line."""
+
+    control: str
+    form: str
+    machine: str = ""
+    tcp: bool = True
+
+    def __str__(self) -> str:
+        parts = [self.control, self.form, self.machine, "" if self.tcp else "axes"]
+        return "-".join(part for part in parts if part)
+
+    def choose(self, *, endless: bool = False) -> Form:
+        """Form of the control; SettingsError where it has none such. `endless` takes the limits off the machine."""
+        machine = load_machine(self.machine) if self.machine else None
+        if machine is not None and endless:
+            machine = without_limits(machine)
+        return choose_form(self.control, self.form, machine=machine, tcp=self.tcp)
+
+    @property
+    def runs(self) -> bool:
+        """Whether the control can run it."""
+        try:
+            self.choose()
+        except SettingsError:
+            return False
+        return True
+
+
+def without_limits(machine: Machine) -> Machine:
+    """Machine whose axes go round without end: real files were made for others."""
+    first, second = (replace(axis, limits=None) for axis in machine.axes)
+    return replace(machine, axes=(first, second))
+
+
+#: everything that can be asked for
+ALL = [
+    Case(control, form, machine, tcp)
+    for control in control_names()
+    for form in load_control(control).forms
+    for machine, tcp in product(("", *MACHINES), (True, False))
+]
+
+#: everything that can be run
+RUNNABLE = [case for case in ALL if case.runs]
+
+
+def _chosen() -> list[Case]:
+    """What no machine is needed for, and each control and form with one machine or two, all machines in turn."""
+    turn = {"linuxcnc": ("xyzac-trt", "xyzbc-trt"), "haas": ("table-bc", "nutated-bc")}
+    chosen = []
+    asked = dict.fromkeys((case.control, case.form, case.tcp) for case in RUNNABLE if case.machine)
+    for at, (control, form, tcp) in enumerate(asked):
+        machines = turn.get(control, (MACHINES[at % len(MACHINES)],))
+        machines = machines if tcp else machines[:1]
+        if (control, form, tcp) == ("fanuc", "g6.2", True):
+            machines = ("table-ac", "head-table-bc", "nutated-bc")
+        chosen += [Case(control, form, machine, tcp) for machine in machines]
+    return [case for case in RUNNABLE if not case.machine] + chosen
+
+
+#: what tests run; `nc.sweep --all` runs all of `RUNNABLE`
+CHOSEN = _chosen()

@@ -1,0 +1,128 @@
+"""The text of every control and form as its manual has it: readers by control, form, machine and units."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from nc.reading import Reader
+from nc.rotations import machine_letters
+from nc.splines import HeidenhainSplines, KnotSplines, SiemensPolynomials, SiemensSplines
+
+#: comments, ends, tools, spindle, coolant, stops, feed modes, planes and compensation of the ISO controls
+ISO = (
+    r"\([^()]*\)|%|T\d+ M6|T\d+|S\d+ M[34]|M(?:0|1|3|4|5|7|8|9|19|30)|G9[345]|G1[789]|G4[12] D\d+|G40|"
+    r"G2[01] G90 G94 G17 G40 G49 G80"
+)
+MILLISECONDS, SECONDS = r"|O\d{4}|G4 P\d+", r"|O\d{4}|G4 P\d+\.\d*"
+SIEMENS = (
+    r"; .*|G90 G94 G17 G40 G7[01]0|T\d+|M6|D1|S[\d.]+ M[34]|M(?:0|1|3|4|5|7|8|9|30)|SPOS=0|G4 F[\d.]+|G9[345]|"
+    r"G1[789]|G4[0-2]|TRAORI|TRAFOOF|ORIWKS ORIVECT|ORIWKS ORICURVE|ORIMKS ORIAXES"
+)
+HEIDENHAIN = (
+    r"; .*|BEGIN PGM \w+ (?:MM|INCH)|END PGM \w+ (?:MM|INCH)|TOOL CALL \d+ Z|TOOL CALL Z S\d+(?:\.\d{1,3})?|"
+    r"TOOL DEF \d+|STOP|M(?:1|3|4|5|8|9|30|136|137)|CYCL DEF 9\.0 DWELL TIME|CYCL DEF 9\.1 DWELL [\d.]+|"
+    r"FUNCTION TCPM F TCP AXIS POS PATHCTRL (?:VECTOR|AXIS)|FUNCTION RESET TCPM"
+)
+
+#: how tip control or the length of the tool is switched on and off
+LENGTH = {"on": r"G43 H\d+", "off": "G49"}
+VECTORS = {"on": r"G43\.5 H\d+", "off": "G49"}
+ANGLES = {"on": r"G43\.4 H\d+", "off": "G49"}
+HAAS = {"on": r"G234 H\d+", "off": "G49"}
+TRAORI = {"on": "TRAORI", "off": "TRAFOOF", "tool": "M6"}
+TCPM = {"on": "FUNCTION TCPM .*", "off": "FUNCTION RESET TCPM", "tool": r"TOOL CALL \d+ Z"}
+
+
+def reader(control: str, form: str, machine: str = "", tcp: bool = True, units: str = "mm") -> Reader:
+    """Reader of the text of a control in one of its forms."""
+    tip = 4 if units == "mm" else 5
+    made = {"siemens": _siemens, "heidenhain": _heidenhain}.get(control, _iso)(control, form, machine, tcp, tip)
+    return replace(made, scale=1.0 if units == "mm" else 25.4)
+
+
+def _rotary(machine: str, tcp: bool) -> str:
+    return "angles" if tcp else "machine"
+
+
+def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
+    switch = LENGTH
+    if control == "generic":
+        switch = {"on": "", "off": ""}
+    elif tcp and machine:
+        switch = {"haas": HAAS, "linuxcnc": LENGTH}.get(control, ANGLES)
+    elif tcp and form == "g1":
+        switch = VECTORS
+    codes = ISO + (SECONDS if control in ("haas", "linuxcnc") else MILLISECONDS)
+    if control == "generic":
+        codes = codes.replace(" G49", "")
+    if control == "linuxcnc":
+        codes = codes.replace("M(?:", "M(?:2|").replace("M(?:2|0|1|3|4|5|7|8|9|19|30)", "M(?:0|1|2|3|4|5|7|8|9)")
+        codes += r"|S\d+\.\d{1,3} M[34]|M19 R0|G64 P(?!0\.0* )\d+\.\d+ Q0"
+    else:
+        codes += "|G5 P10000|G5 P0" if (control, form) == ("mitsubishi", "g6.2") else ""
+    codes = "|".join(part for part in (codes, switch["on"], switch["off"]) if part)
+    if machine:
+        angle = 4 if control == "haas" else 5
+        words, decimals, turn = machine_letters(machine), (angle,) * 2, _rotary(machine, tcp)
+    elif form == "g1":
+        words, decimals, turn = ("I", "J", "K"), (7,) * 3, "great circle"
+    elif control == "mitsubishi":
+        words, decimals, turn = (), (), "fixed"
+    else:
+        words, decimals, turn = ("U", "V", "W"), (tip,) * 3, "point"
+    return Reader(
+        ("X", "Y", "Z", *words),
+        codes,
+        turn,
+        machine,
+        decimals=(tip,) * 3 + decimals,
+        circles="R" if turn == "great circle" else "",
+        extra=KnotSplines(weight_decimals=4 if control == "mitsubishi" else 3) if form == "g6.2" else None,
+        **switch,
+    )
+
+
+def _siemens(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
+    if machine:
+        words, decimals, turn = machine_letters(machine), (5,) * 2, _rotary(machine, tcp)
+    elif form == "g1":
+        words, decimals, turn = ("A3=", "B3=", "C3="), (7,) * 3, "great circle"
+    else:
+        words, decimals, turn = ("XH=", "YH=", "ZH="), (tip,) * 3, "point"
+    return Reader(
+        ("X", "Y", "Z", *words),
+        SIEMENS,
+        turn,
+        machine,
+        decimals=(tip,) * 3 + decimals,
+        circles="CR=" if turn == "great circle" else "",
+        longest=512,
+        extra={"bspline": SiemensSplines(), "poly": SiemensPolynomials()}.get(form),
+        **(TRAORI if tcp else {}),
+    )
+
+
+def _heidenhain(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
+    assert tcp
+    if machine:
+        words, decimals, turn = machine_letters(machine), (4,) * 2, "angles"
+    elif form == "g1":
+        words, decimals, turn = ("TX", "TY", "TZ"), (7,) * 3, "great circle"
+    else:
+        words, decimals, turn = (), (), "fixed"
+    line = "LN" if turn == "great circle" else "L"
+    return Reader(
+        ("X", "Y", "Z", *words),
+        HEIDENHAIN,
+        turn,
+        machine,
+        rapid=line,
+        feed=line,
+        rapid_end=" FMAX",
+        decimals=(tip,) * 3 + decimals,
+        signs=True,
+        number="{number} ",
+        modes=("M137", "M136", "G93"),
+        extra=HeidenhainSplines() if form == "spl" else None,
+        **(TCPM if turn != "fixed" else {}),
+    )
