@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
-import tomllib
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics.dynamics import LINEAR, Dynamics
 from cornersmooth.kinematics.machine import Machine, RotaryAxis
+from cornersmooth.tables import Shelf, unknown_key
 
+_SHELF = Shelf("machine", __package__, "machines", unknown="CS250", unreadable="CS251")
 _MACHINE_KEYS = ("name", "description", "preferred", "tool_direction", "tool_length", "part_zero", "axis", "dynamics")
 _AXIS_KEYS = ("name", "direction", "carrier", "point", "positive", "limits")
 _DYNAMICS_KEYS = ("velocity", "acceleration", "jerk")
@@ -19,8 +18,7 @@ _DYNAMICS_KEYS = ("velocity", "acceleration", "jerk")
 
 def machine_names() -> tuple[str, ...]:
     """Names of the machines that come with the program, sorted."""
-    folder = resources.files(__package__) / "machines"
-    return tuple(sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")))
+    return _SHELF.names()
 
 
 def load_machine(name_or_path: str | Path) -> Machine:
@@ -33,25 +31,8 @@ def load_machine(name_or_path: str | Path) -> Machine:
     SettingsError
         The name is unknown (with the closest known one), the file cannot be read, or it does not describe a machine.
     """
-    given = str(name_or_path)
-    if isinstance(name_or_path, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
-        try:
-            text = Path(name_or_path).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) and error.strerror else "not UTF-8 text"
-            raise SettingsError(
-                "CS251", f"machine file cannot be read: {reason}", "check the name", file=given
-            ) from error
-        return parse_machine(text, file=given, name=Path(name_or_path).stem)
-    known = machine_names()
-    if given not in known:
-        close = difflib.get_close_matches(given, known, n=1)
-        advice = f"did you mean {close[0]}? " if close else ""
-        raise SettingsError(
-            "CS250", f"unknown machine {given!r}", f"{advice}use a TOML file or one of {', '.join(known)}"
-        )
-    text = (resources.files(__package__) / "machines" / f"{given}.toml").read_text(encoding="utf-8")
-    return parse_machine(text, file=f"{given}.toml", name=given)
+    text, file, name = _SHELF.choose(name_or_path)
+    return parse_machine(text, file=file, name=name)
 
 
 def parse_machine(text: str, *, file: str = "<machine>", name: str = "machine") -> Machine:
@@ -75,10 +56,7 @@ def parse_machine(text: str, *, file: str = "<machine>", name: str = "machine") 
         The text is not TOML, has an unknown key (with the closest known one), or does not describe a machine.
     """
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError("CS251", f"not TOML: {error}", "correct the text", file=file) from error
-    try:
+        table = _SHELF.parse(text)
         _check_keys(table, _MACHINE_KEYS, "")
         entries = table.get("axis", [])
         if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
@@ -136,11 +114,9 @@ def _dynamics(table: dict[str, Any], names: tuple[str, ...]) -> tuple[Dynamics, 
 
 
 def _check_keys(table: dict[str, Any], known: tuple[str, ...], where: str) -> None:
-    for key in table:
-        if key not in known:
-            close = difflib.get_close_matches(key, known, n=1)
-            advice = f"did you mean {close[0]}?" if close else f"known keys are {', '.join(known)}"
-            raise SettingsError("CS252", f"{where}unknown key {key!r}", advice)
+    if unknown := unknown_key(table, known):
+        key, advice = unknown
+        raise SettingsError("CS252", f"{where}unknown key {key!r}", advice)
 
 
 def _text(table: dict[str, Any], key: str, default: str) -> str:
