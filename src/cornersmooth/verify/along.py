@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from cornersmooth.verify.reader import read_nc
 from cornersmooth.verify.stops import find_stretches
 from cornersmooth.verify.trails import original_motion, written_at
 from cornersmooth.verify.walking import Track
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
 
 #: segments on either side in which the common pose is looked for
 _REACH = 2
@@ -54,12 +58,14 @@ def deviation_along(
     axis_length: float = 10.0,
     samples: int = 8,
     control: str = "fanuc",
+    machine: Machine | None = None,
+    tcp: bool = True,
 ) -> Distribution:
     """Measure the deviation at equally spaced parameters of every path element, and at every original pose.
 
     Parameters
     ----------
-    program, nc, tolerance, axis_length, control
+    program, nc, tolerance, axis_length, control, machine, tcp
         As in `verify`.
     samples : int
         Poses per element.
@@ -69,7 +75,9 @@ def deviation_along(
     Distribution
         At the poses of the original that come nearest to tip and axis point together.
     """
-    text = nc if isinstance(nc, NcProgram) else read_nc(nc, control=control)
+    text = nc
+    if not isinstance(text, NcProgram):
+        text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
     original = original_motion(program, tolerance, axis_length)
     matcher = Matcher(original, text, Track.of(original.trail.six(axis_length)), tolerance, axis_length)
     holes = divide_at_holes(original, text, axis_length)

@@ -24,6 +24,9 @@ LANE = 300
 #: last printed digits by which the next segment must be nearer to be taken
 MARGIN_STEPS = 4.0
 
+#: parts of blocks beyond which nothing is looked for
+MOST_PARTS = 16
+
 Lane = tuple[int, int, int, int, float]
 
 
@@ -102,6 +105,12 @@ class Matcher:
         """Distance by which places on the trails may be wrong, mm: more than `margin` where they cut curves short."""
         bare = len(self.original.trail) == len(self.original.pose) and not len(self.nc.curves) and not len(self.nc.arcs)
         return self.margin if bare else self.margin + 2 * CHORD_SHARE * self.tolerance
+
+    @cached_property
+    def parts(self) -> int:
+        """Elements that blocks have become at most, up to `MOST_PARTS`: more than one in rotary words only."""
+        edges = np.flatnonzero(np.append(np.diff(self.nc.line) != 0, True))
+        return min(int(np.diff(edges, prepend=-1).max(initial=1)), MOST_PARTS)
 
     @property
     def near(self) -> float:

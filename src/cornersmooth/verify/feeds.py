@@ -12,9 +12,6 @@ from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.ncprogram import Element, NcProgram, Problem
 from cornersmooth.verify.stops import ARITHMETIC
 
-#: F words may be rounded to so many decimals in units of the text
-FEED_STEP = 1e-4
-
 #: a rounding reaches at most so many times as far as its first vertex that is visibly off the line
 _BEYOND_VISIBLE = 3.0
 
@@ -49,20 +46,21 @@ def check_feeds(matcher: Matcher, block: Block, off: Floats) -> list[tuple[float
     start, end = start[feeding], end[feeding]
     low, high = _touched(matcher, block, start, end)
     feed, mode = program.feed[original.pose], program.feed_mode[original.pose] == FeedMode.PER_REVOLUTION
-    said, per_revolution = nc.feed[element], nc.per_revolution[element]
+    said, per_revolution, room = nc.feed[element], nc.per_revolution[element], nc.feed_room[element]
     rapid = nc.kind[element] == Element.RAPID
-    good = _same(said, per_revolution, feed, mode, low, nc.mm_per_unit) | rapid
+    good = _same(said, per_revolution, room, feed, mode, low) | rapid
     other = np.flatnonzero(~good)
     if len(other):
-        good[other] = _same(said[other], per_revolution[other], feed, mode, high[other], nc.mm_per_unit)
+        good[other] = _same(said[other], per_revolution[other], room[other], feed, mode, high[other])
         several = np.flatnonzero(~good & (high > low + 1))
         for k in several.tolist():
             among = np.arange(low[k], high[k] + 1)
-            count = np.full(len(among), said[k]), np.full(len(among), per_revolution[k])
-            good[k] = bool(_same(*count, feed, mode, among, nc.mm_per_unit).any())
+            own = tuple(np.full(len(among), column[k]) for column in (said, per_revolution, room))
+            good[k] = bool(_same(own[0], own[1], own[2], feed, mode, among).any())
     wrong = np.flatnonzero(~good)
     for k in wrong[:_MOST_SINGLE].tolist():
-        good[k] = _inside_rounding(matcher, block, off, int(start[k]), int(end[k]), int(low[k]), float(said[k]), feed)
+        pair = float(said[k]), float(room[k])
+        good[k] = _inside_rounding(matcher, block, off, int(start[k]), int(end[k]), int(low[k]), pair, feed)
     wrong = np.flatnonzero(~good)
     if not len(wrong):
         return []
@@ -86,19 +84,26 @@ def _touched(matcher: Matcher, block: Block, start: Ints, end: Ints) -> tuple[In
     return owner[segment + 1], owner[last + 1]
 
 
-def _same(said: Floats, per_revolution: Bools, feed: Floats, mode: Bools, move: Ints, unit: float) -> Bools:
+def _same(said: Floats, per_revolution: Bools, room: Floats, feed: Floats, mode: Bools, move: Ints) -> Bools:
     asked = feed[move]
-    room = FEED_STEP / 2 * unit + ARITHMETIC * np.maximum(np.abs(asked), 1.0)
+    room = room + ARITHMETIC * np.maximum(np.abs(asked), 1.0)
     same: Bools = np.isnan(asked) | ((np.abs(said - asked) <= room) & (per_revolution == mode[move]))
     return same
 
 
 def _inside_rounding(
-    matcher: Matcher, block: Block, off: Floats, start: int, end: int, move: int, said: float, feed: Floats
+    matcher: Matcher,
+    block: Block,
+    off: Floats,
+    start: int,
+    end: int,
+    move: int,
+    pair: tuple[float, float],
+    feed: Floats,
 ) -> bool:
     """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
     length, trail = matcher.track.length, matcher.original.trail
-    room = FEED_STEP / 2 * matcher.nc.mm_per_unit + ARITHMETIC * max(abs(said), 1.0)
+    said, room = pair[0], pair[1] + ARITHMETIC * max(abs(pair[0]), 1.0)
     visible = matcher.margin / 2
     low, high = int(block.low[start]), int(block.high[start])
 

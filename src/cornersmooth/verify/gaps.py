@@ -15,11 +15,14 @@ from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.curves import CurveGroup
 from cornersmooth.verify.ncprogram import Element
-from cornersmooth.verify.nearest import Gap, gap_between, nearest_segments
+from cornersmooth.verify.nearest import Gap, Metric, gap_between, nearest_segments
 from cornersmooth.verify.trails import directions, written_at
 
 #: a Newton step from a knot longer than this part of the parameter range is followed up
 _SHORT_STEP = 0.02
+
+#: segments that the nearest place may be away from where it is looked for
+_MOST_STEPS = 200
 
 #: samples and rounds of the search on single elements
 _SAMPLES, _ROUNDS, _ZOOM = 17, 4, 9
@@ -81,6 +84,7 @@ def from_original(matcher: Matcher, block: Block) -> Reached:
     vertex, middle, low, high = _brackets(block)
     trail, six = matcher.original.trail, matcher.track.six
     segment, at = nearest_segments(six[vertex], block.six, middle, 1, low, high)
+    _climb(six[vertex], block.six, middle, low, high, segment, at)
     tip = _on(block.written.trail.tip, segment, at)
     axis = _unit_on(block.written.trail.axis, segment, at)
     owner = block.written.trail.owner[segment + 1]
@@ -89,6 +93,29 @@ def from_original(matcher: Matcher, block: Block) -> Reached:
         tip[bent], axis[bent], at[bent] = _on_bent(matcher, block, six[vertex[bent]], segment[bent], at[bent])
     gap = gap_between(tip, axis, trail.tip[vertex], trail.axis[vertex], matcher.axis_length)
     return Reached(vertex, gap, segment + at)
+
+
+def _climb(
+    point: Floats,
+    vertices: Floats,
+    middle: Ints,
+    low: Ints,
+    high: Ints,
+    segment: Ints,
+    at: Floats,
+    metric: Metric = "both",
+) -> None:
+    """Go on to nearer segments, in place, from where the look around `middle` has led away from it.
+
+    Blocks in rotary words may have become many short lines, and the nearest is then not next door.
+    """
+    rows = np.flatnonzero(segment != middle)
+    for _ in range(_MOST_STEPS):
+        if not len(rows):
+            return
+        before = segment[rows]
+        segment[rows], at[rows] = nearest_segments(point[rows], vertices, before, 1, low[rows], high[rows], metric)
+        rows = rows[segment[rows] != before]
 
 
 def _brackets(block: Block) -> tuple[Ints, Ints, Ints, Ints]:
@@ -266,14 +293,24 @@ _REACH = 4
 
 def own_gaps_of_original(matcher: Matcher, block: Block, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
     """Distance of chosen original vertices from the written tip path and axis-point path, each on its own."""
-    nc = matcher.nc
+    nc, written = matcher.nc, block.written
     segment = np.minimum(reached.place[rows].astype(np.int64), len(block.six) - 2)
-    owner = block.written.trail.owner[segment + 1]
-    low, high = block.written.first + 1, block.written.first + len(block.written.trail.last) - 1
-    elements = np.clip(owner[:, None] + np.arange(-_REACH, _REACH + 1), low, high)
-    rapid = nc.kind[elements] == Element.RAPID
-    elements = np.where(rapid, owner[:, None], elements)
+    ends = np.flatnonzero(np.append(np.diff(block.piece) != 0, True))
+    piece = np.searchsorted(ends, segment)
+    low = np.concatenate(([0], ends[:-1] + 1))[piece]
+    high = np.maximum(ends[piece] - 1, segment)
     point = matcher.track.six[reached.vertex[rows]]
-    tip = search_elements(matcher, elements, point, column=slice(0, 3))[2]
-    axis = search_elements(matcher, elements, point, column=slice(3, 6))[2]
-    return np.minimum(tip, reached.gap.tip[rows]), np.minimum(axis, reached.gap.axis_point[rows])
+    first, last = written.first + 1, written.first + len(written.trail.last) - 1
+    result = []
+    ways: tuple[tuple[Metric, slice, Floats], ...] = (
+        ("tip", slice(0, 3), reached.gap.tip[rows]),
+        ("axis point", slice(3, 6), reached.gap.axis_point[rows]),
+    )
+    for metric, column, known in ways:
+        near, at = nearest_segments(point, block.six, segment, _REACH * matcher.parts, low, high, metric)
+        _climb(point, block.six, segment, low, high, near, at, metric)
+        owner = written.trail.owner[near + 1]
+        elements = np.clip(owner[:, None] + np.arange(-_REACH, _REACH + 1), first, last)
+        elements = np.where(nc.kind[elements] == Element.RAPID, owner[:, None], elements)
+        result.append(np.minimum(search_elements(matcher, elements, point, column=column)[2], known))
+    return result[0], result[1]

@@ -158,6 +158,12 @@ class NcProgram:
         Value of the last printed digit of tip (mm) and of vector (1) or axis point (mm).
     blocks : int
         Number of blocks that are not empty, ``%`` and comments left out.
+    feed_room : (m,) float64
+        mm/min or mm/rev by which the feed is not known: digits of F, and of times and ways where it is timed.
+    second_room : float
+        By how much, as `second`, directions that must be exact may be off beside the printed digits.
+    unsaid : frozenset
+        Kinds of tokens (see `statements`), or pairs of kind and value, that the control has no words for.
     """
 
     kind: NDArray[np.uint8]
@@ -175,6 +181,9 @@ class NcProgram:
     tip_step: float
     second_step: float
     blocks: int
+    feed_room: Floats = field(default_factory=lambda: np.zeros(0))
+    second_room: float = 0.0
+    unsaid: frozenset[str | tuple[str, float]] = frozenset()
 
     def __len__(self) -> int:
         return len(self.kind)

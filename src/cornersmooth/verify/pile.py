@@ -17,6 +17,10 @@ _GROWTH: Final = 0.125
 _LARGE: Final = 1 << 22
 
 
+#: fields of path elements
+_ELEMENTS: Final = ("kind", "tip", "second", "line", "feed", "per_revolution", "feed_room")
+
+
 class _Column:
     """Array that rows are added to."""
 
@@ -49,68 +53,42 @@ class _Column:
 
 
 class Pile:
-    """Path elements, curves and arcs of all pieces; the fields are those of `Piece`."""
+    """Path elements, curves and arcs of all pieces; in millimetres."""
 
     def __init__(self) -> None:
         self.kind, self.line = _Column(np.uint8), _Column(np.int64)
         self.tip, self.second = _Column(np.float64, 3), _Column(np.float64, 3)
         self.feed, self.per_revolution = _Column(np.float64), _Column(np.bool_)
+        self.feed_room = _Column(np.float64)
         self.curve_element, self.curve_order, self.curve_points = (_Column(np.int64) for _ in range(3))
         self.control, self.weight, self.knot = _Column(np.float64, 6), _Column(np.float64), _Column(np.float64)
         self.arc_element, self.arc_sweep = _Column(np.int64), _Column(np.float64)
         self.arc_centre, self.arc_normal = _Column(np.float64, 3), _Column(np.float64, 3)
-        self._units: list[tuple[int, int, int, float]] = []
 
     def __len__(self) -> int:
         return self.kind.size
 
-    def add(self, piece: Piece, unit: float) -> None:
-        """Add a piece whose lengths are in units of so many millimetres."""
-        if not self._units or self._units[-1][-1] != unit:
-            self._units.append((self.kind.size, self.control.size, self.arc_element.size, unit))
+    def add(self, piece: Piece) -> None:
+        """Add a piece, in millimetres."""
         first = self.kind.size
-        for name in (
-            "kind",
-            "tip",
-            "second",
-            "line",
-            "feed",
-            "per_revolution",
-            "curve_order",
-            "curve_points",
-            "control",
-            "weight",
-            "knot",
-            "arc_centre",
-            "arc_normal",
-            "arc_sweep",
-        ):
+        for name in (*_ELEMENTS, "arc_centre", "arc_normal", "arc_sweep"):
             values = getattr(piece, name)
             if len(values):
                 getattr(self, name).add(values)
-        self.curve_element.add(piece.curve_element + first)
+        curves = piece.curves
+        if len(curves):
+            self.curve_element.add(piece.curve_element + first)
+            self.curve_order.add(curves.order)
+            self.curve_points.add(curves.points)
+            self.control.add(curves.control)
+            self.weight.add(curves.weight)
+            self.knot.add(curves.knot)
         self.arc_element.add(piece.arc_element + first)
 
-    def whole(self, *, points: bool) -> tuple[dict[str, Any], Curves, NcArcs]:
-        """Put together path elements (as fields of `NcProgram`), curves and arcs, in millimetres.
-
-        Parameters
-        ----------
-        points : bool
-            Whether the second triples are points, and lengths too.
-        """
-        elements = {
-            name: getattr(self, name).whole() for name in ("kind", "tip", "second", "line", "feed", "per_revolution")
-        }
+    def whole(self) -> tuple[dict[str, Any], Curves, NcArcs]:
+        """Put together path elements (as fields of `NcProgram`), curves and arcs."""
+        elements = {name: getattr(self, name).whole() for name in _ELEMENTS}
         control, centre = self.control.whole(), self.arc_centre.whole()
-        ends = [*self._units[1:], (len(self), len(control), len(centre), 1.0)]
-        for (*begin, unit), (*end, _) in zip(self._units, ends, strict=bool(self._units)):
-            if unit != 1.0:  # a factor of one leaves the numbers untouched
-                of_elements, of_points, of_arcs = (slice(a, b) for a, b in zip(begin, end, strict=True))
-                for name in ("tip", "second", "feed") if points else ("tip", "feed"):
-                    elements[name][of_elements] *= unit
-                control[of_points] *= unit
-                centre[of_arcs] *= unit
         order, count = self.curve_order.whole(), self.curve_points.whole()
         curves = Curves(
             element=self.curve_element.whole(),

@@ -1,55 +1,69 @@
-"""NC text to `NcProgram`: what a FANUC control makes of it, block by block, with nothing known of who wrote it."""
+"""NC text to `NcProgram`: what a control makes of it, block by block, with nothing known of who wrote it."""
 
 from __future__ import annotations
 
 import io
 import os
-import re
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO, Final, Literal
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, NoReturn
 
 import numpy as np
 
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.model import MM_PER_UNIT, Units
-from cornersmooth.verify.motion import Modal, execute
+from cornersmooth.verify.dialects import CONTROLS, Dialect, dialect_of
+from cornersmooth.verify.motion import Modal, Piece, execute
 from cornersmooth.verify.ncprogram import Event, NcProgram, Problem, Second
 from cornersmooth.verify.pile import Pile
+from cornersmooth.verify.rotary import POLE_SHARE, Rotary
 from cornersmooth.verify.runs import read_lines
-from cornersmooth.verify.words import Line, Table, motion_row, table_of
+from cornersmooth.verify.words import Line, Table, table_of
 
-Form = Literal["g1", "g6.2"]
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
 
-CONTROLS: Final = ("fanuc",)
-
-#: letters whose words are events
-_EVENT_LETTERS = "TSMHD"
-
-#: M words that act after the motion of their block (FANUC: stops, spindle off, coolant off, end)
-_AFTER_MOTION = (0.0, 1.0, 2.0, 5.0, 9.0, 30.0)
-
-#: G words that change nothing measured here: planes of work, cancellations, work offsets
-_SILENT = {80.0, 90.0, *map(float, range(54, 60))}
-_COMPENSATION = {41.0, 42.0}
-_TIP_CONTROL = {43.0, 43.4, 43.5}
+__all__ = ["CONTROLS", "read_nc"]
 
 #: decimals are looked for in so many bytes from the first motion block on
-_DIGITS_SAMPLE = 1 << 16
-_BRACKETS: Final = re.compile(rb"\([^)\n]*\)")
-_FRACTION: Final = re.compile(rb"([XYZIJUVW])[-+]?\d*\.(\d*)")
+_DIGITS_SAMPLE: Final = 1 << 16
+
+#: words that say what is in force when it must be
+_NEEDS = {
+    "vector": "a tool vector",
+    "point": "a second point on the tool axis",
+    "angles": "tip and rotary words",
+    "machine": "words of the machine's axes",
+}
 
 
-def read_nc(data: bytes | str | os.PathLike[str], *, control: str = "fanuc", name: str | None = None) -> NcProgram:
+def read_nc(
+    data: bytes | str | os.PathLike[str],
+    *,
+    control: str = "fanuc",
+    machine: Machine | None = None,
+    tcp: bool = True,
+    name: str | None = None,
+    tolerance: float = 0.01,
+    axis_length: float = 10.0,
+) -> NcProgram:
     """Read an NC text.
 
     Parameters
     ----------
     data : bytes or path
         The text itself, or the file that holds it.
-    control : {"fanuc"}
+    control : str
+        One of `CONTROLS`.
+    machine : Machine, optional
+        That the rotary words of the text are for; without one it has tool vectors, axis points or a fixed tool.
+    tcp : bool
+        Whether X Y Z are the tip, or positions of the machine's axes.
     name : str, optional
         Name for messages; the file's own by default.
+    tolerance, axis_length : float, mm
+        How fine motion in rotary words is resolved: to a thousandth of `tolerance` at tip and axis point.
 
     Returns
     -------
@@ -61,48 +75,55 @@ def read_nc(data: bytes | str | os.PathLike[str], *, control: str = "fanuc", nam
     InputError
         CS501 where the text is not made of words, CS503 for words that make it impossible to tell where the tool is.
     SettingsError
-        CS204 for an unknown control.
+        CS204 for an unknown control, CS215 for positions of a machine that is not named.
     """
-    if control not in CONTROLS:
-        raise SettingsError("CS204", f"unknown control {control!r}", f"use one of {', '.join(CONTROLS)}")
+    dialect = dialect_of(control, "".join(machine.names) if machine is not None else "")
+    if machine is None and not tcp:
+        raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
+
+    def read(file: BinaryIO, label: str | None) -> NcProgram:
+        tip, second = dialect.decimals(file.read(_DIGITS_SAMPLE))
+        file.seek(0)
+        rotary = None
+        if machine is not None:
+            rotary = Rotary(machine, tcp, tolerance, axis_length, 10.0**-tip, 10.0 ** -(second or 0))
+        reader = _Reader(label, dialect, rotary)
+        for item in read_lines(file, label, dialect.spelling):
+            if isinstance(item, Table):
+                reader.rows(item)
+            else:
+                reader.line(item)
+        reader.flush()
+        return reader.result(10.0**-tip, 0.0 if second is None else 10.0**-second, POLE_SHARE * tolerance / axis_length)
+
     if isinstance(data, bytes):
-        return _read(io.BytesIO(data), name)
+        return read(io.BytesIO(data), name)
     path = Path(data)
     label = name if name is not None else str(path)
     try:
         with path.open("rb") as file:
-            return _read(file, label)
+            return read(file, label)
     except OSError as error:
         raise InputError("CS500", f"cannot read: {error.strerror}", "check name and rights", file=label) from error
 
 
-def _read(file: BinaryIO, name: str | None) -> NcProgram:
-    reader = _Reader(name)
-    steps = _steps(file.read(_DIGITS_SAMPLE))
-    file.seek(0)
-    for item in read_lines(file, name):
-        if isinstance(item, Table):
-            reader.rows(item)
-        else:
-            reader.line(item)
-    reader.flush()
-    return reader.result(*steps)
-
-
 class _Reader:
-    """Collects what the lines say; holds the modal state of the control."""
+    """Collects what the lines say; holds the modal state of the control (`dialects.State`)."""
 
-    def __init__(self, name: str | None) -> None:
-        self.name = name
-        self.modal = Modal()
+    def __init__(self, name: str | None, dialect: Dialect, rotary: Rotary | None) -> None:
+        self.name, self.dialect, self.rotary = name, dialect, rotary
+        self.modal = Modal(rotary=rotary.names if rotary is not None else "")
+        self.tip_control = ""
         self.pile = Pile()
         self.waiting: list[Table | tuple[int, dict[str, float]]] = []
         self.events: list[Event] = []
+        self.late: list[tuple[Line, str, float, str]] = []
         self.comments: list[tuple[int, str]] = []
         self.problems: list[Problem] = []
+        self.complained: set[tuple[str, str]] = set()
+        self.lever = 0.0
         self.elements = 0
         self.blocks = 0
-        self.units_said = False
 
     def rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
@@ -116,23 +137,34 @@ class _Reader:
         if line.words:
             self.blocks += 1
         self.comments.extend((line.number, text) for text in line.comments)
-        row = motion_row(line)
+        row = self.dialect.row(line) if line.words else None
         if row is not None:
             self.waiting.append((line.number, row))
-            return
-        if line.words:
+        elif line.words:
             self.flush()
-            self._words(line)
+            self.dialect.words(line, self)
+            self.events += [Event(self.elements, *self._event(*late)) for late in self.late]
+            self.late = []
 
     def flush(self) -> None:
         """Execute the motion blocks that wait."""
         if not self.waiting:
             return
+        factor = MM_PER_UNIT[self.units]
         for table in _joined(self.waiting):
-            piece, self.modal = execute(table, self.modal)
-            self.pile.add(piece, MM_PER_UNIT[self.units])
-            self.elements += len(piece.kind)
+            before = self.modal
+            piece, self.modal = execute(table, before)
+            self._check_control(table)
             self.problems.extend(piece.problems)
+            piece = _in_mm(piece, factor, points=self.modal.points)
+            piece.feed_room += self.dialect.feed_step / 2 * factor
+            if self.rotary is not None:
+                start = before.but(tip=tuple(factor * value for value in before.tip))
+                piece = self.rotary.resolve(piece, start, inverse_time=before.inverse_time)
+                levers = self.rotary.levers(piece.tip)
+                self.lever = max(self.lever, float(levers.max(initial=0.0, where=~np.isnan(levers))))
+            self.pile.add(piece)
+            self.elements += len(piece.kind)
         self.waiting = []
 
     @property
@@ -140,84 +172,75 @@ class _Reader:
         """Units in force."""
         return "inch" if self.modal.inch else "mm"
 
-    def _words(self, line: Line) -> None:
-        motion: dict[str, float] = {}
-        after: list[Event] = []
-        given = {letter: value for letter, value, _ in line.words}
-        for letter, value, text in line.words:
-            if letter == "G":
-                if value in (0.0, 1.0, 2.0, 3.0, 6.2):
-                    motion["G"] = value
-                elif value == 4.0:
-                    dwell = given.get("P", 1000.0 * given.get("X", given.get("U", 0.0)))
-                    self.events.append(Event(self.elements, line.number, "G", 4.0, f"{dwell:g}"))
-                    return
-                else:
-                    self._mode(value, line.number)
-            elif letter in _EVENT_LETTERS:
-                event = Event(self.elements, line.number, letter, value, text)
-                if letter == "M" and value in _AFTER_MOTION:
-                    after.append(event)
-                else:
-                    self.events.append(event)
-            elif letter in "XYZIJKUVWFRP":
-                motion[letter] = value
-            elif letter not in "NO":
-                raise InputError(
-                    "CS503",
-                    f"{text} is not understood",
-                    "only the words of milling with tool vectors or axis points are read",
-                    file=self.name,
-                    line=line.number,
-                )
-        if set(motion) & set("XYZIJKUVW"):
-            self.waiting.append((line.number, motion))
+    def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
+        """Say a word that stands beside the motion; a late one acts after the motion of its block."""
+        if late:
+            self.late.append((line, letter, value, text))
+        else:
+            self.events.append(Event(self.elements, *self._event(line, letter, value, text)))
+
+    @staticmethod
+    def _event(line: Line, letter: str, value: float, text: str) -> tuple[int, str, float, str]:
+        return line.number, letter, value, text
+
+    def move(self, line: Line, row: dict[str, float]) -> None:
+        """Execute a single motion block; one without words of position only changes what holds."""
+        if set(row) & self.dialect.spelling.places or set(row) & set("XYZIJKUVW"):
+            self.waiting.append((line.number, row))
             self.flush()
-        elif motion:
-            self.modal = self.modal.but(code=motion.get("G", self.modal.code), feed=motion.get("F", self.modal.feed))
-        self.events.extend(Event(self.elements, event.line, event.letter, event.value, event.text) for event in after)
+        elif row:
+            self.modal = self.modal.but(code=row.get("G", self.modal.code), feed=row.get("F", self.modal.feed))
 
-    def _mode(self, code: float, number: int) -> None:
-        """Take a G word outside group 01 that changes the state."""
-        if code in (17.0, 18.0, 19.0):
-            self.modal = self.modal.but(plane=int(code))
-        elif code in (20.0, 21.0):
-            inch = code == 20.0
-            if self.elements and inch != self.modal.inch:
-                text = f"G{code:g} after the first motion; units are changed in the middle of the path"
-                self.problems.append(Problem("CS504", 0, number, text))
-            self.modal = self.modal.but(inch=inch)
-            self.units_said = True
-        elif code in (94.0, 95.0):
-            self.modal = self.modal.but(per_revolution=code == 95.0)
-        elif code in _TIP_CONTROL:
-            self.modal = self.modal.but(vectors=code == 43.5)
-            self.events.append(Event(self.elements, number, "G", code, f"G{code:g}"))
-        elif code == 49.0:
-            self.modal = self.modal.but(vectors=False)
-            self.events.append(Event(self.elements, number, "G", code, "G49"))
-        elif code in _COMPENSATION or code == 40.0:
-            self.events.append(Event(self.elements, number, "G", code, f"G{code:g}"))
-        elif code not in _SILENT:
-            raise InputError(
-                "CS503",
-                f"G{code:g} is not understood",
-                "only absolute milling with tool vectors or axis points is read",
-                file=self.name,
-                line=number,
-            )
+    def change(self, line: Line, **modes: Any) -> None:
+        """Change what holds from block to block."""
+        if self.elements and modes.get("inch", self.modal.inch) != self.modal.inch:
+            self.wrong("CS504", line, "units are changed in the middle of the path")
+        if modes.get("inverse_time") and self.rotary is None:
+            self.refuse(line, "inverse time feed (G93) without rotary words", "name the machine with --machine")
+        self.modal = self.modal.but(**modes)
 
-    def result(self, tip_step: float, second_step: float) -> NcProgram:
+    def wrong(self, code: str, line: Line, text: str) -> None:
+        """Note what breaks the rules of the control."""
+        self.problems.append(Problem(code, 0, line.number, text))
+
+    def refuse(self, line: Line, what: str, hint: str) -> NoReturn:
+        """Give up: words that make it impossible to tell where the tool is."""
+        raise InputError("CS503", what, hint, file=self.name, line=line.number)
+
+    def _check_control(self, table: Table) -> None:
+        """Complain, once for each state, of words that the control would not take for what they are."""
+        letters = table.columns.keys()
+        if self.rotary is not None:
+            kind = "angles" if self.rotary.tip_control else "machine"
+            used = bool(letters & set(self.rotary.names))
+        else:
+            kind = "point" if self.modal.points else "vector"
+            used = bool(letters & set("UVW" if self.modal.points else "IJ"))
+        wanted = self.dialect.controls.get(kind)
+        if wanted is None or not used or self.tip_control in wanted or (kind, self.tip_control) in self.complained:
+            return
+        code = table.columns.get("G")
+        if kind == "vector" and code is not None and (code >= 2).any():  # I J of an arc
+            return
+        self.complained.add((kind, self.tip_control))
+        need = " or ".join(word or "no tool tip control" for word in wanted)
+        text = f"{_NEEDS[kind]} under {self.tip_control or 'no tool tip control'}, where {need} must be in force"
+        self.problems.append(Problem("CS506", 0, int(table.line[0]), text))
+
+    def result(self, tip_step: float, second_step: float, second_room: float) -> NcProgram:
         """Put all pieces together, in millimetres."""
         second_is: Second = "point" if self.modal.points else "vector"
         scale = MM_PER_UNIT[self.units]
-        elements, curves, arcs = self.pile.whole(points=second_is == "point")
+        elements, curves, arcs = self.pile.whole()
         place = np.searchsorted(elements["line"], [number for number, _ in self.comments])
         self.events.extend(
             Event(int(element), number, "(", 0.0, text)
             for element, (number, text) in zip(place, self.comments, strict=True)
         )
         self.events.sort(key=lambda event: event.line)
+        steps = (tip_step * scale, second_step * (scale if second_is == "point" else 1.0))
+        if self.rotary is not None:
+            steps = replace(self.rotary, tip_step=steps[0]).steps(self.lever)
         return NcProgram(
             **elements,
             curves=curves,
@@ -226,9 +249,11 @@ class _Reader:
             problems=tuple(self.problems),
             units=self.units,
             second_is=second_is,
-            tip_step=tip_step * scale,
-            second_step=second_step * (scale if second_is == "point" else 1.0),
+            tip_step=steps[0],
+            second_step=steps[1],
             blocks=self.blocks,
+            second_room=second_room if self.rotary is not None or (second_is == "vector" and not second_step) else 0.0,
+            unsaid=self.dialect.unsaid,
         )
 
 
@@ -259,12 +284,16 @@ def _closed(table: Table) -> bool:
     return first is not None and not np.isnan(first[0])
 
 
-def _steps(sample: bytes) -> tuple[float, float]:
-    """Value of the last printed digit of X Y Z and of I J K or U V W, from a sample of the text."""
-    decimals = {b"XYZ": 0, b"IJUVW": 0}
-    for letter, fraction in _FRACTION.findall(_BRACKETS.sub(b"", sample)):
-        for letters in decimals:
-            if letter in letters:
-                decimals[letters] = max(decimals[letters], len(fraction))
-    tip, second = decimals.values()
-    return 10.0**-tip, 10.0**-second
+def _in_mm(piece: Piece, factor: float, *, points: bool) -> Piece:
+    """Lengths in millimetres; a factor of one leaves the numbers untouched."""
+    if factor == 1.0:
+        return piece
+    columns = slice(0, 6 if points else 3)
+    piece.curves.control[:, columns] *= factor
+    return replace(
+        piece,
+        tip=piece.tip * factor,
+        second=piece.second * factor if points else piece.second,
+        feed=piece.feed * factor,
+        arc_centre=piece.arc_centre * factor,
+    )

@@ -18,7 +18,7 @@ SPEED_DECIMALS = 0
 #: cutting speeds in mm per minute
 _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}
 
-_COOLANT = {"ON": 8.0, "FLOOD": 8.0, "MIST": 7.0, "OFF": 9.0, "NOMORE": 9.0}
+_COOLANT = {"ON": 8.0, "FLOOD": 8.0, "MIST": 7.0, "THRU": 88.0, "OFF": 9.0, "NOMORE": 9.0}
 
 _COMPENSATION = {"LEFT": 41.0, "RIGHT": 42.0, "OFF": 40.0, "NOMORE": 40.0}
 
@@ -226,7 +226,7 @@ def _of_m(value: float, place: float, line: int) -> list[Token]:
     """Token of an M word other than M6."""
     if value in (3, 4, 5, 19):
         return [Token("spindle", value, place, line)]
-    if value in (7, 8, 9):
+    if value in (7, 8, 9, 88):
         return [Token("coolant", value, place, line)]
     if value in (0, 1):
         return [Token("stop", value, place, line)]
@@ -266,7 +266,9 @@ def said(events: Sequence[Event], places: Sequence[float]) -> list[Token]:
 _PLAIN = {"S": "speed", "H": "offset", "D": "register"}
 
 
-def compare(asked_for: list[Token], found: list[Token], room: float) -> list[Problem]:
+def compare(
+    asked_for: list[Token], found: list[Token], room: float, unsaid: frozenset[str | tuple[str, float]] = frozenset()
+) -> list[Problem]:
     """Compare the two, kind by kind.
 
     Parameters
@@ -274,8 +276,12 @@ def compare(asked_for: list[Token], found: list[Token], room: float) -> list[Pro
     asked_for, found : list of Token
     room : float, mm
         How far apart along the path the places of the same token may be.
+    unsaid : frozenset
+        Kinds, and pairs of kind and value, that the control has no words for.
     """
     problems: list[Problem] = []
+    asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
+    found = [token for token in found if token.kind not in unsaid]
     for kind, (name, code) in _NAMES.items():
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
         matcher = difflib.SequenceMatcher(

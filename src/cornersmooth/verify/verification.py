@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from cornersmooth.verify.statements import asked, compare, said
 from cornersmooth.verify.stops import Stretches, find_stretches
 from cornersmooth.verify.trails import original_motion
 from cornersmooth.verify.walking import Track
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,8 @@ def verify(
     tolerance: float,
     axis_length: float = 10.0,
     control: str = "fanuc",
+    machine: Machine | None = None,
+    tcp: bool = True,
 ) -> Verification:
     """Measure an NC text against the CL program it was made from.
 
@@ -177,7 +182,8 @@ def verify(
         ε: what is allowed at tip and axis point.
     axis_length : float, mm
         H: distance of the axis point from the tip.
-    control : {"fanuc"}
+    control, machine, tcp
+        As in `read_nc`.
 
     Returns
     -------
@@ -194,7 +200,9 @@ def verify(
         low, high = BOUNDS[name]
         if not low <= value <= high:
             raise SettingsError("CS202", f"{name} is {value:g}", f"give a value from {low:g} to {high:g}")
-    text = nc if isinstance(nc, NcProgram) else read_nc(nc, control=control)
+    text = nc
+    if not isinstance(text, NcProgram):
+        text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
     return _Run(program, text, tolerance, axis_length).result()
 
 
@@ -307,7 +315,10 @@ class _Run:
             if len(values):
                 k = int(np.argmax(values))
                 worst.update(values[k : k + 1], cl_line(where[k : k + 1]), nc.line[where[k : k + 1]])
-        ends = trail.last
+        # a block in rotary words may have become several elements: its length is from its start to its end
+        lines = nc.line[block.written.first : block.written.first + len(trail.last)]
+        chosen = np.flatnonzero(np.append(lines[1:] != lines[:-1], True))
+        ends = trail.last[chosen]
         six = block.six[ends] if len(ends) < len(block.six) else block.six
         step = six[1:] - six[:-1]
         square = np.maximum(
@@ -317,11 +328,13 @@ class _Run:
         square[block.piece[ends[1:]] != block.piece[ends[:-1]]] = np.inf
         if len(square):
             k = int(np.argmin(square))
-            own = np.array([k + 1 + block.written.first])
+            own = chosen[k + 1 : k + 2] + block.written.first
             self.shortest.update(-np.sqrt(square[k : k + 1]), cl_line(own), nc.line[own])
 
     def _statements(self, elements: Ints, element_place: Floats) -> list[Problem]:
         original, length = self.original, self.matcher.track.length
+        if not len(self.nc):  # without any motion nothing has a place
+            return []
         statements = self.program.statements
         move = np.searchsorted(original.pose, [statement.pose for statement in statements]) - 1
         moves = len(original.pose)
@@ -330,7 +343,7 @@ class _Run:
         theirs = asked(self.program, places.tolist(), end)
         index = np.searchsorted(elements, [event.element - 1 for event in self.nc.events])
         mine = np.nan_to_num(element_place[index], nan=0.0) if len(elements) else np.zeros(0)
-        return compare(theirs, said(self.nc.events, mine.tolist()), self.matcher.margin)
+        return compare(theirs, said(self.nc.events, mine.tolist()), self.matcher.margin, self.nc.unsaid)
 
     def _verification(self, deviation: Deviation, problems: list[Problem]) -> Verification:
         kept: list[Problem] = []

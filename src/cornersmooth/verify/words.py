@@ -20,8 +20,11 @@ MOTION_LETTERS = "GXYZIJKUVWFRPN"
 #: letters that make a block move the tool or belong to a curve
 PLACE_LETTERS = frozenset("XYZUVWIJK")
 
+#: code of FANUC's curves, and what stands for those of controls that say it in words
+NURBS, BSPLINE, POLY, SPL = 6.2, 901.0, 902.0, 903.0
+
 #: G words of group 01 that a run may contain
-MOTION_CODES = (0.0, 1.0, 2.0, 3.0, 6.2)
+MOTION_CODES = (0.0, 1.0, 2.0, 3.0, NURBS)
 
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _COMMENT = re.compile(r"\(([^)]*)\)|;(.*)$")
@@ -95,17 +98,6 @@ def tokenise(text: bytes, number: int, name: str | None) -> Line:
         words.append((match[1], float(match[2]), match[0].strip()))
         place = match.end()
     return Line(number, tuple(words), comments)
-
-
-def motion_row(line: Line) -> dict[str, float] | None:
-    """Words of a motion block as a dict, or None where the line is something else."""
-    row = {letter: value for letter, value, _ in line.words}
-    letters = set(row)
-    if len(row) != len(line.words) or not letters <= set(MOTION_LETTERS) or not letters & PLACE_LETTERS:
-        return None
-    if "G" in row and row["G"] not in MOTION_CODES:
-        return None
-    return row
 
 
 def table_of(rows: list[tuple[int, dict[str, float]]]) -> Table:

@@ -1,0 +1,39 @@
+"""The texts of all controls that can be read back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.verify.dialects.base import Dialect, State
+from cornersmooth.verify.dialects.iso import ISO_WORDS, Iso
+
+__all__ = ["CONTROLS", "Dialect", "State", "dialect_of"]
+
+_DIALECTS: Final[dict[str, Callable[[str], Dialect]]] = {
+    **{name: partial(Iso, name) for name in ISO_WORDS},
+}
+
+#: controls whose texts are read
+CONTROLS: Final = tuple(sorted(_DIALECTS))
+
+
+def dialect_of(control: str, rotary: str = "") -> Dialect:
+    """Dialect of a control.
+
+    Parameters
+    ----------
+    control : str
+    rotary : str
+        Addresses of the rotary axes of a machine; empty for texts without rotary words.
+
+    Raises
+    ------
+    SettingsError
+        CS204 for an unknown control.
+    """
+    if control not in _DIALECTS:
+        raise SettingsError("CS204", f"unknown control {control!r}", f"use one of {', '.join(CONTROLS)}")
+    return _DIALECTS[control](rotary)

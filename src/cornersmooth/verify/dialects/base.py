@@ -1,0 +1,82 @@
+"""What a dialect is: how a control spells its words, and what those mean that are not motion."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+from cornersmooth.verify.spelling import Spelling
+from cornersmooth.verify.words import Line
+
+if TYPE_CHECKING:
+    from cornersmooth.verify.motion import Modal
+
+
+class State(Protocol):
+    """What a dialect may ask of the reader, and tell it."""
+
+    modal: Modal
+    #: what keeps the tip where it is told, in the words of the dialect; empty for nothing
+    tip_control: str
+
+    def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
+        """Say a word that stands beside the motion; a late one acts after the motion of its block."""
+
+    def move(self, line: Line, row: dict[str, float]) -> None:
+        """Execute a single motion block."""
+
+    def change(self, line: Line, **modes: Any) -> None:
+        """Change what holds from block to block."""
+
+    def wrong(self, code: str, line: Line, text: str) -> None:
+        """Note what breaks the rules of the control."""
+
+    def refuse(self, line: Line, what: str, hint: str) -> None:
+        """Give up: words that make it impossible to tell where the tool is."""
+
+
+class Dialect:
+    """A control's way to say things.
+
+    Parameters
+    ----------
+    spelling : Spelling
+    rotary : str
+        Addresses of the rotary axes; empty without a machine.
+    """
+
+    #: decimals of F are worth so much
+    feed_step = 1e-4
+    #: kinds of tokens, or pairs of kind and value, that the control has no words for
+    unsaid: frozenset[str | tuple[str, float]] = frozenset()
+    #: what must be in force for words of a kind: ``"vector"``, ``"point"``, ``"angles"``, ``"machine"``
+    controls: Mapping[str, tuple[str, ...]] = {}
+    #: the first letter, or letters, of tip and second triple in the spelling, with their decimals
+    digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
+
+    def __init__(self, spelling: Spelling, rotary: str = "") -> None:
+        self.spelling, self.rotary = spelling, rotary
+        if rotary:
+            self.digits = re.compile(rb"(?:([XYZ])|([%b]))[-+]?\d*\.(\d*)" % rotary.encode())
+
+    def row(self, line: Line) -> dict[str, float] | None:
+        """Words of a motion block; None where the line is something else."""
+        raise NotImplementedError
+
+    def words(self, line: Line, state: State) -> None:
+        """Interpret a line that is no motion block."""
+        raise NotImplementedError
+
+    def decimals(self, text: bytes) -> tuple[int, int | None]:
+        """Decimals of the tip and of the second triple, from a sample of the text; None without any."""
+        tip, second = 0, None
+        for _, other, fraction in self.digits.findall(self.spelling.respell(_COMMENT.sub(b"", text))):
+            if other:
+                second = max(second or 0, len(fraction))
+            else:
+                tip = max(tip, len(fraction))
+        return tip, second
+
+
+_COMMENT = re.compile(rb"\([^)\n]*\)|;[^\n]*")

@@ -1,0 +1,302 @@
+"""Motion in rotary words as motion of the tool: a machine's axes, by rotations of our own (Rodrigues).
+
+A block runs linearly in its words. Under tool tip control that is the tip and the angles, without it the linear axes
+of the machine and the angles. Where the turn makes it matter a block becomes several lines, fine enough that nobody can
+tell them from the motion; curves become curves of a higher degree in tip and tool vector. So what measures need not
+know of rotary axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.verify.curves import basis, groups
+from cornersmooth.verify.motion import Modal, Piece
+from cornersmooth.verify.ncprogram import Curves, Element
+from cornersmooth.verify.splines import CurveTable
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine, RotaryAxis
+
+#: share of the tolerance by which lines may leave the motion they stand for, and least length, mm
+LINE_SHARE, LEAST = 1e-3, 1e-7
+
+#: lines that one block becomes at most
+_MOST_LINES = 4096
+
+#: order of the curves that stand for curves in angles, and how often their spans are halved
+_ORDER, _HALVINGS = 8, 6
+
+#: an axis that turns faster (deg/min) may make a block slower than its feed where the text times it (G93)
+FAST_TURN = 30_000.0
+
+#: share of the tolerance that is left to angles where they need not be exact: near the pole of the machine
+POLE_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Rotary:
+    """How rotary words move the tool.
+
+    Parameters
+    ----------
+    machine : Machine
+    tip_control : bool
+        Whether X Y Z are the tip, or the linear axes of the machine.
+    tolerance, axis_length : float, mm
+        What decides how fine motion is cut.
+    tip_step, angle_step : float
+        Last printed digits, mm and degrees.
+    """
+
+    machine: Machine
+    tip_control: bool
+    tolerance: float
+    axis_length: float
+    tip_step: float
+    angle_step: float
+
+    @property
+    def names(self) -> str:
+        """Addresses, nearest to the part first."""
+        return "".join(self.machine.names)
+
+    def directions(self, angles: Floats) -> Floats:
+        """(n, 3) unit tool vectors in the part, for (n, 2) degrees."""
+        first, second = self.machine.axes
+        tool = np.broadcast_to(self.machine.tool, (len(angles), 3))
+        return _turned(first, angles[:, 0], _turned(second, angles[:, 1], tool))
+
+    def tips(self, position: Floats, angles: Floats) -> Floats:
+        """(n, 3) tips in the part, mm, for words of the linear axes and degrees.
+
+        Words count from the zero of the part, with the length of the tool compensated: with both axes at zero they
+        are the tip itself. Heads swing the tip about their points, then the tables carry the part with them.
+        """
+        if self.tip_control:
+            return position
+        machine = self.machine
+        nose = machine.tool_length * machine.tool
+        swing = np.zeros_like(position)
+        for index in (1, 0):
+            axis = machine.axes[index]
+            if axis.carrier == "head":
+                pivot = nose + axis.point
+                swing = pivot + _turned(axis, angles[:, index], swing - pivot)
+        tip = position + swing + machine.part_zero
+        for index in (1, 0):
+            axis = machine.axes[index]
+            if axis.carrier == "table":
+                tip = axis.point + _turned(axis, angles[:, index], tip - axis.point)
+        result: Floats = tip - machine.part_zero
+        return result
+
+    def levers(self, position: Floats) -> Floats:
+        """(n,) mm: sum of the distances at which the two axes may move the tip; zero under tip control."""
+        total = np.zeros(len(position))
+        if self.tip_control:
+            return total
+        for axis in self.machine.axes:
+            if axis.carrier == "table":
+                away = position + self.machine.part_zero - axis.point
+                total += np.linalg.norm(away, axis=1) + self.machine.tool_length
+            else:
+                total += float(np.linalg.norm(self.machine.tool_length * self.machine.tool + axis.point))
+        return total
+
+    def steps(self, lever: float) -> tuple[float, float]:
+        """Steps of tip and vector that printed digits stand for, `lever` being the longest."""
+        turn = float(np.radians(self.angle_step))
+        linear = self.tip_step if self.tip_control else np.sqrt(3) * self.tip_step
+        return float(linear + lever * turn), 2 * turn
+
+    def resolve(self, piece: Piece, before: Modal, *, inverse_time: bool) -> Piece:
+        """Return a run in tips and tool vectors, all in mm, the second triple being degrees before.
+
+        Parameters
+        ----------
+        piece : Piece
+            In mm.
+        before : Modal
+            In mm; what is not known of the angles is zero.
+        inverse_time : bool
+            Whether the feeds are moves per minute.
+        """
+        position = np.vstack((before.tip, piece.tip))
+        angles = np.nan_to_num(np.vstack((before.second, piece.second))[:, :2])
+        tip, vector = self.tips(position, angles), self.directions(angles)
+        curves = self._curves(piece.curves)
+        feed, room = piece.feed, piece.feed_room
+        if inverse_time:
+            feed, room = self._timed(feed, position, tip, vector, angles)
+        count = self._counts(piece, position, angles, tip, vector)
+        if not len(count) or count.max() == 1:
+            return replace(piece, tip=tip[1:], second=vector[1:], curves=curves, feed=feed, feed_room=room)
+        last = np.cumsum(count) - 1
+        owner = np.repeat(np.arange(len(count)), count)
+        part = np.arange(len(owner)) - last[owner] + count[owner] - 1
+        share = ((part + 1) / count[owner])[:, None]
+        inner = np.flatnonzero(part < count[owner] - 1)
+        own, at = owner[inner], share[inner]
+        fine_tip, fine_vector = tip[1:][owner], vector[1:][owner]
+        words = [start[own] + at * (start[own + 1] - start[own]) for start in (position, angles)]
+        fine_tip[inner], fine_vector[inner] = self.tips(*words), self.directions(words[1])
+        return replace(
+            piece,
+            kind=piece.kind[owner],
+            tip=fine_tip,
+            second=fine_vector,
+            line=piece.line[owner],
+            feed=feed[owner],
+            feed_room=room[owner],
+            per_revolution=piece.per_revolution[owner],
+            curves=curves,
+            arc_element=last[piece.arc_element],
+        )
+
+    @property
+    def _fine(self) -> float:
+        return max(LINE_SHARE * self.tolerance, LEAST)
+
+    def _counts(self, piece: Piece, position: Floats, angles: Floats, tip: Floats, vector: Floats) -> Ints:
+        """Number of lines that each element becomes."""
+        count = np.ones(len(piece.kind), np.int64)
+        turn = np.radians(np.abs(np.diff(angles, axis=0)).sum(axis=1))
+        bound = self.axis_length * turn**2
+        if not self.tip_control:
+            way = np.linalg.norm(np.diff(position, axis=0), axis=1)
+            bound += turn**2 * self.levers(position[:-1]) + 2 * turn * way
+        rows = np.flatnonzero((piece.kind == Element.LINE) & (bound / 4 > self._fine))
+        if not len(rows):
+            return count
+        off = np.zeros(len(rows))
+        for share in (0.25, 0.5, 0.75):
+            words = [start[rows] + share * (start[rows + 1] - start[rows]) for start in (position, angles, tip, vector)]
+            here, there = self.tips(*words[:2]) - words[2], self.directions(words[1])
+            chord = words[3] / np.maximum(np.linalg.norm(words[3], axis=1), 1e-12)[:, None]
+            point = here + self.axis_length * (there - chord)
+            off = np.maximum(off, np.maximum(np.linalg.norm(here, axis=1), np.linalg.norm(point, axis=1)))
+        # 4/3: the quarters of a parabola are as far from its chord as three quarters of the middle
+        count[rows] = np.clip(np.ceil(np.sqrt(off * 4 / 3 / self._fine)), 1, _MOST_LINES)
+        # a turn of the tool by more than a right angle has no chord to be compared with
+        wide = np.ceil(turn[rows] / 0.2).astype(np.int64)
+        count[rows] = np.maximum(count[rows], wide)
+        return count
+
+    def _timed(
+        self, rate: Floats, position: Floats, tip: Floats, vector: Floats, angles: Floats
+    ) -> tuple[Floats, Floats]:
+        """Feeds (mm/min) of blocks whose F is moves per minute, and how far they are uncertain.
+
+        Where the tip stands still the axis point runs with the feed.
+        """
+        step, turn_step = self.steps(float(self.levers(position).max(initial=0.0)))
+        length = np.linalg.norm(np.diff(tip, axis=0), axis=1)
+        swing = np.linalg.norm(np.diff(tip + self.axis_length * vector, axis=0), axis=1)
+        turn = np.abs(np.diff(angles, axis=0)).max(axis=1)
+        still = length < 0.5 * self.tip_step
+        way = np.where(still, swing, length)
+        room = rate * np.where(still, 2 * step + self.axis_length * turn_step, 2 * step)
+        room[(rate * turn > FAST_TURN) | (~still & (length < 3 * step))] = np.inf
+        return rate * way, room
+
+    def _curves(self, curves: CurveTable) -> CurveTable:
+        """Curves in tip and tool vector."""
+        if not len(curves):
+            return curves
+        size = curves.points + curves.order
+        table = Curves(
+            element=np.arange(len(curves)),
+            order=curves.order,
+            points=curves.points,
+            first_point=np.cumsum(curves.points) - curves.points,
+            first_knot=np.cumsum(size) - size,
+            point=curves.control,
+            weight=curves.weight,
+            knot=curves.knot,
+        )
+        found = []
+        for group in groups(table, np.arange(len(curves))):
+            breaks, rows = group.spans, np.arange(len(group.index))
+            for halving in range(_HALVINGS + 1):
+                if halving:
+                    breaks = np.sort(np.append(breaks, (breaks[1:] + breaks[:-1]) / 2))
+                own = group.only(rows)
+                control, weight, good = self._elevated(own.knot, own.order, own.points, own.weight, breaks)
+                keep = good if halving < _HALVINGS else np.ones_like(good)
+                points = control.shape[1]
+                inner = np.repeat(breaks[1:-1], _ORDER - 1)
+                knot = np.concatenate(([breaks[0]] * _ORDER, inner, [breaks[-1]] * _ORDER))
+                chosen = group.index[rows[keep]]
+                count = len(chosen)
+                found.append(
+                    CurveTable(
+                        row=curves.row[chosen],
+                        end=curves.end[chosen],
+                        order=np.full(count, _ORDER, np.int64),
+                        points=np.full(count, points, np.int64),
+                        control=control[keep].reshape(-1, 6),
+                        weight=weight[keep].ravel(),
+                        knot=np.tile(knot, count),
+                    )
+                )
+                rows = rows[~keep]
+                if not len(rows):
+                    break
+        return CurveTable.joined(found)
+
+    def _elevated(
+        self, knot: Floats, order: int, points: Floats, weight: Floats, breaks: Floats
+    ) -> tuple[Floats, Floats, Bools]:
+        """Control points (k, p, 6) and weights (k, p) of a higher order, and whether (k,) they are near enough.
+
+        Interpolation, in homogeneous coordinates, between the breaks; what is rational of lower order is exact.
+        """
+        t = (1 - np.cos(np.pi * np.arange(_ORDER) / (_ORDER - 1))) / 2
+        between = (t[1:] + t[:-1]) / 2
+        start, width = breaks[:-1, None], np.diff(breaks)[:, None]
+        spans = len(breaks) - 1
+
+        def at(share: Floats) -> Floats:
+            values = basis(knot, order, (start + share * width).ravel())
+            below = weight @ values.T
+            six = np.einsum("up,kpd->kud", values, points * weight[:, :, None]) / below[:, :, None]
+            vector = self.directions(six[:, :, 3:5].reshape(-1, 2)).reshape(*six.shape[:2], 3)
+            whole = np.concatenate((six[:, :, :3], vector, np.ones_like(vector[:, :, :1])), axis=2)
+            whole *= below[:, :, None]
+            return whole.reshape(len(points), spans, len(share), 7)
+
+        nodes = at(t)
+        bezier = np.einsum("ij,ksjd->ksid", np.linalg.inv(_bernstein(t)), nodes)
+        bezier[:, :, [0, -1]] = nodes[:, :, [0, -1]]
+        true = at(between)
+        close = np.einsum("ij,ksjd->ksid", _bernstein(between), bezier)
+        off = np.linalg.norm(close[..., 3:6] / close[..., 6:] - true[..., 3:6] / true[..., 6:], axis=3)
+        good = off.max(axis=(1, 2)) * self.axis_length <= self._fine / 10
+        joined = np.concatenate((bezier[:, :, :-1].reshape(len(points), -1, 7), bezier[:, -1, -1:]), axis=1)
+        return joined[:, :, :6] / joined[:, :, 6:], joined[:, :, 6], good
+
+
+def _bernstein(t: Floats) -> Floats:
+    """(len(t), order) Bernstein polynomials."""
+    degree = _ORDER - 1
+    i = np.arange(_ORDER)
+    binomial = np.cumprod(np.concatenate(([1.0], (degree - i[:-1]) / (i[:-1] + 1))))
+    values: Floats = binomial * t[:, None] ** i * (1 - t[:, None]) ** (degree - i)
+    return values
+
+
+def _turned(axis: RotaryAxis, degrees: Floats, vectors: Floats) -> Floats:
+    """Vectors (n, 3) turned with an axis as seen from the part: Rodrigues' rotation."""
+    direction = np.asarray(axis.direction, np.float64)
+    direction = direction / np.linalg.norm(direction)
+    sense = 1.0 if axis.positive == "tool" else -1.0
+    angle = sense * np.radians(degrees)
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    along = (vectors @ direction)[:, None] * direction
+    turned: Floats = along + cosine * (vectors - along) + sine * np.cross(direction, vectors)
+    return turned

@@ -1,0 +1,237 @@
+"""Curves of a run of blocks as control points, weights and knots: FANUC's G06.2 and Siemens' BSPLINE."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.verify.ncprogram import Problem
+from cornersmooth.verify.words import Table
+
+#: FANUC: order of a curve whose first block has no P (B-63324EN/03 4.17)
+DEFAULT_ORDER = 4
+
+#: Siemens: order of BSPLINE SD=3, and the largest weight PW
+SPLINE_ORDER, LARGEST_WEIGHT = 4, 3.0
+
+
+@dataclass
+class CurveTable:
+    """Curves of a run, c of them.
+
+    Parameters
+    ----------
+    row, end : (c,) int64
+        Blocks of the run with which each curve begins and ends.
+    order, points : (c,) int64
+    control : (p, 6) float64
+    weight : (p,) float64
+    knot : (q,) float64
+        All curves one after another.
+    """
+
+    row: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    end: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    order: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    points: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    control: Floats = field(default_factory=lambda: np.zeros((0, 6)))
+    weight: Floats = field(default_factory=lambda: np.zeros(0))
+    knot: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @classmethod
+    def joined(cls, tables: Sequence[CurveTable]) -> CurveTable:
+        """Return the curves of several tables in the order of their blocks."""
+        tables = [table for table in tables if len(table)]
+        if len(tables) == 1:
+            return tables[0]
+        if not tables:
+            return cls()
+        columns = [np.concatenate([getattr(table, name) for table in tables]) for name in vars(tables[0])]
+        row, end, order, points, control, weight, knot = columns
+        chosen = np.argsort(row, kind="stable")
+        place, at = slices(points, chosen), slices(points + order, chosen)
+        return cls(row[chosen], end[chosen], order[chosen], points[chosen], control[place], weight[place], knot[at])
+
+
+def slices(size: Ints, chosen: Ints) -> Ints:
+    """Indices of the parts `chosen` of a table that consists of parts of given sizes."""
+    first = np.cumsum(size) - size
+    count = size[chosen]
+    start = np.cumsum(count) - count
+    index: Ints = np.arange(int(count.sum())) + np.repeat(first[chosen] - start, count)
+    return index
+
+
+def knot_curves(
+    table: Table, tip: Floats, second: Floats, placed: Bools, curve: Bools, starts: Bools, problems: list[Problem]
+) -> CurveTable:
+    """Curves of FANUC's G06.2 (B-63324EN/03 4.17): a knot K and a weight R in every block.
+
+    Parameters
+    ----------
+    table : Table
+        Of r blocks.
+    tip, second : (r, 3) float64
+        After every block.
+    placed : (r,) bool
+        Blocks with words of position.
+    curve : (r,) bool
+        Blocks that belong to curves.
+    starts : (r,) bool
+        Those with which one begins.
+    problems : list of Problem
+        Takes what breaks the rules.
+    """
+    rows = np.flatnonzero(curve)
+    start = np.flatnonzero(starts[rows])
+    if len(start) == 0 or start[0] != 0:
+        problems.append(Problem("CS511", 0, int(table.line[rows[0]]), "curve blocks without a G6.2 before them"))
+        first = start[0] if len(start) else len(rows)
+        rows, start = rows[first:], start - first
+    if not len(start):
+        return CurveTable()
+    size = np.diff(np.append(start, len(rows)))
+    is_point = placed[rows]
+    points = np.add.reduceat(is_point, start, dtype=np.int64)
+    given = table.column("P")[rows[start]]
+    order = np.where(np.isnan(given), DEFAULT_ORDER, given).astype(np.int64)
+    knot = table.column("K")[rows]
+    weight = table.column("R")[rows][is_point]
+    weight = np.where(np.isnan(weight), 1.0, weight)
+
+    def complain(mask: Bools, code: str, text: str) -> None:
+        problems.extend(Problem(code, 0, int(table.line[rows[k]]), text) for k in np.flatnonzero(mask).tolist())
+
+    def complain_curve(mask: Bools, code: str, text: str) -> None:
+        wrong = np.zeros(len(rows), np.bool_)
+        wrong[start[mask]] = True
+        complain(wrong, code, text)
+
+    gap = np.append(False, (np.diff(table.line[rows]) != 1) & ~starts[rows][1:])
+    complain(gap, "CS510", "something else stands between the blocks of a curve")
+    complain(np.isnan(knot), "CS512", "a curve block without its knot K")
+    knot = np.nan_to_num(knot)
+    single = size - points
+    complain_curve(single < order, "CS513", "fewer blocks with only a knot than the order of the curve asks for")
+    complain_curve(single > order, "CS513", "more blocks with only a knot than the order of the curve asks for")
+    complain_curve((points < order) | (order < 2), "CS514", "fewer control points than the order of the curve")
+    late = is_point[1:] & ~is_point[:-1]
+    late &= ~starts[rows][1:]
+    complain(np.append(False, late), "CS515", "a control point after the blocks with only a knot")
+    falls = np.append(False, (np.diff(knot) < 0) & ~starts[rows][1:])
+    complain(falls, "CS516", "a knot below the one before it")
+    complain_curve(_unclamped(knot, start, size, order), "CS517", "first or last knots that are not all equal")
+    point_rows = rows[is_point]
+    wrong = np.flatnonzero((weight <= 0) | ~np.isfinite(weight))
+    text = "a weight R that is not positive"
+    problems.extend(Problem("CS518", 0, int(table.line[row]), text) for row in point_rows[wrong].tolist())
+    return CurveTable(
+        row=rows[start],
+        end=point_rows[np.cumsum(points) - 1],
+        order=order,
+        points=points,
+        control=np.hstack((tip[point_rows], second[point_rows])),
+        weight=weight,
+        knot=_exactly(knot, start, size, points + order),
+    )
+
+
+def _unclamped(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
+    """(c,) whether the first `order` or the last `order` knots of a curve differ."""
+    wrong = np.zeros(len(start), np.bool_)
+    for k in range(1, int(order.max(initial=1))):
+        used = k < np.minimum(order, size)
+        wrong[used] |= knot[start[used] + k] != knot[start[used]]
+        end = start[used] + size[used] - 1
+        wrong[used] |= knot[end - k] != knot[end]
+    return wrong
+
+
+def _exactly(knot: Floats, start: Ints, size: Ints, wanted: Ints) -> Floats:
+    """Knots cut or filled to the number each curve needs, so that a malformed curve can still be measured."""
+    if (size == wanted).all():
+        return knot
+    index = np.arange(wanted.sum()) - np.repeat(np.cumsum(wanted) - wanted, wanted)
+    filled: Floats = knot[np.repeat(start, wanted) + np.minimum(index, np.repeat(size, wanted) - 1)]
+    return filled
+
+
+def interval_curves(
+    table: Table, tip: Floats, second: Floats, spline: Bools, before: Floats, problems: list[Problem]
+) -> CurveTable:
+    """Curves of Siemens' BSPLINE (programming manual 12/2019): control points with knot intervals PL and weights PW.
+
+    The first control point is where the block before has ended. With the knots u the block of control point j has
+    PL = u[j+2] − u[j+1]. Where three knots meet a spline passes its control point, and a new curve begins.
+
+    Parameters
+    ----------
+    table, tip, second, problems
+        As in `knot_curves`.
+    spline : (r,) bool
+        Blocks on splines; neighbours are one spline.
+    before : (6,) float64
+        Tip and second point in front of the run.
+    """
+    rows = np.flatnonzero(spline)
+    opens = np.append(True, np.diff(rows) != 1)
+
+    def complain(mask: Bools, code: str, text: str) -> None:
+        problems.extend(Problem(code, 0, int(table.line[rows[k]]), text) for k in np.flatnonzero(mask).tolist())
+
+    interval, weight = table.column("PL")[rows], table.column("PW")[rows]
+    complain(np.isnan(interval), "CS512", "a spline block without its knot interval PL")
+    complain(interval < 0, "CS516", "a negative knot interval PL")
+    interval = np.maximum(np.nan_to_num(interval), 0.0)
+    weight = np.where(np.isnan(weight), 1.0, weight)
+    complain((weight <= 0) | (weight > LARGEST_WEIGHT), "CS518", "a weight PW that is not above 0 and up to 3")
+    gap = np.append(False, np.diff(table.line[rows]) != 1) & ~opens
+    complain(gap, "CS510", "something else stands between the blocks of a curve")
+    closes = np.append(opens[1:], True)
+    complain((opens | closes) & (interval != 0), "CS517", "a spline whose first or last interval is not zero")
+    six = np.hstack((tip, second))
+    # a curve begins with the control point in front of the block `first`
+    passed = np.append(False, (interval[:-1] == 0) & (interval[1:] == 0)) & ~opens
+    first = np.flatnonzero(opens | passed)
+    count = np.diff(np.append(first, len(rows)))
+    points = count + 1
+    short = np.zeros(len(rows), np.bool_)
+    short[first[points < SPLINE_ORDER]] = True
+    complain(short, "CS514", "fewer control points than the order of the curve")
+    index = np.repeat(rows[first] - 1 - np.cumsum(points) + points, points) + np.arange(int(points.sum()))
+    control = np.vstack((before, six))[index + 1]
+    own = np.concatenate(([1.0], weight))
+    at = slices(points, np.arange(len(points)))
+    place = np.repeat(first - np.cumsum(points) + points, points) + at
+    weights = own[place]
+    # the first control point of a spline is no block's own
+    weights[(np.cumsum(points) - points)[opens[first]]] = 1.0
+    return CurveTable(
+        row=rows[first],
+        end=rows[first + count - 1],
+        order=np.full(len(first), SPLINE_ORDER, np.int64),
+        points=points,
+        control=control,
+        weight=weights,
+        knot=_knots_of(interval, first, count),
+    )
+
+
+def _knots_of(interval: Floats, first: Ints, count: Ints) -> Floats:
+    """Knots of curves whose blocks carry intervals, `count` of them from `first` on: four equal ones at each end."""
+    size = count + 1 + SPLINE_ORDER
+    start = np.cumsum(size) - size
+    steps = np.zeros(int(size.sum()))
+    # knots 3 to count + 1 follow from the intervals of the blocks; those behind are equal
+    used = np.maximum(count - 1, 0)
+    block = np.arange(int(used.sum())) - np.repeat(np.cumsum(used) - used, used)
+    steps[np.repeat(start, used) + 3 + block] = interval[np.repeat(first, used) + block]
+    total = np.cumsum(steps)
+    knots: Floats = total - np.repeat(total[start], size)
+    return knots
