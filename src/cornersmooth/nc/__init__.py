@@ -11,7 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.model import Ints, Program, SmoothProgram, Units
+from cornersmooth.kinematics import rapid_moves
+from cornersmooth.model import FeedMode, Ints, Program, SmoothProgram, Units
 from cornersmooth.nc.blocks import BlockWriter
 from cornersmooth.nc.choice import check_program, choose_form
 from cornersmooth.nc.circles import Circles, plan_circles
@@ -136,6 +137,7 @@ def write(
     check_program(chosen, program, smoothed.settings)
     frame = frame or Frame()
     statements = StatementWriter(chosen, program, notes, _values(program, smoothed.settings), comments=frame.comments)
+    _tell_feeds(chosen, program, notes)
     circles = plan_circles(program, smoothed.settings, chosen)
     _tell_arcs(circles, program, notes)
     writer = BlockWriter(chosen, program, statements, notes, circles)
@@ -224,6 +226,16 @@ class _Behind:
             self._done.result()
         self._done = self._pool.submit(self._stream.write, b"".join(self._waiting))
         self._waiting, self._size = [], 0
+
+
+def _tell_feeds(form: Form, program: Program, notes: Notes) -> None:
+    if form.orientation != "machine":
+        return
+    cuts = ~rapid_moves(program.kind) & (program.feed_mode == FeedMode.PER_REVOLUTION)
+    rows = np.flatnonzero(cuts)
+    if len(rows):
+        text = "feed per revolution without tool tip control counts along the machine's axes; give feeds per minute"
+        notes.add("CS323", "warning", int(program.line[rows[0]]), text, len(rows))
 
 
 def _tell_arcs(circles: Circles, program: Program, notes: Notes) -> None:

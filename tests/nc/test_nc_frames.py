@@ -1,0 +1,280 @@
+"""Heads and tails, block numbers, names, long blocks, number formats, functions that are asked for, comments."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.errors import OutputError, SettingsError
+from cornersmooth.nc import Form, Frame, choose_form, control_names, control_table, fit_settings, write
+from cornersmooth.nc.tables import parse_control
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from nc.cases import RUNNABLE, Case
+
+CL = (
+    "UNITS/MM\nPPRINT FIRST\nLOADTL/3\nSPINDL/9000,RPM,CLW\nCOOLNT/ON\nRAPID\nGOTO/0,0,50,0,0,1\nFEDRAT/800,MMPM\n"
+    "GOTO/0,0,0\nGOTO/20,0,0\nGOTO/20,20,0\nLOADTL/4\nSPINDL/9000,RPM,CLW\nRAPID\nGOTO/20,20,50\nFEDRAT/800,MMPM\n"
+    "GOTO/0,20,0\nFINI\n"
+)
+
+
+def text_of(form: Form, cl: str = CL, frame: Frame | None = None, tolerance: float = 0.05) -> list[str]:
+    program = read(cl.encode(), name="part.cls")
+    smoothed = smooth(program, fit_settings(Settings(tolerance=tolerance), form, program.units))
+    stream = io.BytesIO()
+    found = write(smoothed, stream, form=form, frame=frame)
+    lines = stream.getvalue().decode("ascii").splitlines()
+    assert found.blocks == sum(not line.endswith(" ~") for line in lines)
+    return lines
+
+
+def without_numbers(lines: list[str], control: str) -> list[str]:
+    return [line.partition(" ")[2] for line in lines] if control == "heidenhain" else lines
+
+
+# ------------------------------------------------------------------------------------------------ heads and tails
+
+
+@pytest.mark.parametrize("case", [case for case in RUNNABLE if case.machine in ("", "table-ac")], ids=str)
+def test_a_tool_is_changed_before_tip_control_is_on(case: Case) -> None:
+    """On behind the tool and before the motion, off before the next tool and at the end."""
+    form = case.choose()
+    lines = without_numbers(text_of(form), case.control)
+    change = {"siemens": "M6", "heidenhain": "TOOL CALL {} Z"}.get(case.control, "T{} M6")
+    first, second = lines.index(change.format(3)), lines.index(change.format(4))
+    if change == "M6":
+        second = lines.index("M6", first + 1)
+    assert first < second
+    if form.mode.on:
+        starts = {form.mode.on[0].format(offset=tool) for tool in (3, 4)}
+        on = [number for number, line in enumerate(lines) if line in starts]
+        off = [number for number, line in enumerate(lines) if line == form.mode.off[-1]]
+        assert len(on) == len(off) == 2
+        assert first < on[0] < off[0] < second < on[1] < off[1] < len(lines) - 1
+
+
+ENDS = {
+    "fanuc": (["%", "O0001", "G21 G90 G94 G17 G40 G49 G80"], ["M30", "%"]),
+    "generic": (["%", "O0001", "G21 G90 G94 G17 G40 G80"], ["M30", "%"]),
+    "haas": (["%", "O0001", "G21 G90 G94 G17 G40 G49 G80"], ["M30", "%"]),
+    "heidenhain": (["BEGIN PGM CORNERSMOOTH MM"], ["M30", "END PGM CORNERSMOOTH MM"]),
+    "linuxcnc": (["(CORNERSMOOTH)", "G21 G90 G94 G17 G40 G49 G80", "G64 P0.00500 Q0"], ["M2"]),
+    "mitsubishi": (["%", "O0001", "G21 G90 G94 G17 G40 G49 G80"], ["M30", "%"]),
+    "siemens": (["; CORNERSMOOTH", "G90 G94 G17 G40 G710"], ["M30"]),
+}
+
+
+@pytest.mark.parametrize("control", control_names())
+def test_head_and_tail(control: str) -> None:
+    case = next(case for case in RUNNABLE if case.control == control)
+    lines = without_numbers(text_of(case.choose()), control)
+    head, tail = ENDS[control]
+    assert lines[: len(head)] == head
+    assert lines[-len(tail) :] == tail
+
+
+@pytest.mark.parametrize(
+    ("statements", "left"),
+    [
+        ("FEDRAT/0.1,MMPR\nGOTO/9,0,0\n", ["G94", "G49"]),
+        ("CUTCOM/LEFT,ZXPLAN\nGOTO/9,0,0\n", ["G40", "G17", "G49"]),
+        ("CUTCOM/LEFT\nFEDRAT/0.1,MMPR\nGOTO/9,0,0\n", ["G40", "G94", "G49"]),
+        ("CUTCOM/LEFT\nGOTO/9,0,0\nCUTCOM/OFF\n", ["G40", "G49"]),
+        ("", ["G49"]),
+    ],
+)
+def test_what_is_on_at_the_end_is_cancelled(statements: str, left: list[str]) -> None:
+    lines = text_of(
+        choose_form("fanuc"), "UNITS/MM\nLOADTL/1\nFEDRAT/500,MMPM\nGOTO/0,0,0\nGOTO/5,0,0\n" + statements + "FINI\n"
+    )
+    assert lines[-2 - len(left) : -2] == left
+
+
+def test_a_machine_without_tip_control_ends_in_feed_per_minute() -> None:
+    lines = text_of(
+        Case("siemens", "g1", "table-ac", tcp=False).choose(), CL.replace("/0,20,0\n", "/0,20,0,0,0.6,0.8\n")
+    )
+    assert "G93" in lines
+    assert lines[-2:] == ["G94", "M30"]
+
+
+# ------------------------------------------------------------------------------------------------ names, numbers
+
+
+@pytest.mark.parametrize(
+    ("control", "good", "bad"),
+    [
+        ("fanuc", ["O4711", "O12345678", "<PART-7>"], ["PART7", "O", "O123456789", "O1)", "4711"]),
+        ("mitsubishi", ["O4711"], ["PART7"]),
+        ("haas", ["O04711"], ["PART 7"]),
+        ("heidenhain", ["BLADE_7"], ["BLADE 7", "BLADE-7", ""]),
+        ("siemens", ["BLADE 7", "a very long name " * 4], []),
+        ("linuxcnc", ["blade 7 of 12"], ["blade (7)"]),
+    ],
+)
+def test_names_of_programs_are_those_of_the_control(control: str, good: list[str], bad: list[str]) -> None:
+    form = next(case for case in RUNNABLE if case.control == control).choose()
+    for name in good:
+        assert any(name in line for line in text_of(form, frame=Frame(name))[:3])
+    for name in bad:
+        with pytest.raises(SettingsError, match="takes no program name"):
+            text_of(form, frame=Frame(name))
+
+
+@pytest.mark.parametrize("control", control_names())
+def test_block_numbers_start_again_behind_the_last(control: str) -> None:
+    form = next(case for case in RUNNABLE if case.control == control).choose()
+    layout = replace(form.table.layout, number_last=5 * form.table.layout.number_step)
+    lines = text_of(replace(form, table=replace(form.table, layout=layout)), frame=Frame(block_numbers=True))
+    numbers = [int(re.match(r"N?(\d+) ", line)[1]) for line in lines if line != "%"]  # type: ignore[index]
+    step, start = layout.number_step, layout.number_start
+    cycle = list(range(start, layout.number_last + 1, step))
+    assert numbers == (cycle * len(numbers))[: len(numbers)]
+    assert choose_form("fanuc").table.layout.number_last == 99999
+
+
+# ------------------------------------------------------------------------------------------------ long blocks
+
+
+def test_a_spline_of_five_axes_goes_on_in_the_next_line() -> None:
+    lines = text_of(Case("heidenhain", "spl", "table-ac").choose(), CL.replace("20,20,0\n", "20,20,0,0,0.6,0.8\n"))
+    parts = [line for line in lines if "SPL" in line]
+    assert parts
+    assert all(line.endswith(" ~") for line in parts)
+    assert max(map(len, lines)) <= 200
+    assert not any(line.endswith(" ~") for line in lines if "SPL" not in line)
+
+
+def test_lines_too_long_for_a_control_are_refused() -> None:
+    form = Case("linuxcnc", "g1", "xyzac-trt").choose()
+    assert text_of(form, frame=Frame(header=("(" + 253 * "x" + ")",)))
+    with pytest.raises(OutputError, match="a block of 256 characters is too long for the control, which takes 255"):
+        text_of(form, frame=Frame(header=("(" + 254 * "x" + ")",)))
+
+
+def test_long_comments_are_divided_for_every_control() -> None:
+    for case in RUNNABLE:
+        if case.machine in ("", "table-ac"):
+            lines = text_of(case.choose(), CL.replace("FIRST", 500 * "x"), Frame(block_numbers=True))
+            assert sum(line.count("x") for line in lines) == 500
+            assert max(map(len, lines)) <= (case.choose().table.layout.longest_block or 255)
+
+
+# ------------------------------------------------------------------------------------------------ number formats
+
+COMPACT = "like = 'fanuc'\n[motion]\nspaces = false\nleading_zeros = false\ntrailing_zeros = false\n"
+
+
+@pytest.mark.parametrize("form", ["g1", "g6.2"])
+def test_words_may_stand_close_and_zeros_be_left_out(form: str) -> None:
+    """The same numbers word by word."""
+    plain = text_of(choose_form("fanuc", form))
+    tight = text_of(choose_form(parse_control(COMPACT), form))
+    assert len(plain) == len(tight)
+    assert sum(map(len, tight)) < 0.75 * sum(map(len, plain))
+    words = re.compile(r"([A-Z])([+-]?[\d.]+)")
+    for one, other in zip(plain, tight, strict=True):
+        if one.startswith(("G0 ", "G1 ", "G6.2", "K")):
+            assert " " not in other
+            assert not re.search(r"[XYZIJKUVW]-?0\.\d", re.sub(r"K0\.5", "", other))
+            assert [(word, float(number)) for word, number in words.findall(one)] == [
+                (word, float(number)) for word, number in words.findall(other)
+            ]
+
+
+# ------------------------------------------------------------------------------------------------ extras, comments
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "name", "on", "off"),
+    [
+        ("fanuc", "g1", "aicc", ["G43.5 H3", "G5.1 Q1"], ["G5.1 Q0", "G49"]),
+        ("fanuc", "g6.2", "hpcc", ["G43 H3", "G5 P10000"], ["G5 P0", "G49"]),
+        (
+            "siemens",
+            "g1",
+            "cycle832",
+            ["CYCLE832(0.00500,_ORI_FINISH,0.02865)", "TRAORI"],
+            ["TRAFOOF", "CYCLE832(0,_OFF,1)"],
+        ),
+    ],
+)
+def test_functions_are_switched_on_and_off(control: str, form: str, name: str, on: list[str], off: list[str]) -> None:
+    lines = text_of(choose_form(control, form, extras=(name, name)))
+    for pair in (on, off):
+        places = [number for number, line in enumerate(lines) if line == pair[0]]
+        assert places
+        assert [lines[number + 1] for number in places] == [pair[1]] * len(places)
+    own = [line for line in lines if line.startswith(("G5", "CYCLE832"))]
+    assert own == 2 * [next(line for line in pair if line in own) for pair in (on, off)]
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "name", "message"),
+    [
+        ("siemens", "g1", "cycle800", "siemens has no function 'cycle800'; choose one of cycle832"),
+        ("siemens", "bspline", "cycle832", "cycle832 is not for siemens form bspline; use -f g1"),
+        ("heidenhain", "g1", "aicc", "heidenhain has no function 'aicc'; leave it out"),
+        ("generic", "g1", "hpcc", "generic has no function 'hpcc'; leave it out"),
+    ],
+)
+def test_unknown_functions_are_refused(control: str, form: str, name: str, message: str) -> None:
+    with pytest.raises(SettingsError) as refused:
+        choose_form(control, form, extras=(name,))
+    assert str(refused.value) == f"error: {message}"
+
+
+@pytest.mark.parametrize("control", control_names())
+def test_comments_may_be_left_out(control: str) -> None:
+    form = next(case for case in RUNNABLE if case.control == control).choose()
+    mark = form.table.layout.comment[0]
+    cl = CL.replace("GOTO/0,20,0", "CYCLE/TAP,4\nGOTO/0,20,0\nCYCLE/OFF\nABC/3")
+    with_comments = without_numbers(text_of(form, cl), control)
+    bare = without_numbers(text_of(form, cl, Frame(comments=False)), control)
+    head = form.table.layout.head
+    assert sum(line.startswith(mark) for line in with_comments) > 3
+    assert sum(line.startswith(mark) for line in bare) == sum(line.startswith(mark) for line in head)
+    assert [line for line in with_comments if not line.startswith(mark)] == [
+        line for line in bare if not line.startswith(mark)
+    ]
+
+
+def test_comments_hold_what_controls_take() -> None:
+    """No brackets, percent signs, ends of blocks or letters beyond ASCII; LinuxCNC's orders are no orders any more."""
+    said = "Fräsen (links) 50% ø8 ~; Ende – fertig 漢"
+    cl = CL.replace("PPRINT FIRST", f"PPRINT {said}")
+    assert "(Frasen [links] 50/ o8 -, Ende ? fertig ?)" in text_of(choose_form("fanuc"), cl)
+    assert "; Frasen [links] 50/ o8 -, Ende ? fertig ?" in text_of(choose_form("siemens"), cl)
+    assert "2 ; Frasen [links] 50/ o8 -, Ende ? fertig ?" in text_of(choose_form("heidenhain"), cl)
+    trunnion = Case("linuxcnc", "g1", "xyzac-trt").choose()
+    for order in ("MSG, stop", "logopen,/tmp/x", "DEBUG,#1", "py,import os", "Probeopen x"):
+        lines = text_of(trunnion, CL.replace("PPRINT FIRST", f"PPRINT {order}"))
+        assert f"(- {order})" in lines
+    assert "(FIRST)" in text_of(trunnion)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "units", "word"), [(0.05, "MM", "0.00500"), (1e-5, "MM", "0.00001"), (0.001, "INCHES", "0.00001")]
+)
+def test_blending_is_never_without_limit(tolerance: float, units: str, word: str) -> None:
+    """G64 P0 would let LinuxCNC cut corners as far as it likes."""
+    form = Case("linuxcnc", "g1", "xyzac-trt").choose()
+    program = read(CL.replace("UNITS/MM", f"UNITS/{units}").encode(), name="part.cls")
+    stream = io.BytesIO()
+    write(smooth(program, Settings(tolerance=tolerance)), stream, form=form)
+    assert f"G64 P{word} Q0" in stream.getvalue().decode().splitlines()
+
+
+def test_tables_can_be_started_from(tmp_path: Path) -> None:
+    for name in control_names():
+        file = tmp_path / f"{name}.toml"
+        file.write_text(control_table(name))
+        case = next(case for case in RUNNABLE if case.control == name)
+        form = choose_form(file, case.form, machine=case.choose().machine, tcp=case.tcp)
+        assert text_of(form) == text_of(case.choose())

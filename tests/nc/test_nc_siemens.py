@@ -1,0 +1,146 @@
+"""BSPLINE by the rules of the programming manual (12/2019) and POLY by those of the PGA, against the curves themselves.
+
+BSPLINE SD=3: the first control point is where the block before ended, with weight 1; block j carries P_j, PW and
+PL = u[j+2] − u[j+1] of the clamped knots u; blocks that follow one another are one spline. `nc.splines` reads that.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.model import SmoothProgram
+from cornersmooth.nc import choose_form
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import nurbs
+from nc.grammars import reader
+from nc.promise import written
+from nc.reading import Reading
+from nc.splines import SplineRun
+from oracle.chains import Chain, cl_text
+
+AXIS_LENGTH, TOLERANCE = 10.0, 0.5
+#: mm: rounding of control points to four decimals, for the largest weights
+DIGITS = 1.5e-4
+
+
+def circle(count: int, step: float) -> bytes:
+    """Chain of short segments with a turning tool: curves meet in the middle of each."""
+    angle = np.arange(count) * step
+    tip = np.stack((20 * np.cos(angle), 20 * np.sin(angle), angle), axis=1)
+    axis = np.stack((0.3 * np.cos(angle), 0.3 * np.sin(angle), np.ones(count)), axis=1)
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    return cl_text([Chain(np.round(tip, 6), np.round(axis, 9), np.full(count, 900.0))])[0]
+
+
+def text_of(data: bytes, form: str, **settings: object) -> tuple[str, SmoothProgram]:
+    wanted = Settings(tolerance=TOLERANCE, axis_length=AXIS_LENGTH, **settings)  # type: ignore[arg-type]
+    return written(read(data, name="part.cls"), choose_form("siemens", form), wanted)
+
+
+def reading(text: str, form: str) -> Reading:
+    return reader("siemens", form).read(text, AXIS_LENGTH, TOLERANCE)
+
+
+def splines(text: str) -> list[SplineRun]:
+    return [piece for piece in reading(text, "bspline").pieces if isinstance(piece, SplineRun)]
+
+
+WEIGHTS = [(1.0, 1.0), (0.7, 1.3), (1.5, 0.5), (3.0, 3.0), (0.25, 2.0)]
+
+
+@pytest.mark.parametrize("weights", WEIGHTS)
+@pytest.mark.parametrize(("count", "step"), [(3, 0.3), (4, 0.3), (12, 0.3)])
+def test_a_run_of_splines_is_the_curves_one_after_another(
+    weights: tuple[float, float], count: int, step: float
+) -> None:
+    text, smoothed = text_of(circle(count, step), "bspline", weights=weights)
+    rows = np.flatnonzero(smoothed.corners.smoothed)
+    assert len(rows) == count - 2
+    (run,) = splines(text)
+    assert len(run.points) == 4 * len(rows) + 1
+    tip_curves, axis_curves = nurbs.control_points(smoothed.program, smoothed.corners, rows, AXIS_LENGTH)
+    share = np.linspace(0, 1, 101)[None]
+    for index in range(len(rows)):
+        tip, direction = run.at((index + share[0]) / len(rows))
+        own = np.array([smoothed.corners.weights[rows[index]]])
+        np.testing.assert_allclose(tip, nurbs.evaluate(tip_curves[index : index + 1], own, share)[0], atol=DIGITS)
+        top = nurbs.evaluate(axis_curves[index : index + 1], own, share)[0]
+        np.testing.assert_allclose(tip + direction, top, atol=DIGITS)
+
+
+@pytest.mark.parametrize("weights", WEIGHTS)
+def test_intervals_and_weights_stand_in_the_blocks_of_their_points(weights: tuple[float, float]) -> None:
+    text, _ = text_of(circle(5, 0.3), "bspline", weights=weights)
+    lines = [line for line in text.splitlines() if " PL=" in line]
+    w1, w2 = (f"{weight:g}" for weight in weights)
+    assert [line.split()[-2:] for line in lines] == 3 * [
+        ["PL=0", f"PW={w1}"],
+        ["PL=0.5", f"PW={w2}"],
+        ["PL=0.5", f"PW={w1}"],
+        ["PL=0", "PW=1"],
+    ]
+    assert [line.startswith("BSPLINE SD=3 ") for line in lines] == [True] + 11 * [False]
+    before = text.splitlines()[text.splitlines().index(lines[0]) - 1]
+    assert before.startswith("G1 ")  # the block that reaches P0
+
+
+def test_isolated_corners_are_splines_of_their_own() -> None:
+    data = (
+        b"UNITS/MM\nRAPID\nGOTO/0,0,0,0,0,1\nFEDRAT/500,MMPM\nGOTO/90,0,0,0,0,1\nGOTO/90,90,0,0,0.6,0.8\nGOTO/0,90,0\n"
+    )
+    text, _ = text_of(data, "bspline")
+    found = splines(text)
+    assert [len(run.points) for run in found] == [5, 5]
+    np.testing.assert_array_equal(found[0].knots, [0, 0, 0, 0, 0.5, 1, 1, 1, 1])
+
+
+def test_knots_of_neighbours_are_triple() -> None:
+    (run,) = splines(text_of(circle(4, 0.3), "bspline")[0])
+    np.testing.assert_array_equal(run.knots, [0, 0, 0, 0, 0.5, 1, 1, 1, 1.5, 2, 2, 2, 2])
+
+
+@pytest.mark.parametrize("change", [("PL=0.5", "PL=0.4"), ("PL=0 PW", "PL=0.1 PW"), ("PW=1.3", "PW=1.2")])
+def test_a_wrong_interval_or_weight_is_another_curve(change: tuple[str, str]) -> None:
+    """What the reader makes of the blocks depends on all of them."""
+    text, _ = text_of(circle(4, 0.3), "bspline", weights=(0.7, 1.3))
+    share = np.linspace(0, 1, 201)
+    (run,), (other,) = splines(text), splines(text.replace(*change, 1))
+    assert np.abs(run.at(share)[0] - other.at(share)[0]).max() > 10 * DIGITS
+
+
+@pytest.mark.parametrize("shape", ["paper", "auto"])
+def test_weights_keep_to_the_range_of_the_control(shape: str) -> None:
+    """PW from 0 to 3 in steps of 0.0001: the reader refuses others."""
+    text, smoothed = text_of(circle(12, 0.9), "bspline", shape=shape)
+    found = np.array([float(weight) for weight in re.findall(r"PW=(\S+)", text)])
+    assert len(found) == 4 * int(smoothed.corners.smoothed.sum())
+    assert found.min() > 0
+
+
+def test_polynomials_are_the_curve_in_two_blocks() -> None:
+    text, smoothed = text_of(circle(6, 0.3), "poly")
+    rows = np.flatnonzero(smoothed.corners.smoothed)
+    pieces = [piece for piece in reading(text, "poly").pieces if piece.samples == 48]
+    assert len(pieces) == 2 * len(rows)
+    tip_curves, axis_curves = nurbs.control_points(smoothed.program, smoothed.corners, rows, AXIS_LENGTH)
+    share = np.linspace(0, 1, 51)
+    for index, piece in enumerate(pieces):
+        u = (index % 2 + share[None]) / 2
+        for curves, found in zip(
+            (tip_curves, axis_curves), (piece.at(share)[0], np.add(*piece.at(share))), strict=True
+        ):
+            wanted = nurbs.evaluate(curves[index // 2 : index // 2 + 1], np.ones((1, 2)), u)[0]
+            np.testing.assert_allclose(found, wanted, atol=2 * DIGITS)
+
+
+def test_cycle832_is_asked_for_by_name() -> None:
+    program = read(circle(4, 0.3), name="part.cls")
+    form = choose_form("siemens", "g1", extras=("cycle832",))
+    text, _ = written(program, form, Settings(tolerance=0.02, axis_length=25.0))
+    lines = text.splitlines()
+    assert lines[lines.index("TRAORI") - 1] == "CYCLE832(0.00200,_ORI_FINISH,0.00458)"
+    assert lines[lines.index("TRAFOOF") + 1] == "CYCLE832(0,_OFF,1)"
