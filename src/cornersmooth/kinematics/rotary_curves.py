@@ -34,7 +34,7 @@ from cornersmooth.kinematics.rotary_fit import (
     measured,
 )
 from cornersmooth.kinematics.rotary_lines import CornerLines, corner_lines
-from cornersmooth.kinematics.rotary_motion import RotaryMotion, rotary_motion
+from cornersmooth.kinematics.rotary_motion import RotaryMotion, lever_points, rotary_motion, tip_points
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.settings import WEIGHT_DECIMALS
 from cornersmooth.smoothing import nurbs
@@ -47,6 +47,9 @@ SHARE = 0.95
 LEAST_ALLOWANCE = 1e-3
 #: Places on curves that are worked on at a time: their intermediate arrays fit the processor's cache.
 BLOCK = 1 << 15
+#: A curve on even segments whose angles vary by D (rad, both axes and both legs) errs by less than this times D² away
+#: from the pole. Where that is within the allowance the error has one hump on either half, and needs few places.
+GENTLE, GENTLE_PLACES = 0.8, 4
 
 
 @dataclass(frozen=True)
@@ -248,15 +251,30 @@ class _Work:
             even = self.motion.even[corners.pose[rows]] & self.motion.even[corners.after[rows]]
             open_.append(chosen[~even])
             chosen = chosen[even]
-        size = max(1, BLOCK // (MEASURE_PLACES * spans))
-        for begin in range(0, len(chosen), size):
-            block = chosen[begin : begin + size]
-            points, error = self.curves(spans, ruled, block)
-            met = error <= SHARE * self.allowed[self.motion.rows[block]]
-            if met.any():
-                found.append(_Found(spans, block[met], points[met], error[met], ruled))
-            open_.append(block[~met])
+        gentle = self.gentle(chosen)
+        for some, places in ((chosen[gentle], GENTLE_PLACES), (chosen[~gentle], MEASURE_PLACES)):
+            size = max(1, BLOCK // (places * spans))
+            for begin in range(0, len(some), size):
+                block = some[begin : begin + size]
+                points, error = self.curves(spans, ruled, block, places)
+                met = error <= SHARE * self.allowed[self.motion.rows[block]]
+                if met.any():
+                    found.append(_Found(spans, block[met], points[met], error[met], ruled))
+                open_.append(block[~met])
         return found, np.sort(np.concatenate(open_))
+
+    def gentle(self, chosen: Ints) -> Bools:
+        """Corners on even segments whose angles vary so little that few places tell their error."""
+        corners, motion = self.smoothed.corners, self.motion
+        rows = motion.rows[chosen]
+        pose, after = corners.pose[rows], corners.after[rows]
+        here = motion.pose_angles[pose]
+        turn = np.abs(motion.end.angles[pose] - here).sum(axis=1) + np.abs(motion.start.angles[after] - here).sum(
+            axis=1
+        )
+        small = GENTLE * np.radians(turn) ** 2 <= SHARE * np.radians(self.allowed[rows])
+        gentle: Bools = small & motion.even[pose] & motion.even[after]
+        return gentle
 
     def group(self, spans: int, found: list[_Found]) -> CurveGroup:
         """All curves on so many knot intervals, as they are to be written."""
@@ -265,7 +283,7 @@ class _Work:
         order = np.argsort(numbers)
         rows = self.motion.rows[numbers[order]]
         weights = nurbs.full_weights(self.smoothed.corners.weights[rows])
-        tip, _ = nurbs.control_points(self.smoothed.program, self.smoothed.corners, rows, 0.0)
+        tip = tip_points(self.smoothed, rows)
         own = refined.homogeneous(weights)
         return CurveGroup(
             row=rows,
@@ -277,17 +295,20 @@ class _Work:
             ruled=np.concatenate([np.full(len(part.numbers), part.ruled) for part in found])[order],
         )
 
-    def curves(self, spans: int, ruled: bool, chosen: Ints) -> tuple[Floats, Floats]:
-        """Angle control points (g, p, 2) of some corners, and their errors (g,); infinite outside of the limits."""
+    def curves(self, spans: int, ruled: bool, chosen: Ints, places: int) -> tuple[Floats, Floats]:
+        """Angle control points (g, p, 2) of some corners, and their errors (g,); infinite outside of the limits.
+
+        These are measured in so many `places` in each knot interval.
+        """
         refined, targets = refinement(spans), self.targets(chosen, ruled)
         if spans == SPANS[0]:
             start, end = end_points(refined, targets)
             middle = (start[:, 2:] + end[:, :1]) / 2  # the same, but for where two transitions are joined
             points = np.concatenate((start[:, :2], middle, end[:, 1:]), axis=1)
         else:
-            places = fit_places(refined)
-            points = fit(self.machine, refined, targets, self.exact(targets, chosen, places), places)
-        error, extremes = measured(self.machine, refined, targets, points)
+            fitted = fit_places(refined)
+            points = fit(self.machine, refined, targets, self.exact(targets, chosen, fitted), fitted)
+        error, extremes = measured(self.machine, refined, targets, points, places)
         limits = self.machine.limits
         slack = self.allowed[self.motion.rows[chosen], None]
         inside = (extremes[:, :, 0] >= limits[:, 0] - slack) & (extremes[:, :, 1] <= limits[:, 1] + slack)
@@ -297,8 +318,6 @@ class _Work:
         """What the curves of some corners have to follow."""
         corners, motion = self.smoothed.corners, self.motion
         rows = motion.rows[chosen]
-        height = self.smoothed.settings.axis_length
-        tip, axis = nurbs.control_points(self.smoothed.program, corners, rows, height)
         weights = nurbs.full_weights(corners.weights[rows])
         slope, bend = (part[:, None] for part in leg_derivatives(weights, corners.ratio[rows]))
         conditions = []
@@ -308,7 +327,7 @@ class _Work:
         ):
             along, across = trim * side.slope[pose], trim**2 * side.bend[pose]
             conditions.append((side.angles[pose], along * slope, along * bend + across * slope**2))
-        return Targets(axis - tip, weights, conditions[0], conditions[1])
+        return Targets(lever_points(self.smoothed, rows), weights, conditions[0], conditions[1])
 
     def exact(self, targets: Targets, chosen: Ints, places: Floats) -> Floats:
         """Angles that give the wanted axes of some corners at common parameters: (g, m, 2) degrees."""

@@ -130,12 +130,16 @@ def fit_places(refined: Refinement) -> Floats:
     return (np.arange(count) + 0.5) / count
 
 
-def measured(machine: Machine, refined: Refinement, targets: Targets, points: Floats) -> tuple[Floats, Floats]:
+def measured(
+    machine: Machine, refined: Refinement, targets: Targets, points: Floats, count: int = MEASURE_PLACES
+) -> tuple[Floats, Floats]:
     """Largest angle between the axis of the angles and the one wanted, and the extremes of the angles.
 
     Parameters
     ----------
     points : (g, p, 2) float64, degrees
+    count : int
+        Places in each knot interval.
 
     Returns
     -------
@@ -143,7 +147,7 @@ def measured(machine: Machine, refined: Refinement, targets: Targets, points: Fl
     extremes : (g, 2, 2) float64, degrees
         ``[curve, axis, lowest or highest]``
     """
-    places = np.linspace(0.0, 1.0, MEASURE_PLACES * refined.spans + 1)
+    places = np.linspace(0.0, 1.0, count * refined.spans + 1)
     angles = refined.rational_basis(places, refined.homogeneous(targets.weights)) @ points
     axis = tool_axis(machine, angles.reshape(-1, 2)).reshape(*angles.shape[:2], 3)
     error = angle_between(axis, targets.axis(places)).max(axis=1)

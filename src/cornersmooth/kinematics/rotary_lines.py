@@ -9,7 +9,7 @@ import numpy as np
 from cornersmooth.kinematics.insertion import fill, insertions
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.orientation import continued, unit
-from cornersmooth.kinematics.rotary_motion import RotaryMotion
+from cornersmooth.kinematics.rotary_motion import RotaryMotion, lever_points, tip_points
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.layout import lines_per_half
@@ -60,10 +60,9 @@ def corner_lines(
         group = np.flatnonzero(halves == number)
         u = _nodes(int(number))
         where = first[group, None] + np.arange(len(u))
-        tip_curve, axis_curve = nurbs.control_points(program, corners, rows[group], smoothed.settings.axis_length)
         weights = corners.weights[rows[group]]
-        tip[where] = nurbs.evaluate(tip_curve, weights, u)
-        lever[where] = nurbs.evaluate(axis_curve - tip_curve, weights, u)
+        tip[where] = nurbs.evaluate(tip_points(smoothed, rows[group]), weights, u)
+        lever[where] = nurbs.evaluate(lever_points(smoothed, rows[group]), weights, u)
         guess, branch = motion.followed.interpolated(chosen[group], u)
         words, _ = continued(
             machine, unit(lever[where].reshape(-1, 3)), guess.reshape(-1, 2), branch.ravel(), motion.cone

@@ -15,7 +15,7 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.kinematics.insertion import Insertions, insertions
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.orientation import angle_between, continued, solutions, tool_axis, unit, wrap
+from cornersmooth.kinematics.orientation import angle_between, continued, pole_distance, tool_axis, unit
 from cornersmooth.kinematics.route import rapid_moves, rotary_angles
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
@@ -31,6 +31,8 @@ SEGMENT_PLACES, SEGMENT_SHARE = tuple(j / 8 for j in range(1, 8)), 0.8
 STRICTEST_SHARE = 0.1
 #: Step of the derivatives of the ruled angles, in fractions of the segment.
 DIFFERENCE = 1e-3
+#: Places worked on at a time: their intermediate arrays fit the processor's cache.
+BLOCK = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -181,12 +183,11 @@ def _follow(
 ) -> tuple[Followed, Floats, tuple[Finding, ...]]:
     """Rotary angles along the whole smoothed path, a few places on every transition."""
     program, corners = smoothed.program, smoothed.corners
-    pose, height = corners.pose[rows], smoothed.settings.axis_length
-    axis = program.axis
+    pose, axis = corners.pose[rows], program.axis
     step = np.maximum(
         angle_between(axis[corners.before[rows]], axis[pose]), angle_between(axis[pose], axis[corners.after[rows]])
     )
-    near = solutions(machine, axis[pose]).pole_distance < NEAR_POLE * step + NEAR_POLE_DEGREES
+    near = pole_distance(machine, axis[pose]) < NEAR_POLE * step + NEAR_POLE_DEGREES
     count = np.where(near, MANY_PLACES, FEW_PLACES)
     counts = np.where(layout.skip, 0, 1)
     counts[pose] = count
@@ -195,21 +196,20 @@ def _follow(
     first = last[pose] - count
     path_tip, path_axis = program.tip[owner], axis[owner]
     for number in (FEW_PLACES, MANY_PLACES):
-        chosen = np.flatnonzero(count == number)
-        if len(chosen):
+        of_number = np.flatnonzero(count == number)
+        size = max(1, BLOCK // number)
+        for begin in range(0, len(of_number), size):
+            chosen = of_number[begin : begin + size]
             where = first[chosen, None] + np.arange(number)
-            tip_curve, axis_curve = nurbs.control_points(program, corners, rows[chosen], height)
             weights, u = corners.weights[rows[chosen]], np.linspace(0.0, 1.0, number)
-            path_tip[where] = nurbs.evaluate(tip_curve, weights, u)
-            path_axis[where] = unit(nurbs.evaluate(axis_curve - tip_curve, weights, u))
+            path_tip[where] = nurbs.evaluate(tip_points(smoothed, rows[chosen]), weights, u)
+            path_axis[where] = unit(nurbs.evaluate(lever_points(smoothed, rows[chosen]), weights, u))
     rapid = rapid_moves(program.kind)[owner]
     rapid[1:] &= owner[1:] != owner[:-1]
     path = rotary_angles(
         machine, path_tip, path_axis, tolerance=tolerance, rapid=rapid, line=program.line[owner], file=file
     )
-    found = solutions(machine, path_axis)
-    off = np.abs(wrap(found.angles - path.angles[:, None, :])).sum(axis=2)
-    branch = np.where(found.pole_distance <= tolerance / 2, -1, np.argmin(off, axis=1))
+    branch = path.branch.astype(np.int64)
     followed = Followed(first, count, path.angles, branch)
     pose_angles = np.full((len(program), 2), np.nan)
     written = np.flatnonzero(~layout.skip)
@@ -323,3 +323,21 @@ def _ruled(smoothed: SmoothProgram, machine: Machine, layout: Layout, even: Bool
     slope[pose] = (behind - before) / (2 * DIFFERENCE)
     bend[pose] = (behind - 2 * here + before) / DIFFERENCE**2
     return Ends(side.place, side.angles, slope, bend)
+
+
+def tip_points(smoothed: SmoothProgram, rows: Ints) -> Floats:
+    """Control points of the tip curves of some rows of `Corners`: (g, 5, 3) mm."""
+    return _points(smoothed, rows, smoothed.program.tip)
+
+
+def lever_points(smoothed: SmoothProgram, rows: Ints) -> Floats:
+    """Those of (Q − P)/H, where P and Q are trimmed by the same share: (g, 5, 3)."""
+    return _points(smoothed, rows, smoothed.program.axis)
+
+
+def _points(smoothed: SmoothProgram, rows: Ints, values: Floats) -> Floats:
+    corners = smoothed.corners
+    here = values[corners.pose[rows]]
+    leg_in = (here - values[corners.before[rows]]) * corners.trim_in[rows, None]
+    leg_out = (values[corners.after[rows]] - here) * corners.trim_out[rows, None]
+    return nurbs.five_points(here, leg_in, leg_out, corners.ratio[rows])

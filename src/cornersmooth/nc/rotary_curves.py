@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics.rotary_curves import CurveGroup, RotaryCurves, angle_allowance, rotary_curves
-from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
+from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.nc.control import Form
 from cornersmooth.nc.notes import Notes
 from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
@@ -61,99 +61,123 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, notes: Notes) -> Iter
 
 
 class _Table:
-    """All rows, put together pose by pose: inserted points, the end of the straight motion, the curve."""
+    """Where all rows stand, pose by pose: inserted points, the end of the straight motion, the curve."""
 
     def __init__(self, smoothed: SmoothProgram, found: RotaryCurves) -> None:
         program, corners = smoothed.program, smoothed.corners
         self.smoothed, self.found = smoothed, found
         self.layout: Layout = lay_out(smoothed, dense=False)
         n = len(program)
-        self.inserted = np.bincount(found.inserted.segment, minlength=n)[:n]
-        straight = np.where(self.layout.line & ~self.layout.skip, 1, 0)
-        pieces = arc_lines(program, smoothed.settings) if len(program.arcs) else np.zeros(0, np.int64)
-        straight[program.arcs.pose] = pieces
+        more = found.inserted
+        self.order = np.lexsort((more.fraction, more.segment))
+        self.inserted = np.bincount(more.segment, minlength=n)[:n]
+        self.straight = np.where(self.layout.line & ~self.layout.skip, 1, 0)
+        self.pieces = arc_lines(program, smoothed.settings) if len(program.arcs) else np.zeros(0, np.int64)
+        self.straight[program.arcs.pose] = self.pieces
         curve = np.zeros(n, np.int64)
         curve[corners.pose] = found.points + np.maximum(np.bincount(found.lines.row, minlength=len(corners)) - 1, 0)
-        counts = self.inserted + straight + curve
-        self.first = np.concatenate(([0], np.cumsum(counts)))
-        self.after = self.first[:-1] + self.inserted + straight  # where the curve of each pose begins
-        total = int(self.first[-1])
-        self.tip, self.angles = np.zeros((total, 3)), np.zeros((total, 2))
-        self.move = np.repeat(np.arange(n), counts)
-        self.curve, self.joined = np.zeros(total, np.int8), np.zeros(total, np.bool_)
-        self.spline = np.zeros((total, 3))
-        self._straight(straight > 0)
-        self._arcs(pieces)
-        for group in found.groups:
-            self._curves(group)
-        self._lines()
+        self.counts = self.inserted + self.straight + curve
 
     def blocks(self) -> Iterator[Rows]:
         """Rows of some poses at a time."""
-        n = len(self.smoothed.program)
-        for begin in range(0, n, _BLOCK):
-            rows = slice(self.first[begin], self.first[min(begin + _BLOCK, n)])
-            yield Rows(
-                self.tip[rows],
-                self.angles[rows],
-                self.move[rows],
-                self.curve[rows],
-                self.joined[rows],
-                spline=self.spline[rows],
-            )
+        for begin in range(0, len(self.counts), _BLOCK):
+            yield _Block(self, begin, min(begin + _BLOCK, len(self.counts))).rows
 
-    def _straight(self, there: Bools) -> None:
-        """Inserted points and ends of straight motion; those before curves get their joint with the curve."""
-        program, more = self.smoothed.program, self.found.inserted
-        order = np.lexsort((more.fraction, more.segment))
-        segment, fraction = more.segment[order], more.fraction[order]
-        first = np.concatenate(([0], np.cumsum(self.inserted)))
-        at = self.first[segment] + np.arange(len(segment)) - first[segment]
-        start = program.tip[self.layout.start[segment]]
-        self.tip[at] = start + fraction[:, None] * (program.tip[segment] - start)
-        self.angles[at] = more.angles[order]
-        pose = np.flatnonzero(there & (self.layout.row < 0))
-        self.tip[self.after[pose] - 1] = program.tip[pose]
-        self.angles[self.after[pose] - 1] = self.found.pose_angles[pose]
 
-    def _arcs(self, pieces: Ints) -> None:
-        program = self.smoothed.program
+class _Block:
+    """Rows of the poses from `begin` to before `end`."""
+
+    def __init__(self, table: _Table, begin: int, end: int) -> None:
+        self.table, self.begin, self.end = table, begin, end
+        poses = slice(begin, end)
+        counts = table.counts[poses]
+        self.first = np.cumsum(counts) - counts  # of each pose
+        self.after = self.first + table.inserted[poses] + table.straight[poses]  # where the curve of each pose begins
+        total = int(counts.sum())
+        self.rows = Rows(
+            tip=np.zeros((total, 3)),
+            other=np.zeros((total, 2)),
+            move=np.repeat(np.arange(begin, end), counts),
+            curve=np.zeros(total, np.int8),
+            joined=np.zeros(total, np.bool_),
+            spline=np.zeros((total, 3)),
+        )
+        self._inserted()
+        self._straight()
+        self._arcs()
+        for group in table.found.groups:
+            self._curves(group)
+        self._lines()
+
+    def _put(self, at: Ints, tip: Floats, angles: Floats) -> None:
+        self.rows.tip[at], self.rows.other[at] = tip, angles
+
+    def _within(self, poses: Ints) -> slice:
+        """Entries of a list of poses, ascending, that are in this block."""
+        low, high = np.searchsorted(poses, (self.begin, self.end)).tolist()
+        return slice(low, high)
+
+    def _inserted(self) -> None:
+        """Points inserted into straight motion."""
+        more, program = self.table.found.inserted, self.table.smoothed.program
+        own = self.table.order[self._within(more.segment[self.table.order])]
+        segment, fraction = more.segment[own], more.fraction[own]
+        number = np.arange(len(own)) - np.searchsorted(segment, segment)
+        start = program.tip[self.table.layout.start[segment]]
+        tip = start + fraction[:, None] * (program.tip[segment] - start)
+        self._put(self.first[segment - self.begin] + number, tip, more.angles[own])
+
+    def _straight(self) -> None:
+        """Ends of straight motion that are no joints."""
+        poses = slice(self.begin, self.end)
+        pose = self.begin + np.flatnonzero((self.table.straight[poses] > 0) & (self.table.layout.row[poses] < 0))
+        at = self.after[pose - self.begin] - 1
+        self._put(at, self.table.smoothed.program.tip[pose], self.table.found.pose_angles[pose])
+
+    def _arcs(self) -> None:
+        program, poses = self.table.smoothed.program, self.table.found.pose_angles
+        chosen = self._within(program.arcs.pose)
+        pieces = self.table.pieces[chosen]
         if not len(pieces):
             return
         rows, share = divided(pieces)
+        rows += chosen.start
         pose = program.arcs.pose[rows]
-        at = np.flatnonzero(np.isin(self.move, program.arcs.pose))
-        self.tip[at], _ = arc_points(program, rows, share)
-        end = self.found.pose_angles[pose]
-        start = self.found.pose_angles[pose - 1]
-        start = np.where(np.isnan(start), end, start)  # from a stated position
-        self.angles[at] = start + share[:, None] * (end - start)
+        at = np.flatnonzero(np.isin(self.rows.move, program.arcs.pose[chosen]))
+        tip, _ = arc_points(program, rows, share)
+        start = np.where(np.isnan(poses[pose - 1]), poses[pose], poses[pose - 1])  # from a stated position
+        self._put(at, tip, start + share[:, None] * (poses[pose] - start))
 
     def _curves(self, group: CurveGroup) -> None:
-        pose = self.smoothed.corners.pose[group.row]
+        poses = self.table.smoothed.corners.pose[group.row]
+        own = self._within(poses)
+        pose, tip, angles = poses[own], group.tip[own], group.angles[own]
         count = group.tip.shape[1]
-        at = self.after[pose][:, None] + np.arange(count)
-        self.tip[at], self.angles[at] = group.tip, group.angles
-        self.curve[at] = np.arange(1, count + 1)
-        self.spline[at, 0] = group.knots[:count]
-        self.spline[at, 1] = group.weights
-        self.spline[at[:, -1], 2] = group.knots[-1]
-        self._join(pose, group.tip[:, 0], group.angles[:, 0])
-        self.joined[at[:, 0]] = ~self.layout.line[pose]
+        at = self.after[pose - self.begin][:, None] + np.arange(count)
+        self._put(at, tip, angles)
+        self.rows.curve[at] = np.arange(1, count + 1)
+        spline = self.rows.spline
+        assert spline is not None
+        spline[at, 0] = group.knots[:count]
+        spline[at, 1] = group.weights[own]
+        spline[at[:, -1], 2] = group.knots[-1]
+        self._join(pose, tip[:, 0], angles[:, 0])
+        self.rows.joined[at[:, 0]] = ~self.table.layout.line[pose]
 
     def _lines(self) -> None:
-        lines = self.found.lines
-        begins = np.diff(lines.row, prepend=-1) != 0
+        lines = self.table.found.lines
+        own = self._within(self.table.smoothed.corners.pose[lines.row])
+        row, tip, angles = lines.row[own], lines.tip[own], lines.angles[own]
+        begins = np.diff(row, prepend=-1) != 0
         first = np.flatnonzero(begins)
-        pose = self.smoothed.corners.pose[lines.row[first]]
-        self._join(pose, lines.tip[first], lines.angles[first])
+        pose = self.table.smoothed.corners.pose[row[first]]
+        self._join(pose, tip[first], angles[first])
         rest = np.flatnonzero(~begins)
-        own = np.cumsum(begins)[rest] - 1
-        at = self.after[pose][own] + rest - first[own] - 1
-        self.tip[at], self.angles[at] = lines.tip[rest], lines.angles[rest]
+        number = np.cumsum(begins)[rest] - 1
+        at = self.after[pose[number] - self.begin] + rest - first[number] - 1
+        self._put(at, tip[rest], angles[rest])
 
     def _join(self, pose: Ints, tip: Floats, angles: Floats) -> None:
         """Let the straight motion before a curve end exactly where the curve begins."""
-        line = self.layout.line[pose]
-        at = self.after[pose[line]] - 1
-        self.tip[at], self.angles[at] = tip[line], angles[line]
+        line = self.table.layout.line[pose]
+        self._put(self.after[pose[line] - self.begin] - 1, tip[line], angles[line])
