@@ -96,6 +96,9 @@ class BlockWriter:
         """Numbers of rows in units of the text, (r, c)."""
         form = self.form
         if form.orientation == "machine" and form.machine is not None:
+            # for the angles as they are written: far from the axes their rounding would move the tip
+            step = 10.0**-form.table.digits.angle
+            other = step * to_ticks(other, (form.table.digits.angle,) * 2)
             tip = machine_position(form.machine, tip, other)
         if form.rotary and form.machine is not None and form.machine.names != form.other_words:
             other = other[:, ::-1]
