@@ -76,6 +76,28 @@ class Block:
 
 
 @dataclass(frozen=True)
+class Cut:
+    """Part of the written motion, cut in lanes that can be walked on their own.
+
+    Parameters
+    ----------
+    written : Written
+    six : (v, 6) float64
+    lanes : Lanes
+    spans : list of (first, last, start, stop)
+        Vertices of each stretch, first original segment and last one plus one.
+    closed : bool
+        See `Block`.
+    """
+
+    written: Written
+    six: Floats
+    lanes: Lanes
+    spans: list[tuple[int, int, int, int]]
+    closed: bool
+
+
+@dataclass(frozen=True)
 class Matcher:
     """The two motions and the lengths that decide what counts as near.
 
@@ -119,6 +141,10 @@ class Matcher:
 
     def blocks(self, stretches: Stretches) -> Iterator[Block]:
         """Give out all stretches, in blocks of about `BLOCK` elements, each vertex with its place."""
+        return map(self.walked, self.cuts(stretches))
+
+    def cuts(self, stretches: Stretches) -> Iterator[Cut]:
+        """Give out all stretches, in parts of about `BLOCK` elements."""
         last_vertex = self.original.trail.last
         pending: list[tuple[int, int, int, int, float]] = []
         columns = (
@@ -138,23 +164,23 @@ class Matcher:
                 start, fraction = stop - 1, 1.0
             while True:
                 if pending and last - pending[0][0] > BLOCK:
-                    done, _ = self._match(pending, open_end=False)
+                    done, _ = self._cut(pending, open_end=False)
                     pending = []
                     yield done
                 if last - first <= BLOCK + BLOCK // 2:
                     pending.append((first, last, start, stop, fraction))
                     break
-                done, rest = self._match([(first, first + BLOCK, start, stop, fraction)], open_end=True)
+                done, rest = self._cut([(first, first + BLOCK, start, stop, fraction)], open_end=True)
                 yield done
                 first, start, fraction = rest
         if pending:
-            done, _ = self._match(pending, open_end=False)
+            done, _ = self._cut(pending, open_end=False)
             yield done
 
-    def _match(
+    def _cut(
         self, pieces: list[tuple[int, int, int, int, float]], *, open_end: bool
-    ) -> tuple[Block, tuple[int, int, float]]:
-        """Make one block; with an open end only up to the last anchor, and say where the rest begins."""
+    ) -> tuple[Cut, tuple[int, int, float]]:
+        """Make one part; with an open end only up to the last anchor, and say where the rest begins."""
         first, last = pieces[0][0], pieces[-1][1]
         written = written_motion(self.nc, first, last, self.tolerance, self.axis_length)
         six = written.trail.six(self.axis_length)
@@ -163,17 +189,28 @@ class Matcher:
         ends = written.trail.last
         lanes: list[Lane] = []
         spans = []
+        rest: tuple[int, int, float] | None = None
         for piece in pieces:
             lane = (int(ends[piece[0] - first]), int(ends[piece[1] - first]), piece[2], piece[3], piece[4])
             cut = [lane]
             if lane[1] - lane[0] > 2 * LANE:
                 cut = cut_lane(six, length, self.track, lane, LANE, self.near, ends if open_end else None)
             if open_end and len(cut) > 1:
-                cut.pop()
+                vertex, _, start, _, fraction = cut.pop()
+                rest = int(written.trail.owner[vertex]), start, fraction
             lanes += cut
             spans.append((lane[0], cut[-1][1], lane[2], cut[-1][3]))
         table = Lanes(*(np.array(column) for column in zip(*lanes, strict=True)))
-        segment, fraction, backward, distance = walk(six, self.track, table, self.margin, self.near)
+        done = Cut(written, six, table, spans, not open_end)
+        if rest is None and open_end:  # no anchor: only the walk tells where the rest begins
+            block, tail = self.walked(done), spans[-1][1]
+            rest = int(written.trail.owner[tail]), int(block.segment[tail]), float(block.fraction[tail])
+        return done, rest or (last, 0, 0.0)
+
+    def walked(self, cut: Cut) -> Block:
+        """Assign a place on the original to every vertex of a part."""
+        six, spans = cut.six, cut.spans
+        segment, fraction, backward, distance = walk(six, self.track, cut.lanes, self.margin, self.near)
         on = fraction >= 0
         number = np.full(len(six), -1, np.int64)
         low, high = np.zeros(len(six), np.int64), np.zeros(len(six), np.int64)
@@ -181,15 +218,13 @@ class Matcher:
             a, b, start, stop = spans[0]
             number[a : b + 1], low[a : b + 1], high[a : b + 1] = 0, start, stop - 1
         else:
-            a, b, start, stop = np.array(spans).T
-            index = np.repeat(np.arange(len(spans)), b - a + 1)
-            vertex = np.repeat(a - np.cumsum(b - a + 1) + (b - a + 1), b - a + 1) + np.arange(len(index))
-            number[vertex], low[vertex], high[vertex] = index, start[index], stop[index] - 1
+            firsts, lasts, starts, stops = np.array(spans).T
+            size = lasts - firsts + 1
+            index = np.repeat(np.arange(len(spans)), size)
+            vertex = np.repeat(firsts - np.cumsum(size) + size, size) + np.arange(len(index))
+            number[vertex], low[vertex], high[vertex] = index, starts[index], stops[index] - 1
         self._look_again(six, number, segment, fraction, backward, distance)
-        tail = spans[-1][1]
-        block = Block(written, six, on, number, segment, fraction, backward, distance, low, high, not open_end)
-        rest = (int(written.trail.owner[tail]), int(segment[tail]), float(fraction[tail]))
-        return block, rest
+        return Block(cut.written, six, on, number, segment, fraction, backward, distance, low, high, cut.closed)
 
     def _look_again(
         self, six: Floats, piece: Ints, segment: Ints, fraction: Floats, backward: Bools, distance: Floats

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -64,6 +64,11 @@ class Violations:
         self.amount.append(amount)
         self.code.append(np.full(len(place), code))
 
+    def extend(self, other: Violations) -> None:
+        """Add the places of another."""
+        for name, columns in vars(other).items():
+            getattr(self, name).extend(columns)
+
     def problems(self, text: dict[int, str]) -> list[Problem]:
         """One problem for each group of neighbouring places with the same code, at its worst place."""
         if not self.place:
@@ -86,8 +91,8 @@ class Violations:
 
 
 @dataclass
-class Deviation:
-    """What was measured.
+class Largest:
+    """Largest deviations.
 
     Parameters
     ----------
@@ -97,17 +102,39 @@ class Deviation:
         The same at one common pose of the tool line.
     orientation : Worst, rad
         At the common pose.
+    """
+
+    tip: Worst = field(default_factory=Worst)
+    axis_point: Worst = field(default_factory=Worst)
+    together_tip: Worst = field(default_factory=Worst)
+    together_axis_point: Worst = field(default_factory=Worst)
+    orientation: Worst = field(default_factory=Worst)
+
+    def copy(self) -> Largest:
+        """Return the same values, to go on from."""
+        return Largest(*(replace(worst) for worst in vars(self).values()))
+
+    def take(self, other: Largest) -> None:
+        """Take over what is larger elsewhere."""
+        for name, worst in vars(other).items():
+            if worst.value > getattr(self, name).value:
+                setattr(self, name, worst)
+
+
+@dataclass
+class Deviation:
+    """What was measured.
+
+    Parameters
+    ----------
+    largest : Largest
     pose_tip, pose_axis_point : (n,) float64, mm
         Distance of every original pose from the nearest written pose; NaN where the tool does not pass at feed.
     pose_angle : (n,) float64, rad
     pose_nc_line : (n,) int64
     """
 
-    tip: Worst
-    axis_point: Worst
-    together_tip: Worst
-    together_axis_point: Worst
-    orientation: Worst
+    largest: Largest
     pose_tip: Floats
     pose_axis_point: Floats
     pose_angle: Floats
@@ -115,8 +142,36 @@ class Deviation:
     violations: Violations
 
 
+@dataclass
+class Measured:
+    """What one block shows.
+
+    Parameters
+    ----------
+    largest : Largest
+        At least what it started from.
+    violations : Violations
+    off : (v,) float64, mm
+        Distance of every written vertex from the original.
+    pose : (k,) int64
+        Original poses, and for each of them:
+    pose_tip, pose_axis_point : (k,) float64, mm
+    pose_angle : (k,) float64, rad
+    pose_nc_line : (k,) int64
+    """
+
+    largest: Largest
+    violations: Violations
+    off: Floats
+    pose: Ints
+    pose_tip: Floats
+    pose_axis_point: Floats
+    pose_angle: Floats
+    pose_nc_line: Ints
+
+
 class Meter:
-    """Measures block after block."""
+    """Measures blocks, several at once, and gathers what they show in their order."""
 
     def __init__(self, matcher: Matcher, tolerance: float) -> None:
         n = len(matcher.original.program)
@@ -126,11 +181,7 @@ class Meter:
         self.exact = exact_poses(matcher)
         nan = np.full(n, np.nan)
         self.result = Deviation(
-            Worst(),
-            Worst(),
-            Worst(),
-            Worst(),
-            Worst(),
+            Largest(),
             nan,
             nan.copy(),
             nan.copy(),
@@ -138,8 +189,9 @@ class Meter:
             Violations(),
         )
 
-    def measure(self, block: Block) -> Reached:
-        """Measure one block; return what its written vertices found."""
+    def measure(self, block: Block, so_far: Largest) -> Measured:
+        """Measure one block; what is not larger than what was met so far is not looked at closely."""
+        largest, violations = so_far.copy(), Violations()
         matcher = self.matcher
         written = from_written(matcher, block)
         theirs = from_original(matcher, block)
@@ -147,31 +199,59 @@ class Meter:
         rows = np.minimum(written.place.astype(np.int64) + 1, len(original.trail) - 1)
         cl_line = original.program.line[original.pose[original.trail.owner[rows]]]
         nc_line = matcher.nc.line[block.written.trail.owner[written.vertex]]
-        self._take(block, written, cl_line, nc_line, written.place, mine=True)
-        self._take_hulls(block)
+        part = _Part(self, block, largest, violations)
+        part.take(written, cl_line, nc_line, written.place, mine=True)
+        part.take_hulls()
 
         pose = original.pose[original.trail.owner[theirs.vertex]]
         cl_line = original.program.line[pose]
         segment = np.minimum(theirs.place.astype(np.int64) + 1, len(block.six) - 1)
         nc_line = matcher.nc.line[block.written.trail.owner[segment]]
-        self._take(block, theirs, cl_line, nc_line, theirs.vertex.astype(np.float64), mine=False)
+        part.take(theirs, cl_line, nc_line, theirs.vertex.astype(np.float64), mine=False)
         whole = original.trail.fraction[theirs.vertex] == 1
-        result, pose = self.result, pose[whole]
-        result.pose_tip[pose], result.pose_axis_point[pose] = theirs.gap.tip[whole], theirs.gap.axis_point[whole]
-        result.pose_angle[pose], result.pose_nc_line[pose] = theirs.gap.angle[whole], nc_line[whole]
-
-        self._check_exact(block, theirs, whole)
+        part.check_exact(theirs, whole)
         for found in (written_backwards(matcher, block, written), original_backwards(matcher, block, theirs)):
             if found is not None:
-                result.violations.add(523, *found)
-        return written
+                violations.add(523, *found)
+        off = np.zeros(len(block.six))
+        off[written.vertex] = written.gap.larger
+        gap = theirs.gap
+        return Measured(
+            largest,
+            violations,
+            off,
+            pose[whole],
+            gap.tip[whole],
+            gap.axis_point[whole],
+            gap.angle[whole],
+            nc_line[whole],
+        )
+
+    def add(self, measured: Measured) -> None:
+        """Gather what the next block shows."""
+        result, pose = self.result, measured.pose
+        result.largest.take(measured.largest)
+        result.violations.extend(measured.violations)
+        result.pose_tip[pose], result.pose_axis_point[pose] = measured.pose_tip, measured.pose_axis_point
+        result.pose_angle[pose], result.pose_nc_line[pose] = measured.pose_angle, measured.pose_nc_line
 
     def problems(self) -> list[Problem]:
         """What is wrong, neighbouring places taken together."""
         return self.result.violations.problems(_TEXT)
 
-    def _take(self, block: Block, reached: Reached, cl_line: Ints, nc_line: Ints, place: Floats, *, mine: bool) -> None:
-        result, gap = self.result, reached.gap
+
+@dataclass(frozen=True)
+class _Part:
+    """One block being measured."""
+
+    meter: Meter
+    block: Block
+    largest: Largest
+    violations: Violations
+
+    def take(self, reached: Reached, cl_line: Ints, nc_line: Ints, place: Floats, *, mine: bool) -> None:
+        """Take what the vertices of one of the two motions found."""
+        result, gap, limit = self.largest, reached.gap, self.meter.limit
         result.together_tip.update(gap.tip, cl_line, nc_line)
         result.together_axis_point.update(gap.axis_point, cl_line, nc_line)
         result.orientation.update(gap.angle, cl_line, nc_line)
@@ -180,10 +260,10 @@ class Meter:
         tip, axis = gap.tip.copy(), gap.axis_point.copy()
 
         def look(rows: Ints) -> None:
-            tip[rows], axis[rows] = own_gaps(self.matcher, block, reached, rows)
+            tip[rows], axis[rows] = own_gaps(self.meter.matcher, self.block, reached, rows)
             known[rows] = True
 
-        over = np.flatnonzero(gap.larger > self.limit)
+        over = np.flatnonzero(gap.larger > limit)
         if len(over):
             look(over[np.argsort(-gap.larger[over])[:_MOST_OWN_ROWS]])
         for values, worst in ((tip, result.tip), (axis, result.axis_point)):
@@ -200,36 +280,38 @@ class Meter:
             rows = np.flatnonzero(known)
             worst.update(values[rows], cl_line[rows], nc_line[rows])
         over = over[known[over]]
-        apart = over[(gap.larger[over] > self.together) & (np.maximum(tip, axis)[over] <= self.limit)]
+        apart = over[(gap.larger[over] > self.meter.together) & (np.maximum(tip, axis)[over] <= limit)]
         if len(apart):
-            result.violations.add(525, place[apart], cl_line[apart], nc_line[apart], gap.larger[apart])
+            self.violations.add(525, place[apart], cl_line[apart], nc_line[apart], gap.larger[apart])
         for code, values in ((521, tip), (522, axis)):
-            broken = over[values[over] > self.limit]
+            broken = over[values[over] > limit]
             if len(broken):
-                result.violations.add(code, place[broken], cl_line[broken], nc_line[broken], values[broken])
+                self.violations.add(code, place[broken], cl_line[broken], nc_line[broken], values[broken])
 
-    def _take_hulls(self, block: Block) -> None:
+    def take_hulls(self) -> None:
         """Deviations of curves between their knots, where they may be larger than at the knots."""
-        found = hull_gaps(self.matcher, block, self.limit)
+        matcher, limit = self.meter.matcher, self.meter.limit
+        found = hull_gaps(matcher, self.block, limit)
         if found is None:
             return
         place, element, tip, axis = found
-        original = self.matcher.original
+        original = matcher.original
         rows = np.minimum(place.astype(np.int64) + 1, len(original.trail) - 1)
         cl_line = original.program.line[original.pose[original.trail.owner[rows]]]
-        nc_line = self.matcher.nc.line[element]
-        for code, values, worst in ((521, tip, self.result.tip), (522, axis, self.result.axis_point)):
+        nc_line = matcher.nc.line[element]
+        for code, values, worst in ((521, tip, self.largest.tip), (522, axis, self.largest.axis_point)):
             worst.update(values, cl_line, nc_line)
-            broken = np.flatnonzero(values > self.limit)
+            broken = np.flatnonzero(values > limit)
             if len(broken):
-                self.result.violations.add(code, place[broken], cl_line[broken], nc_line[broken], values[broken])
+                self.violations.add(code, place[broken], cl_line[broken], nc_line[broken], values[broken])
 
-    def _check_exact(self, block: Block, theirs: Reached, whole: Bools) -> None:
+    def check_exact(self, theirs: Reached, whole: Bools) -> None:
         """Poses that may not be rounded must be ends of elements, to the printed digits."""
-        matcher, original = self.matcher, self.matcher.original
+        matcher, block = self.meter.matcher, self.block
+        original = matcher.original
         rows = np.flatnonzero(whole)
         move = original.trail.owner[theirs.vertex[rows]]
-        rows = rows[self.exact[move]]
+        rows = rows[self.meter.exact[move]]
         if not len(rows):
             return
         move = original.trail.owner[theirs.vertex[rows]]
@@ -247,7 +329,7 @@ class Meter:
             amount = np.minimum(amount, off)
         missed = np.flatnonzero(~exact)
         if len(missed):
-            self.result.violations.add(
+            self.violations.add(
                 524,
                 theirs.vertex[rows[missed]].astype(np.float64),
                 original.program.line[pose[missed]],

@@ -16,6 +16,10 @@ Result = TypeVar("Result")
 MOST_THREADS: Final = 4
 
 
+#: items taken ahead of what has been given out, whatever the number of threads: what comes out never depends on it
+_AHEAD: Final = 5
+
+
 def threads() -> int:
     """Threads to work with."""
     return max(1, min(MOST_THREADS, os.cpu_count() or 1))
@@ -27,18 +31,17 @@ def ahead(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Res
     Items are taken as they are needed, by the caller's thread; few are in flight at any time.
     """
     source = iter(items)
-    count = threads()
     first = list(islice(source, 2))
     if len(first) < 2:  # not worth a thread
         yield from map(work, first)
         return
     waiting: deque[Future[Result]] = deque()
-    with ThreadPoolExecutor(count) as pool:
+    with ThreadPoolExecutor(threads()) as pool:
         try:
             waiting.extend(pool.submit(work, item) for item in first)
             for item in source:
                 waiting.append(pool.submit(work, item))
-                if len(waiting) > count + 1:
+                if len(waiting) >= _AHEAD:
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()

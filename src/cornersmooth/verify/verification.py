@@ -11,12 +11,13 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.settings import BOUNDS
-from cornersmooth.verify.blocks import Block, Matcher
-from cornersmooth.verify.deviation import Deviation, Meter, Worst
+from cornersmooth.verify.blocks import Block, Cut, Matcher
+from cornersmooth.verify.deviation import Deviation, Largest, Measured, Meter, Worst
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.holes import divide_at_holes
 from cornersmooth.verify.joints import joint_jumps
 from cornersmooth.verify.ncprogram import NcProgram, Problem
+from cornersmooth.verify.pool import ahead
 from cornersmooth.verify.reader import read_nc
 from cornersmooth.verify.statements import asked, compare, said
 from cornersmooth.verify.stops import Stretches, find_stretches
@@ -206,6 +207,31 @@ def verify(
     return _Run(program, text, tolerance, axis_length).result()
 
 
+@dataclass
+class _Joints:
+    """Largest jumps of direction (minus the cosine) and curvature, and the shortest element (minus its length)."""
+
+    tangent: Worst = field(default_factory=lambda: Worst(-1.0))
+    curvature: Worst = field(default_factory=Worst)
+    shortest: Worst = field(default_factory=lambda: Worst(-np.inf))
+
+    def take(self, other: _Joints) -> None:
+        """Take over what is larger elsewhere."""
+        for name, worst in vars(other).items():
+            if worst.value > getattr(self, name).value:
+                setattr(self, name, worst)
+
+
+@dataclass(frozen=True)
+class _Examined:
+    """What one block shows; see `Meter.measure`, `check_feeds` and `_Run`."""
+
+    measured: Measured
+    feeds: list[tuple[float, Problem]]
+    places: tuple[slice, Floats]
+    joints: _Joints
+
+
 class _Run:
     """One verification in progress."""
 
@@ -216,8 +242,7 @@ class _Run:
         self.matcher = Matcher(
             self.original, nc, Track.of(self.original.trail.six(axis_length)), tolerance, axis_length
         )
-        self.tangent, self.curvature = Worst(-1.0), Worst()
-        self.shortest = Worst(-np.inf)
+        self.joints = _Joints()
 
     def result(self) -> Verification:
         """Do it."""
@@ -234,13 +259,24 @@ class _Run:
         asked_elements = np.unique([event.element - 1 for event in nc.events]).astype(np.int64)
         element_place = self._stop_places(stretches, asked_elements, holes.element_move)
         feeds: list[tuple[float, Problem]] = []
-        for block in self.matcher.blocks(stretches):
-            written = meter.measure(block)
-            off = np.zeros(len(block.six))
-            off[written.vertex] = written.gap.larger
-            feeds += check_feeds(self.matcher, block, off)
-            self._note_places(block, asked_elements, element_place)
-            self._take_joints(block)
+
+        def examine(item: tuple[Cut, Largest]) -> _Examined:
+            block = self.matcher.walked(item[0])
+            measured = meter.measure(block, item[1])
+            return _Examined(
+                measured,
+                check_feeds(self.matcher, block, measured.off),
+                self._places(block, asked_elements),
+                self._joints(block),
+            )
+
+        cuts = ((cut, meter.result.largest.copy()) for cut in self.matcher.cuts(stretches))
+        for found_here in ahead(examine, cuts):
+            meter.add(found_here.measured)
+            feeds += found_here.feeds
+            part, places = found_here.places
+            element_place[part] = np.where(np.isnan(element_place[part]), places, element_place[part])
+            self.joints.take(found_here.joints)
         deviation = meter.result
         problems += meter.problems()
         problems += [problem for _, problem in feeds]
@@ -289,20 +325,17 @@ class _Run:
         place[stop] = length[last[stretches.move_first[k[stop]]]]
         return place
 
-    def _note_places(self, block: Block, elements: Ints, place: Floats) -> None:
-        """Fill in what is asked for inside this block."""
+    def _places(self, block: Block, elements: Ints) -> tuple[slice, Floats]:
+        """Which of the given elements lie in this block, and the path length at their ends; NaN where not known."""
         first = block.written.first
-        a, b = np.searchsorted(elements, (first, first + len(block.written.trail.last)))
-        if a == b:
-            return
+        a, b = np.searchsorted(elements, (first, first + len(block.written.trail.last))).tolist()
         vertex = block.written.trail.last[elements[a:b] - first]
         length, segment = self.matcher.track.length, block.segment[vertex]
         here = length[segment] + block.fraction[vertex] * (length[segment + 1] - length[segment])
-        unknown = np.isnan(place[a:b]) & block.on[vertex]
-        place[a:b][unknown] = here[unknown]
+        return slice(a, b), np.where(block.on[vertex], here, np.nan)
 
-    def _take_joints(self, block: Block) -> None:
-        nc, program, original = self.nc, self.program, self.original
+    def _joints(self, block: Block) -> _Joints:
+        nc, program, original, found = self.nc, self.program, self.original, _Joints()
         element, cosine, curved, jump = joint_jumps(self.matcher, block)
         trail = block.written.trail
 
@@ -311,7 +344,7 @@ class _Run:
             lines: Ints = program.line[original.pose[original.trail.owner[block.segment[vertex] + 1]]]
             return lines
 
-        for worst, values, where in ((self.tangent, -cosine, element), (self.curvature, jump, curved)):
+        for worst, values, where in ((found.tangent, -cosine, element), (found.curvature, jump, curved)):
             if len(values):
                 k = int(np.argmax(values))
                 worst.update(values[k : k + 1], cl_line(where[k : k + 1]), nc.line[where[k : k + 1]])
@@ -329,7 +362,8 @@ class _Run:
         if len(square):
             k = int(np.argmin(square))
             own = chosen[k + 1 : k + 2] + block.written.first
-            self.shortest.update(-np.sqrt(square[k : k + 1]), cl_line(own), nc.line[own])
+            found.shortest.update(-np.sqrt(square[k : k + 1]), cl_line(own), nc.line[own])
+        return found
 
     def _statements(self, elements: Ints, element_place: Floats) -> list[Problem]:
         original, length = self.original, self.matcher.track.length
@@ -352,25 +386,26 @@ class _Run:
             count[problem.code] = count.get(problem.code, 0) + 1
             if count[problem.code] <= MOST_PROBLEMS:
                 kept.append(problem)
-        tangent = float(np.degrees(np.arccos(np.clip(-self.tangent.value, -1.0, 1.0))))
+        tangent = float(np.degrees(np.arccos(np.clip(-self.joints.tangent.value, -1.0, 1.0))))
+        largest = deviation.largest
         return Verification(
             passed=not problems,
             tolerance=self.tolerance,
             axis_length=self.axis_length,
-            tip=_where(deviation.tip),
-            axis_point=_where(deviation.axis_point),
-            together_tip=_where(deviation.together_tip),
-            together_axis_point=_where(deviation.together_axis_point),
-            orientation=_where(deviation.orientation, float(np.degrees(deviation.orientation.value))),
+            tip=_where(largest.tip),
+            axis_point=_where(largest.axis_point),
+            together_tip=_where(largest.together_tip),
+            together_axis_point=_where(largest.together_axis_point),
+            orientation=_where(largest.orientation, float(np.degrees(largest.orientation.value))),
             problems=tuple(kept),
             problem_count=len(problems),
             blocks=self.nc.blocks,
             elements=len(self.nc),
             curves=len(self.nc.curves),
             poses=len(self.program),
-            shortest=_where(self.shortest, -self.shortest.value),
-            tangent_jump=_where(self.tangent, tangent),
-            curvature_jump=_where(self.curvature),
+            shortest=_where(self.joints.shortest, -self.joints.shortest.value),
+            tangent_jump=_where(self.joints.tangent, tangent),
+            curvature_jump=_where(self.joints.curvature),
             pose_tip=deviation.pose_tip,
             pose_axis_point=deviation.pose_axis_point,
             pose_angle=np.degrees(deviation.pose_angle),
