@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,10 @@ BLOCK = 1 << 17
 
 #: written vertices between anchors
 LANE = 300
+
+#: blocks are cut at anchors that are no nearer to the ends of their original segment than this part of it: there is no
+#: doubt then in which of two blocks an original vertex belongs
+_INNER = 0.2
 
 #: last printed digits by which the next segment must be nearer to be taken
 MARGIN_STEPS = 4.0
@@ -52,8 +56,8 @@ class Block:
         See `walking.walk`.
     low, high : (v,) int64
         First and last original segment of the stretch a vertex belongs to.
-    closed : bool
-        Whether the last stretch ends in this block.
+    until : float
+        Where on the original trail the next block goes on with the last stretch; inf where that ends in this block.
     """
 
     written: Written
@@ -66,7 +70,7 @@ class Block:
     distance: Floats
     low: Ints
     high: Ints
-    closed: bool
+    until: float
 
     @cached_property
     def place(self) -> Floats:
@@ -86,7 +90,7 @@ class Cut:
     lanes : Lanes
     spans : list of (first, last, start, stop)
         Vertices of each stretch, first original segment and last one plus one.
-    closed : bool
+    until : float
         See `Block`.
     """
 
@@ -94,7 +98,7 @@ class Cut:
     six: Floats
     lanes: Lanes
     spans: list[tuple[int, int, int, int]]
-    closed: bool
+    until: float
 
 
 @dataclass(frozen=True)
@@ -196,15 +200,18 @@ class Matcher:
             if lane[1] - lane[0] > 2 * LANE:
                 cut = cut_lane(six, length, self.track, lane, LANE, self.near, ends if open_end else None)
             if open_end and len(cut) > 1:
+                while len(cut) > 2 and not _INNER <= cut[-1][-1] <= 1 - _INNER:
+                    cut.pop()
                 vertex, _, start, _, fraction = cut.pop()
                 rest = int(written.trail.owner[vertex]), start, fraction
             lanes += cut
             spans.append((lane[0], cut[-1][1], lane[2], cut[-1][3]))
         table = Lanes(*(np.array(column) for column in zip(*lanes, strict=True)))
-        done = Cut(written, six, table, spans, not open_end)
+        done = Cut(written, six, table, spans, rest[1] + rest[2] if rest else np.inf)
         if rest is None and open_end:  # no anchor: only the walk tells where the rest begins
             block, tail = self.walked(done), spans[-1][1]
             rest = int(written.trail.owner[tail]), int(block.segment[tail]), float(block.fraction[tail])
+            done = replace(done, until=rest[1] + rest[2])
         return done, rest or (last, 0, 0.0)
 
     def walked(self, cut: Cut) -> Block:
@@ -224,7 +231,7 @@ class Matcher:
             vertex = np.repeat(firsts - np.cumsum(size) + size, size) + np.arange(len(index))
             number[vertex], low[vertex], high[vertex] = index, starts[index], stops[index] - 1
         self._look_again(six, number, segment, fraction, backward, distance)
-        return Block(cut.written, six, on, number, segment, fraction, backward, distance, low, high, cut.closed)
+        return Block(cut.written, six, on, number, segment, fraction, backward, distance, low, high, cut.until)
 
     def _look_again(
         self, six: Floats, piece: Ints, segment: Ints, fraction: Floats, backward: Bools, distance: Floats

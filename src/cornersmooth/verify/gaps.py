@@ -128,8 +128,10 @@ def _brackets(block: Block) -> tuple[Ints, Ints, Ints, Ints]:
     stop = np.where(np.arange(len(last)) < len(last) - 1, block.high[on[last]] + 1, np.floor(place[last])).astype(
         np.int64
     )
-    if block.closed:
+    if np.isinf(block.until):
         stop[-1] = block.high[on[last[-1]]] + 1
+    else:  # up to where the next block begins, wherever the walk has ended
+        stop[-1] = max(stop[-1], int(block.until))
     count = np.maximum(stop - start + 1, 0)
     number = np.repeat(np.arange(len(first)), count)
     vertex = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count) + start[number]
