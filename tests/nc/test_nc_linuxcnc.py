@@ -9,6 +9,7 @@ import io
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,10 @@ from numpy.typing import NDArray
 
 from cornersmooth.cl import read
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.nc import Frame, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
+from nc.cases import Case
 from nc.grammars import reader
 from nc.reading import Reading
 from nc.rotations import tool_direction
@@ -32,6 +34,7 @@ Floats = NDArray[np.float64]
 
 PYTHON = Path("/usr/bin/python3")
 CANON = Path(__file__).parent / "linuxcnc_canon.py"
+SAMPLES = Path(__file__).parents[2] / "samples"
 
 pytestmark = [
     pytest.mark.linuxcnc,
@@ -64,13 +67,22 @@ def accepted(text: str, folder: Path) -> None:
     assert "PROGRAM_END" in result.stdout
 
 
-def written(cl: bytes, machine: str, *, tcp: bool = True, tolerance: float = 0.01, feed: float = 500.0) -> str:
+def written(
+    cl: bytes,
+    machine: str,
+    *,
+    tcp: bool = True,
+    tolerance: float = 0.01,
+    feed: float = 500.0,
+    frame: Frame | None = None,
+    endless: bool = False,
+) -> str:
     program = read(cl, name="part.cls")
-    program = type(program)(**{**vars(program), "feed": np.where(np.isnan(program.feed), feed, program.feed)})
-    chosen = choose_form("linuxcnc", machine=load_machine(machine), tcp=tcp)
+    program = replace(program, feed=np.where(np.isnan(program.feed), feed, program.feed))
+    chosen = Case("linuxcnc", "g1", machine, tcp).choose(endless=endless)
     smoothed = smooth(program, fit_settings(Settings(tolerance=tolerance), chosen, program.units))
     stream = io.BytesIO()
-    write(smoothed, stream, form=chosen)
+    write(smoothed, stream, form=chosen, frame=frame)
     return stream.getvalue().decode("ascii")
 
 
@@ -84,9 +96,25 @@ def flat(seed: int, count: int = 60) -> tuple[bytes, list]:  # type: ignore[type
     return cl_text(chains)[0], chains
 
 
-@pytest.mark.parametrize("machine", ["xyzac-trt", "xyzbc-trt"])
-def test_positions_are_those_in_the_text(machine: str, tmp_path: Path) -> None:
-    text = written(flat(1)[0], machine)
+def in_inches(cl: bytes) -> bytes:
+    return cl.replace(b"UNITS/MM", b"UNITS/INCHES").replace(b"MMPM", b"IPM")
+
+
+#: machine, tool tip control, units of the program
+WAYS = [
+    ("xyzac-trt", True, "mm"),
+    ("xyzbc-trt", True, "mm"),
+    ("xyzac-trt", False, "mm"),
+    ("xyzbc-trt", False, "mm"),
+    ("xyzac-trt", True, "inch"),
+    ("xyzbc-trt", False, "inch"),
+]
+
+
+@pytest.mark.parametrize(("machine", "tcp", "units"), WAYS)
+def test_positions_are_those_in_the_text(machine: str, tcp: bool, units: str, tmp_path: Path) -> None:
+    cl = flat(1, 24)[0]
+    text = written(cl if units == "mm" else in_inches(cl), machine, tcp=tcp)
     accepted(text, tmp_path)
     letters = "XYZAC" if "ac" in machine else "XYZBC"
     ours = [
@@ -95,23 +123,28 @@ def test_positions_are_those_in_the_text(machine: str, tmp_path: Path) -> None:
         if line.startswith(("G0 ", "G1 "))
     ]
     theirs = positions(text, tmp_path)
-    assert len(ours) == len(theirs) > 500
+    assert len(ours) == len(theirs) > 200
     columns = ["XYZABC".index(letter) for letter in letters]
+    scale = np.array([1.0 if units == "mm" else 25.4] * 3 + [1.0] * 2)
     for (code, numbers), (kind, found) in zip(ours, theirs, strict=True):
         assert (code == "G0") == (kind == "rapid")
-        np.testing.assert_allclose(found[columns], numbers, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(found[columns], scale * numbers, rtol=1e-12, atol=1e-9)
 
 
-@pytest.mark.parametrize("machine", ["xyzac-trt", "xyzbc-trt"])
-def test_tip_and_axis_by_its_own_formulas_keep_the_tolerance(machine: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("machine", "tcp", "units"), WAYS)
+def test_tip_and_axis_by_its_own_formulas_keep_the_tolerance(
+    machine: str, tcp: bool, units: str, tmp_path: Path
+) -> None:
     """The published kinematics of trtfuncs.c over the positions that the interpreter produces."""
-    cl, chains = flat(2)
+    cl, chains = flat(2, 60 if tcp else 12)
+    if units == "inch":
+        cl, chains = in_inches(cl), [replace(chain, tip=25.4 * chain.tip) for chain in chains]
     axis_length, tolerance = 10.0, 0.01
-    control = reader("linuxcnc", "g1", machine)
+    control = reader("linuxcnc", "g1", machine, tcp)
     control.step, control.mode = 0.01, "G94"
     columns = [0, 1, 2, 3 if "ac" in machine else 4, 5]
     reading, before = Reading(), None
-    for number, (kind, place) in enumerate(positions(written(cl, machine, tolerance=tolerance), tmp_path)):
+    for number, (kind, place) in enumerate(positions(written(cl, machine, tcp=tcp, tolerance=tolerance), tmp_path)):
         here = place[columns]
         reading.pieces.append(control.piece(number, kind == "rapid", here if before is None else before, here))
         before = here
@@ -141,15 +174,59 @@ def _normalised(match: re.Match[bytes]) -> bytes:
     return b"GOTO/%b,%b\n" % (match[1], ",".join(f"{n:.9f}" for n in axis / np.linalg.norm(axis)).encode())
 
 
-def test_real_files_are_accepted(corpus: Path, tmp_path: Path) -> None:
-    names = [
-        "hecc_flank_nx.cls",
-        "nx_clsf_coremill_steptools.cls",
-        "swcam_shimemcunha.apt",
-        "creo11_3x_inch_multiop.ncl",
-    ]
-    for name in names:
-        accepted(written((corpus / name).read_bytes(), "xyzac-trt"), tmp_path)
+#: poses beyond which a file takes too long here
+MOST_POSES = 1000
+
+
+@pytest.mark.corpus
+@pytest.mark.parametrize(("machine", "tcp"), [("xyzac-trt", True), ("xyzbc-trt", True), ("xyzac-trt", False)])
+def test_real_files_are_accepted(machine: str, tcp: bool, corpus: Path, tmp_path: Path) -> None:
+    taken = 0
+    for path in sorted(corpus.iterdir()):
+        if path.is_dir() or path.suffix == ".md" or len(read(path.read_bytes(), name=path.name)) > MOST_POSES:
+            continue
+        data = path.read_bytes().replace(
+            b",SFM,", b",RPM,"
+        )  # a lathe's; without a speed there is no feed per revolution
+        accepted(written(data, machine, tcp=tcp, tolerance=0.02, endless=True), tmp_path)
+        taken += 1
+    assert taken >= 20
+
+
+@pytest.mark.parametrize("name", ["impeller.cls", "paper_table1.csv"])
+def test_samples_are_accepted(name: str, tmp_path: Path) -> None:
+    accepted(written((SAMPLES / name).read_bytes(), "xyzac-trt", endless=True), tmp_path)
+
+
+SHORT = b"UNITS/MM\nLOADTL/4\nFEDRAT/800,MMPM\nGOTO/0,0,0,0,0,1\nGOTO/20,0,0\nGOTO/20,20,0\n"
+
+
+def test_comments_do_nothing(tmp_path: Path) -> None:
+    """(LOGOPEN, file) would write a file, (ABORT, text) stop the program."""
+    orders = b"".join(b"PPRINT %b,%b\n" % (word, b"made.txt") for word in (b"LOGOPEN", b"log", b"Abort", b"PROBEOPEN"))
+    text = written(SHORT + orders + b"GOTO/0,20,0\nFINI\n", "xyzac-trt")
+    assert "(- LOGOPEN,made.txt)" in text
+    accepted(text, tmp_path)
+    with pytest.raises(AssertionError, match="Abort"):  # so that it is known what is kept away
+        accepted(text.replace("(- ", "("), tmp_path)
+
+
+def test_numbers_of_blocks_and_long_lines_are_accepted(tmp_path: Path) -> None:
+    poses = b"".join(b"GOTO/%d,%d,0\n" % (number, number % 2) for number in range(4000))
+    header = ("(" + 248 * "x" + ")",)
+    text = written(SHORT + poses + b"FINI\n", "xyzac-trt", frame=Frame(block_numbers=True, header=header))
+    assert "N99990 " in text
+    assert max(map(len, text.splitlines())) == 254
+    accepted(text, tmp_path)
+    with pytest.raises(AssertionError, match="Command too long"):
+        accepted(text.replace("(xxx", "(xxxx"), tmp_path)
+
+
+def test_a_spindle_that_is_oriented_is_accepted(tmp_path: Path) -> None:
+    text = written(SHORT + b"SPINDL/2546.479,RPM,CLW\nSPINDL/LOCK\nGOTO/0,20,0\nFINI\n", "xyzac-trt")
+    assert "S2546.479 M3" in text
+    assert "M19 R0" in text
+    accepted(text, tmp_path)
 
 
 def test_an_error_is_seen(tmp_path: Path) -> None:
@@ -158,7 +235,7 @@ def test_an_error_is_seen(tmp_path: Path) -> None:
         accepted("G21\nG43.5 H1\nM2\n", tmp_path)
 
 
-@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 1.3), (1.5, 0.5)])
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 1.3), (1.5, 0.5), (3.0, 0.2)])
 def test_its_splines_are_our_curves(weights: tuple[float, float], tmp_path: Path) -> None:
     """G5.2 with L4 has our knots, and runs in the plane: each projection of both curves is a program of its own."""
     rng = np.random.default_rng(5)

@@ -195,3 +195,9 @@ def test_comments_stand_where_they_stood() -> None:
     )
     order = [line for line in lines if line[0] == "(" or line == "M0"]
     assert order == ["(UNITS/MM)", "(one)", "(two)", "M0", "(three)"]
+
+
+@pytest.mark.parametrize(("spindle", "count"), [("", 1), ("SPINDL/500,SFM\n", 1), ("SPINDL/500,RPM,CLW\n", 0)])
+def test_feed_per_revolution_wants_a_speed(spindle: str, count: int) -> None:
+    _, written = text_of_cl(f"UNITS/MM\n{spindle}FEDRAT/0.1,MMPR\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
+    assert codes(written).get("CS324", 0) == count

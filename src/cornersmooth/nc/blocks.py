@@ -143,6 +143,9 @@ class BlockWriter:
         modes = run.mode[feeding]
         for place in np.flatnonzero(np.diff(modes, prepend=self._mode)).tolist():
             self._mode = int(modes[place])
+            if self._mode == FeedMode.PER_REVOLUTION and not self.statements.speed:
+                text = "feed per revolution while no spindle speed is given; controls stop there or stand still"
+                self.notes.add("CS324", "warning", int(self.program.line[run.move[feeding[place]]]), text)
             before[int(feeding[place])] = self._block(self.statements.words.feed_mode, self._mode)
         if run.arc is not None:
             rows = np.flatnonzero(run.arc >= 0)

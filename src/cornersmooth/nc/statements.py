@@ -60,12 +60,12 @@ class StatementWriter:
     plane: int = 17  #: the plane selected, kept by who writes the motion
     changed: bool = False  #: a tool change left the machine elsewhere
     cycle: Cycle | None = None  #: the hole cycle in force, None where it is not understood
+    speed: float | None = None  #: of the spindle, revolutions per minute
     _compensated: bool = False
     _tool: int | None = None
     _offset: int = 1
     _tip_control: bool = False
     _direction: str = "clockwise"
-    _speed: float | None = None
     _diameter: float = 0.0
     _last_cycle: Cycle | None = None
     words: Words = field(init=False)
@@ -217,7 +217,7 @@ class StatementWriter:
         direction = getattr(self.words, self._direction)
         if speed is None:
             return [direction]
-        self._speed = speed
+        self.speed = speed
         digits = format_number(speed, self.form.table.digits.speed, trim=True).rstrip(".")
         return [block.format(speed=digits, direction=direction) for block in self.words.spindle_speed]
 
@@ -239,7 +239,7 @@ class StatementWriter:
         numbers, words = _numbers(statement), _words(statement)
         if len(numbers) != 1 or words not in ([], ["REV"]):
             return None
-        time = milliseconds(numbers[0], "REV" in words, self._speed)
+        time = milliseconds(numbers[0], "REV" in words, self.speed)
         if time is None:
             return None
         return self.dwell(time) if self.words.dwell else None
@@ -284,7 +284,7 @@ class StatementWriter:
         if words == ["ON"]:
             self.cycle = self._last_cycle
         elif words != ["INIT"]:  # SolidWorks announces a cycle by it
-            self.cycle = self._last_cycle = read_cycle(statement.args, self.program, self._speed)
+            self.cycle = self._last_cycle = read_cycle(statement.args, self.program, self.speed)
         if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
             text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
             self.notes.add("CS321", "warning", statement.line, text)
