@@ -15,8 +15,9 @@ from scipy.spatial import cKDTree
 
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import Machine, load_machine, machine_names, tool_axis
+from cornersmooth.kinematics.curve_group import CurveGroup
 from cornersmooth.kinematics.refinement import SPANS, refinement, weight_factors
-from cornersmooth.kinematics.rotary_curves import CurveGroup, RotaryCurves, angle_allowance, rotary_curves
+from cornersmooth.kinematics.rotary_curves import RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.model import Move, Program, SmoothProgram, Status
 from cornersmooth.nc import choose_form, write
 from cornersmooth.settings import Settings

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
+from cornersmooth.kinematics.curve_group import CurveGroup
 from cornersmooth.kinematics.insertion import Insertions
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.orientation import continued
@@ -34,7 +35,7 @@ from cornersmooth.kinematics.rotary_fit import (
     measured,
 )
 from cornersmooth.kinematics.rotary_lines import CornerLines, corner_lines
-from cornersmooth.kinematics.rotary_motion import RotaryMotion, lever_points, rotary_motion, tip_points
+from cornersmooth.kinematics.rotary_motion import RotaryMotion, lever_points, rotary_motion
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.settings import WEIGHT_DECIMALS
 from cornersmooth.smoothing import nurbs
@@ -50,47 +51,6 @@ BLOCK = 1 << 15
 #: A curve on even segments whose angles vary by D (rad, both axes and both legs) errs by less than this times D² away
 #: from the pole. Where that is within the allowance the error has one hump on either half, and needs few places.
 GENTLE, GENTLE_PLACES = 0.8, 4
-
-
-@dataclass(frozen=True)
-class CurveGroup:
-    """Curves that share a knot vector: g curves with p control points each.
-
-    A writer prints for each of them, in FANUC's form (B-63324EN/03 4.17), p blocks with the knot, X Y Z, both rotary
-    words and the weight of one control point each, ``K<knots[i]> X.. Y.. Z.. <angles> R<weights>``, G6.2 P4 in the
-    first; then the last four knots in blocks of their own. The first control point is the current position digit for
-    digit: the end of the straight remainder before it, or the last control point of the curve before.
-
-    Parameters
-    ----------
-    row : (g,) int64
-        Rows of `Corners`, ascending.
-    knots : (p + 4,) float64
-        As they are to be written: from 0, with three decimals at most. The parameter u of the corner is the knot
-        parameter over the last knot.
-    weights : (g, p) float64
-        As they are to be written: with three decimals at most. All of a curve may have a power of two as common factor.
-    tip : (g, p, 3) float64, mm
-        Control points of the tip: the same curve as that of the five points, exactly.
-    angles : (g, p, 2) float64, degrees
-        Control points of the rotary angles in the order of `Machine.axes`.
-    orientation_error : (g,) float64, degrees
-        Largest angle between the axis that the angles give and the direction of Q(u) − P(u), as measured.
-    ruled : (g,) bool
-        Beside straight remainders that do not run evenly the angles join with the rates of the ruled motion, not with
-        those of the line, which follows it by steps: a kink like those where points are inserted.
-    """
-
-    row: Ints
-    knots: Floats
-    weights: Floats
-    tip: Floats
-    angles: Floats
-    orientation_error: Floats
-    ruled: Bools
-
-    def __len__(self) -> int:
-        return len(self.row)
 
 
 @dataclass(frozen=True)
@@ -201,26 +161,22 @@ def rotary_curves(
     for spans, ruled in TRIALS:
         more, pending = work.trial(spans, ruled, pending)
         found += more
-    groups = [work.group(spans, same) for spans in SPANS if (same := [part for part in found if part.spans == spans])]
-    points, error = np.zeros(len(corners), np.int64), np.full(len(corners), np.nan)
-    for group in groups:
-        points[group.row], error[group.row] = group.tip.shape[1], group.orientation_error
     start, end = np.full((2, len(corners), 2), np.nan)
     pose, after = corners.pose[motion.rows], corners.after[motion.rows]
     start[motion.rows], end[motion.rows] = motion.end.angles[pose], motion.start.angles[after]
     lines = corner_lines(smoothed, machine, motion, pending, file)
-    return RotaryCurves(
-        tuple(groups),
-        lines,
-        points,
-        error,
-        start,
-        end,
-        motion.pose_angles,
-        motion.inserted,
-        motion.even,
-        motion.findings + _lines_finding(smoothed, machine, motion.rows[pending]),
-    )
+    findings = motion.findings + _lines_finding(smoothed, machine, motion.rows[pending])
+    rows, pose_angles, inserted, even = motion.rows, motion.pose_angles, motion.inserted, motion.even
+    del work, motion  # as large as what is made of it
+    groups = [
+        _group(smoothed, rows, spans, same)
+        for spans in SPANS
+        if (same := [part for part in found if part.spans == spans])
+    ]
+    points, error = np.zeros(len(corners), np.int64), np.full(len(corners), np.nan)
+    for group in groups:
+        points[group.row], error[group.row] = group.points, group.orientation_error
+    return RotaryCurves(tuple(groups), lines, points, error, start, end, pose_angles, inserted, even, findings)
 
 
 @dataclass(frozen=True)
@@ -276,25 +232,6 @@ class _Work:
         gentle: Bools = small & motion.even[pose] & motion.even[after]
         return gentle
 
-    def group(self, spans: int, found: list[_Found]) -> CurveGroup:
-        """All curves on so many knot intervals, as they are to be written."""
-        refined = refinement(spans)
-        numbers = np.concatenate([part.numbers for part in found])
-        order = np.argsort(numbers)
-        rows = self.motion.rows[numbers[order]]
-        weights = nurbs.full_weights(self.smoothed.corners.weights[rows])
-        tip = tip_points(self.smoothed, rows)
-        own = refined.homogeneous(weights)
-        return CurveGroup(
-            row=rows,
-            knots=refined.knots * refined.end,
-            weights=np.round(own * weight_factors(own)[:, None], WEIGHT_DECIMALS),
-            tip=tip if spans == SPANS[0] else refined.control_points(tip, weights),
-            angles=np.concatenate([part.angles for part in found])[order],
-            orientation_error=np.concatenate([part.error for part in found])[order],
-            ruled=np.concatenate([np.full(len(part.numbers), part.ruled) for part in found])[order],
-        )
-
     def curves(self, spans: int, ruled: bool, chosen: Ints, places: int) -> tuple[Floats, Floats]:
         """Angle control points (g, p, 2) of some corners, and their errors (g,); infinite outside of the limits.
 
@@ -335,6 +272,28 @@ class _Work:
         axis = targets.axis(places).reshape(-1, 3)
         angles, _ = continued(self.machine, axis, guess.reshape(-1, 2), branch.ravel(), self.motion.cone)
         return angles.reshape(guess.shape)
+
+
+def _group(smoothed: SmoothProgram, smooth_rows: Ints, spans: int, found: list[_Found]) -> CurveGroup:
+    """All curves on so many knot intervals, as they are to be written; `smooth_rows` as in `RotaryMotion.rows`."""
+    refined = refinement(spans)
+    numbers = np.sort(np.concatenate([part.numbers for part in found]))
+    rows = smooth_rows[numbers]
+    angles, error = np.empty((len(rows), refined.points, 2)), np.empty(len(rows))
+    ruled = np.empty(len(rows), np.bool_)
+    for part in found:
+        at = np.searchsorted(numbers, part.numbers)
+        angles[at], error[at], ruled[at] = part.angles, part.error, part.ruled
+    own = refined.homogeneous(nurbs.full_weights(smoothed.corners.weights[rows]))
+    return CurveGroup(
+        smoothed=smoothed,
+        row=rows,
+        knots=refined.knots * refined.end,
+        weights=np.round(own * weight_factors(own)[:, None], WEIGHT_DECIMALS),
+        angles=angles,
+        orientation_error=error,
+        ruled=ruled,
+    )
 
 
 def _lines_finding(smoothed: SmoothProgram, machine: Machine, lines: Ints) -> tuple[Finding, ...]:

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.kinematics.rotary_curves import CurveGroup, RotaryCurves, angle_allowance, rotary_curves
+from cornersmooth.kinematics.curve_group import CurveGroup
+from cornersmooth.kinematics.rotary_curves import RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.nc.control import Form
 from cornersmooth.nc.notes import Notes
@@ -151,8 +152,8 @@ class _Block:
     def _curves(self, group: CurveGroup) -> None:
         poses = self.table.smoothed.corners.pose[group.row]
         own = self._within(poses)
-        pose, tip, angles = poses[own], group.tip[own], group.angles[own]
-        count = group.tip.shape[1]
+        pose, tip, angles = poses[own], group.tips(own), group.angles[own]
+        count = group.points
         at = self.after[pose - self.begin][:, None] + np.arange(count)
         self._put(at, tip, angles)
         self.rows.curve[at] = np.arange(1, count + 1)
