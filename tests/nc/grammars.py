@@ -77,7 +77,7 @@ def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
         machine,
         decimals=(tip,) * 3 + decimals,
         circles="R" if turn == "great circle" else "",
-        longest=254,
+        longest=252,
         extra=KnotSplines(weight_decimals=4 if control == "mitsubishi" else 3) if form == "g6.2" else None,
         **switch,
     )

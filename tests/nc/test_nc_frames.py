@@ -153,9 +153,9 @@ def test_a_spline_of_five_axes_goes_on_in_the_next_line() -> None:
 
 def test_lines_too_long_for_a_control_are_refused() -> None:
     form = Case("linuxcnc", "g1", "xyzac-trt").choose()
-    assert text_of(form, frame=Frame(header=("(" + 252 * "x" + ")",)))
-    with pytest.raises(OutputError, match="a block of 255 characters is too long for the control, which takes 254"):
-        text_of(form, frame=Frame(header=("(" + 253 * "x" + ")",)))
+    assert text_of(form, frame=Frame(header=("(" + 250 * "x" + ")",)))
+    with pytest.raises(OutputError, match="a block of 253 characters is too long for the control, which takes 252"):
+        text_of(form, frame=Frame(header=("(" + 251 * "x" + ")",)))
 
 
 def test_long_comments_are_divided_for_every_control() -> None:

@@ -97,8 +97,8 @@ class BlockWriter:
         form = self.form
         if form.orientation == "machine" and form.machine is not None:
             # for the angles as they are written: far from the axes their rounding would move the tip
-            step = 10.0**-form.table.digits.angle
-            other = step * to_ticks(other, (form.table.digits.angle,) * 2)
+            decimals = form.table.digits.angle
+            other = to_ticks(other, (decimals,) * 2) / 10.0**decimals
             tip = machine_position(form.machine, tip, other)
         if form.rotary and form.machine is not None and form.machine.names != form.other_words:
             other = other[:, ::-1]
