@@ -2,57 +2,58 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.kinematics import load_machine
-from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
+from nc.cases import CHOSEN, Case
+from nc.grammars import reader
+from nc.promise import written
 
 GOLDEN = Path(__file__).parent / "golden"
+TOLERANCE, AXIS_LENGTH = 0.05, 10.0
 
-#: CL file, control, form, machine, tool tip control
-TEXTS = [
-    ("mixed", "fanuc", "g1", "", True),
-    ("mixed", "fanuc", "g6.2", "", True),
-    ("mixed", "siemens", "g1", "", True),
-    ("mixed", "heidenhain", "g1", "", True),
-    ("corner", "fanuc", "g1", "table-ac", True),
-    ("corner", "fanuc", "g1", "table-ac", False),
-    ("corner", "fanuc", "g6.2", "table-ac", True),
-    ("corner", "generic", "g6.2", "", True),
-    ("corner", "siemens", "bspline", "", True),
-    ("corner", "siemens", "poly", "", True),
-    ("corner", "siemens", "g1", "head-ac", True),
-    ("corner", "heidenhain", "g1", "table-bc", True),
-    ("corner", "heidenhain", "spl", "table-bc", True),
-    ("corner", "haas", "g1", "table-bc", True),
-    ("corner", "linuxcnc", "g1", "xyzac-trt", True),
-    ("corner", "mitsubishi", "g1", "", True),
-]
+#: forms for a tool that stays parallel to Z
+UPRIGHT = (Case("heidenhain", "spl"), Case("mitsubishi", "g6.2"))
+
+#: CL file and what is asked for: every control in every form, and what was kept before there was a choice
+TEXTS = list(
+    dict.fromkeys(
+        [
+            *(("mixed", Case(control, "g1")) for control in ("fanuc", "siemens", "heidenhain")),
+            ("mixed", Case("fanuc", "g6.2")),
+            *(("upright" if case in UPRIGHT else "corner", case) for case in CHOSEN),
+            ("corner", Case("fanuc", "g1", "table-ac", tcp=False)),
+            ("corner", Case("siemens", "g1", "head-ac")),
+            ("corner", Case("heidenhain", "spl", "table-bc")),
+            *(("inch", case) for case in (Case("siemens", "bspline"), Case("heidenhain", "g1"))),
+            ("inch", Case("linuxcnc", "g1", "xyzac-trt")),
+        ]
+    )
+)
 
 
-def text_of(source: str, control: str, form: str, machine: str, tcp: bool) -> str:
-    chosen = choose_form(control, form, machine=load_machine(machine) if machine else None, tcp=tcp)
+def text_of(source: str, case: Case) -> str:
     program = read((GOLDEN / f"{source}.cls").read_bytes(), name=f"{source}.cls")
-    smoothed = smooth(program, fit_settings(Settings(tolerance=0.05), chosen, program.units))
-    stream = io.BytesIO()
-    write(smoothed, stream, form=chosen)
-    return stream.getvalue().decode("ascii")
+    return written(program, case.choose(), Settings(tolerance=TOLERANCE, axis_length=AXIS_LENGTH))[0]
 
 
-def golden(source: str, control: str, form: str, machine: str, tcp: bool) -> Path:
-    parts = [control, form, machine, "" if tcp else "axes"]
-    return GOLDEN / f"{source}.{'-'.join(part for part in parts if part)}.nc"
+def golden(source: str, case: Case) -> Path:
+    return GOLDEN / f"{source}.{case}.nc"
 
 
-@pytest.mark.parametrize("which", TEXTS, ids=lambda which: golden(*which).stem)
-def test_text_is_what_was_agreed(which: tuple[str, str, str, str, bool]) -> None:
-    assert text_of(*which) == golden(*which).read_text()
+@pytest.mark.parametrize(("source", "case"), TEXTS, ids=lambda value: str(value))
+def test_text_is_what_was_agreed(source: str, case: Case) -> None:
+    assert text_of(source, case) == golden(source, case).read_text()
+
+
+@pytest.mark.parametrize(("source", "case"), TEXTS, ids=lambda value: str(value))
+def test_agreed_text_is_text_of_the_control(source: str, case: Case) -> None:
+    units = "inch" if source == "inch" else "mm"
+    control = reader(case.control, case.form, case.machine, case.tcp, units)
+    assert control.read(golden(source, case).read_text(), AXIS_LENGTH, TOLERANCE).pieces
 
 
 def test_no_golden_file_is_left_over() -> None:
