@@ -191,7 +191,10 @@ def _newton_from_knot(
     """
     value, slope, bend = (part[curve] for part in group.jet(u))
     target = point.copy()
-    if matcher.nc.second_is == "point":
+    vectors = matcher.nc.second_is == "vector"
+    if vectors:  # of length one
+        value, slope, bend = (_with_axis_point(part, matcher.axis_length) for part in (value, slope, bend))
+    else:
         reach = np.linalg.norm(value[:, 3:] - value[:, :3], axis=1) / matcher.axis_length
         target[:, 3:] = target[:, :3] + reach[:, None] * (target[:, 3:] - target[:, :3])
     rest = target - value
@@ -199,7 +202,15 @@ def _newton_from_knot(
     step = np.divide(np.einsum("ij,ij->i", rest, slope), size, out=np.full(len(size), np.inf), where=size > 0)
     good = np.abs(step) <= _SHORT_STEP * (group.spans[-1] - group.spans[0])
     step = np.where(good, step, 0.0)[:, None]
-    return value + step * slope + step * step / 2 * bend, good
+    found = value + step * slope + step * step / 2 * bend
+    if vectors:
+        found[:, 3:] -= found[:, :3]
+    return found, good
+
+
+def _with_axis_point(six: Floats, axis_length: float) -> Floats:
+    """Tip and axis point (k, 6) of tip and tool vector."""
+    return np.hstack((six[:, :3], six[:, :3] + axis_length * six[:, 3:]))
 
 
 def search_elements(

@@ -156,11 +156,14 @@ class _Reader:
             piece, self.modal = execute(table, before)
             self._check_control(table)
             self.problems.extend(piece.problems)
-            piece = _in_mm(piece, factor, points=self.modal.points)
-            piece.feed_room += self.dialect.feed_step / 2 * factor
+            unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
+            unit = 1.0 if before.inverse_time else unit
+            piece = _in_mm(piece, factor, unit, points=self.modal.points)
+            piece.feed_room += self.dialect.feed_step / 2 * unit
             if self.rotary is not None:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
-                piece = self.rotary.resolve(piece, start, inverse_time=before.inverse_time)
+                rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
+                piece = rotary.resolve(piece, start, inverse_time=before.inverse_time)
                 levers = self.rotary.levers(piece.tip)
                 self.lever = max(self.lever, float(levers.max(initial=0.0, where=~np.isnan(levers))))
             self.pile.add(piece)
@@ -284,7 +287,7 @@ def _closed(table: Table) -> bool:
     return first is not None and not np.isnan(first[0])
 
 
-def _in_mm(piece: Piece, factor: float, *, points: bool) -> Piece:
+def _in_mm(piece: Piece, factor: float, feed: float, *, points: bool) -> Piece:
     """Lengths in millimetres; a factor of one leaves the numbers untouched."""
     if factor == 1.0:
         return piece
@@ -294,6 +297,6 @@ def _in_mm(piece: Piece, factor: float, *, points: bool) -> Piece:
         piece,
         tip=piece.tip * factor,
         second=piece.second * factor if points else piece.second,
-        feed=piece.feed * factor,
+        feed=piece.feed * feed,
         arc_centre=piece.arc_centre * factor,
     )

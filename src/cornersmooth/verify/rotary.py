@@ -31,6 +31,9 @@ _MOST_LINES = 4096
 #: order of the curves that stand for curves in angles, and how often their spans are halved
 _ORDER, _HALVINGS = 8, 6
 
+#: last digit of F where it is moves per minute
+_F_STEP = 1e-4
+
 #: an axis that turns faster (deg/min) may make a block slower than its feed where the text times it (G93)
 FAST_TURN = 30_000.0
 
@@ -200,7 +203,7 @@ class Rotary:
         turn = np.abs(np.diff(angles, axis=0)).max(axis=1)
         still = length < 0.5 * self.tip_step
         way = np.where(still, swing, length)
-        room = rate * np.where(still, 2 * step + self.axis_length * turn_step, 2 * step)
+        room = np.maximum(rate * np.where(still, 2 * step + self.axis_length * turn_step, 2 * step), _F_STEP * way)
         room[(rate * turn > FAST_TURN) | (~still & (length < 3 * step))] = np.inf
         return rate * way, room
 

@@ -156,6 +156,7 @@ class _Chunk:
 def _read_chunk(
     chunk: bytes, number: int, spelling: Spelling, layouts: Layouts, name: str | None
 ) -> Iterator[Table | Line]:
+    chunk = spelling.unfolded(chunk)
     text = spelling.respell(chunk)
     lines = lines_of(text, layouts)
     if lines is None:
@@ -163,13 +164,15 @@ def _read_chunk(
         return
     bulk = lines.bulk()
     edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
+    written: list[bytes] = []
     for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         if bulk[start]:
             table = spelling.table(Table(np.arange(number + start, number + stop), lines.columns(start, stop)))
             if table is not None:
                 yield table
                 continue
-        written = chunk.split(b"\n") if text is not chunk else []
+        if text is not chunk and not written:
+            written = chunk.split(b"\n")
         for row in range(start, stop):
             yield spelling.line(written[row] if written else lines.text(row), number + row, name)
 

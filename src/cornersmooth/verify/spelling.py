@@ -48,6 +48,10 @@ class Spelling:
     ) -> None:
         self.letters, self.places, self.codes = frozenset(letters), frozenset(places), tuple(codes)
 
+    def unfolded(self, chunk: bytes) -> bytes:
+        """Return the text with every block on one line, and as many lines as before."""
+        return chunk
+
     def respell(self, chunk: bytes) -> bytes:
         """Return the text as `runs` is to read it, with the same lines."""
         return chunk
@@ -57,9 +61,7 @@ class Spelling:
         place = piece.rfind(b"\nG") + 1
         if place:
             return place
-        begin = max(len(piece) - _TAIL, 0)
-        numbered = [match.start() for match in _NUMBERED.finditer(piece[begin:])]
-        return begin + numbered[-1] + 1 if numbered else 0
+        return last_match(_NUMBERED, piece)
 
     def columns(self, signature: bytes) -> tuple[str, ...] | None:
         """Return a name for every letter of a line; None for a line that is read on its own."""
@@ -84,6 +86,13 @@ class Spelling:
             CS501 where it is not made of words.
         """
         return tokenise(text, number, name)
+
+
+def last_match(pattern: re.Pattern[bytes], piece: bytes) -> int:
+    """Place behind the line end with which a pattern was found last; 0 where it is not found near the end."""
+    begin = max(len(piece) - _TAIL, 0)
+    found = [match.start() for match in pattern.finditer(piece, begin)]
+    return found[-1] + 1 if found else 0
 
 
 def respelt(chunk: bytes, words: Iterable[tuple[bytes, bytes]]) -> bytes:

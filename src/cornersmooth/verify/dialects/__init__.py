@@ -8,12 +8,16 @@ from typing import Final
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.verify.dialects.base import Dialect, State
+from cornersmooth.verify.dialects.heidenhain import Heidenhain
 from cornersmooth.verify.dialects.iso import ISO_WORDS, Iso
+from cornersmooth.verify.dialects.siemens import Siemens
 
 __all__ = ["CONTROLS", "Dialect", "State", "dialect_of"]
 
 _DIALECTS: Final[dict[str, Callable[[str], Dialect]]] = {
     **{name: partial(Iso, name) for name in ISO_WORDS},
+    "heidenhain": Heidenhain,
+    "siemens": Siemens,
 }
 
 #: controls whose texts are read

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from cornersmooth.verify.motion import Modal
 
 
+#: M words that act after the motion of their block: stops, spindle off, coolant off, end
+AFTER_MOTION = (0.0, 1.0, 2.0, 5.0, 9.0, 30.0)
+
+
 class State(Protocol):
     """What a dialect may ask of the reader, and tell it."""
 
@@ -48,6 +52,8 @@ class Dialect:
 
     #: decimals of F are worth so much
     feed_step = 1e-4
+    #: inches per minute that F counts in, in a text in inches
+    inch_feed = 1.0
     #: kinds of tokens, or pairs of kind and value, that the control has no words for
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
     #: what must be in force for words of a kind: ``"vector"``, ``"point"``, ``"angles"``, ``"machine"``
@@ -58,7 +64,7 @@ class Dialect:
     def __init__(self, spelling: Spelling, rotary: str = "") -> None:
         self.spelling, self.rotary = spelling, rotary
         if rotary:
-            self.digits = re.compile(rb"(?:([XYZ])|([%b]))[-+]?\d*\.(\d*)" % rotary.encode())
+            self.digits = re.compile(rb"(?:([XYZ])|(?<![A-Z0-9])([%b]))[-+]?\d*\.(\d*)" % rotary.encode())
 
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""

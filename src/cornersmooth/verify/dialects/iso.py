@@ -7,15 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cornersmooth.verify.dialects.base import Dialect, State
+from cornersmooth.verify.dialects.base import AFTER_MOTION, Dialect, State
 from cornersmooth.verify.spelling import Spelling
 from cornersmooth.verify.words import MOTION_CODES, MOTION_LETTERS, PLACE_LETTERS, Line, Table
 
 #: letters whose words are events
 _EVENT_LETTERS = "TSMHD"
-
-#: M words that act after the motion of their block (FANUC: stops, spindle off, coolant off, end)
-_AFTER_MOTION = (0.0, 1.0, 2.0, 5.0, 9.0, 30.0)
 
 #: G words that change nothing measured here: cancellations, work offsets
 _SILENT = frozenset((80.0, 90.0, *map(float, range(54, 60))))
@@ -119,7 +116,7 @@ class Iso(Dialect):
                 else:
                     self._mode(value, line, state)
             elif letter in _EVENT_LETTERS:
-                state.event(line, letter, value, text, late=letter == "M" and value in _AFTER_MOTION)
+                state.event(line, letter, value, text, late=letter == "M" and value in AFTER_MOTION)
             elif letter in self.letters and letter != "N":
                 motion[letter] = value
             elif letter in "ABC":
