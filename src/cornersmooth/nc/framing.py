@@ -146,18 +146,16 @@ class Framing:
     def _folded(self, line: bytes) -> bytes:
         """Line in pieces that are short enough, where the control knows such."""
         longest, end = self.layout.longest_block, self.layout.continuation.encode()
-        if len(line) - 1 <= longest:
-            return line
-        if not end:
-            raise OutputError(
-                "CS302",
-                f"a block of {len(line) - 1} characters is too long for the control, which takes {longest}",
-                "shorten it: " + line[:40].decode("ascii") + " ...",
-            )
         pieces = []
         rest = line[:-1]
         while len(rest) > longest:
-            at = rest.rfind(b" ", 0, longest - len(end) + 1)
+            at = rest.rfind(b" ", 0, longest - len(end) + 1) if end else -1
+            if at <= 0:
+                raise OutputError(
+                    "CS302",
+                    f"a block of {len(rest)} characters is too long for the control, which takes {longest}",
+                    "shorten it: " + rest[:40].decode("ascii") + " ...",
+                )
             pieces.append(rest[:at] + end)
             rest = rest[at + 1 :]
         return b"\n".join([*pieces, rest]) + b"\n"

@@ -7,6 +7,7 @@ keys are those of the tables in the folder ``controls``.
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from dataclasses import fields
 from importlib import resources
@@ -41,6 +42,9 @@ _FEED_MODES = {
     "per_revolution": int(FeedMode.PER_REVOLUTION),
     "inverse_time": INVERSE_TIME,
 }
+#: keys whose values are tables
+_TABLES = ("digits", "layout", "layout.units", "words", "words.coolant", "words.plane", "words.feed_mode", "motion")
+_MOST_DIGITS = 9
 #: what stands in braces in blocks
 _PLACES: dict[str, Table] = {
     "tool_change": {"tool": 1},
@@ -104,6 +108,7 @@ def parse_control(text: str, *, file: str = "<control>", name: str = "control") 
     """
     try:
         table = _resolved(_parsed(text))
+        _check_tables(table)
         return Control(
             name=_text(table, "name", name),
             description=_text(table, "description", ""),
@@ -154,6 +159,25 @@ def _resolved(table: Table) -> Table:
     return _merged(base, {key: value for key, value in table.items() if key != "like"})
 
 
+def _check_tables(table: Table) -> None:
+    """Refuse what is no table where one is wanted."""
+    for path in _TABLES:
+        value: Any = table
+        for key in path.split("."):
+            value = value.get(key, {})
+        _check_table(value, path)
+    _check_table(table.get("forms", {}), "forms")
+    for name, form in table.get("forms", {}).items():
+        _check_table(form, f"forms.{name}")
+        for orientation in get_args(Orientation):
+            _check_table(form.get(orientation, {}), f"forms.{name}.{orientation}")
+
+
+def _check_table(value: object, where: str) -> None:
+    if not isinstance(value, dict):
+        raise SettingsError("CS213", f"{where} is {value!r}", f"write a table [{where}]")
+
+
 def _merged(base: Table, changes: Table) -> Table:
     result = dict(base)
     for key, value in changes.items():
@@ -168,10 +192,15 @@ def _merged(base: Table, changes: Table) -> Table:
 def _layout(table: Table) -> Layout:
     units = {"mm": "", "inch": ""} | _strings(table.get("units", {}), "layout.units", ("mm", "inch"))
     plain = {key: value for key, value in table.items() if key != "units"}
-    if "comment" in plain and len(plain["comment"]) != 2:
-        raise SettingsError("CS213", f"layout.comment is {plain['comment']!r}", "give what stands before and behind")
     _check_keys(table, tuple(item.name for item in fields(Layout)), "layout.")
     layout = _record(Layout, plain, "layout")
+    if len(layout.comment) != 2:
+        raise SettingsError("CS213", f"layout.comment is {plain['comment']!r}", "give what stands before and behind")
+    try:
+        re.compile(layout.program_pattern)
+    except re.error as error:
+        what = f"layout.program_pattern is {layout.program_pattern!r}: {error}"
+        raise SettingsError("CS213", what, "give a regular expression") from error
     return Layout(**{**vars(layout), "units": units})
 
 
@@ -223,13 +252,11 @@ def _form(name: str, entry: Table, motion: Table) -> FormTable:
     return FormTable(name, _text(entry, "description", ""), curve, modes)
 
 
-def _extras(table: Any) -> dict[str, Extra]:
-    if not isinstance(table, dict):
-        raise SettingsError("CS213", f"extras is {table!r}", "write a table for each, as in [extras.cycle832]")
+def _extras(table: Table) -> dict[str, Extra]:
+    _check_table(table, "extras")
     extras = {}
     for name, entry in table.items():
-        if not isinstance(entry, dict):
-            raise SettingsError("CS213", f"extras.{name} is {entry!r}", 'give a table, as in { on = ["G5.1 Q1"] }')
+        _check_table(entry, f"extras.{name}")
         extras[name] = _record(Extra, {**entry, "name": name}, f"extras.{name}")
     return extras
 
@@ -259,8 +286,9 @@ def _record(kind: type[Record], table: Table, where: str) -> Record:
         elif isinstance(default, bool):
             values[key] = _flag(value, f"{where}.{key}")
         elif isinstance(default, int):
-            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 1_000_000:
-                raise SettingsError("CS213", f"{where}.{key} is {value!r}", "give a whole number")
+            most = _MOST_DIGITS if kind is Digits else 1_000_000
+            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
+                raise SettingsError("CS213", f"{where}.{key} is {value!r}", f"give a whole number up to {most}")
             values[key] = value
         else:
             values[key] = _string(value, f"{where}.{key}")

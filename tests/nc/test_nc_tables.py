@@ -1,0 +1,89 @@
+"""Tables of controls with every kind of wrong value in every place: an error that names file and key, never a crash."""
+
+from __future__ import annotations
+
+import copy
+import json
+import tomllib
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.nc import control_names, control_table
+from cornersmooth.nc.tables import parse_control
+
+WRONG: tuple[Any, ...] = (3, -1, 1.5, True, "x", "{", "{nix}", "\n", [], [3], ["{nix}"], {}, {"x": 1})
+
+
+def toml(value: Any) -> str:
+    """Value as TOML."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {toml(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return json.dumps(value)
+
+
+def text_of(table: dict[str, Any]) -> str:
+    return "\n".join(f"{key} = {toml(value)}" for key, value in table.items())
+
+
+def places(table: dict[str, Any], before: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Every key, with those of tables in it."""
+    for key, value in table.items():
+        yield (*before, key)
+        if isinstance(value, dict):
+            yield from places(value, (*before, key))
+
+
+def put(table: dict[str, Any], place: tuple[str, ...], value: Any) -> dict[str, Any]:
+    """Copy of the table with a value at a place."""
+    changed = inner = copy.deepcopy(table)
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value
+    return changed
+
+
+@pytest.mark.parametrize("control", control_names())
+def test_wrong_values_are_refused_by_file_and_key(control: str) -> None:
+    table = tomllib.loads(control_table(control))
+    refused = 0
+    for place in places(table):
+        for value in WRONG:
+            try:
+                parse_control(text_of(put(table, place, value)), file="own.toml")
+            except SettingsError as refusal:
+                refused += 1
+                said = str(refusal)
+                named = place[-1] in said or ".".join(place[:2]) in said or place == ("like",)
+                if not (said.startswith("own.toml: error: ") and named and refusal.hint):
+                    raise AssertionError(f"{place} = {value!r}: {said}") from refusal
+    assert refused > 5 * len(list(places(table)))
+
+
+@pytest.mark.parametrize("control", ["fanuc", "heidenhain", "siemens"])
+def test_misspelt_keys_are_refused_with_the_right_one(control: str) -> None:
+    table = tomllib.loads(control_table(control))
+    free = ("forms", "extras", "words.coolant")  # tables whose keys are names
+    for place in places(table):
+        if ".".join(place[:-1]) in free or len(place[-1]) < 4:
+            continue
+        wrong = put(table, (*place[:-1], place[-1][:-1] + "x" + place[-1][-1]), 1)
+        with pytest.raises(SettingsError, match=rf"^own.toml: error: unknown key .*; did you mean {place[-1]}\?$"):
+            parse_control(text_of(wrong), file="own.toml")
+
+
+def test_what_would_only_fail_later_is_refused_too() -> None:
+    for text, message in (
+        ("like = 'fanuc'\n[layout]\nprogram_pattern = '('\n", "layout.program_pattern is '('"),
+        ("like = 'fanuc'\n[digits]\nmm = 10\n", "digits.mm is 10; give a whole number up to 9"),
+        ("like = 'fanuc'\n[layout]\ncomment = ['(']\n", "layout.comment is"),
+        ("like = 'fanuc'\n[extras]\nx = 1\n", "extras.x is 1"),
+        ("like = 'fanuc'\n[extras.x]\non = ['{offset}']\n", "extras.x.on: '{offset}' has unknown braces; use {blend}"),
+    ):
+        with pytest.raises(SettingsError) as refused:
+            parse_control(text, file="own.toml")
+        assert str(refused.value).startswith(f"own.toml: error: {message}")
