@@ -97,40 +97,48 @@ def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
         After the last block.
     """
     points = modal.points or any(letter in table.columns for letter in _POINT)
-    code = _held(table.column("G"), modal.code)
-    tip, placed = _held_columns(table, _TIP, modal.tip)
-    is_arc = (code == 2) | (code == 3)
+    held = _Held()
+    code = held.fill(table.column("G"), modal.code)
+    # tip and second triple side by side: curves take both at once
+    six = np.empty((len(table), 6))
+    tip, second = six[:, :3], six[:, 3:]
+    placed = held.columns(table, _TIP, modal.tip, tip)
     straight = (code <= 1) | np.isnan(code)
-    letters = _POINT if points else _VECTOR
-    if modal.rotary:
-        letters = modal.rotary
-        second, turned = _held_columns(table, letters, modal.second)
-    elif points:
-        second, turned = _held_columns(table, letters, modal.second)
+    is_arc = np.zeros(len(table), np.bool_) if straight.all() else (code == 2) | (code == 3)
+    letters = modal.rotary or (_POINT if points else _VECTOR)
+    if modal.rotary or points:
+        placed |= held.columns(table, letters, modal.second, second)
     else:
-        second, turned = _vectors(table, modal, straight)
-    placed |= turned
+        placed |= _vectors(table, modal, straight, second)
     problems: list[Problem] = []
     curves = CurveTable()
     element_rows = placed
     if not (straight | is_arc).all():
         before = np.array((*modal.tip, *modal.second))
-        curves = _curves(table, tip, second, placed, code, before, _TIP + letters, problems)
+        curves = _curves(table, six, placed, code, before, _TIP + letters, problems)
         element_rows = placed & (straight | is_arc)
         element_rows[curves.row] = True
     rows = np.flatnonzero(element_rows)
-    ends = rows.copy()
-    curved = np.searchsorted(rows, curves.row)
-    ends[curved] = curves.end
-    feed = _held(table.column("F"), modal.feed)
-    kind = np.select([is_arc[rows], code[rows] == 0], [Element.ARC, Element.RAPID], Element.LINE).astype(np.uint8)
-    kind[curved] = Element.CURVE
+    ends = rows
+    if len(curves):
+        ends = rows.copy()
+        curved = np.searchsorted(rows, curves.row)
+        ends[curved] = curves.end
+    feed = held.fill(table.column("F"), modal.feed)
+    end = six if ends is rows and len(rows) == len(six) else six.take(ends, axis=0)
+    rapid = code[rows] == 0
+    kind = np.where(rapid, np.uint8(Element.RAPID), np.uint8(Element.LINE))
+    if is_arc.any():
+        kind[is_arc[rows]] = Element.ARC
+    if len(curves):
+        kind[curved] = Element.CURVE
+        rapid = kind == Element.RAPID
     piece = Piece(
         kind=kind,
-        tip=tip[ends],
-        second=second[ends],
+        tip=end[:, :3],
+        second=end[:, 3:],
         line=table.line[rows],
-        feed=np.where(kind == Element.RAPID, np.nan, feed[rows]),
+        feed=np.where(rapid, np.nan, feed[rows]),
         per_revolution=np.full(len(rows), modal.per_revolution),
         feed_room=np.zeros(len(rows)),
         curves=curves,
@@ -161,52 +169,68 @@ def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
     return piece, after
 
 
-def _held(column: Floats, before: float) -> Floats:
-    """Fill what is missing with the last value given."""
-    missing = np.isnan(column)
-    if not missing.any():
-        return column
-    if missing.all():
-        return np.full(len(column), before)
-    last = np.maximum.accumulate(np.where(missing, -1, np.arange(len(column))))
-    return np.where(last < 0, before, column[last])
+class _Held:
+    """Fills what is missing in columns with the last value given; most columns of a run miss the same blocks."""
+
+    def __init__(self) -> None:
+        self._missing = np.zeros(0, np.bool_)
+        self._last = np.zeros(0, np.int64)
+
+    def fill(self, column: Floats, before: float, missing: Bools | None = None) -> Floats:
+        """Fill a column; `before` is what held in front of it."""
+        if missing is None:
+            missing = np.isnan(column)
+        if not missing.any():
+            return column
+        if missing.all():
+            return np.full(len(column), before)
+        if not np.array_equal(missing, self._missing):
+            given = np.flatnonzero(~missing)
+            count = np.diff(given, append=len(column))
+            self._missing, self._last = missing, np.repeat(given, count)
+        rest = len(column) - len(self._last)
+        filled = column.take(self._last)
+        return np.concatenate((np.full(rest, before), filled)) if rest else filled
+
+    def columns(self, table: Table, letters: str, before: tuple[float, ...], values: Floats) -> Bools:
+        """Put three words held from block to block into `values`; say which blocks have any of them."""
+        given = np.zeros(len(table), np.bool_)
+        for k, letter in enumerate(letters):
+            column = table.columns.get(letter)
+            if column is None:
+                values[:, k] = before[k]
+            else:
+                missing = np.isnan(column)
+                given |= ~missing
+                values[:, k] = self.fill(column, before[k], missing)
+        if len(letters) < values.shape[1]:
+            values[:, len(letters) :] = 0.0
+        return given
 
 
-def _held_columns(table: Table, letters: str, before: tuple[float, ...]) -> tuple[Floats, Bools]:
-    """(r, 3) words held from block to block, and (r,) whether a block has any of them."""
-    values = np.zeros((len(table), 3))
-    given = np.zeros(len(table), np.bool_)
-    for k, letter in enumerate(letters):
-        column = table.columns.get(letter)
-        if column is None:
-            values[:, k] = before[k]
-        else:
-            given |= ~np.isnan(column)
-            values[:, k] = _held(column, before[k])
-    return values, given
-
-
-def _vectors(table: Table, modal: Modal, straight: Bools) -> tuple[Floats, Bools]:
-    """Tool vector after every block.
+def _vectors(table: Table, modal: Modal, straight: Bools, values: Floats) -> Bools:
+    """Put the tool vector after every block into `values`; say which blocks have any of its words.
 
     In a vector some of whose words are missing they are zero; without any the last vector holds (FANUC G43.5,
     Siemens).
     """
     before = modal.second if not np.isnan(modal.second[0]) else (0.0, 0.0, 1.0)
-    columns = np.stack([table.column(letter) for letter in _VECTOR], axis=1)
-    columns[~straight] = np.nan  # K is a knot in a curve; I J K are no vector on an arc
-    given: Bools = ~np.logical_and.reduce(np.isnan(columns), axis=1)
-    columns[given] = np.nan_to_num(columns[given], nan=0.0)
-    if not given.all():
-        for k in range(3):
-            columns[:, k] = _held(columns[:, k], before[k])
-    return columns, given
+    given = np.zeros(len(table), np.bool_)
+    missing = []
+    for letter in _VECTOR:
+        # K is a knot in a curve; I J K are no vector on an arc
+        missing.append(np.isnan(table.column(letter)) | ~straight)
+        given |= ~missing[-1]
+    held = _Held()
+    for k, letter in enumerate(_VECTOR):
+        column = np.where(missing[k], 0.0, table.column(letter)) if missing[k].any() else table.column(letter)
+        values[:, k] = held.fill(column, before[k], ~given)
+    return given
 
 
 def _curves(
     table: Table,
-    tip: Floats,
-    second: Floats,
+    six: Floats,
     placed: Bools,
     code: Floats,
     before: Floats,
@@ -217,10 +241,9 @@ def _curves(
     found = []
     if (nurbs := code == NURBS).any():
         starts = nurbs & (table.column("G") == NURBS)
-        found.append(knot_curves(table, tip, second, placed, nurbs, starts, problems))
+        found.append(knot_curves(table, six, placed, nurbs, starts, problems))
     if (spline := placed & (code == BSPLINE)).any():
-        found.append(interval_curves(table, tip, second, spline, before, problems))
-    six = np.hstack((tip, second))
+        found.append(interval_curves(table, six, spline, before, problems))
     for kind, read in ((POLY, poly_curves), (SPL, spl_curves)):
         if (polynomial := placed & (code == kind)).any():
             found.append(read(table, six, before, polynomial, letters, problems))
@@ -232,8 +255,11 @@ def _check_starts(piece: Piece, modal: Modal, exact: Bools) -> None:
     element = piece.curve_element[exact]
     points = piece.curves.points
     control = piece.curves.control[(np.cumsum(points) - points)[exact]]
-    position = np.vstack(((*modal.tip, *modal.second), np.hstack((piece.tip, piece.second))))[element]
-    wrong = (control != position).any(axis=1)
+    wrong = np.zeros(len(element), np.bool_)
+    for ends, start, columns in ((piece.tip, modal.tip, slice(0, 3)), (piece.second, modal.second, slice(3, 6))):
+        position = ends[element - 1]
+        position[element == 0] = start
+        wrong |= (control[:, columns] != position).any(axis=1)
     for k in np.flatnonzero(wrong).tolist():
         text = "first control point is not the current position"
         piece.problems.append(Problem("CS519", 0, int(piece.line[element[k]]), text))

@@ -69,7 +69,7 @@ def slices(size: Ints, chosen: Ints) -> Ints:
 
 
 def knot_curves(
-    table: Table, tip: Floats, second: Floats, placed: Bools, curve: Bools, starts: Bools, problems: list[Problem]
+    table: Table, six: Floats, placed: Bools, curve: Bools, starts: Bools, problems: list[Problem]
 ) -> CurveTable:
     """Curves of FANUC's G06.2 (B-63324EN/03 4.17): a knot K and a weight R in every block.
 
@@ -77,8 +77,8 @@ def knot_curves(
     ----------
     table : Table
         Of r blocks.
-    tip, second : (r, 3) float64
-        After every block.
+    six : (r, 6) float64
+        Tip and second triple after every block.
     placed : (r,) bool
         Blocks with words of position.
     curve : (r,) bool
@@ -136,7 +136,7 @@ def knot_curves(
         end=point_rows[np.cumsum(points) - 1],
         order=order,
         points=points,
-        control=np.hstack((tip[point_rows], second[point_rows])),
+        control=six.take(point_rows, axis=0),
         weight=weight,
         knot=_exactly(knot, start, size, points + order),
     )
@@ -162,9 +162,7 @@ def _exactly(knot: Floats, start: Ints, size: Ints, wanted: Ints) -> Floats:
     return filled
 
 
-def interval_curves(
-    table: Table, tip: Floats, second: Floats, spline: Bools, before: Floats, problems: list[Problem]
-) -> CurveTable:
+def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, problems: list[Problem]) -> CurveTable:
     """Curves of Siemens' BSPLINE (programming manual 12/2019): control points with knot intervals PL and weights PW.
 
     The first control point is where the block before has ended. With the knots u the block of control point j has
@@ -172,7 +170,7 @@ def interval_curves(
 
     Parameters
     ----------
-    table, tip, second, problems
+    table, six, problems
         As in `knot_curves`.
     spline : (r,) bool
         Blocks on splines; neighbours are one spline.
@@ -195,7 +193,6 @@ def interval_curves(
     complain(gap, "CS510", "something else stands between the blocks of a curve")
     closes = np.append(opens[1:], True)
     complain((opens | closes) & (interval != 0), "CS517", "a spline whose first or last interval is not zero")
-    six = np.hstack((tip, second))
     # a curve begins with the control point in front of the block `first`
     passed = np.append(False, (interval[:-1] == 0) & (interval[1:] == 0)) & ~opens
     first = np.flatnonzero(opens | passed)
