@@ -6,11 +6,8 @@ keys are those of the tables in the folder ``controls``.
 
 from __future__ import annotations
 
-import difflib
 import re
-import tomllib
 from dataclasses import fields
-from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -29,8 +26,10 @@ from cornersmooth.nc.control import (
     Orientation,
     Words,
 )
+from cornersmooth.tables import Shelf, Table, unknown_key
 
-Table = dict[str, Any]
+_SHELF = Shelf("control", __package__, "controls", unknown="CS210", unreadable="CS212")
+
 Record = TypeVar("Record", Digits, Layout, Words, Motion, Extra)
 
 _CONTROL_KEYS = ("name", "like", "description", "digits", "layout", "words", "motion", "forms", "extras")
@@ -64,8 +63,7 @@ _EXTRA_PLACES: Table = {"blend": "0.001", "turn": "0.01"}
 
 def control_names() -> tuple[str, ...]:
     """Names of the controls that come with the program, sorted."""
-    folder = resources.files(__package__) / "controls"
-    return tuple(sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")))
+    return _SHELF.names()
 
 
 def load_control(name_or_path: str | Path) -> Control:
@@ -78,17 +76,8 @@ def load_control(name_or_path: str | Path) -> Control:
     SettingsError
         The name is unknown (with the closest known one), the file cannot be read, or it does not describe a control.
     """
-    given = str(name_or_path)
-    if isinstance(name_or_path, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
-        try:
-            text = Path(name_or_path).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) and error.strerror else "not UTF-8 text"
-            raise SettingsError(
-                "CS212", f"control file cannot be read: {reason}", "check the name", file=given
-            ) from error
-        return parse_control(text, file=given, name=Path(name_or_path).stem)
-    return parse_control(control_table(given), file=f"{given}.toml", name=given)
+    text, file, name = _SHELF.choose(name_or_path)
+    return parse_control(text, file=file, name=name)
 
 
 def parse_control(text: str, *, file: str = "<control>", name: str = "control") -> Control:
@@ -107,7 +96,7 @@ def parse_control(text: str, *, file: str = "<control>", name: str = "control") 
         The text is not TOML, has an unknown key (with the closest known one), or does not describe a control.
     """
     try:
-        table = _resolved(_parsed(text))
+        table = _resolved(_SHELF.parse(text))
         _check_tables(table)
         return Control(
             name=_text(table, "name", name),
@@ -130,21 +119,7 @@ def control_table(name: str) -> str:
     SettingsError
         The name is unknown.
     """
-    known = control_names()
-    if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
-        advice = f"did you mean {close[0]}? " if close else ""
-        raise SettingsError(
-            "CS210", f"unknown control {name!r}", f"{advice}use a TOML file or one of {', '.join(known)}"
-        )
-    return (resources.files(__package__) / "controls" / f"{name}.toml").read_text(encoding="utf-8")
-
-
-def _parsed(text: str) -> Table:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError("CS212", f"not TOML: {error}", "correct the text") from error
+    return _SHELF.built_in(name)
 
 
 def _resolved(table: Table) -> Table:
@@ -155,7 +130,7 @@ def _resolved(table: Table) -> Table:
         return table
     if not isinstance(like, str):
         raise SettingsError("CS213", f"like is {like!r}", "name one of the built-in controls")
-    base = _resolved(_parsed(control_table(like)))
+    base = _resolved(_SHELF.parse(control_table(like)))
     return _merged(base, {key: value for key, value in table.items() if key != "like"})
 
 
@@ -332,8 +307,6 @@ def _flag(value: object, where: str) -> bool:
 
 
 def _check_keys(table: Table, known: tuple[str, ...], where: str) -> None:
-    for key in table:
-        if key not in known:
-            close = difflib.get_close_matches(key, known, n=1)
-            advice = f"did you mean {close[0]}?" if close else f"known keys are {', '.join(known)}"
-            raise SettingsError("CS214", f"unknown key {where}{key}", advice)
+    if unknown := unknown_key(table, known):
+        key, advice = unknown
+        raise SettingsError("CS214", f"unknown key {where}{key}", advice)
