@@ -175,7 +175,8 @@ def test_arc_against_arc_and_against_chords(as_arc):
 
 
 @pytest.mark.parametrize("form", ["g1", "g6.2"])
-def test_one_long_chain_cut_at_anchors_is_the_same_as_whole(form, monkeypatch):
+@pytest.mark.parametrize("hop", [30, 1000])
+def test_one_long_chain_cut_at_anchors_is_the_same_as_whole(form, hop, monkeypatch):
     from cornersmooth.verify import blocks
 
     tip, axis = corners(200, seed=4)
@@ -184,6 +185,7 @@ def test_one_long_chain_cut_at_anchors_is_the_same_as_whole(form, monkeypatch):
     whole = verify(program, nc, tolerance=0.02)
     monkeypatch.setattr(blocks, "LANE", 20)
     monkeypatch.setattr(blocks, "BLOCK", 100)
+    monkeypatch.setattr(blocks, "_HOP", hop)
     cut = verify(program, nc, tolerance=0.02)
     assert whole.problems == cut.problems == ()
     assert cut.max_tip_deviation_mm == pytest.approx(whole.max_tip_deviation_mm, abs=1e-12)

@@ -12,7 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.careful import assign, doubtful_windows
 from cornersmooth.verify.ncprogram import NcProgram
 from cornersmooth.verify.stops import Stretches
-from cornersmooth.verify.trails import CHORD_SHARE, Original, Written, written_motion
+from cornersmooth.verify.trails import CHORD_SHARE, Original, Written, directions, written_motion
 from cornersmooth.verify.walking import Lanes, Track, cut_lane, walk
 
 #: path elements in a block
@@ -24,6 +24,9 @@ LANE = 300
 #: blocks are cut at anchors that are no nearer to the ends of their original segment than this part of it: there is no
 #: doubt then in which of two blocks an original vertex belongs
 _INNER = 0.2
+
+#: path elements between the anchors that lead to where a block is cut
+_HOP = 1 << 12
 
 #: last printed digits by which the next segment must be nearer to be taken
 MARGIN_STEPS = 4.0
@@ -81,24 +84,22 @@ class Block:
 
 @dataclass(frozen=True)
 class Cut:
-    """Part of the written motion, cut in lanes that can be walked on their own.
+    """Part of the written motion that can be looked at on its own.
 
     Parameters
     ----------
-    written : Written
-    six : (v, 6) float64
-    lanes : Lanes
-    spans : list of (first, last, start, stop)
-        Vertices of each stretch, first original segment and last one plus one.
+    pieces : list of (first, last, start, stop, fraction)
+        Elements of each stretch, at the end of which it begins and ends; the original segment and the fraction of it
+        where it begins, and the last segment plus one.
     until : float
         See `Block`.
+    block : Block, optional
+        Where it had to be made at once.
     """
 
-    written: Written
-    six: Floats
-    lanes: Lanes
-    spans: list[tuple[int, int, int, int]]
-    until: float
+    pieces: list[Lane]
+    until: float = np.inf
+    block: Block | None = None
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ class Matcher:
     def cuts(self, stretches: Stretches) -> Iterator[Cut]:
         """Give out all stretches, in parts of about `BLOCK` elements."""
         last_vertex = self.original.trail.last
-        pending: list[tuple[int, int, int, int, float]] = []
+        pending: list[Lane] = []
         columns = (
             stretches.move_first,
             stretches.move_last,
@@ -168,56 +169,53 @@ class Matcher:
                 start, fraction = stop - 1, 1.0
             while True:
                 if pending and last - pending[0][0] > BLOCK:
-                    done, _ = self._cut(pending, open_end=False)
+                    yield Cut(pending)
                     pending = []
-                    yield done
                 if last - first <= BLOCK + BLOCK // 2:
                     pending.append((first, last, start, stop, fraction))
                     break
-                done, rest = self._cut([(first, first + BLOCK, start, stop, fraction)], open_end=True)
+                done, (first, start, fraction) = self._begin((first, first + BLOCK, start, stop, fraction))
                 yield done
-                first, start, fraction = rest
         if pending:
-            done, _ = self._cut(pending, open_end=False)
-            yield done
+            yield Cut(pending)
 
-    def _cut(
-        self, pieces: list[tuple[int, int, int, int, float]], *, open_end: bool
-    ) -> tuple[Cut, tuple[int, int, float]]:
-        """Make one part; with an open end only up to the last anchor, and say where the rest begins."""
-        first, last = pieces[0][0], pieces[-1][1]
-        written = written_motion(self.nc, first, last, self.tolerance, self.axis_length)
-        six = written.trail.six(self.axis_length)
-        difference = six[1:] - six[:-1]
-        length = np.concatenate(([0.0], np.cumsum(np.sqrt(np.einsum("ij,ij->i", difference, difference)))))
-        ends = written.trail.last
-        lanes: list[Lane] = []
-        spans = []
-        rest: tuple[int, int, float] | None = None
-        for piece in pieces:
-            lane = (int(ends[piece[0] - first]), int(ends[piece[1] - first]), piece[2], piece[3], piece[4])
-            cut = [lane]
-            if lane[1] - lane[0] > 2 * LANE:
-                cut = cut_lane(six, length, self.track, lane, LANE, self.near, ends if open_end else None)
-            if open_end and len(cut) > 1:
-                while len(cut) > 2 and not _INNER <= cut[-1][-1] <= 1 - _INNER:
-                    cut.pop()
-                vertex, _, start, _, fraction = cut.pop()
-                rest = int(written.trail.owner[vertex]), start, fraction
-            lanes += cut
-            spans.append((lane[0], cut[-1][1], lane[2], cut[-1][3]))
-        table = Lanes(*(np.array(column) for column in zip(*lanes, strict=True)))
-        done = Cut(written, six, table, spans, rest[1] + rest[2] if rest else np.inf)
-        if rest is None and open_end:  # no anchor: only the walk tells where the rest begins
-            block, tail = self.walked(done), spans[-1][1]
-            rest = int(written.trail.owner[tail]), int(block.segment[tail]), float(block.fraction[tail])
-            done = replace(done, until=rest[1] + rest[2])
-        return done, rest or (last, 0, 0.0)
+    def _begin(self, piece: Lane) -> tuple[Cut, tuple[int, int, float]]:
+        """Cut off the beginning of a stretch, at an anchor if there is one, and say where the rest begins."""
+        first, last, start, stop, fraction = piece
+        part = slice(first, last + 1)
+        tip = self.nc.tip[part]
+        six = np.hstack((tip, tip + self.axis_length * directions(self.nc, tip, self.nc.second[part])))
+        lanes = cut_lane(six, _lengths(six), self.track, (0, last - first, start, stop, fraction), _HOP, self.near)
+        while len(lanes) > 2 and not _INNER <= lanes[-1][-1] <= 1 - _INNER:
+            lanes.pop()
+        if len(lanes) > 1:
+            end, _, segment, _, at = lanes[-1]
+            return Cut([(first, first + end, start, segment + 1, fraction)], segment + at), (first + end, segment, at)
+        block = self._match([piece], np.nan)  # only the walk tells where the rest begins
+        tail = block.written.trail.last[-1]
+        segment, at = int(block.segment[tail]), float(block.fraction[tail])
+        return Cut([piece], segment + at, replace(block, until=segment + at)), (last, segment, at)
 
     def walked(self, cut: Cut) -> Block:
         """Assign a place on the original to every vertex of a part."""
-        six, spans = cut.six, cut.spans
-        segment, fraction, backward, distance = walk(six, self.track, cut.lanes, self.margin, self.near)
+        return cut.block or self._match(cut.pieces, cut.until)
+
+    def _match(self, pieces: list[Lane], until: float) -> Block:
+        first, last = pieces[0][0], pieces[-1][1]
+        written = written_motion(self.nc, first, last, self.tolerance, self.axis_length)
+        six = written.trail.six(self.axis_length)
+        length = _lengths(six)
+        ends = written.trail.last
+        lanes: list[Lane] = []
+        for piece in pieces:
+            lane = (int(ends[piece[0] - first]), int(ends[piece[1] - first]), *piece[2:])
+            if lane[1] - lane[0] > 2 * LANE:
+                lanes += cut_lane(six, length, self.track, lane, LANE, self.near, None if np.isinf(until) else ends)
+            else:
+                lanes.append(lane)
+        table = Lanes(*(np.array(column) for column in zip(*lanes, strict=True)))
+        segment, fraction, backward, distance = walk(six, self.track, table, self.margin, self.near)
+        spans = [(int(ends[a - first]), int(ends[b - first]), start, stop) for a, b, start, stop, _ in pieces]
         on = fraction >= 0
         number = np.full(len(six), -1, np.int64)
         low, high = np.zeros(len(six), np.int64), np.zeros(len(six), np.int64)
@@ -231,7 +229,7 @@ class Matcher:
             vertex = np.repeat(firsts - np.cumsum(size) + size, size) + np.arange(len(index))
             number[vertex], low[vertex], high[vertex] = index, starts[index], stops[index] - 1
         self._look_again(six, number, segment, fraction, backward, distance)
-        return Block(cut.written, six, on, number, segment, fraction, backward, distance, low, high, cut.until)
+        return Block(written, six, on, number, segment, fraction, backward, distance, low, high, until)
 
     def _look_again(
         self, six: Floats, piece: Ints, segment: Ints, fraction: Floats, backward: Bools, distance: Floats
@@ -254,3 +252,10 @@ class Matcher:
                 length = self.track.length[found[0] + 1] - self.track.length[found[0]]
                 behind = np.einsum("ij,ij->i", six[part] - row[:, :6], row[:, 6:12]) * row[:, 12]
                 backward[part] = found[2] & ((found[1] - np.clip(behind, 0.0, 1.0)) * length > self.margin)
+
+
+def _lengths(six: Floats) -> Floats:
+    """(v,) path length up to every vertex of a trail."""
+    step = six[1:] - six[:-1]
+    lengths: Floats = np.concatenate(([0.0], np.cumsum(np.sqrt(np.einsum("ij,ij->i", step, step)))))
+    return lengths
