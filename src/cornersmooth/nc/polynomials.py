@@ -34,10 +34,23 @@ def curves_for(form: Form, units: Units) -> Curves:
 
 
 class _Polynomials(NoCurves):
-    """One block for each knot interval, in the last rows of a curve."""
+    """One block for each knot interval, in the last rows of a curve.
+
+    Parameters
+    ----------
+    decimals : tuple of int
+        Of the words of lines.
+    """
+
+    def __init__(self, decimals: tuple[int, ...]) -> None:
+        self._line_decimals = decimals
 
     def prepare(self, run: Run) -> Run:
-        """Leave the rows that carry an interval."""
+        """Leave the rows that carry an interval; curves begin where the block before ended, digit for digit."""
+        first = np.flatnonzero(run.curve == 1)
+        if len(first):
+            assert run.pieces is not None
+            run.pieces[first + _DEGREE, 0] = run.ticks[first] / 10.0 ** np.array(self._line_decimals)
         return run.only((run.curve == 0) | (run.curve > _DEGREE))
 
     def _pieces(self, run: Run, curved: Bools) -> NDArray[np.float64]:
@@ -54,6 +67,7 @@ class PolyBlocks(_Polynomials):
     """
 
     def __init__(self, form: Form, units: Units) -> None:
+        super().__init__(form.decimals(units))
         digits, tip = form.table.digits, form.tip_decimals(units)
         letters = [word.rstrip("=") for word in (*form.mode.motion.coordinates, *form.other_words)]
         words = []
@@ -88,6 +102,7 @@ class SplBlocks(_Polynomials):
     """
 
     def __init__(self, form: Form, units: Units) -> None:
+        super().__init__(form.decimals(units))
         letters = (*form.mode.motion.coordinates, *form.other_words)
         self._decimals, self._coefficient = form.decimals(units), form.table.digits.coefficient
         self.format = _SplFormat(letters, self._decimals, self._coefficient)
