@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from oracle.command import large, small
+
+__all__ = ["corpus", "large", "small"]
+
 ROOT = Path(__file__).resolve().parent.parent
 
 

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from oracle.chains import cl_text, random_chains
 from oracle.command import (
     BAD_INPUT,
     BAD_OUTPUT,
@@ -32,21 +31,6 @@ from oracle.nc_text import Line, parse
 ESCAPE = b"\x1b"
 #: CPU seconds for --help
 HELP_SECONDS = 0.15
-
-
-@pytest.fixture
-def small(tmp_path: Path) -> Path:
-    path = tmp_path / "small.cls"
-    path.write_bytes(SMALL)
-    return path
-
-
-@pytest.fixture(scope="module")
-def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Some ten thousand corners: enough text to be interrupted while it is written."""
-    path = tmp_path_factory.mktemp("large") / "large.cls"
-    path.write_bytes(cl_text(random_chains(7, 2500, tame=True))[0])
-    return path
 
 
 # ---------------------------------------------------------------- success, streams

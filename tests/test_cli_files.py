@@ -33,22 +33,6 @@ from oracle.command import (
 )
 from oracle.nc_text import parse
 
-
-@pytest.fixture
-def small(tmp_path: Path) -> Path:
-    path = tmp_path / "small.cls"
-    path.write_bytes(SMALL)
-    return path
-
-
-@pytest.fixture(scope="module")
-def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Some ten thousand corners: enough text to be interrupted while it is written."""
-    path = tmp_path_factory.mktemp("large") / "large.cls"
-    path.write_bytes(cl_text(random_chains(7, 2500, tame=True))[0])
-    return path
-
-
 # ---------------------------------------------------------------- 4: output
 
 

@@ -9,6 +9,10 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+import pytest
+
+from oracle.chains import cl_text, random_chains
+
 DONE, USAGE, BAD_INPUT, BAD_OUTPUT = 0, 2, 3, 4
 OLD = b"old program\n"
 
@@ -103,3 +107,19 @@ def message(stderr: bytes) -> str:
 def only(folder: Path, *names: str) -> bool:
     """Whether the folder holds these names and nothing else."""
     return sorted(os.listdir(folder)) == sorted(names)
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    """A file with two corners in a folder of its own."""
+    path = tmp_path / "small.cls"
+    path.write_bytes(SMALL)
+    return path
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Some ten thousand corners: enough text to be interrupted while it is written."""
+    path = tmp_path_factory.mktemp("large") / "large.cls"
+    path.write_bytes(cl_text(random_chains(7, 2500, tame=True))[0])
+    return path
