@@ -178,6 +178,7 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
     import numpy as np
 
     from cornersmooth.cl import read
+    from cornersmooth.cli.readback import readback
     from cornersmooth.nc import fit_settings, write
     from cornersmooth.report import corners_csv, report, report_json
     from cornersmooth.settings import Settings
@@ -189,7 +190,9 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
         return None if progress is None else lambda done, total: progress(stage, done, total)
 
     form = job.writing.choose()
-    unread = form.unreadable if job.verify else "not asked for"
+    how = readback(job.writing.control, form.machine if form.rotary else None, tcp=form.orientation != "machine")
+    unread = "" if how.control else "its table is like no control whose text is known"
+    unread = unread if job.verify else "not asked for"
     with _timed(seconds, "read"):
         data, name = read_input(job.source)
         program = read(data, name=name, **job.reading)
@@ -214,14 +217,16 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
                         output.path,
                         tolerance=settings.verified_tolerance,
                         axis_length=settings.axis_length,
-                        control=form.control,
+                        words=not how.own,
+                        **how.reading,
                     )
                     verification = verified.to_dict()
                     output.rejected = not verified.passed
                 except InputError as failure:
-                    if not (job.writing.header or job.writing.footer):
+                    if not (job.writing.header or job.writing.footer or how.own):
                         raise
-                    unread = f"{failure.what} in line {failure.line}; header and footer may hold any words"
+                    where = "a table of your own" if how.own else "header and footer"
+                    unread = f"{failure.what} in line {failure.line}; {where} may hold any words"
     findings = written.findings
     if job.verify and unread:
         findings += (Finding("CS509", "note", 0, f"the text is not read back: {unread}"),)

@@ -158,8 +158,8 @@ machine = click.option(
     "--machine",
     type=str,
     metavar="NAME|FILE",
-    help="Write rotary words of this machine instead of tool vectors: a name that 'cornersmooth machines' lists, or a "
-    "TOML file.",
+    help="The text has rotary words of this machine instead of tool vectors: a name that 'cornersmooth machines' "
+    "lists, or a TOML file.",
 )
 no_tcp = click.option(
     "--no-tcp", is_flag=True, help="Positions of the machine's axes, for controls that do not keep the tool tip."

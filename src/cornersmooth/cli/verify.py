@@ -10,6 +10,7 @@ import click
 
 from cornersmooth.cli import options
 from cornersmooth.cli.files import STANDARD, check_output, open_output, read_input
+from cornersmooth.errors import SettingsError
 
 if TYPE_CHECKING:
     from cornersmooth.model import Program
@@ -32,6 +33,8 @@ _PROBLEMS_SHOWN = 20
 @options.tolerance
 @options.axis_length
 @options.control
+@options.machine
+@options.no_tcp
 @options.reading
 @click.option(
     "--report",
@@ -54,19 +57,27 @@ def command(source: str, text: str, **given: Any) -> int:
     Examples:
       cornersmooth verify part.cls part.nc -e 0.04
       cornersmooth verify part.cls part.nc -e 0.04 -H 25 --report found.json --report poses.csv
+      cornersmooth verify part.cls part.mpf -e 0.04 --control siemens
+      cornersmooth verify part.cls part.ngc -e 0.04 --control linuxcnc --machine xyzac-trt
       cornersmooth verify part.cls part.nc -e 0.04 -v --plot deviation.png
     """
     from cornersmooth.cl import read
+    from cornersmooth.cli.readback import readback
     from cornersmooth.verify import read_nc, verify
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     form = _check_outputs(source, text, given)
+    how = readback(given["control"], given["machine"], tcp=not given["no_tcp"])
+    if not how.control:
+        raise SettingsError(
+            "CS204", f"{given['control']} is like no control that can be read", 'say like = "fanuc" or another in it'
+        )
     data, name = read_input(source)
     program = read(data, name=name, format=given["input_format"], **{key: given[key] for key in _READING})
-    nc = read_nc(read_input(text)[0] if text == STANDARD else text, control=given["control"])
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
-    found = verify(program, nc, **measures)
+    nc = read_nc(read_input(text)[0] if text == STANDARD else text, **how.reading, **measures)
+    found = verify(program, nc, **measures, words=not how.own)
     _write_reports(program, found, given["reports"])
     if given["plot"]:
         from cornersmooth.report.deviationplot import draw_deviation

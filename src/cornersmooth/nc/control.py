@@ -281,13 +281,6 @@ class Form:
         return self.orientation == "vector"
 
     @property
-    def unreadable(self) -> str:
-        """Why `cornersmooth.verify` cannot read the text back; empty where it can."""
-        if self.rotary:
-            return "rotary words are not understood by the verification"
-        return "" if self.control == "fanuc" else f"the verification does not know the text of {self.control}"
-
-    @property
     def rotary(self) -> bool:
         """Whether the words behind the tip are angles."""
         return self.orientation in ("angles", "machine")

@@ -8,10 +8,11 @@ Shares no code with `smoothing` and `nc`::
 
 from cornersmooth.verify.along import Distribution, deviation_along
 from cornersmooth.verify.ncprogram import Event, NcProgram, Problem
-from cornersmooth.verify.reader import read_nc
+from cornersmooth.verify.reader import CONTROLS, read_nc
 from cornersmooth.verify.verification import Verification, Where, verify
 
 __all__ = [
+    "CONTROLS",
     "Distribution",
     "Event",
     "NcProgram",

@@ -173,7 +173,8 @@ class Rotary:
         if not self.tip_control:
             way = np.linalg.norm(np.diff(position, axis=0), axis=1)
             bound += turn**2 * self.levers(position[:-1]) + 2 * turn * way
-        rows = np.flatnonzero((piece.kind == Element.LINE) & (bound / 4 > self._fine))
+        from_somewhere = ~np.isnan(position[:-1]).any(axis=1)
+        rows = np.flatnonzero((piece.kind == Element.LINE) & (bound / 4 > self._fine) & from_somewhere)
         if not len(rows):
             return count
         off = np.zeros(len(rows))

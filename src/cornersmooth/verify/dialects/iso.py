@@ -43,7 +43,7 @@ class IsoWords:
     controls: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     silent: frozenset[float] = frozenset()
     dwell: float = 1.0
-    others: str = "NO"
+    others: str = "NOQ"
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
 
 
@@ -51,9 +51,12 @@ _FANUC = {43.0: "G43", 43.4: "G43.4", 43.5: "G43.5", 49.0: ""}
 _FANUC_CONTROLS = {"vector": ("G43.5",), "angles": ("G43.4",), "machine": ("", "G43")}
 _NO_THROUGH: frozenset[str | tuple[str, float]] = frozenset((("coolant", 88.0),))
 
+#: look ahead and smoothing: G5 P10000, G5.1 Q1, G8 P1
+_HIGH_SPEED = frozenset((5.0, 5.1, 8.0))
+
 ISO_WORDS: Mapping[str, IsoWords] = {
-    "fanuc": IsoWords(_FANUC, _FANUC_CONTROLS, unsaid=_NO_THROUGH),
-    "mitsubishi": IsoWords(_FANUC, _FANUC_CONTROLS, silent=frozenset((5.0,)), unsaid=_NO_THROUGH),
+    "fanuc": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH),
+    "mitsubishi": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH),
     "haas": IsoWords(
         {43.0: "G43", 234.0: "G234", 49.0: ""},
         {"angles": ("G234",), "machine": ("", "G43"), "vector": ("G234",)},
@@ -64,7 +67,6 @@ ISO_WORDS: Mapping[str, IsoWords] = {
         {43.0: "G43", 43.1: "G43.1", 49.0: ""},
         silent=frozenset((61.0, 61.1, 64.0)),
         dwell=1000.0,
-        others="NOQ",
         unsaid=_NO_THROUGH,
     ),
     "generic": IsoWords(_FANUC, unsaid=_NO_THROUGH | {"offset"}),
@@ -156,6 +158,13 @@ class _IsoSpelling(Spelling):
     def __init__(self, letters: str, places: set[str], rotary: str) -> None:
         super().__init__(letters, places)
         self._rotary = rotary
+
+    def line(self, text: bytes, number: int, name: str | None) -> Line:
+        """Take one line apart; a program name in brackets says nothing."""
+        plain = text.strip()
+        if plain[:1] == b"<" and plain.find(b">") == len(plain) - 1:
+            return Line(number, (("O", 0.0, plain.decode("latin-1")),), ())
+        return super().line(text, number, name)
 
     def table(self, table: Table) -> Table | None:
         """Return the run; None where its lines must be read one by one."""

@@ -47,7 +47,7 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _WORD: Final = re.compile(
     rf"PO\[(?P<po>\w+)\]=\((?P<factors>[-+.\d,\s]+)\)"
     rf"|(?P<name>[A-Z][A-Z]?\d?|SPOS)\s*=\s*(?P<given>{_NUMBER})"
-    rf"|(?P<letter>[A-Z])\s*(?P<value>{_NUMBER})(?![\w=])"
+    rf"|(?P<letter>[A-Z])\s*(?P<value>{_NUMBER})(?!=)"
     rf"|(?P<call>[A-Z_][A-Z_0-9]*)\s*(?:\([^()]*\))?"
 )
 _COMMENT: Final = re.compile(r";(.*)$")
