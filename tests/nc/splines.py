@@ -12,8 +12,8 @@ from nc.reading import Floats, Piece, Reader, Reading, TextError
 
 #: samples of a knot interval; an even number, so that the middle is one
 SAMPLES = 48
-#: mm and degrees that the start of an SPL may be from where the block before ended: rounding, a fifth of what is allowed
-SPL_START = 2e-4
+#: mm and degrees from the end of the block before to the start of an SPL: rounding of both, a third of what is allowed
+SPL_START = 3e-4
 
 
 def rational(points: Floats, weights: Floats, knots: Floats, parameters: Floats) -> Floats:
