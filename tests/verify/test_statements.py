@@ -98,6 +98,14 @@ def test_compensation_and_its_register():
     assert codes(program, text("G43.5 H1", PATH[0], "G41 D1", *PATH[1:], "G40")) == []
     assert codes(program, text("G43.5 H1", PATH[0], "G42 D1", *PATH[1:], "G40")) == ["CS554"]
     assert codes(program, text("G43.5 H1", PATH[0], "G41 D2", *PATH[1:], "G40")) == ["CS554"]
+    assert codes(program, text("G43.5 H1", PATH[0], "G41 D1", *PATH[1:])) == ["CS554"]
+
+
+def test_compensation_may_be_cancelled_before_the_end():
+    program = said(Statement(1, 1, "CUTCOM", ("LEFT",)))
+    for tail in ((), ("G40",)):
+        assert codes(program, text("G43.5 H1", PATH[0], "G41 D1", *PATH[1:], *tail)) == []
+    assert codes(program, text("G43.5 H1", PATH[0], "G41 D1", PATH[1], "G40", PATH[2])) == ["CS554"]
 
 
 CYCLE = Statement(1, 3, "CYCLE", ("DRILL", "FEDTO", 8.0, "MMPM", 100.0, "RAPTO", 2.0))

@@ -282,6 +282,9 @@ def compare(
     problems: list[Problem] = []
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
     found = [token for token in found if token.kind not in unsaid]
+    end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf) - room
+    if not any(_tidies(token, end) for token in asked_for):
+        found = [token for token in found if not _tidies(token, end)]
     for kind, (name, code) in _NAMES.items():
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
         matcher = difflib.SequenceMatcher(
@@ -307,6 +310,11 @@ def compare(
                 text = f"{name.format(ours[j].value)} is nothing that the CL file asks for"
                 problems.append(Problem(f"CS{code}", 0, ours[j].line, text))
     return problems
+
+
+def _tidies(token: Token, end: float) -> bool:
+    """Whether a token only ends what ends with the program anyway."""
+    return token.kind == "compensation" and token.value == 40.0 and token.place >= end
 
 
 def _effective(tokens: list[Token], kind: str) -> list[Token]:
