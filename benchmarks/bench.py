@@ -1,7 +1,8 @@
 """Time the whole ``cornersmooth smooth`` command beside a plain C program: ``bench.py [--points N] [--runs K]``.
 
 Both read the same file of five-axis points and write the same kind of NC text; runs alternate, medians are shown.
-The C program (`baseline.c`) leaves out all that is not reading, rounding corners and writing.
+The C program (`baseline.c`) leaves out all that is not reading, rounding corners and writing. With ``--controls`` the
+text of several controls is timed beside that of fanuc g1 instead, all of them without verification.
 """
 
 from __future__ import annotations
@@ -20,6 +21,13 @@ from pathlib import Path
 from statistics import median
 
 FORMS = ("g1", "g6.2")
+#: control and form, with the machine where it needs one; the first is what the others are compared with
+CONTROLS = {
+    "fanuc g1": ("--control", "fanuc", "-f", "g1"),
+    "siemens g1": ("--control", "siemens", "-f", "g1"),
+    "siemens bspline": ("--control", "siemens", "-f", "bspline"),
+    "linuxcnc xyzac-trt": ("--control", "linuxcnc", "--machine", "xyzac-trt"),
+}
 TOLERANCE, AXIS_LENGTH = 0.01, 10.0  # mm
 POINTS = 1_000_000
 HERE = Path(__file__).parent
@@ -126,21 +134,46 @@ def compare(form: str, path: Path, folder: Path, programs: dict[str, Path], runs
     print("  stages of the last run: " + ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
 
 
+def compare_controls(path: Path, folder: Path, command: Path, runs: int) -> None:
+    """Time the text of several controls in turn and print one table."""
+    taken: dict[str, list[Run]] = {name: [] for name in CONTROLS}
+    written = folder / "control.nc"
+    size: dict[str, tuple[float, int]] = {}
+    for _ in range(runs):
+        for name, options in CONTROLS.items():
+            numbers = ("-e", f"{TOLERANCE}", "-H", f"{AXIS_LENGTH}", "--no-verify", "--force", "-q", "-o", written)
+            taken[name].append(run([command, "smooth", path, *options, *numbers]))
+            size[name] = (written.stat().st_size / 1e6, count_lines(written))
+    print(f"\n{'':22}    wall s   ratio   user+sys s   ratio   peak MB        lines       MB")
+    summary = {name: typical(one) for name, one in taken.items()}
+    first = summary[next(iter(CONTROLS))]
+    for name, one in summary.items():
+        megabytes, lines = size[name]
+        print(
+            f"  {name:20}  {one.wall:8.2f}   {one.wall / first.wall:5.2f}   {one.processor:10.2f}   "
+            f"{one.processor / first.processor:5.2f}   {one.memory:7.0f}   {lines:10,}   {megabytes:6.1f}"
+        )
+
+
 def main() -> None:
     """Make the file, compile the C program, time both."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", type=int, default=POINTS, help="points of the file (default %(default)s)")
     parser.add_argument("--runs", type=int, default=3, help="runs of each program (default %(default)s)")
+    parser.add_argument("--controls", action="store_true", help="time the text of several controls, no C program")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="bench-") as name:
         folder = Path(name)
         path = folder / "bench.cls"
         # in a process of its own: what this one has in memory would count as a peak of those it starts
         subprocess.run([sys.executable, HERE / "make_clsf.py", path, str(given.points)], check=True)
-        programs = {"cornersmooth": find_command(), "baseline.c": compile_baseline(folder)}
         print(
             f"{given.points:,} points, {path.stat().st_size / 1e6:.1f} MB, tolerance {TOLERANCE} mm, {given.runs} runs"
         )
+        if given.controls:
+            compare_controls(path, folder, find_command(), given.runs)
+            return
+        programs = {"cornersmooth": find_command(), "baseline.c": compile_baseline(folder)}
         for form in FORMS:
             compare(form, path, folder, programs, given.runs)
 
