@@ -19,6 +19,9 @@ from cornersmooth.verify.ncprogram import Element, NcProgram
 #: how far, relative to the tolerance, a trail may stay off the motion it stands for
 CHORD_SHARE = 0.1
 
+#: square of the cosine of half a turn below which a move is divided no more: the axis comes near to turning over
+_STEEPEST = 1e-6
+
 
 @dataclass(frozen=True)
 class Trail:
@@ -136,8 +139,10 @@ def turn_cuts(axis: Floats, tolerance: float, axis_length: float) -> Ints:
         turn = np.sqrt(np.einsum("ij,ij->i", step, step))
         largest = np.sqrt(8 * CHORD_SHARE * tolerance / axis_length)
         many = np.flatnonzero(turn > largest)
-        angle = 2 * np.arcsin(np.minimum(turn[many] / 2, 1))
-        cuts[many + 1] = np.ceil(angle / largest)
+        # parts are equal in the fraction, and the axis turns fastest in the middle: by 2 tan(θ/2) per move
+        sine = turn[many] / 2
+        fastest = turn[many] / np.sqrt(np.maximum(1 - sine * sine, _STEEPEST))
+        cuts[many + 1] = np.ceil(fastest / largest)
     return cuts
 
 
