@@ -31,10 +31,49 @@ def test_controls_are_listed_with_their_forms() -> None:
     text = run("controls").stdout.decode()
     for word in ("fanuc:", "siemens:", "-f bspline:", "-f poly:", "heidenhain:", "linuxcnc:", "mitsubishi:", "haas:"):
         assert word in text
+    assert "--with cycle832:" in text
     assert run("controls", "haas").stdout.decode().splitlines()[0].startswith("haas: ")
     failed = run("controls", "hass")
     assert failed.returncode == 2
     assert "did you mean haas?" in failed.stderr.decode()
+
+
+def test_the_table_of_a_control_is_printed_to_start_from(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_bytes(run("controls", "siemens", "--table").stdout)
+    mine.write_text(mine.read_text().replace('tail = ["M30"]', 'tail = ["M17"]'))
+    assert lines_of("--control", mine)[-1] == "M17"
+    assert run("controls", mine).stdout.decode().startswith("siemens: ")
+    assert run("controls", "--table").returncode == 2
+    assert run("controls", "siemenz", "--table").returncode == 2
+
+
+def test_own_tables_are_checked(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    for text, message in (
+        ("like = 'fanuc'\n[words]\ncolant = {}\n", "unknown key words.colant; did you mean coolant?"),
+        ("like = 'fanuc'\n[words]\ncoolant = 3\n", "words.coolant is 3; write a table [words.coolant]"),
+        ("like = 'fanuc'\n[digits]\nmm = 'four'\n", "digits.mm is 'four'; give a whole number up to 9"),
+    ):
+        mine.write_text(text)
+        for command in (("controls", mine), ("smooth", "-", "--control", mine)):
+            result = run(*command, data=CL)
+            assert result.returncode == 2
+            assert result.stderr.decode().strip() == f"{mine}: error: {message}"
+
+
+def test_functions_of_the_control_are_asked_for_by_name() -> None:
+    lines = lines_of("--control", "siemens", "--with", "cycle832")
+    assert "CYCLE832(0.00500,_ORI_FINISH,0.02865)" in lines
+    assert [line for line in lines_of("--with", "aicc") if line.startswith("G5.1")] == ["G5.1 Q1", "G5.1 Q0"]
+    code, said = refusal("--control", "heidenhain", "--with", "cycle832")
+    assert (code, said) == (2, "error: heidenhain has no function 'cycle832'; leave it out")
+
+
+def test_comments_may_be_left_out() -> None:
+    data = CL.replace(b"LOADTL/3", b"PPRINT SAID\nLOADTL/3")
+    assert "(SAID)" in lines_of(data=data)
+    assert not [line for line in lines_of("--no-comments", data=data) if "(" in line]
 
 
 def test_machines_are_listed_and_described() -> None:
@@ -89,6 +128,13 @@ def test_own_tables_are_taken_from_files(tmp_path: Path) -> None:
             ("-f", "g6.2", "--machine", "table-ac", "--method", "zhang2016"),
             2,
             "method zhang2016 has no curves in rotary",
+        ),
+        (("--program-name", "PART7"), 2, "fanuc takes no program name 'PART7'; use one like O0001"),
+        (("-f", "g6.2", "--no-tcp"), 2, "fanuc form g6.2 cannot run without tool tip control"),
+        (
+            ("--control", "heidenhain", "--no-tcp"),
+            2,
+            "heidenhain form g1 cannot run without tool tip control; leave out",
         ),
         (("--header", "none.txt"), 3, "none.txt: error: cannot read it"),
     ],
