@@ -152,6 +152,20 @@ def test_pure_rotation():
     assert found.max_axis_point_deviation_mm == pytest.approx(0.04, rel=1e-3)
 
 
+def test_axis_that_nearly_turns_over_is_followed_closely():
+    """The ruled motion turns fastest in the middle; every pose written here lies on it."""
+    angle = math.radians(165.0)
+    ends = np.array([[0.0, 0.0, 1.0], [math.sin(angle), 0.0, math.cos(angle)]])
+    tip = np.array([[0.0, 0, 0], [0.3, 0, 0]])
+    program = Program.from_poses(tip, ends, feed=100.0)
+    share = (1 + np.tan(np.linspace(-angle / 2, angle / 2, 1200)) / math.tan(angle / 2)) / 2
+    points = tip[0] + share[1:, None] * (tip[1] - tip[0])
+    axes = unit(ends[0] + share[1:, None] * (ends[1] - ends[0]))
+    found = verify(program, g1(program, points, axes), tolerance=0.002)
+    assert found.passed
+    assert found.axis_point.value < 2e-4
+
+
 @pytest.mark.parametrize("as_arc", [True, False])
 def test_arc_against_arc_and_against_chords(as_arc):
     tip = np.array([[10.0, 0, 0], [0, 10, 0], [0, 20, 0]])
