@@ -117,3 +117,39 @@ def test_inverse_time_gives_the_tip_its_feed(case: Case) -> None:
         assert piece.feed is not None
         if length > 0.5:  # the digits of the ends are a part in ten thousand of it
             assert length * piece.feed == pytest.approx(800.0, rel=2e-3)
+
+
+TURN = (
+    b"UNITS/MM\nLOADTL/4\nSPINDL/9000,RPM,CLW\nRAPID\nGOTO/0,0,0,0,0.6,0.8\nFEDRAT/800,MMPM\nGOTO/9,0,0\n"
+    b"GOTO/9,0,0,0,0.7,0.714142843\nGOTO/18,0,0\nFINI\n"
+)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [case for case in RUNNABLE if case.choose().orientation != "fixed" and not case.machine.endswith("trt")],
+    ids=str,
+)
+def test_a_tool_that_only_turns(case: Case) -> None:
+    """Tip control takes F as it is; LinuxCNC would take it as degrees per minute and is told the time instead."""
+    text, _ = written(read(TURN, name="part.cls"), case.choose(), Settings(tolerance=1e-3, reversal_angle=1.0))
+    found = reader(case.control, case.form, case.machine, case.tcp).read(text, 10.0, 1e-3)
+    turns = []
+    for piece in found.pieces[1:]:
+        tip, direction = piece.at(np.array([0.0, 1.0]))
+        if (
+            np.abs(tip[1] - tip[0]).max() < 2e-4 * (1 if case.tcp else 100)
+            and np.abs(direction[1] - direction[0]).max() > 1e-5
+        ):
+            turns.append(piece)
+    assert turns
+    modes = {piece.mode for piece in turns}
+    if case.control == "linuxcnc" or not case.tcp:
+        assert modes == {"G93"}
+        time = sum(1.0 / piece.feed for piece in turns if piece.feed)
+        # the axis point runs with the feed: 10 mm away from the tip, 7.6 degrees
+        swing = 10.0 * np.arccos(0.6 * 0.7 + 0.8 * 0.714142843)
+        assert time == pytest.approx(swing / 800.0, rel=0.02)
+    else:
+        assert modes == {found.pieces[1].mode}
+        assert all(piece.feed is None for piece in turns)

@@ -12,6 +12,7 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.model import Arcs, Move, Program
 from cornersmooth.settings import Settings
 from nc.cases import CHOSEN, Case
 from nc.promise import random_verdict, runs_of, verdict, without_holes
@@ -82,4 +83,28 @@ def test_machine_positions_go_with_the_angles_as_written(control: str) -> None:
     program = read(cl_text([Chain(tip, np.round(axis, 9), np.full(4, 500.0))])[0], name="far.cls")
     case, settings = Case(control, "g1", "table-bc", tcp=False), Settings(tolerance=0.002)
     found = verdict(program, [Original(tip, axis)], case, case.choose(), settings)
+    assert found.deviation.worst <= settings.tolerance, found
+
+
+@pytest.mark.parametrize("case", [case for case in CHOSEN if case.choose().orientation != "fixed"], ids=str)
+def test_arcs_with_a_turning_tool_keep_the_tolerance(case: Case) -> None:
+    """A circular block has no words for it: lines, on which tip and axis run as one."""
+    axis = unit(np.array([[0.1, 0.0, 1.0], [0.0, 0.3, 1.0]]))
+    program = Program.from_poses(
+        [(10.0, 0, 0), (0, 10, 2)],
+        axis,
+        kind=np.array([Move.RAPID, Move.ARC]),
+        feed=300.0,
+        arcs=Arcs(np.array([1]), np.zeros((1, 3)), np.array([[0.0, 0, 1]]), np.array([np.pi / 2])),
+    )
+    share = np.linspace(0, 1, 4001)[:, None]
+    angle = share[:, 0] * np.pi / 2
+    tip = np.stack((10 * np.cos(angle), 10 * np.sin(angle), 2 * share[:, 0]), axis=1)
+    settings = Settings(tolerance=0.01, axis_length=30.0)
+    original = Original(tip, unit(axis[0] + share * (axis[1] - axis[0])))
+    if case.machine and case.choose().curves:  # angles of an arc are not looked for there
+        with pytest.raises(SettingsError, match=r"the tool turns on an arc, .*; use -f g1"):
+            verdict(program, [original], case, case.choose(), settings)
+        return
+    found = verdict(program, [original], case, case.choose(), settings)
     assert found.deviation.worst <= settings.tolerance, found

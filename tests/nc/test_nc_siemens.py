@@ -6,6 +6,7 @@ PL = u[j+2] − u[j+1] of the clamped knots u; blocks that follow one another ar
 
 from __future__ import annotations
 
+import io
 import re
 
 import numpy as np
@@ -13,9 +14,9 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.model import SmoothProgram
-from cornersmooth.nc import choose_form
+from cornersmooth.nc import choose_form, write
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing import nurbs, smooth
 from nc.grammars import reader
 from nc.promise import written
 from nc.reading import Reading
@@ -96,6 +97,15 @@ def test_isolated_corners_are_splines_of_their_own() -> None:
     found = splines(text)
     assert [len(run.points) for run in found] == [5, 5]
     np.testing.assert_array_equal(found[0].knots, [0, 0, 0, 0, 0.5, 1, 1, 1, 1])
+
+
+@pytest.mark.parametrize(("count", "said"), [(3, 1), (4, 0), (12, 0)])
+def test_single_splines_are_warned_of(count: int, said: int) -> None:
+    """At least 6 blocks out of every 10 must be spline blocks (programming manual)."""
+    form = choose_form("siemens", "bspline")
+    smoothed = smooth(read(circle(count, 0.3), name="part.cls"), Settings(tolerance=TOLERANCE))
+    found = write(smoothed, io.BytesIO(), form=form).findings
+    assert sum(finding.count for finding in found if finding.code == "CS325") == said
 
 
 def test_knots_of_neighbours_are_triple() -> None:

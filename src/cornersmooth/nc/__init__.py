@@ -8,11 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.kinematics import rapid_moves
-from cornersmooth.model import FeedMode, Ints, Program, SmoothProgram, Units
+from cornersmooth.model import Ints, Program, SmoothProgram, Units
+from cornersmooth.nc.advice import advise
 from cornersmooth.nc.blocks import BlockWriter
 from cornersmooth.nc.choice import check_program, choose_form
 from cornersmooth.nc.circles import Circles, plan_circles
@@ -137,9 +135,8 @@ def write(
     check_program(chosen, program, smoothed.settings)
     frame = frame or Frame()
     statements = StatementWriter(chosen, program, notes, _values(program, smoothed.settings), comments=frame.comments)
-    _tell_feeds(chosen, program, notes)
     circles = plan_circles(program, smoothed.settings, chosen)
-    _tell_arcs(circles, program, notes)
+    advise(chosen, smoothed, circles, notes)
     writer = BlockWriter(chosen, program, statements, notes, circles)
     motion = MotionWriter(program, writer, statements, notes)
     with _Behind(stream) as behind:
@@ -226,23 +223,3 @@ class _Behind:
             self._done.result()
         self._done = self._pool.submit(self._stream.write, b"".join(self._waiting))
         self._waiting, self._size = [], 0
-
-
-def _tell_feeds(form: Form, program: Program, notes: Notes) -> None:
-    if form.orientation != "machine":
-        return
-    cuts = ~rapid_moves(program.kind) & (program.feed_mode == FeedMode.PER_REVOLUTION)
-    rows = np.flatnonzero(cuts)
-    if len(rows):
-        text = "feed per revolution without tool tip control counts along the machine's axes; give feeds per minute"
-        notes.add("CS323", "warning", int(program.line[rows[0]]), text, len(rows))
-
-
-def _tell_arcs(circles: Circles, program: Program, notes: Notes) -> None:
-    for chosen, code, text in (
-        (circles.pieces > 0, "CS313", "arc written as G2 or G3"),
-        (circles.pieces == 0, "CS314", "arc written as lines"),
-    ):
-        rows = np.flatnonzero(chosen)
-        if len(rows):
-            notes.add(code, "note", int(program.line[program.arcs.pose[rows[0]]]), text, len(rows))

@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import Move, Program
+from cornersmooth.model import Floats, Move, Program
 from cornersmooth.nc.control import ROTARY_SHARE, Control, Extra, Form, FormTable, Orientation
 from cornersmooth.nc.tables import load_control
 from cornersmooth.settings import Settings
@@ -77,22 +77,29 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
     Raises
     ------
     SettingsError
-        The tool is not parallel to Z and the form has no words for that.
+        The tool is not parallel to Z, or turns on an arc, and the form has no words for that.
     """
-    if form.orientation != "fixed":
-        return
-    tilt = norm(program.axis - (0.0, 0.0, 1.0))
-    tilt[program.kind == Move.FROM] = 0.0
+    if form.orientation == "fixed":
+        tilt = norm(program.axis - (0.0, 0.0, 1.0))
+        tilt[program.kind == Move.FROM] = 0.0
+        text = "the tool is not parallel to Z, and {} has no words for its axis"
+        vectors = [name for name, other in form.table.forms.items() if "vector" in other.modes]
+        hint = f"use -f {vectors[0]}" if vectors else "name your machine with --machine"
+        _refuse_tilt(form, program, settings, tilt, text, hint)
+    if form.rotary and form.curves and len(program.arcs):
+        turn = np.zeros(len(program))
+        pose = program.arcs.pose
+        turn[pose] = norm(program.axis[pose] - program.axis[pose - 1])
+        text = "the tool turns on an arc, which {} cannot follow within the tolerance"
+        _refuse_tilt(form, program, settings, turn, text, f"use -f {next(iter(form.table.forms))}")
+
+
+def _refuse_tilt(form: Form, program: Program, settings: Settings, tilt: Floats, text: str, hint: str) -> None:
+    """Refuse the first pose whose tilt (n,), rad, is worth more than a rounding error at the axis point."""
     tilted = np.flatnonzero(settings.axis_length * tilt > ROTARY_SHARE * settings.tolerance)
     if len(tilted):
-        straight = [name for name, other in form.table.forms.items() if "vector" in other.modes]
-        raise SettingsError(
-            "CS219",
-            f"the tool is not parallel to Z, and {form.control} form {form.name} has no words for its axis",
-            f"use -f {straight[0]}" if straight else "name your machine with --machine",
-            file=program.source.name,
-            line=int(program.line[tilted[0]]),
-        )
+        what = text.format(f"{form.control} form {form.name}")
+        raise SettingsError("CS219", what, hint, file=program.source.name, line=int(program.line[tilted[0]]))
 
 
 def _refusal(
