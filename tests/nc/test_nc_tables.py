@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 import tomllib
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -87,3 +89,14 @@ def test_what_would_only_fail_later_is_refused_too() -> None:
         with pytest.raises(SettingsError) as refused:
             parse_control(text, file="own.toml")
         assert str(refused.value).startswith(f"own.toml: error: {message}")
+
+
+def test_the_documents_show_what_is_true() -> None:
+    """The table of one's own is accepted, the dual form is that of a text kept in `golden`."""
+    document = (Path(__file__).parents[2] / "docs" / "controls.md").read_text()
+    table = document.partition("```toml\n")[2].partition("```")[0]
+    assert list(parse_control(table, file="docs/controls.md").forms) == ["g1"]
+    shown = [line.strip() for line in document.splitlines() if re.match(r"    (G1 X|G6\.2|K)", line)]
+    kept = (Path(__file__).parent / "golden" / "corner.generic-g6.2.nc").read_text()
+    assert len(shown) == 10
+    assert "\n".join(shown) in kept
