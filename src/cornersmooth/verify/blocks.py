@@ -9,17 +9,18 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.verify.anchors import cut_finely, cut_lane
 from cornersmooth.verify.careful import assign, doubtful_windows
 from cornersmooth.verify.ncprogram import NcProgram
 from cornersmooth.verify.stops import Stretches
 from cornersmooth.verify.trails import CHORD_SHARE, Original, Written, directions, written_motion
-from cornersmooth.verify.walking import Lanes, Track, cut_lane, walk
+from cornersmooth.verify.walking import Lane, Lanes, Track, walk
 
 #: path elements in a block
-BLOCK = 1 << 17
+BLOCK = 1 << 16
 
 #: written vertices between anchors
-LANE = 300
+LANE = 150
 
 #: blocks are cut at anchors that are no nearer to the ends of their original segment than this part of it: there is no
 #: doubt then in which of two blocks an original vertex belongs
@@ -33,8 +34,6 @@ MARGIN_STEPS = 4.0
 
 #: parts of blocks beyond which nothing is looked for
 MOST_PARTS = 16
-
-Lane = tuple[int, int, int, int, float]
 
 
 @dataclass(frozen=True)
@@ -213,7 +212,7 @@ class Matcher:
         for piece in pieces:
             lane = (int(ends[piece[0] - first]), int(ends[piece[1] - first]), *piece[2:])
             if lane[1] - lane[0] > 2 * LANE:
-                lanes += cut_lane(six, length, self.track, lane, LANE, self.near, None if np.isinf(until) else ends)
+                lanes += cut_finely(six, length, self.track, lane, LANE, self.near, ends)
             else:
                 lanes.append(lane)
         table = Lanes(*(np.array(column) for column in zip(*lanes, strict=True)))

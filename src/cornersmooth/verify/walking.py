@@ -14,14 +14,11 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 
+#: a stretch to walk as single numbers: see `Lanes`
+Lane = tuple[int, int, int, int, float]
+
 #: segments a walker that has lost its way looks ahead
 LOOK_AHEAD = 12
-
-#: how much longer or shorter than the written path the original may be between two anchors, as a first guess
-_LENGTH_LOW, _LENGTH_HIGH = 0.97, 1.25
-
-#: places tried for an anchor before the lane is made longer, and written vertices between them
-_ANCHOR_TRIALS, _ANCHOR_STRIDE = 5, 7
 
 
 @dataclass(frozen=True)
@@ -170,85 +167,3 @@ def _look_ahead(point: Floats, track: Track, here: Ints, end: Ints, beat: Floats
         best[nearer] = here[nearer] + step
         beat = np.where(nearer, d - margin, beat)
     return best
-
-
-def cut_lane(
-    six: Floats,
-    written_length: Floats,
-    track: Track,
-    lane: tuple[int, int, int, int, float],
-    size: int,
-    near: float,
-    candidates: Ints | None = None,
-) -> list[tuple[int, int, int, int, float]]:
-    """Cut one lane at anchors about `size` vertices apart.
-
-    Parameters
-    ----------
-    six : (v, 6) float64
-        Written vertices.
-    written_length : (v,) float64
-        Path length up to every vertex, mm.
-    track : Track
-    lane : (first, last, start, stop, fraction)
-        As in `Lanes`.
-    size : int
-    near : float, mm
-        An anchor lies no farther from the original, and nothing else of the original comes so near to it.
-    candidates : (c,) int64, optional
-        Vertices that may become anchors; all by default.
-
-    Returns
-    -------
-    list of lanes
-        At least one; they join where they are cut.
-    """
-    first, last, start, stop, fraction = lane
-    lanes = []
-    target = first + size
-    while target < last - size // 2:
-        anchor = None
-        for trial in range(_ANCHOR_TRIALS):
-            vertex = target + trial * _ANCHOR_STRIDE
-            if candidates is not None:
-                vertex = int(candidates[min(int(np.searchsorted(candidates, vertex)), len(candidates) - 1)])
-            if vertex < last:
-                anchor = _find_anchor(
-                    six[vertex], written_length[vertex] - written_length[first], track, start, stop, near
-                )
-            if anchor is not None:
-                break
-        if anchor is None:
-            target += size
-            continue
-        segment, at = anchor
-        lanes.append((first, vertex, start, segment + 1, fraction))
-        first, start, fraction = vertex, segment, at
-        target = vertex + size
-    lanes.append((first, last, start, stop, fraction))
-    return lanes
-
-
-def _find_anchor(
-    point: Floats, gone: float, track: Track, start: int, stop: int, near: float
-) -> tuple[int, float] | None:
-    """Place of a written vertex on the original, `gone` mm after segment `start`; None where it is in doubt."""
-    origin = track.length[start]
-    for low, high in ((_LENGTH_LOW, _LENGTH_HIGH), (0.0, 2 * _LENGTH_HIGH)):
-        a, b = np.searchsorted(track.length, (origin + low * gone - near, origin + high * gone + 2 * near))
-        a, b = max(int(a) - 1, start), min(int(b) + 1, stop)
-        if a >= b:
-            continue
-        row = track.row[a:b]
-        away = point - row[:, :6]
-        t = np.clip(np.einsum("ij,ij->i", away, row[:, 6:12]) * row[:, 12], 0.0, 1.0)
-        away -= t[:, None] * row[:, 6:12]
-        d = np.einsum("ij,ij->i", away, away)
-        close = np.flatnonzero(d <= 4 * near * near)
-        best = int(np.argmin(d))
-        if d[best] > near * near:
-            continue
-        if track.length[a + close[-1]] - track.length[a + close[0] + 1] > 8 * near:
-            return None
-        return a + best, float(t[best])
-    return None
