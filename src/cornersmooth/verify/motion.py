@@ -147,6 +147,7 @@ def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
     unknown = np.flatnonzero(np.isnan(code[rows]))
     if len(unknown):
         problems.append(Problem("CS502", 0, int(piece.line[unknown[0]]), "a motion before the first G0 or G1"))
+    _check_straight(table, straight, problems, knots="R PL PW K" if points or modal.rotary else "R PL PW")
     if modal.inverse_time:
         _check_inverse_time(table, code, rows, problems)
     if len(curves):
@@ -263,6 +264,19 @@ def _check_starts(piece: Piece, modal: Modal, exact: Bools) -> None:
     for k in np.flatnonzero(wrong).tolist():
         text = "first control point is not the current position"
         piece.problems.append(Problem("CS519", 0, int(piece.line[element[k]]), text))
+
+
+def _check_straight(table: Table, straight: Bools, problems: list[Problem], *, knots: str) -> None:
+    """Words of curves have no meaning on lines: what was to begin the curve is missing."""
+    for name in knots.split():
+        column = table.columns.get(name)
+        if column is None:
+            continue
+        rows = np.flatnonzero(straight & ~np.isnan(column))
+        if len(rows):
+            text = "curve blocks without what begins a curve before them"
+            problems.append(Problem("CS511", 0, int(table.line[rows[0]]), text))
+            return
 
 
 def _check_inverse_time(table: Table, code: Floats, rows: Ints, problems: list[Problem]) -> None:

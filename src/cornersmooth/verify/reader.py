@@ -242,6 +242,8 @@ class _Reader:
         )
         self.events.sort(key=lambda event: event.line)
         steps = (tip_step * scale, second_step * (scale if second_is == "point" else 1.0))
+        if self.rotary is not None and len(curves):  # on curves the angles are fitted, and turn early near the pole
+            second_room /= POLE_SHARE
         if self.rotary is not None:
             steps = replace(self.rotary, tip_step=steps[0]).steps(self.lever)
         return NcProgram(

@@ -131,15 +131,34 @@ def knot_curves(
     wrong = np.flatnonzero((weight <= 0) | ~np.isfinite(weight))
     text = "a weight R that is not positive"
     problems.extend(Problem("CS518", 0, int(table.line[row]), text) for row in point_rows[wrong].tolist())
+    weight[wrong] = 1.0  # has been said; what follows wants curves that can be measured
+    bad = (single != order) | (points < order) | (order < 2) | _unclamped(knot, start, size, order)
+    bad |= np.logical_or.reduceat(falls, start)
+    own = _exactly(knot, start, size, points + order)
+    if bad.any():
+        order, own = _replaced(own, order, points, bad)
     return CurveTable(
         row=rows[start],
         end=point_rows[np.cumsum(points) - 1],
         order=order,
         points=points,
-        control=six.take(point_rows, axis=0),
+        control=six[point_rows],
         weight=weight,
-        knot=_exactly(knot, start, size, points + order),
+        knot=own,
     )
+
+
+def _replaced(knot: Floats, order: Ints, points: Ints, bad: Bools) -> tuple[Ints, Floats]:
+    """Orders and knots with those of malformed curves replaced by such that can be measured."""
+    fitting = np.where(bad, np.clip(order, 1, np.maximum(points, 1)), order)
+    first = np.cumsum(points + order) - points - order
+    parts = []
+    for k in range(len(points)):
+        count, own = int(points[k]), int(fitting[k])
+        inner = np.arange(1.0, max(count - own, 0) + 1)
+        clamped = np.concatenate((np.zeros(own), inner, np.full(own, len(inner) + 1.0)))
+        parts.append(clamped if bad[k] else knot[first[k] : first[k] + count + own])
+    return fitting, np.concatenate(parts)
 
 
 def _unclamped(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
@@ -189,8 +208,7 @@ def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, pr
     interval = np.maximum(np.nan_to_num(interval), 0.0)
     weight = np.where(np.isnan(weight), 1.0, weight)
     complain((weight <= 0) | (weight > LARGEST_WEIGHT), "CS518", "a weight PW that is not above 0 and up to 3")
-    gap = np.append(False, np.diff(table.line[rows]) != 1) & ~opens
-    complain(gap, "CS510", "something else stands between the blocks of a curve")
+    weight = np.where(weight <= 0, 1.0, weight)
     closes = np.append(opens[1:], True)
     complain((opens | closes) & (interval != 0), "CS517", "a spline whose first or last interval is not zero")
     # a curve begins with the control point in front of the block `first`
@@ -209,14 +227,19 @@ def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, pr
     weights = own[place]
     # the first control point of a spline is no block's own
     weights[(np.cumsum(points) - points)[opens[first]]] = 1.0
+    knot = _knots_of(interval, first, count)
+    order = np.full(len(first), SPLINE_ORDER, np.int64)
+    bad = (points < SPLINE_ORDER) | (interval[first] != 0) | (interval[first + count - 1] != 0)
+    if bad.any():
+        order, knot = _replaced(knot, order, points, bad)
     return CurveTable(
         row=rows[first],
         end=rows[first + count - 1],
-        order=np.full(len(first), SPLINE_ORDER, np.int64),
+        order=order,
         points=points,
         control=control,
         weight=weights,
-        knot=_knots_of(interval, first, count),
+        knot=knot,
     )
 
 

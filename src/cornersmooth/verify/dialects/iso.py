@@ -61,7 +61,6 @@ ISO_WORDS: Mapping[str, IsoWords] = {
         {43.0: "G43", 234.0: "G234", 49.0: ""},
         {"angles": ("G234",), "machine": ("", "G43"), "vector": ("G234",)},
         dwell=1000.0,
-        unsaid=frozenset((("coolant", 7.0),)),
     ),
     "linuxcnc": IsoWords(
         {43.0: "G43", 43.1: "G43.1", 49.0: ""},
