@@ -239,12 +239,18 @@ def test_limit_on_the_way_between_two_poses():
     plain = load_machine("table-ac")
     tilting = RotaryAxis("A", (1, 0, 0), "table", limits=(-105, 105))
     machine = Machine("tight", (plain.axes[0], tilting))
+    plain = replace(plain, axes=(plain.axes[0], replace(tilting, limits=None)))
     tilt, azimuth = np.radians(100), np.radians(np.array([0, 120]))
     axis = np.stack((np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.full(2, np.cos(tilt))), axis=1)
     tip = np.array([[0.0, 0, 0], [10, 0, 0]])
-    angles = rotary_angles(machine, tip, axis, tolerance=0.01).angles
-    with pytest.raises(InputError, match=r"p\.cls:9: error: A would have to go to .* its limit is 105 deg"):
-        insertions(machine, tip, axis, angles, tolerance=0.01, line=np.array([8, 9]), file="p.cls")
+    where = {"line": np.array([8, 9]), "file": "p.cls"}
+    said = r"p\.cls:9: error: A would have to go to .* its limit is -?105 deg"
+    with pytest.raises(InputError, match=said):
+        rotary_angles(machine, tip, axis, tolerance=0.01, **where)
+    angles = rotary_angles(plain, tip, axis, tolerance=0.01).angles
+    assert np.abs(angles[:, 1]).max() < 101
+    with pytest.raises(InputError, match=said):
+        insertions(machine, tip, axis, angles, tolerance=0.01, **where)
 
 
 def test_nothing_to_do():

@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -273,9 +274,11 @@ def main() -> int:
     parser.add_argument("cl", type=Path)
     parser.add_argument("-e", "--tolerance", type=float, default=0.01, help="mm")
     parser.add_argument("-H", "--axis-length", type=float, default=10.0, help="mm")
+    parser.add_argument("--feed", type=float, default=500.0, help="mm/min where the CL file gives none")
     parser.add_argument("--seconds", type=float, default=600.0, help="give up after so long")
     given = parser.parse_args()
     program = read(given.cl.read_bytes(), name=given.cl.name)
+    program = replace(program, feed=np.where(np.isnan(program.feed), given.feed, program.feed))
     form = choose_form("linuxcnc", machine=load_machine(MACHINE))
     settings = Settings(tolerance=given.tolerance, axis_length=given.axis_length)
     smoothed = smooth(program, fit_settings(settings, form, program.units))
@@ -291,6 +294,8 @@ def main() -> int:
     tip, axis = tool(joints)
     poses = np.concatenate((tip, tip + given.axis_length * axis), axis=1)
     cuts = original(program, given.axis_length)
+    start = np.linalg.norm(poses - cuts[0][0], axis=1) < 2 * given.tolerance
+    poses = poses[int(np.argmax(start)) :]  # a file without rapids is approached with its feed
     tip_error, axis_error = deviations(poses, cuts)
     every = np.concatenate(cuts)
     left, _ = cKDTree(poses).query(every, workers=1)

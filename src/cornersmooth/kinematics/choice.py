@@ -38,7 +38,7 @@ class Pieces:
     Parameters
     ----------
     first, last : (p, 2, 2) float64
-        ``[piece, branch, axis]`` at the first pose, in (-180, 180], and at the last.
+        ``[piece, branch, axis]`` at the first pose and at the last, or at the pole where pieces meet there.
     low, high : (p, 2, 2) float64
         Extremes over the piece.
     free : (p,) bool

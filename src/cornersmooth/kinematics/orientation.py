@@ -207,6 +207,14 @@ def angle_between(one: Floats, other: Floats) -> Floats:
     return angle
 
 
+def pole_angle(machine: Machine, axis: Floats) -> Floats:
+    """Second angle that the machine has at the pole nearest to each axis: (n, 3) -> (n,) degrees in (-180, 180]."""
+    poles = np.array(_Frame.of(machine).poles(machine))
+    angles = closest_second(machine, poles, np.zeros(len(poles)))
+    nearest: Floats = angles[np.argmax(axis @ poles.T, axis=1)]
+    return nearest
+
+
 def unit(vectors: Floats) -> Floats:
     """Vectors along the last axis brought to unit length; none becomes a vector of no length, 60 degrees off all."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)

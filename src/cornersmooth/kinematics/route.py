@@ -19,12 +19,9 @@ from cornersmooth.kinematics.orientation import (
     solutions,
     tool_axis,
 )
+from cornersmooth.kinematics.unwrapping import WideSteps, meet_at_pole, unwrap
 from cornersmooth.model import Bools, Floats, Ints, Move
 
-#: A step of the first angle larger than this (degrees) is followed on its way to see which way round it goes.
-WIDE_STEP = 90.0
-#: So many points are looked at on the way.
-WIDE_STEP_POINTS = 15
 #: Poses worked on at a time, so that memory is needed for their angles and little else.
 BLOCK = 1 << 15
 
@@ -181,21 +178,30 @@ def _steady_angles(
     steady, unwrapped = poses.steady, poses.angles
     dislike = _dislike(machine, unwrapped[0])
     free, first = [np.ones(1, np.bool_)], [np.zeros(1, np.int64)]
+    wide = [WideSteps(np.zeros(0, np.int64), *np.zeros((2, 0, 2, 2)))]
     for here in _blocks(len(steady)):
         rows = slice(max(here.start, 1), here.stop)
         start, end = steady[rows.start - 1 : rows.stop - 1], steady[rows]
         rests = run[start] != run[end]
         broken = rests | (end - start > 1) | passes_pole(machine, axis[start], axis[end], tolerance / 2)
-        _unwrap(machine, axis, start, end, unwrapped[rows.start - 1 : rows.stop], broken)
+        found = unwrap(machine, axis, start, end, unwrapped[rows.start - 1 : rows.stop], broken)
+        wide.append(WideSteps(found.row + rows.start, found.low, found.high))
         breaks = np.flatnonzero(broken)
         first.append(rows.start + breaks)
         free.append(rests[breaks])
     begins = np.concatenate(first)
+    enter, leave = unwrapped[begins], unwrapped[np.append(begins[1:], len(steady)) - 1]
+    meet_at_pole(machine, axis, steady, begins, ~np.concatenate(free), enter, leave)
+    low, high = np.minimum.reduceat(unwrapped, begins, axis=0), np.maximum.reduceat(unwrapped, begins, axis=0)
+    way = WideSteps(*(np.concatenate([getattr(part, name) for part in wide]) for name in ("row", "low", "high")))
+    owner = np.searchsorted(begins, way.row, side="right") - 1
+    np.minimum.at(low, owner, way.low)
+    np.maximum.at(high, owner, way.high)
     pieces = Pieces(
-        first=unwrapped[begins],
-        last=unwrapped[np.append(begins[1:], len(steady)) - 1],
-        low=np.minimum.reduceat(unwrapped, begins, axis=0),
-        high=np.maximum.reduceat(unwrapped, begins, axis=0),
+        first=enter,
+        last=leave,
+        low=low,
+        high=high,
         free=np.concatenate(free),
         dislike=dislike,
     )
@@ -203,45 +209,13 @@ def _steady_angles(
     try:
         branch, turns = choose(pieces, machine.limits)
     except NoChoiceError as stuck:
-        raise _stuck_error(machine, stuck, piece, axis, unwrapped, steady, run, line, file) from stuck
+        raise _stuck_error(machine, stuck, piece, axis, unwrapped, way, steady, run, line, file) from stuck
     angles = np.empty((len(steady), 2))
     for here in _blocks(len(steady)):
         own = piece[here]
         angles[here] = unwrapped[here][np.arange(len(own)), branch[own]] + 360 * turns[own]
     swaps = begins[1:][pieces.free[1:] & (branch[1:] != branch[:-1])]
     return angles, branch.astype(np.int8)[piece], steady[swaps]
-
-
-def _unwrap(machine: Machine, axis: Floats, start: Ints, end: Ints, angles: Floats, broken: Bools) -> None:
-    """Make both branches continuous from the first row on, in place, where nothing breaks the path.
-
-    Parameters
-    ----------
-    start, end : (e,) int64
-        Poses before and behind each step.
-    angles : (e + 1, 2, 2) float64, degrees
-        The first row is unwrapped already; after a break the turns are counted from 0 again.
-    """
-    step = np.diff(angles, axis=0)
-    change = -np.round(step / 360)
-    wide = np.flatnonzero(~broken & (np.abs(step + 360 * change).max(axis=(1, 2)) > WIDE_STEP))
-    if len(wide):
-        # A wide step: the sum of the short ones on the way says which way round it goes.
-        share = (np.arange(1, WIDE_STEP_POINTS + 1) / (WIDE_STEP_POINTS + 1))[:, None, None]
-        between = axis[start[wide]] * (1 - share) + axis[end[wide]] * share
-        length = np.linalg.norm(between, axis=2, keepdims=True)
-        between = np.where(length > 0, between / np.where(length > 0, length, 1.0), axis[start[wide]])
-        on_way = solutions(machine, between.reshape(-1, 3)).angles.reshape(WIDE_STEP_POINTS, -1, 2, 2)
-        steps = np.diff(np.concatenate((angles[wide][None], on_way, angles[wide + 1][None])), axis=0)
-        steps -= 360 * np.round(steps / 360)
-        change[wide] = np.round((steps.sum(axis=0) - step[wide]) / 360)
-    if not change.any():
-        return
-    turns = np.cumsum(change, axis=0)
-    if broken.any():
-        base = np.maximum.accumulate(np.where(broken, np.arange(len(broken)), -1))
-        turns -= np.where(base[:, None, None] >= 0, turns[base], 0.0)
-    angles[1:] += 360 * turns
 
 
 def _dislike(machine: Machine, start: Floats) -> Floats:
@@ -276,7 +250,10 @@ def _fill_cone(
     share = np.where(span > 0, gone / np.where(span > 0, span, 1.0), even)
     share = np.where(from_left & to_right, share, np.where(to_right, 1.0, 0.0))
     first = left_angles[:, 0] + share * (right_angles[:, 0] - left_angles[:, 0])
-    guess = np.where((share < 0.5)[:, None], left_angles, right_angles)[:, 1]
+    # Which turn of the second angle: both sides say the same, but where the axis goes over from pole to pole.
+    pole = machine.axes[0].unit
+    follows = to_right & (~from_left | ((axis[poses] @ pole > 0) == (axis[end] @ pole > 0)))
+    guess = np.where(follows, right_angles[:, 1], left_angles[:, 1])
     second = closest_second(machine, axis[poses], first)
     angles[poses, 0] = first
     angles[poses, 1] = second + 360 * np.round((guess - second) / 360)
@@ -294,6 +271,7 @@ def _stuck_error(
     piece: Ints,
     axis: Floats,
     unwrapped: Floats,
+    way: WideSteps,
     steady: Ints,
     run: Ints,
     line: Ints,
@@ -302,13 +280,17 @@ def _stuck_error(
     """Message for the pose that no choice gets beyond."""
     limits = machine.limits
     members = np.flatnonzero(piece == stuck.piece)
+    low, high = unwrapped[members], unwrapped[members]
+    own = (way.row >= members[0]) & (way.row <= members[-1])
+    row = way.row[own] - members[0]
+    low[row], high[row] = np.minimum(low[row], way.low[own]), np.maximum(high[row], way.high[own])
     furthest, words = 0, unwrapped[members[0], 0]
     for branch, *turns in stuck.states:
-        path = unwrapped[members, branch] + 360 * np.array(turns)
-        outside = (path < limits[:, 0] - LIMIT_SLACK) | (path > limits[:, 1] + LIMIT_SLACK)
-        first = int(np.argmax(outside.any(axis=1)))
+        least, most = low[:, branch] + 360 * np.array(turns), high[:, branch] + 360 * np.array(turns)
+        below, above = least < limits[:, 0] - LIMIT_SLACK, most > limits[:, 1] + LIMIT_SLACK
+        first = int(np.argmax((below | above).any(axis=1)))
         if first >= furthest:
-            furthest, words = first, path[first]
+            furthest, words = first, np.where(below[first], least[first], most[first])
     pose = int(steady[members[furthest]])
     start = int(np.searchsorted(run, run[pose]))
     both = solutions(machine, axis[pose : pose + 1]).angles[0]
