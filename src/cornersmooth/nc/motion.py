@@ -48,6 +48,7 @@ class MotionWriter:
     _last: NDArray[np.int64] | None = None  #: what was written last, a tool change or not
     _return_to: int = _NOWHERE  #: first pose behind a tool change, until it is reached
     _next_statement: int = 0
+    _arc_begun: int = -1  #: arc behind a FROM whose start has been gone to
     _ticks: Ints = field(init=False)  #: of the block that is written
     _said: tuple[Statement, ...] = field(init=False)
     _approach: Ints | None = field(init=False)
@@ -127,6 +128,9 @@ class MotionWriter:
         yield from self._go_back(int(move[0]))
         if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
             yield from self._go_to(self.writer.ticks(program.tip[move[:1] - 1], rows.other[part][:1]), move[:1])
+        elif self._begins_at_stated(int(move[0])):  # an arc in lines wants its start, too
+            start_of_arc = self._shifted(rows, part, program.tip[move[:1] - 1], np.zeros(1, np.int64))
+            yield from self._go_to(start_of_arc, move[:1])
         self._join(ticks, rows.joined[part])
         feed, mode = program.feed[move], program.feed_mode[move].astype(np.int64)
         if rows.rate is not None:
@@ -149,6 +153,14 @@ class MotionWriter:
         run = self._moving(run)
         self._repeated += before - len(run)
         yield from self._emit(run)
+
+    def _begins_at_stated(self, move: int) -> bool:
+        """Whether a move is an arc from a stated position, met for the first time."""
+        kind = self.program.kind
+        if move in (0, self._arc_begun) or kind[move] != Move.ARC or kind[move - 1] != Move.FROM:
+            return False
+        self._arc_begun = move
+        return True
 
     def _go_back(self, move: int) -> Iterator[bytes]:
         """Go to the pose behind a tool change even if it repeats the last one before, and so is no row."""

@@ -104,7 +104,10 @@ def unit(vectors: Floats) -> Floats:
 
 def original_motion(program: Program, tolerance: float, axis_length: float) -> Original:
     """Make the trail of the CL motion."""
-    pose = np.flatnonzero(program.kind != Move.FROM)
+    stated = program.kind == Move.FROM
+    # an arc wants a start: where that is only stated the tool is sent there
+    stated[:-1] &= program.kind[1:] != Move.ARC
+    pose = np.flatnonzero(~stated)
     arc = np.full(len(pose), -1, np.int64)
     place = np.searchsorted(pose, program.arcs.pose)
     arc[place] = np.arange(len(place))
