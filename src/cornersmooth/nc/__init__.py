@@ -14,7 +14,7 @@ from cornersmooth.nc.advice import advise
 from cornersmooth.nc.blocks import BlockWriter
 from cornersmooth.nc.choice import check_program, choose_form
 from cornersmooth.nc.circles import Circles, plan_circles
-from cornersmooth.nc.control import Control, Form
+from cornersmooth.nc.control import Form
 from cornersmooth.nc.framing import BLEND_SHARE, Frame, blend_word
 from cornersmooth.nc.motion import MotionWriter
 from cornersmooth.nc.notes import Notes
@@ -22,6 +22,7 @@ from cornersmooth.nc.rotary import rotary_rows
 from cornersmooth.nc.rotary_curves import rotary_curve_rows
 from cornersmooth.nc.statements import StatementWriter
 from cornersmooth.nc.tables import control_names, control_table, load_control
+from cornersmooth.nc.vocabulary import Control
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
 from cornersmooth.text import format_number

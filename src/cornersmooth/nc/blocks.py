@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from cornersmooth.kinematics import machine_position
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.circles import FIRST_PLANE, Circles
-from cornersmooth.nc.control import INVERSE_TIME, Form
+from cornersmooth.nc.control import Form
 from cornersmooth.nc.curves import Curves, RowWriter
 from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.polynomials import curves_for, pieces_of
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.statements import StatementWriter
+from cornersmooth.nc.vocabulary import INVERSE_TIME
 from cornersmooth.text import RowFormat, format_number, to_ticks
 
 

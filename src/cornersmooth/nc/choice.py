@@ -10,8 +10,9 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Move, Program
-from cornersmooth.nc.control import ROTARY_SHARE, Control, Extra, Form, FormTable, Orientation
+from cornersmooth.nc.control import ROTARY_SHARE, Form
 from cornersmooth.nc.tables import load_control
+from cornersmooth.nc.vocabulary import Control, Extra, FormTable, Orientation
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.neighbours import norm
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Program
-from cornersmooth.nc.control import Form, Layout
+from cornersmooth.nc.control import Form
+from cornersmooth.nc.vocabulary import Layout
 from cornersmooth.text import format_number
 
 #: share of the tolerance that a control may blend lines with, where it is told so

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.blocks import BlockWriter
-from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.holes import approaches, hole_moves, travel_height
 from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.statements import StatementWriter
+from cornersmooth.nc.vocabulary import INVERSE_TIME
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
 

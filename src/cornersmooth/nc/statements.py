@@ -12,11 +12,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from cornersmooth.model import Move, Program, Statement
+from cornersmooth.nc.arguments import number_after, numbers_of, spoken_text, whole_number, words_of
 from cornersmooth.nc.comments import comment_lines
-from cornersmooth.nc.control import Form, Words
+from cornersmooth.nc.control import Form
 from cornersmooth.nc.holes import Cycle, read_cycle
 from cornersmooth.nc.notes import Notes
 from cornersmooth.nc.revolutions import milliseconds, revolutions
+from cornersmooth.nc.vocabulary import Words
 from cornersmooth.text import format_number
 
 #: words whose text is for the machinist: comments without the word
@@ -86,7 +88,7 @@ class StatementWriter:
                 return written
             self._not_understood(statement)
         elif word in _TEXT_WORDS:
-            return self.comment(_spoken(statement))
+            return self.comment(spoken_text(statement))
         elif word in _SILENT:
             return []
         elif word not in _DESCRIBING:
@@ -146,15 +148,15 @@ class StatementWriter:
 
     def load(self, statement: Statement) -> list[str] | None:
         """LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]."""
-        words, numbers = _words(statement), _numbers(statement)
+        words, numbers = words_of(statement), numbers_of(statement)
         if statement.word == "LOAD" and words[:1] != ["TOOL"]:
             return None
         if not numbers and statement.word == "LOADTL" and words and re.fullmatch(r"T\d+", words[0]):
             numbers = [float(words[0][1:])]
-        number = _whole(numbers[:1])
+        number = whole_number(numbers[:1])
         if number is None:
             return None
-        offset = _whole(_after(statement, "ADJUST") or _after(statement, "OSETNO"))
+        offset = whole_number(number_after(statement, "ADJUST") or number_after(statement, "OSETNO"))
         offset = number if offset is None else offset
         if (number, offset) == (self._tool, self._offset):  # CATIA loads a tool twice: at the change, in the operation
             return self.comment(statement.text)
@@ -171,8 +173,8 @@ class StatementWriter:
 
     def select(self, statement: Statement) -> list[str] | None:
         """SELECT/TOOL,n: brings the next tool near."""
-        number = _whole(_numbers(statement))
-        if number is None or _words(statement) != ["TOOL"]:
+        number = whole_number(numbers_of(statement))
+        if number is None or words_of(statement) != ["TOOL"]:
             return None
         if number == self._tool:
             return self.comment(statement.text)
@@ -181,17 +183,17 @@ class StatementWriter:
 
     def cutter(self, statement: Statement) -> list[str]:
         """CUTTER/d,r,e,... and TLDATA/MILL,d,...: the diameter is kept; CUTTER/d alone is the nose of a lathe tool."""
-        numbers = _numbers(statement)
-        mill = {"MILL", "DRILL"} & set(_words(statement)) if statement.word == "TLDATA" else len(numbers) > 2
+        numbers = numbers_of(statement)
+        mill = {"MILL", "DRILL"} & set(words_of(statement)) if statement.word == "TLDATA" else len(numbers) > 2
         self._diameter = numbers[0] * self.program.mm_per_unit if mill and numbers else 0.0
         return self.comment(statement.text)
 
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
-        words, numbers = _words(statement), _numbers(statement)
+        words, numbers = words_of(statement), numbers_of(statement)
         for word in ("RANGE", "MAXRPM"):  # gears and limits are the control's own affair
             if word in words:
-                following = _after(statement, word)
+                following = number_after(statement, word)
                 words = [other for other in words if other not in (word, "HIGH", "LOW", "MEDIUM")]
                 for number in following:
                     numbers.remove(number)
@@ -223,11 +225,11 @@ class StatementWriter:
 
     def coolant(self, statement: Statement) -> list[str] | None:
         """COOLNT/ON, OFF, FLOOD, MIST and what else the control has; a bare COOLNT means ON."""
-        words = _words(statement)
+        words = words_of(statement)
         if not words and "/" not in statement.text:
             words = ["ON"]
         kinds = [word for word in words if word not in ("ON", "OFF")] or words[:1]
-        if _numbers(statement) or len(kinds) != 1:
+        if numbers_of(statement) or len(kinds) != 1:
             return None
         if "OFF" in words or kinds == ["NOMORE"]:
             return list(self.words.coolant.get("OFF", ())) or None
@@ -236,7 +238,7 @@ class StatementWriter:
 
     def delay(self, statement: Statement) -> list[str] | None:
         """DELAY/seconds and DELAY/n,REV."""
-        numbers, words = _numbers(statement), _words(statement)
+        numbers, words = numbers_of(statement), words_of(statement)
         if len(numbers) != 1 or words not in ([], ["REV"]):
             return None
         time = milliseconds(numbers[0], "REV" in words, self.speed)
@@ -251,13 +253,13 @@ class StatementWriter:
 
     def compensation(self, statement: Statement) -> list[str] | None:
         """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF."""
-        words, numbers = _words(statement), _numbers(statement)
+        words, numbers = words_of(statement), numbers_of(statement)
         if words[:1] in (["OFF"], ["NOMORE"]):
             self._compensated = False
             return list(self.words.compensation_off) or None
         planes = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
         side = {"LEFT": self.words.compensation_left, "RIGHT": self.words.compensation_right}.get((words or [""])[0])
-        register = _whole(numbers or [float(self._offset)])
+        register = whole_number(numbers or [float(self._offset)])
         if not side or len(words) > 2 or not set(words[1:]) <= planes.keys() or register is None:
             return None
         self.notes.add(
@@ -277,7 +279,7 @@ class StatementWriter:
 
     def hole_cycle(self, statement: Statement) -> list[str]:
         """CYCLE: kept for the holes that follow."""
-        words = _words(statement)
+        words = words_of(statement)
         if words[:1] in (["OFF"], ["NOMORE"]):
             self.cycle = None
             return []
@@ -300,7 +302,7 @@ class StatementWriter:
 
     def insert(self, statement: Statement) -> list[str]:
         """INSERT: text for the NC file; as a comment, since nobody has looked at what it does."""
-        text = _spoken(statement)
+        text = spoken_text(statement)
         if _NC_WORDS.fullmatch(text):
             what = "INSERT with NC words is written as a comment; where the machine needs them, put them in by hand"
             self.notes.add("CS320", "warning", statement.line, what)
@@ -308,8 +310,8 @@ class StatementWriter:
 
     def auxiliary(self, statement: Statement) -> list[str] | None:
         """AUXFUN/n: M code n, unless it ends the program or calls another."""
-        number = _whole(_numbers(statement))
-        if number is None or _words(statement) or number in (2, 6, 30, 98, 99):
+        number = whole_number(numbers_of(statement))
+        if number is None or words_of(statement) or number in (2, 6, 30, 98, 99):
             return None
         return [f"M{number}"]
 
@@ -321,43 +323,14 @@ class StatementWriter:
 
     def mode(self, statement: Statement) -> list[str] | None:
         """SET/MODE,ABSOL: positions are absolute, as ours always are."""
-        return self.comment(statement.text) if _words(statement) == ["MODE", "ABSOL"] else None
+        return self.comment(statement.text) if words_of(statement) == ["MODE", "ABSOL"] else None
 
     def start(self, statement: Statement) -> list[str]:
         """FROM: a position that is stated; the tool is not sent there."""
         decimals = self.form.tip_decimals(self.program.units)
-        numbers = (format_number(value, decimals, trim=True) for value in _numbers(statement))
+        numbers = (format_number(value, decimals, trim=True) for value in numbers_of(statement))
         place = " ".join(letter + number for letter, number in zip("XYZ", numbers, strict=True))
         return self.comment(f"FROM {place}")
-
-
-def _numbers(statement: Statement) -> list[float]:
-    return [value for value in statement.args if isinstance(value, float)]
-
-
-def _words(statement: Statement) -> list[str]:
-    return [value for value in statement.args if isinstance(value, str) and value]
-
-
-def _after(statement: Statement, word: str) -> list[float]:
-    """Return the number that stands behind a word, if any."""
-    args = statement.args
-    place = args.index(word) + 1 if word in args else len(args)
-    return [value for value in args[place : place + 1] if isinstance(value, float)]
-
-
-def _whole(numbers: list[float]) -> int | None:
-    """Return the only number, where it is a whole one that is not negative."""
-    if len(numbers) != 1 or not 0.0 <= numbers[0] < 1e9 or numbers[0] != int(numbers[0]):
-        return None
-    return int(numbers[0])
-
-
-def _spoken(statement: Statement) -> str:
-    """Text of a text statement without its word and quotes."""
-    text = statement.args[0] if statement.args and isinstance(statement.args[0], str) else statement.text
-    text = text.strip()
-    return text[1:-1] if len(text) > 1 and text[0] == text[-1] == "'" else text
 
 
 Handler = Callable[[StatementWriter, Statement], list[str] | None]

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, get_args
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import FeedMode
-from cornersmooth.nc.control import (
+from cornersmooth.nc.vocabulary import (
     INVERSE_TIME,
     Control,
     CurveStyle,

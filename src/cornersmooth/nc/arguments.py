@@ -1,0 +1,36 @@
+"""Arguments of CL statements: their words and numbers."""
+
+from __future__ import annotations
+
+from cornersmooth.model import Statement
+
+
+def numbers_of(statement: Statement) -> list[float]:
+    """Numbers of a statement in order."""
+    return [value for value in statement.args if isinstance(value, float)]
+
+
+def words_of(statement: Statement) -> list[str]:
+    """Words of a statement in order."""
+    return [value for value in statement.args if isinstance(value, str) and value]
+
+
+def number_after(statement: Statement, word: str) -> list[float]:
+    """Return the number that stands behind a word, if any."""
+    args = statement.args
+    place = args.index(word) + 1 if word in args else len(args)
+    return [value for value in args[place : place + 1] if isinstance(value, float)]
+
+
+def whole_number(numbers: list[float]) -> int | None:
+    """Return the only number, where it is a whole one that is not negative."""
+    if len(numbers) != 1 or not 0.0 <= numbers[0] < 1e9 or numbers[0] != int(numbers[0]):
+        return None
+    return int(numbers[0])
+
+
+def spoken_text(statement: Statement) -> str:
+    """Text of a text statement without its word and quotes."""
+    text = statement.args[0] if statement.args and isinstance(statement.args[0], str) else statement.text
+    text = text.strip()
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] == "'" else text
