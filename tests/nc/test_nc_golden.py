@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from cornersmooth.settings import Settings
 from nc.cases import CHOSEN, Case
 from nc.grammars import reader
 from nc.promise import written
+from nc.reading import TextError
 
 GOLDEN = Path(__file__).parent / "golden"
 TOLERANCE, AXIS_LENGTH = 0.05, 10.0
@@ -54,6 +57,42 @@ def test_agreed_text_is_text_of_the_control(source: str, case: Case) -> None:
     units = "inch" if source == "inch" else "mm"
     control = reader(case.control, case.form, case.machine, case.tcp, units)
     assert control.read(golden(source, case).read_text(), AXIS_LENGTH, TOLERANCE).pieces
+
+
+def spoilt(lines: list[str], case: Case, tip: int) -> Iterator[tuple[str, list[str]]]:
+    """What is wrong, and the text with it."""
+    first = next(number for number, line in enumerate(lines) if re.search(r"\bX[+-]?\d+\.\d{4,5} Y", line))
+    changes = {
+        "unknown word": lines[first] + " Q1.",
+        "a digit less": re.sub(r"(X[+-]?\d+\.\d+)\d ", r"\1 ", lines[first]),
+        "zero with a minus": re.sub(r"X[+-]?\d+\.\d+ ", f"X-{0:.{tip}f} ", lines[first]),
+        "no blank": lines[first].replace(" Y", "Y"),
+        "exponent": re.sub(r"X([+-]?\d+\.\d+) ", r"X\1e0 ", lines[first]),
+    }
+    for what, line in changes.items():
+        yield what, [*lines[:first], line, *lines[first + 1 :]]
+    mode = case.choose().mode
+    for what, blocks in (("never switched on", mode.on[:1]), ("never switched off", mode.off[-1:])):
+        for block in blocks:
+            own = re.compile(r"(\d+ )?" + re.escape(block).replace(r"\{offset\}", r"\d+"))
+            yield what, [line for line in lines if not own.fullmatch(line)]
+    if not case.tcp:
+        yield "no F under G93", [re.sub(r" F\S+$", "", line) for line in lines]
+        yield "G93 to the end", [line for line in lines if line != "G94"]
+
+
+@pytest.mark.parametrize(("source", "case"), TEXTS, ids=lambda value: str(value))
+def test_spoilt_text_is_refused(source: str, case: Case) -> None:
+    """The readers can say no."""
+    units, tip = ("inch", 5) if source == "inch" else ("mm", 4)
+    lines = golden(source, case).read_text().splitlines()
+    for what, text in spoilt(lines, case, tip):
+        assert text != lines, what
+        try:
+            reader(case.control, case.form, case.machine, case.tcp, units).read("\n".join(text), AXIS_LENGTH, TOLERANCE)
+        except TextError:
+            continue
+        pytest.fail(f"{what} was taken")
 
 
 def test_no_golden_file_is_left_over() -> None:

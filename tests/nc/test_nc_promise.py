@@ -72,7 +72,10 @@ FILES = [
 @pytest.mark.corpus
 @pytest.mark.parametrize("name", FILES)
 def test_real_files_keep_the_tolerance(name: str, corpus: Path) -> None:
-    assert sum(keeps_the_tolerance(corpus / name, case) for case in CHOSEN) > len(CHOSEN) - 10
+    path = corpus / name
+    small = path.stat().st_size < 12_000  # without tool tip control every line becomes many: `nc.sweep` tries those
+    cases = [case for case in CHOSEN if case.tcp or small]
+    assert sum(keeps_the_tolerance(path, case) for case in cases) > len(cases) - 10
 
 
 @pytest.mark.parametrize("control", ["haas", "fanuc"])
