@@ -26,6 +26,10 @@ _BLOCK = 32768
 #: deg/min that no rotary axis exceeds where we time its blocks ourselves
 _FASTEST_TURN = 36_000.0
 
+#: degrees that a rotary axis turns in one block of a cut at most: far from the half turn where some controls go the
+#: other way round
+LARGEST_TURN = 60.0
+
 #: turns below this many degrees are none
 _NO_TURN = 1e-9
 
@@ -68,7 +72,7 @@ def rotary_rows(rows: Iterator[Rows], program: Program, settings: Settings, form
             tolerance=tolerance,
             rapid=rapid[here],
             tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
-            max_step=settings.axis_step,
+            max_step=min(settings.axis_step or LARGEST_TURN, LARGEST_TURN),
             line=line[here],
             file=file,
         )
