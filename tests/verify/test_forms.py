@@ -105,7 +105,7 @@ def test_no_false_alarm_on_the_sample(case: Case) -> None:
     _passes_on(case, SAMPLES / "impeller.cls", 0.04)
 
 
-FILES = ["nx_clsf_varcontour5x_ust_a.cls", "swcam_shimemcunha.apt", "creo11_3x_inch_multiop.ncl", "hecc_flank_nx.cls"]
+FILES = ["swcam_shimemcunha.apt", "creo11_3x_inch_multiop.ncl", "hecc_flank_nx.cls", "cnclite_tulsyan_altintas.apt"]
 
 
 @pytest.mark.corpus

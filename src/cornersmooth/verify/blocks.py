@@ -130,7 +130,7 @@ class Matcher:
     def slack(self) -> float:
         """Distance by which places on the trails may be wrong, mm: more than `margin` where they cut curves short."""
         bare = len(self.original.trail) == len(self.original.pose) and not len(self.nc.curves) and not len(self.nc.arcs)
-        if bare and not self.nc.second_room:
+        if bare and not self.nc.rotary:
             return self.margin
         # rotary words may let the tool swing by as much
         return self.margin + 2 * CHORD_SHARE * self.tolerance

@@ -164,7 +164,7 @@ def _on_bent(matcher: Matcher, block: Block, point: Floats, segment: Ints, at: F
     open_rows = np.ones(len(point), np.bool_)
     for group in block.written.curves:
         element = nc.curves.element[group.index]
-        for u in group.spans[1:-1]:
+        for u in group.spans[1:]:
             rows = np.flatnonzero(
                 open_rows & (trail.fraction[vertex] == u) & (trail.owner[vertex] == owner) & np.isin(owner, element)
             )
@@ -201,7 +201,7 @@ def _newton_from_knot(
     size = np.einsum("ij,ij->i", slope, slope) - np.einsum("ij,ij->i", rest, bend)
     step = np.divide(np.einsum("ij,ij->i", rest, slope), size, out=np.full(len(size), np.inf), where=size > 0)
     good = np.abs(step) <= _SHORT_STEP * (group.spans[-1] - group.spans[0])
-    step = np.where(good, step, 0.0)[:, None]
+    step = np.clip(np.where(good, step, 0.0), group.spans[0] - u, group.spans[-1] - u)[:, None]
     found = value + step * slope + step * step / 2 * bend
     if vectors:
         found[:, 3:] -= found[:, :3]

@@ -160,8 +160,10 @@ class NcProgram:
         Number of blocks that are not empty, ``%`` and comments left out.
     feed_room : (m,) float64
         mm/min or mm/rev by which the feed is not known: digits of F, and of times and ways where it is timed.
-    second_room : float
+    second_room : (m,) float64
         By how much, as `second`, directions that must be exact may be off beside the printed digits.
+    rotary : bool
+        Whether the text has rotary words.
     unsaid : frozenset
         Kinds of tokens (see `statements`), or pairs of kind and value, that the control has no words for.
     """
@@ -182,7 +184,8 @@ class NcProgram:
     second_step: float
     blocks: int
     feed_room: Floats = field(default_factory=lambda: np.zeros(0))
-    second_room: float = 0.0
+    second_room: Floats = field(default_factory=lambda: np.zeros(0))
+    rotary: bool = False
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
 
     def __len__(self) -> int:

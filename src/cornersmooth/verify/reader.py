@@ -17,7 +17,7 @@ from cornersmooth.verify.dialects import CONTROLS, Dialect, dialect_of
 from cornersmooth.verify.motion import Modal, Piece, execute
 from cornersmooth.verify.ncprogram import Event, NcProgram, Problem, Second
 from cornersmooth.verify.pile import Pile
-from cornersmooth.verify.rotary import POLE_SHARE, Rotary
+from cornersmooth.verify.rotary import Rotary
 from cornersmooth.verify.runs import read_lines
 from cornersmooth.verify.words import Line, Table, table_of
 
@@ -28,6 +28,9 @@ __all__ = ["CONTROLS", "read_nc"]
 
 #: decimals are looked for in so many bytes from the first motion block on
 _DIGITS_SAMPLE: Final = 1 << 16
+
+#: share of the tolerance, at the axis point, that a tool without words for its axis may lean
+FIXED_SHARE: Final = 0.1
 
 #: words that say what is in force when it must be
 _NEEDS = {
@@ -63,7 +66,7 @@ def read_nc(
     name : str, optional
         Name for messages; the file's own by default.
     tolerance, axis_length : float, mm
-        How fine motion in rotary words is resolved: to a thousandth of `tolerance` at tip and axis point.
+        How fine motion in rotary words is resolved: to a two-hundredth of `tolerance` at tip and axis point.
 
     Returns
     -------
@@ -94,7 +97,9 @@ def read_nc(
             else:
                 reader.line(item)
         reader.flush()
-        return reader.result(10.0**-tip, 0.0 if second is None else 10.0**-second, POLE_SHARE * tolerance / axis_length)
+        return reader.result(
+            10.0**-tip, 0.0 if second is None else 10.0**-second, FIXED_SHARE * tolerance / axis_length
+        )
 
     if isinstance(data, bytes):
         return read(io.BytesIO(data), name)
@@ -230,7 +235,7 @@ class _Reader:
         text = f"{_NEEDS[kind]} under {self.tip_control or 'no tool tip control'}, where {need} must be in force"
         self.problems.append(Problem("CS506", 0, int(table.line[0]), text))
 
-    def result(self, tip_step: float, second_step: float, second_room: float) -> NcProgram:
+    def result(self, tip_step: float, second_step: float, fixed_room: float) -> NcProgram:
         """Put all pieces together, in millimetres."""
         second_is: Second = "point" if self.modal.points else "vector"
         scale = MM_PER_UNIT[self.units]
@@ -242,10 +247,13 @@ class _Reader:
         )
         self.events.sort(key=lambda event: event.line)
         steps = (tip_step * scale, second_step * (scale if second_is == "point" else 1.0))
-        if self.rotary is not None and len(curves):  # on curves the angles are fitted, and turn early near the pole
-            second_room /= POLE_SHARE
         if self.rotary is not None:
             steps = replace(self.rotary, tip_step=steps[0]).steps(self.lever)
+        room = np.zeros(len(elements["kind"]))
+        if self.rotary is not None:
+            room = self.rotary.pole_room(elements["second"])
+        elif second_is == "vector" and not second_step:  # no word says anything of the tool axis
+            room += fixed_room
         return NcProgram(
             **elements,
             curves=curves,
@@ -257,7 +265,8 @@ class _Reader:
             tip_step=steps[0],
             second_step=steps[1],
             blocks=self.blocks,
-            second_room=second_room if self.rotary is not None or (second_is == "vector" and not second_step) else 0.0,
+            second_room=room,
+            rotary=self.rotary is not None,
             unsaid=self.dialect.unsaid,
         )
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine, RotaryAxis
 
 #: share of the tolerance by which lines may leave the motion they stand for, and least length, mm
-LINE_SHARE, LEAST = 1e-3, 1e-7
+LINE_SHARE, LEAST = 5e-3, 1e-7
 
 #: lines that one block becomes at most
 _MOST_LINES = 4096
@@ -37,8 +37,8 @@ _F_STEP = 1e-4
 #: an axis that turns faster (deg/min) may make a block slower than its feed where the text times it (G93)
 FAST_TURN = 30_000.0
 
-#: share of the tolerance that is left to angles where they need not be exact: near the pole of the machine
-POLE_SHARE = 0.1
+#: near the pole, so many tolerances at the axis point, the first axis may turn ahead of time
+_POLE = 3.0
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,15 @@ class Rotary:
             else:
                 total += float(np.linalg.norm(self.machine.tool_length * self.machine.tool + axis.point))
         return total
+
+    def pole_room(self, vector: Floats) -> Floats:
+        """(n,) by how much the axis may be off though its pose must be exact: by the tolerance near the pole.
+
+        There the first axis hardly moves the tool, and turns ahead of time.
+        """
+        allowed = self.tolerance / self.axis_length
+        sine = np.linalg.norm(np.cross(vector, self.machine.axes[0].unit), axis=1)
+        return np.where(sine <= _POLE * allowed, allowed, 0.0)
 
     def steps(self, lever: float) -> tuple[float, float]:
         """Steps of tip and vector that printed digits stand for, `lever` being the longest."""

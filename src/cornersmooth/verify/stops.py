@@ -68,7 +68,7 @@ def digit_errors(nc: NcProgram, element: Ints, tip: Floats, axis: Floats, axis_l
     exact: Bools = np.logical_and.reduce(np.abs(off) <= nc.tip_step / 2 + ARITHMETIC, axis=1)
     if nc.second_is == "vector":
         side = second - axis
-        room = nc.second_step / 2 + nc.second_room + ARITHMETIC
+        room = (nc.second_step / 2 + nc.second_room[element] + ARITHMETIC)[:, None]
     else:  # only the direction of the axis point counts, and the tip's own rounding turns it too
         side = second - nc.tip[element]
         side -= np.linalg.norm(side, axis=1)[:, None] * axis
