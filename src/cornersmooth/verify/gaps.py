@@ -66,7 +66,7 @@ def from_written(matcher: Matcher, block: Block) -> Reached:
     rows = vertex[loose]
     # the walker stays on a segment until the next is nearer by a margin
     segment[loose], at[loose] = nearest_segments(
-        block.six[rows], matcher.track.six, segment[loose], 1, block.low[rows], block.high[rows]
+        block.six.take(rows, axis=0), matcher.track.six, segment[loose], 1, block.low[rows], block.high[rows]
     )
     better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
     gap.tip[loose], gap.axis_point[loose], gap.angle[loose] = better.tip, better.axis_point, better.angle
@@ -76,22 +76,25 @@ def from_written(matcher: Matcher, block: Block) -> Reached:
 def _gap_to_original(matcher: Matcher, block: Block, vertex: Ints, segment: Ints, at: Floats) -> Gap:
     original, trail = matcher.original, block.written.trail
     tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, segment, at))
-    return gap_between(trail.tip[vertex], trail.axis[vertex], tip, axis, matcher.axis_length)
+    own = trail.tip.take(vertex, axis=0), trail.axis.take(vertex, axis=0)
+    return gap_between(*own, tip, axis, matcher.axis_length)
 
 
 def from_original(matcher: Matcher, block: Block) -> Reached:
     """Deviation of every vertex of the original in this block from the written motion."""
     vertex, middle, low, high = _brackets(block)
     trail, six = matcher.original.trail, matcher.track.six
-    segment, at = nearest_segments(six[vertex], block.six, middle, 1, low, high)
-    _climb(six[vertex], block.six, middle, low, high, segment, at)
+    point = six.take(vertex, axis=0)
+    segment, at = nearest_segments(point, block.six, middle, 1, low, high)
+    _climb(point, block.six, middle, low, high, segment, at)
     tip = _on(block.written.trail.tip, segment, at)
     axis = _unit_on(block.written.trail.axis, segment, at)
     owner = block.written.trail.owner[segment + 1]
     bent = np.flatnonzero(~block.written.straight[owner - block.written.first])
     if len(bent):
-        tip[bent], axis[bent], at[bent] = _on_bent(matcher, block, six[vertex[bent]], segment[bent], at[bent])
-    gap = gap_between(tip, axis, trail.tip[vertex], trail.axis[vertex], matcher.axis_length)
+        tip[bent], axis[bent], at[bent] = _on_bent(matcher, block, point.take(bent, axis=0), segment[bent], at[bent])
+    own = trail.tip.take(vertex, axis=0), trail.axis.take(vertex, axis=0)
+    gap = gap_between(tip, axis, *own, matcher.axis_length)
     return Reached(vertex, gap, segment + at)
 
 
@@ -189,7 +192,7 @@ def _newton_from_knot(
 
     Distances are taken between control-point curves and a pose whose axis point is as far from its tip as theirs.
     """
-    value, slope, bend = (part[curve] for part in group.jet(u))
+    value, slope, bend = (part.take(curve, axis=0) for part in group.jet(u))
     target = point.copy()
     vectors = matcher.nc.second_is == "vector"
     if vectors:  # of length one

@@ -104,7 +104,7 @@ def _plain_corners(matcher: Matcher, block: Block, group: CurveGroup, end: Ints)
     if nc.second_is != "point":
         return np.zeros(len(points), np.bool_)
     corner = np.minimum(block.segment[end - 2] + 1, len(matcher.track.six) - 1)
-    off = points[:, 2] - matcher.track.six[corner]
+    off = points[:, 2] - matcher.track.six.take(corner, axis=0)
     plain: Bools = np.abs(off).max(axis=1) <= matcher.margin
     for outer, inner in ((0, 1), (4, 3)):
         leg = points[:, outer] - points[:, 2]
@@ -118,7 +118,7 @@ def _plain_corners(matcher: Matcher, block: Block, group: CurveGroup, end: Ints)
 
 def _off(matcher: Matcher, block: Block, six: Floats, vertex: Ints) -> Floats:
     """Larger distance, of tip or axis point, from the original segment that a vertex lies on."""
-    row = matcher.track.row[block.segment[vertex]]
+    row = matcher.track.row.take(block.segment[vertex], axis=0)
     away = six - row[:, :6]
     t = np.clip(np.einsum("ij,ij->i", away, row[:, 6:12]) * row[:, 12], 0.0, 1.0)
     away -= t[:, None] * row[:, 6:12]

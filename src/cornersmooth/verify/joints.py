@@ -45,7 +45,9 @@ def joint_jumps(matcher: Matcher, block: Block) -> tuple[Ints, Floats, Ints, Flo
     moving = np.flatnonzero(feeding & (size_in > 0) & (size_out > 0))
     joined = block.piece[end[moving[1:]]] == block.piece[end[moving[:-1]]]
     before, behind = moving[:-1][joined], moving[1:][joined]
-    cosine = np.einsum("ij,ij->i", arrive[before], leave[behind]) / (size_in[before] * size_out[behind])
+    cosine = np.einsum("ij,ij->i", arrive.take(before, axis=0), leave.take(behind, axis=0)) / (
+        size_in[before] * size_out[behind]
+    )
     bent = _bent(kind)
     curved = bent[before] | bent[behind]
     jump = np.abs(bend_in[before[curved]] - bend_out[behind[curved]])

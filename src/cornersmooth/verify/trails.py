@@ -78,7 +78,7 @@ class Original:
         program = self.program
         end = self.pose[owner]
         start = self.pose[np.maximum(owner - 1, 0)]
-        tip = program.tip[start] + fraction[:, None] * (program.tip[end] - program.tip[start])
+        tip = between(program.tip, start, end, fraction)
         row = self.arc[owner]
         curved = np.flatnonzero(row >= 0)
         if len(curved):
@@ -91,8 +91,18 @@ class Original:
                 arcs.sweep[r],
                 fraction[curved],
             )
-        axis = program.axis[start] + fraction[:, None] * (program.axis[end] - program.axis[start])
+        axis = between(program.axis, start, end, fraction)
         return tip, unit(axis)
+
+
+def between(values: Floats, start: Ints, end: Ints, fraction: Floats) -> Floats:
+    """Rows (k, 3) of a table on the way from some of its rows to others."""
+    first = values.take(start, axis=0)
+    way = values.take(end, axis=0)
+    way -= first
+    way *= fraction[:, None]
+    way += first
+    return way
 
 
 def unit(vectors: Floats) -> Floats:
@@ -112,7 +122,9 @@ def original_motion(program: Program, tolerance: float, axis_length: float) -> O
     place = np.searchsorted(pose, program.arcs.pose)
     arc[place] = np.arange(len(place))
     arc[:1] = -1
-    tip, axis = program.tip[pose], program.axis[pose]
+    # nearly always all poses but the first: no copy then
+    chosen = slice(pose[0], pose[-1] + 1) if len(pose) and pose[-1] - pose[0] == len(pose) - 1 else pose
+    tip, axis = program.tip[chosen], program.axis[chosen]
     cuts = turn_cuts(axis, tolerance, axis_length)
     curved = np.flatnonzero(arc >= 0)
     if len(curved):
@@ -128,9 +140,9 @@ def original_motion(program: Program, tolerance: float, axis_length: float) -> O
     if not len(pose) or cuts.max() == 1:
         return bare
     owner, fraction, last = divided(cuts)
-    tip, axis = bare.at(owner, fraction)
-    whole = fraction == 1
-    tip[whole], axis[whole] = program.tip[pose[owner[whole]]], program.axis[pose[owner[whole]]]
+    tip, axis = tip.take(owner, axis=0), axis.take(owner, axis=0)
+    inner = np.flatnonzero(fraction < 1)
+    tip[inner], axis[inner] = bare.at(owner[inner], fraction[inner])
     return Original(program, pose, Trail(tip, axis, owner, fraction, last), arc)
 
 
@@ -216,13 +228,16 @@ def written_motion(nc: NcProgram, first: int, last: int, tolerance: float, axis_
     cuts[0] = 1
     owner, fraction, ends = divided(cuts)
     before = np.maximum(owner - 1, 0)
-    lerp = fraction[:, None]
-    new_tip = tip[before] + lerp * (tip[owner] - tip[before])
-    new_second = second[before] + lerp * (second[owner] - second[before])
+    new_tip, new_second = np.empty((len(owner), 3)), np.empty((len(owner), 3))
+    new_tip[ends], new_second[ends] = tip, second
+    is_curve = kind == Element.CURVE
+    inner = np.flatnonzero((fraction < 1) & ~is_curve[owner])
+    new_tip[inner] = between(tip, before[inner], owner[inner], fraction[inner])
+    new_second[inner] = between(second, before[inner], owner[inner], fraction[inner])
     if len(arc_at):
         row = np.full(count, -1)
         row[arc_at] = np.arange(a0, a1)
-        on = np.flatnonzero(row[owner] >= 0)
+        on = np.flatnonzero((row[owner] >= 0) & (fraction < 1))
         r = row[owner[on]]
         arcs = nc.arcs
         new_tip[on] = arc_points(
@@ -230,14 +245,12 @@ def written_motion(nc: NcProgram, first: int, last: int, tolerance: float, axis_
         )
     for group in curve_groups:
         spans = group.spans
-        at = nc.curves.element[group.index] - first
-        inner = spans[1:] if len(spans) > 1 else spans
-        points = group.at(inner)
-        vertex = ends[at][:, None] - np.arange(len(inner) - 1, -1, -1)
-        new_tip[vertex], new_second[vertex] = points[:, :, :3], points[:, :, 3:]
-        fraction[vertex] = inner
-    whole = ends
-    new_tip[whole], new_second[whole] = tip, second
+        end = ends[nc.curves.element[group.index] - first]
+        fraction[end] = spans[-1]
+        for k, u in enumerate(spans[-2:0:-1]):
+            points = group.at(np.array([u]))[:, 0]
+            new_tip[end - k - 1], new_second[end - k - 1] = points[:, :3], points[:, 3:]
+            fraction[end - k - 1] = u
     trail = Trail(new_tip, directions(nc, new_tip, new_second), owner + first, fraction, ends)
     return Written(nc, first, trail, curve_groups, straight)
 
@@ -245,8 +258,8 @@ def written_motion(nc: NcProgram, first: int, last: int, tolerance: float, axis_
 def written_at(nc: NcProgram, element: Ints, fraction: Floats) -> tuple[Floats, Floats]:
     """Tip and unit axis (k, 3) on path elements, at a fraction of each (curves: of the parameter range)."""
     before = np.maximum(element - 1, 0)
-    tip = nc.tip[before] + fraction[:, None] * (nc.tip[element] - nc.tip[before])
-    second = nc.second[before] + fraction[:, None] * (nc.second[element] - nc.second[before])
+    tip = between(nc.tip, before, element, fraction)
+    second = between(nc.second, before, element, fraction)
     kind = nc.kind[element]
     on = np.flatnonzero(kind == Element.ARC)
     if len(on):

@@ -126,11 +126,11 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
         follow = track.row.take(np.minimum(after, end), axis=0)
         away = point - own[:, :6]
         t = np.einsum("ij,ij->i", away, own[:, 6:12]) * own[:, 12]
-        on = np.clip(t, least, 1.0)
+        on = np.minimum(np.maximum(t, least), 1.0)
         away -= on[:, None] * own[:, 6:12]
         d = np.sqrt(np.einsum("ij,ij->i", away, away))
         away = point - follow[:, :6]
-        s = np.clip(np.einsum("ij,ij->i", away, follow[:, 6:12]) * follow[:, 12], 0.0, 1.0)
+        s = np.minimum(np.maximum(np.einsum("ij,ij->i", away, follow[:, 6:12]) * follow[:, 12], 0.0), 1.0)
         away -= s[:, None] * follow[:, 6:12]
         d_follow = np.sqrt(np.einsum("ij,ij->i", away, away))
         more = after <= end
