@@ -222,5 +222,5 @@ def of_curves(text: Text, rng: np.random.Generator):
         elif line.startswith(("K", "G6.2")):
             yield Mutant("weight zero", text.with_line(i, re.sub(r"R[\d.]+", "R0.", line)), (i - 10, i + 14))
             yield Mutant("knot", text.with_line(i, re.sub(r"K[\d.]+", "K7.", line)), (i - 10, i + 14))
-            if PLACE.search(lines[i + 1]):  # the last one lies on the line behind: without it the curve is as good
+            if "K0. " in line:  # without a later one there is a curve of fewer points, and it may be as good
                 yield Mutant("point lost", [*lines[:i], *lines[i + 1 :]], (i - 10, i + 14))
