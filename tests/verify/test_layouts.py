@@ -1,0 +1,74 @@
+"""Fast path equals careful path: lines read by their layouts, and the same lines read carefully."""
+
+from __future__ import annotations
+
+import random
+import re
+
+import numpy as np
+import pytest
+
+from cornersmooth.verify import pool, runs
+from cornersmooth.verify.layouts import Layouts, lines_of
+from cornersmooth.verify.spelling import Spelling
+from cornersmooth.verify.words import Table
+
+NUMBERS = ["0", "-0.", "5.", ".5", "-.25", "12.3456", "-123.4567", "0.3956870", "-1.0000000", "1234.5678", "7", "-42"]
+ODD = ["+1.5", "123456.789", "1-2", "", " 3.", "1..2"]
+
+
+def text(seed, odd):
+    random.seed(seed)
+    shapes = []
+    for _ in range(100):
+        letters = random.choice(["XYZ", "XYZIJK", "GXYZF", "KXYZUVWR", "K", "XYZ"])
+        words = [letter + ("1" if letter == "G" else random.choice(NUMBERS)) for letter in letters]
+        shapes.append(random.choice([" ", " ", "", "  "]).join(words) + random.choice(["", " ", "\r"]))
+    shapes += ["", "(A 1.5 B)", "T1 M6", "S12000 M3"]
+    lines = [re.sub("[2-9]", lambda _: str(random.randrange(10)), random.choice(shapes)) for _ in range(400)]
+    if odd is not None:
+        lines[200] = f"X1. Y{odd} Z3."
+    return ("\n".join(lines) + "\n").encode()
+
+
+def plain(items):
+    return [
+        (item.line.tolist(), {k: v.tobytes() for k, v in item.columns.items()}) if isinstance(item, Table) else item
+        for item in items
+    ]
+
+
+def read(call):
+    found = []
+    try:
+        found.extend(call)
+    except Exception as error:
+        return plain(found), str(error)
+    return plain(found), ""
+
+
+@pytest.mark.parametrize("odd", [None, *ODD])
+@pytest.mark.parametrize("seed", range(5))
+def test_fast_path_is_the_careful_path(seed, odd):
+    data, spelling = text(seed, odd), Spelling()
+    layouts = Layouts(spelling.columns, numbered=False)
+    assert (lines_of(data, layouts) is not None) == (odd is None)
+    fast = read(runs._read_chunk(data, 1, spelling, layouts, None))
+    assert fast == read(runs._read_carefully(data, data, 1, runs._Signatures(spelling), None))
+
+
+def test_fast_path_is_taken():
+    layouts = Layouts(Spelling().columns, numbered=False)
+    lines = lines_of(b"X1.5 Y-2.25\nX-1.5 Y2.25 Z12345.678\n(A)\n", layouts)
+    assert lines is not None
+    assert lines.bulk().tolist() == [True, True, False]
+    columns = lines.columns(0, 2)
+    assert columns["X"].tolist() == [1.5, -1.5]
+    assert columns["Y"].tolist() == [-2.25, 2.25]
+    assert np.isnan(columns["Z"][0])
+    assert columns["Z"][1] == 12345.678
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 40])
+def test_work_ahead_comes_in_order(count):
+    assert list(pool.ahead(lambda k: k * k, iter(range(count)))) == [k * k for k in range(count)]
