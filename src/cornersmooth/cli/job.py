@@ -101,6 +101,8 @@ class Job:
     writing : Writing
     feed : float or None, mm/min
         For moves without one.
+    alone : bool
+        Whether no other job runs at the same time: verification may use all processors.
     """
 
     source: str
@@ -112,6 +114,7 @@ class Job:
     feed: float | None
     force: bool
     verify: bool = True
+    alone: bool = False
 
 
 @dataclass
@@ -209,6 +212,7 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
             output.stream.flush()
         if not unread:
             from cornersmooth.verify import verify
+            from cornersmooth.verify.workers import useful_processes
 
             with _timed(seconds, "verify"):
                 try:
@@ -218,6 +222,7 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
                         tolerance=settings.verified_tolerance,
                         axis_length=settings.axis_length,
                         words=not how.own,
+                        processes=useful_processes() if job.alone else 1,
                         **how.reading,
                     )
                     verification = verified.to_dict()

@@ -158,6 +158,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 feed=given["feed"],
                 force=given["force"],
                 verify=not given["no_verify"],
+                alone=len(inputs) == 1,
             )
         )
     by_target: dict[str, str] = {}

@@ -64,6 +64,7 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.cl import read
     from cornersmooth.cli.readback import readback
     from cornersmooth.verify import read_nc, verify
+    from cornersmooth.verify.workers import useful_processes
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
@@ -77,7 +78,7 @@ def command(source: str, text: str, **given: Any) -> int:
     program = read(data, name=name, format=given["input_format"], **{key: given[key] for key in _READING})
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
     nc = read_nc(read_input(text)[0] if text == STANDARD else text, **how.reading, **measures)
-    found = verify(program, nc, **measures, words=not how.own)
+    found = verify(program, nc, **measures, words=not how.own, processes=useful_processes())
     _write_reports(program, found, given["reports"])
     if given["plot"]:
         from cornersmooth.report.deviationplot import draw_deviation

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,12 +17,12 @@ from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.holes import divide_at_holes
 from cornersmooth.verify.joints import joint_jumps
 from cornersmooth.verify.ncprogram import NcProgram, Problem
-from cornersmooth.verify.pool import ahead
 from cornersmooth.verify.reader import read_nc
 from cornersmooth.verify.statements import asked, compare, said
 from cornersmooth.verify.stops import Stretches, find_stretches
 from cornersmooth.verify.trails import original_motion
 from cornersmooth.verify.walking import Track
+from cornersmooth.verify.workers import apart
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -176,6 +176,7 @@ def verify(
     machine: Machine | None = None,
     tcp: bool = True,
     words: bool = True,
+    processes: int = 1,
 ) -> Verification:
     """Measure an NC text against the CL program it was made from.
 
@@ -191,6 +192,8 @@ def verify(
         As in `read_nc`.
     words : bool
         Whether words beside the motion must say what the CL file asks for; not where nobody knows what they mean.
+    processes : int
+        Processes to measure long texts with, where the system can fork; the result does not depend on it.
 
     Returns
     -------
@@ -210,7 +213,7 @@ def verify(
     text = nc
     if not isinstance(text, NcProgram):
         text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
-    return _Run(program, text, tolerance, axis_length, words=words).result()
+    return _Run(program, text, tolerance, axis_length, words=words).result(processes)
 
 
 @dataclass
@@ -250,7 +253,7 @@ class _Run:
         )
         self.joints = _Joints()
 
-    def result(self) -> Verification:
+    def result(self, processes: int) -> Verification:
         """Do it."""
         nc = self.nc
         problems = [problem for problem in nc.problems if self.words or problem.code != _CONTROL_WORDS]
@@ -269,15 +272,16 @@ class _Run:
         def examine(item: tuple[Cut, Largest]) -> _Examined:
             block = self.matcher.walked(item[0])
             measured = meter.measure(block, item[1])
+            feeds_here = check_feeds(self.matcher, block, measured.off)
             return _Examined(
-                measured,
-                check_feeds(self.matcher, block, measured.off),
+                replace(measured, off=measured.off[:0]),
+                feeds_here,
                 self._places(block, asked_elements),
                 self._joints(block),
             )
 
         cuts = ((cut, meter.result.largest.copy()) for cut in self.matcher.cuts(stretches))
-        for found_here in ahead(examine, cuts):
+        for found_here in apart(examine, cuts, processes, lambda item: item[0].block is not None):
             meter.add(found_here.measured)
             feeds += found_here.feeds
             part, places = found_here.places
