@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from cornersmooth.verify import pool, runs
+from cornersmooth.verify import runs
 from cornersmooth.verify.layouts import Layouts, lines_of
 from cornersmooth.verify.spelling import Spelling
 from cornersmooth.verify.words import Table
@@ -67,8 +67,3 @@ def test_fast_path_is_taken():
     assert columns["Y"].tolist() == [-2.25, 2.25]
     assert np.isnan(columns["Z"][0])
     assert columns["Z"][1] == 12345.678
-
-
-@pytest.mark.parametrize("count", [0, 1, 2, 3, 40])
-def test_work_ahead_comes_in_order(count):
-    assert list(pool.ahead(lambda k: k * k, iter(range(count)))) == [k * k for k in range(count)]

@@ -10,12 +10,10 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.errors import InputError
 from cornersmooth.model import Floats, Ints
 from cornersmooth.text import NumberError, parse_numbers
 from cornersmooth.verify.fixed import MARGIN, read_column, words_of
 from cornersmooth.verify.layouts import Layouts, lines_of
-from cornersmooth.verify.pool import ahead
 from cornersmooth.verify.spelling import Spelling
 from cornersmooth.verify.words import Line, Table
 
@@ -48,19 +46,8 @@ def read_lines(data: bytes | BinaryIO, name: str | None, spelling: Spelling | No
     spelling = spelling or Spelling()
     layouts = Layouts(spelling.columns, numbered=spelling.numbered)
 
-    def read(piece: tuple[bytes, int]) -> tuple[list[Table | Line], InputError | None]:
-        """Read a chunk; an error waits until what stands before it has been given out."""
-        found: list[Table | Line] = []
-        try:
-            found.extend(_read_chunk(*piece, spelling, layouts, name))
-        except InputError as error:
-            return found, error
-        return found, None
-
-    for found, error in ahead(read, _chunks(data, spelling)):
-        yield from found
-        if error is not None:
-            raise error
+    for chunk, number in _chunks(data, spelling):
+        yield from _read_chunk(chunk, number, spelling, layouts, name)
 
 
 def _chunks(data: bytes | BinaryIO, spelling: Spelling) -> Iterator[tuple[bytes, int]]:
