@@ -12,7 +12,7 @@ from cornersmooth.kinematics.orientation import continued, unit
 from cornersmooth.kinematics.rotary_motion import RotaryMotion, lever_points, tip_points
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.layout import lines_per_half
+from cornersmooth.smoothing.layout import lines_of
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def corner_lines(
 ) -> CornerLines:
     """Points of corners with the numbers `chosen` in `RotaryMotion.rows`, ascending.
 
-    The places are those of dense output (`lines_per_half`), and what the rotary angles need between them.
+    The places are those of dense output (`lines_of`), and what the rotary angles need between them.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def corner_lines(
     """
     program, corners = smoothed.program, smoothed.corners
     rows = motion.rows[chosen]
-    halves = lines_per_half(smoothed)[rows] if len(rows) else rows
+    halves = lines_of(smoothed, rows)
     counts = 2 * np.abs(halves) + 1
     first = np.cumsum(counts) - counts
     total = int(counts.sum())
