@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.text import NumberError, parse_numbers
 from cornersmooth.verify.fixed import MARGIN, read_column, words_of
 from cornersmooth.verify.layouts import Layouts, lines_of
@@ -149,19 +149,36 @@ def _read_chunk(
     if lines is None:
         yield from _read_carefully(chunk, text, number, _Signatures(spelling), name)
         return
-    bulk = lines.bulk()
+
+    def table(start: int, stop: int) -> Table | None:
+        return spelling.table(Table(np.arange(number + start, number + stop), lines.columns(start, stop)))
+
+    yield from _in_order(lines.bulk(), table, lines.text, chunk, text, number, spelling, name)
+
+
+def _in_order(
+    bulk: Bools,
+    table_of: Callable[[int, int], Table | None],
+    text_of: Callable[[int], bytes],
+    chunk: bytes,
+    text: bytes,
+    number: int,
+    spelling: Spelling,
+    name: str | None,
+) -> Iterator[Table | Line]:
+    """Runs as tables, and one by one the other lines and those of runs that turn out to be none."""
     edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
     written: list[bytes] = []
     for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         if bulk[start]:
-            table = spelling.table(Table(np.arange(number + start, number + stop), lines.columns(start, stop)))
+            table = table_of(start, stop)
             if table is not None:
                 yield table
                 continue
         if text is not chunk and not written:
             written = chunk.split(b"\n")
         for row in range(start, stop):
-            yield spelling.line(written[row] if written else lines.text(row), number + row, name)
+            yield spelling.line(written[row] if written else text_of(row), number + row, name)
 
 
 def _read_carefully(
@@ -175,19 +192,14 @@ def _read_carefully(
     first = np.concatenate(([0], last[:-1] + 1))
     found = _Chunk(raw, place, first, last, signatures.classify(letters, first, last))
     bulk = np.array([columns is not None for columns in signatures.columns])[found.index]
-    edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
-    written: list[bytes] = []
-    for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        if bulk[start]:
-            table = _read_run(found, start, stop, signatures, number)
-            if table is not None:
-                yield table
-                continue
-        if text is not chunk and not written:
-            written = chunk.split(b"\n")
-        for row in range(start, stop):
-            line = written[row] if written else found.text(row, row + 1)
-            yield spelling.line(line, number + row, name)
+
+    def table(start: int, stop: int) -> Table | None:
+        return _read_run(found, start, stop, signatures, number)
+
+    def line(row: int) -> bytes:
+        return found.text(row, row + 1)
+
+    yield from _in_order(bulk, table, line, chunk, text, number, spelling, name)
 
 
 def _read_run(chunk: _Chunk, start: int, stop: int, signatures: _Signatures, number: int) -> Table | None:
