@@ -6,7 +6,7 @@ import os
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -206,25 +206,30 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
     with _timed(seconds, "smooth"):
         smoothed = smooth(program, settings, progress=step("smoothing"))
     verification: dict[str, Any] | None = None
-    with open_output(job.target, hold=not unread) as output:
+    with open_output(job.target, hold=not unread) as output, ExitStack() as stack:
+        verifier = None
+        if not unread:
+            from cornersmooth.verify import Verifier
+            from cornersmooth.verify.workers import useful_processes
+
+            verifier = stack.enter_context(
+                Verifier(
+                    program,
+                    output.path,
+                    tolerance=settings.verified_tolerance,
+                    axis_length=settings.axis_length,
+                    words=not how.own,
+                    processes=useful_processes() if job.alone else 1,
+                    **how.reading,
+                )
+            )
         with _timed(seconds, "write"):
             written = write(smoothed, output.stream, form=form, frame=job.writing.frame(), progress=step("writing"))
             output.stream.flush()
-        if not unread:
-            from cornersmooth.verify import verify
-            from cornersmooth.verify.workers import useful_processes
-
+        if verifier is not None:
             with _timed(seconds, "verify"):
                 try:
-                    verified = verify(
-                        program,
-                        output.path,
-                        tolerance=settings.verified_tolerance,
-                        axis_length=settings.axis_length,
-                        words=not how.own,
-                        processes=useful_processes() if job.alone else 1,
-                        **how.reading,
-                    )
+                    verified = verifier.result()
                     verification = verified.to_dict()
                     output.rejected = not verified.passed
                 except InputError as failure:

@@ -14,7 +14,7 @@ from cornersmooth.errors import SettingsError
 
 if TYPE_CHECKING:
     from cornersmooth.model import Program
-    from cornersmooth.verify import NcProgram, Verification, Where
+    from cornersmooth.verify import Distribution, Verification, Where
 
 _READING = ("dialect", "units", "arc_rule", "lenient")
 
@@ -63,7 +63,7 @@ def command(source: str, text: str, **given: Any) -> int:
     """
     from cornersmooth.cl import read
     from cornersmooth.cli.readback import readback
-    from cornersmooth.verify import read_nc, verify
+    from cornersmooth.verify import deviation_along, verify
     from cornersmooth.verify.workers import useful_processes
 
     if source == text == STANDARD:
@@ -77,21 +77,23 @@ def command(source: str, text: str, **given: Any) -> int:
     data, name = read_input(source)
     program = read(data, name=name, format=given["input_format"], **{key: given[key] for key in _READING})
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
-    nc = read_nc(read_input(text)[0] if text == STANDARD else text, **how.reading, **measures)
-    found = verify(program, nc, **measures, words=not how.own, processes=useful_processes())
+    nc = read_input(text)[0] if text == STANDARD else text
+    found = verify(program, nc, **measures, **how.reading, words=not how.own, processes=useful_processes())
     _write_reports(program, found, given["reports"])
     if given["plot"]:
         from cornersmooth.report.deviationplot import draw_deviation
-        from cornersmooth.verify import deviation_along
 
-        picture = draw_deviation(deviation_along(program, nc, **measures), given["tolerance"], form)
+        picture = draw_deviation(deviation_along(program, nc, **measures, **how.reading), given["tolerance"], form)
         with open_output(given["plot"]) as output:
             output.stream.write(picture)
     for line in _problems(found, name, given["verbose"]):
         click.echo(line, err=True)
     if not given["quiet"]:
-        for line in _summary(program, nc, found, given["verbose"]):
+        for line in _summary(found):
             click.echo(line)
+        if given["verbose"]:
+            for line in _along(found, deviation_along(program, nc, **measures, **how.reading)):
+                click.echo(line)
     return 0 if found.passed else 1
 
 
@@ -129,10 +131,8 @@ def _problems(found: Verification, name: str, verbose: int) -> Iterator[str]:
         yield f"{name}: {found.problem_count - len(shown)} more problems; -v shows more, a JSON report lists them"
 
 
-def _summary(program: Program, nc: NcProgram, found: Verification, verbose: int) -> Iterator[str]:
-    """Label and text of everything measured, and with -v where along the path it lies."""
-    from cornersmooth.report.verification import along_lines, histogram_lines
-
+def _summary(found: Verification) -> Iterator[str]:
+    """Label and text of everything measured."""
     yield f"{'result':<18}{'passed' if found.passed else f'FAILED: {found.problem_count} problems'}"
     yield f"{'tolerance':<18}{found.tolerance:g} mm, axis point at {found.axis_length:g} mm"
     yield f"{'tip':<18}{_place(found.tip, 'mm')}"
@@ -144,14 +144,16 @@ def _summary(program: Program, nc: NcProgram, found: Verification, verbose: int)
     if found.curves:
         yield f"{'curvature jump':<18}{_place(found.curvature_jump, '1/mm')}"
     yield f"{'blocks':<18}{found.blocks}, shortest move {_place(found.shortest, 'mm')}"
-    if verbose:
-        from cornersmooth.verify import deviation_along
 
-        yield ""
-        yield from histogram_lines(found)
-        yield ""
-        along = deviation_along(program, nc, tolerance=found.tolerance, axis_length=found.axis_length)
-        yield from along_lines(along, found.tolerance)
+
+def _along(found: Verification, along: Distribution) -> Iterator[str]:
+    """How the deviation is distributed, over poses and along the path."""
+    from cornersmooth.report.verification import along_lines, histogram_lines
+
+    yield ""
+    yield from histogram_lines(found)
+    yield ""
+    yield from along_lines(along, found.tolerance)
 
 
 def _place(where: Where, unit: str) -> str:

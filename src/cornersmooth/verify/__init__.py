@@ -9,7 +9,8 @@ Shares no code with `smoothing` and `nc`::
 from cornersmooth.verify.along import Distribution, deviation_along
 from cornersmooth.verify.ncprogram import Event, NcProgram, Problem
 from cornersmooth.verify.reader import CONTROLS, read_nc
-from cornersmooth.verify.verification import Verification, Where, verify
+from cornersmooth.verify.verification import Verification, Where
+from cornersmooth.verify.verifying import Verifier, verify
 
 __all__ = [
     "CONTROLS",
@@ -18,6 +19,7 @@ __all__ = [
     "NcProgram",
     "Problem",
     "Verification",
+    "Verifier",
     "Where",
     "deviation_along",
     "read_nc",

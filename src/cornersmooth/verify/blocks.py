@@ -187,7 +187,7 @@ class Matcher:
         part = slice(first, last + 1)
         tip = self.nc.tip[part]
         six = np.hstack((tip, tip + self.axis_length * directions(self.nc, tip, self.nc.second[part])))
-        lanes = cut_lane(six, _lengths(six), self.track, (0, last - first, start, stop, fraction), _HOP, self.near)
+        lanes = cut_lane(six, lengths(six), self.track, (0, last - first, start, stop, fraction), _HOP, self.near)
         while len(lanes) > 2 and not _INNER <= lanes[-1][-1] <= 1 - _INNER:
             lanes.pop()
         if len(lanes) > 1:
@@ -206,7 +206,7 @@ class Matcher:
         first, last = pieces[0][0], pieces[-1][1]
         written = written_motion(self.nc, first, last, self.tolerance, self.axis_length)
         six = written.trail.six(self.axis_length)
-        length = _lengths(six)
+        length = lengths(six)
         ends = written.trail.last
         lanes: list[Lane] = []
         for piece in pieces:
@@ -256,7 +256,7 @@ class Matcher:
                 backward[part] = found[2] & ((found[1] - np.clip(behind, 0.0, 1.0)) * length > self.margin)
 
 
-def _lengths(six: Floats) -> Floats:
+def lengths(six: Floats) -> Floats:
     """(v,) path length up to every vertex of a trail."""
     step = six[1:] - six[:-1]
     lengths: Floats = np.concatenate(([0.0], np.cumsum(np.sqrt(np.einsum("ij,ij->i", step, step)))))

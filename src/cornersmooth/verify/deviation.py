@@ -19,6 +19,7 @@ from cornersmooth.verify.hulls import hull_gaps
 from cornersmooth.verify.ncprogram import Problem
 from cornersmooth.verify.order import original_backwards, written_backwards
 from cornersmooth.verify.stops import ARITHMETIC, digit_errors
+from cornersmooth.verify.trails import Original
 
 #: rows of a block for which tip and axis point are looked at each on its own: at a time, and at most
 _OWN_ROWS, _MOST_OWN_ROWS = 64, 2048
@@ -69,7 +70,7 @@ class Violations:
         for name, columns in vars(other).items():
             getattr(self, name).extend(columns)
 
-    def problems(self, text: dict[int, str]) -> list[Problem]:
+    def problems(self) -> list[Problem]:
         """One problem for each group of neighbouring places with the same code, at its worst place."""
         if not self.place:
             return []
@@ -85,7 +86,7 @@ class Violations:
             k = int(rows[np.argmax(amount[rows])])
             value = float(amount[k])
             found.append(
-                Problem(f"CS{code[k]}", int(cl_line[k]), int(nc_line[k]), text[int(code[k])].format(value), value)
+                Problem(f"CS{code[k]}", int(cl_line[k]), int(nc_line[k]), _TEXT[int(code[k])].format(value), value)
             )
         return found
 
@@ -122,27 +123,6 @@ class Largest:
 
 
 @dataclass
-class Deviation:
-    """What was measured.
-
-    Parameters
-    ----------
-    largest : Largest
-    pose_tip, pose_axis_point : (n,) float64, mm
-        Distance of every original pose from the nearest written pose; NaN where the tool does not pass at feed.
-    pose_angle : (n,) float64, rad
-    pose_nc_line : (n,) int64
-    """
-
-    largest: Largest
-    pose_tip: Floats
-    pose_axis_point: Floats
-    pose_angle: Floats
-    pose_nc_line: Ints
-    violations: Violations
-
-
-@dataclass
 class Measured:
     """What one block shows.
 
@@ -153,41 +133,59 @@ class Measured:
     violations : Violations
     off : (v,) float64, mm
         Distance of every written vertex from the original.
-    pose : (k,) int64
-        Original poses, and for each of them:
-    pose_tip, pose_axis_point : (k,) float64, mm
-    pose_angle : (k,) float64, rad
-    pose_nc_line : (k,) int64
+    poses : Poses
     """
 
     largest: Largest
     violations: Violations
     off: Floats
+    poses: Poses
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Distances of original poses from the nearest written pose.
+
+    Parameters
+    ----------
+    pose : (k,) int64
+        Poses of the CL program, and for each of them:
+    tip, axis_point : (k,) float64, mm
+    angle : (k,) float64, rad
+    nc_line : (k,) int64
+    """
+
     pose: Ints
-    pose_tip: Floats
-    pose_axis_point: Floats
-    pose_angle: Floats
-    pose_nc_line: Ints
+    tip: Floats
+    axis_point: Floats
+    angle: Floats
+    nc_line: Ints
+
+    @classmethod
+    def of_all(cls, parts: list[Poses], count: int) -> Poses:
+        """Put the poses of all parts in their places among `count`; NaN where the tool does not pass at feed."""
+        nan = np.full(count, np.nan)
+        whole = cls(np.arange(count), nan, nan.copy(), nan.copy(), np.zeros(count, np.int64))
+        for part in parts:
+            for name in ("tip", "axis_point", "angle", "nc_line"):
+                getattr(whole, name)[part.pose] = getattr(part, name)
+        return whole
 
 
 class Meter:
-    """Measures blocks, several at once, and gathers what they show in their order."""
+    """Measures blocks.
 
-    def __init__(self, matcher: Matcher, tolerance: float) -> None:
-        n = len(matcher.original.program)
-        self.matcher = matcher
-        self.limit = tolerance + ARITHMETIC
-        self.together = TOGETHER * tolerance + matcher.margin
-        self.exact = exact_poses(matcher)
-        nan = np.full(n, np.nan)
-        self.result = Deviation(
-            Largest(),
-            nan,
-            nan.copy(),
-            nan.copy(),
-            np.zeros(n, np.int64),
-            Violations(),
-        )
+    Parameters
+    ----------
+    matcher : Matcher
+    exact : (m,) bool
+        Whether the end of every original move must be passed exactly (`exact_poses`).
+    """
+
+    def __init__(self, matcher: Matcher, exact: Bools) -> None:
+        self.matcher, self.exact = matcher, exact
+        self.limit = matcher.tolerance + ARITHMETIC
+        self.together = TOGETHER * matcher.tolerance + matcher.margin
 
     def measure(self, block: Block, so_far: Largest) -> Measured:
         """Measure one block; what is not larger than what was met so far is not looked at closely."""
@@ -216,28 +214,8 @@ class Meter:
         off = np.zeros(len(block.six))
         off[written.vertex] = written.gap.larger
         gap = theirs.gap
-        return Measured(
-            largest,
-            violations,
-            off,
-            pose[whole],
-            gap.tip[whole],
-            gap.axis_point[whole],
-            gap.angle[whole],
-            nc_line[whole],
-        )
-
-    def add(self, measured: Measured) -> None:
-        """Gather what the next block shows."""
-        result, pose = self.result, measured.pose
-        result.largest.take(measured.largest)
-        result.violations.extend(measured.violations)
-        result.pose_tip[pose], result.pose_axis_point[pose] = measured.pose_tip, measured.pose_axis_point
-        result.pose_angle[pose], result.pose_nc_line[pose] = measured.pose_angle, measured.pose_nc_line
-
-    def problems(self) -> list[Problem]:
-        """What is wrong, neighbouring places taken together."""
-        return self.result.violations.problems(_TEXT)
+        poses = Poses(pose[whole], gap.tip[whole], gap.axis_point[whole], gap.angle[whole], nc_line[whole])
+        return Measured(largest, violations, off, poses)
 
 
 @dataclass(frozen=True)
@@ -338,9 +316,9 @@ class _Part:
             )
 
 
-def exact_poses(matcher: Matcher) -> Bools:
+def exact_poses(original: Original) -> Bools:
     """(m,) whether the end of every original move must be passed exactly: all but the inner poses of chains."""
-    program = matcher.original.program
+    program = original.program
     exact = np.ones(len(program), np.bool_)
     chains = program.chains
     if len(chains):
@@ -349,10 +327,11 @@ def exact_poses(matcher: Matcher) -> Bools:
         np.add.at(steps, chains[:, 1], -1)
         exact = np.cumsum(steps[:-1]) == 0
     exact |= program.keep != Keep.NO
-    chosen: Bools = exact[matcher.original.pose]
+    chosen: Bools = exact[original.pose]
     return chosen
 
 
+#: what a violation of each code is said to be; its amount in mm
 _TEXT = {
     521: "the tip leaves its path by {:.6f} mm",
     522: "the axis point leaves its path by {:.6f} mm",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Final, NoReturn
 
@@ -15,7 +16,7 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.verify.dialects import CONTROLS, Dialect, dialect_of
 from cornersmooth.verify.motion import Modal, Piece, execute
-from cornersmooth.verify.ncprogram import Event, NcProgram, Problem, Second
+from cornersmooth.verify.ncprogram import Element, Event, NcProgram, Problem, Second
 from cornersmooth.verify.pile import Pile
 from cornersmooth.verify.rotary import Rotary
 from cornersmooth.verify.runs import read_lines
@@ -27,10 +28,13 @@ if TYPE_CHECKING:
 __all__ = ["CONTROLS", "read_nc"]
 
 #: decimals are looked for in so many bytes from the first motion block on
-_DIGITS_SAMPLE: Final = 1 << 16
+DIGITS_SAMPLE: Final = 1 << 16
 
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1
+
+#: code of words that want another state of the control
+CONTROL_WORDS: Final = "CS506"
 
 #: words that say what is in force when it must be
 _NEEDS = {
@@ -80,26 +84,18 @@ def read_nc(
     SettingsError
         CS204 for an unknown control, CS215 for positions of a machine that is not named.
     """
-    dialect = dialect_of(control, "".join(machine.names) if machine is not None else "")
-    if machine is None and not tcp:
-        raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
+    return read_styled(data, Style.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length), name)
+
+
+def read_styled(data: bytes | str | os.PathLike[str], style: Style, name: str | None = None) -> NcProgram:
+    """Read an NC text; see `read_nc`."""
 
     def read(file: BinaryIO, label: str | None) -> NcProgram:
-        tip, second = dialect.decimals(file.read(_DIGITS_SAMPLE))
+        steps = style.steps(file.read(DIGITS_SAMPLE))
         file.seek(0)
-        rotary = None
-        if machine is not None:
-            rotary = Rotary(machine, tcp, tolerance, axis_length, 10.0**-tip, 10.0 ** -(second or 0))
-        reader = _Reader(label, dialect, rotary)
-        for item in read_lines(file, label, dialect.spelling):
-            if isinstance(item, Table):
-                reader.rows(item)
-            else:
-                reader.line(item)
-        reader.flush()
-        return reader.result(
-            10.0**-tip, 0.0 if second is None else 10.0**-second, FIXED_SHARE * tolerance / axis_length
-        )
+        reader = Reader(label, style, steps)
+        reader.take(read_lines(file, label, style.dialect.spelling))
+        return reader.result()
 
     if isinstance(data, bytes):
         return read(io.BytesIO(data), name)
@@ -112,13 +108,105 @@ def read_nc(
         raise InputError("CS500", f"cannot read: {error.strerror}", "check name and rights", file=label) from error
 
 
-class _Reader:
-    """Collects what the lines say; holds the modal state of the control (`dialects.State`)."""
+@dataclass(frozen=True)
+class Steps:
+    """What the last printed digit is worth.
 
-    def __init__(self, name: str | None, dialect: Dialect, rotary: Rotary | None) -> None:
-        self.name, self.dialect, self.rotary = name, dialect, rotary
-        self.modal = Modal(rotary=rotary.names if rotary is not None else "")
-        self.tip_control = ""
+    Parameters
+    ----------
+    tip : float
+        In units of the text.
+    second : float
+        Of the second triple; 0 without any.
+    """
+
+    tip: float
+    second: float
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a text is to be understood.
+
+    Parameters
+    ----------
+    dialect : Dialect
+    machine : Machine or None
+    tcp : bool
+    tolerance, axis_length : float, mm
+        As in `read_nc`.
+    """
+
+    dialect: Dialect
+    machine: Machine | None
+    tcp: bool
+    tolerance: float
+    axis_length: float
+
+    @classmethod
+    def of(cls, control: str, machine: Machine | None, *, tcp: bool, tolerance: float, axis_length: float) -> Style:
+        """Choose it.
+
+        Raises
+        ------
+        SettingsError
+            CS204 for an unknown control, CS215 for positions of a machine that is not named.
+        """
+        dialect = dialect_of(control, "".join(machine.names) if machine is not None else "")
+        if machine is None and not tcp:
+            raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
+        return cls(dialect, machine, tcp, tolerance, axis_length)
+
+    def steps(self, sample: bytes) -> Steps:
+        """Printed digits, from the beginning of a text (`DIGITS_SAMPLE`)."""
+        tip, second = self.dialect.decimals(sample)
+        return Steps(10.0**-tip, 0.0 if second is None else 10.0**-second)
+
+    def rotary(self, steps: Steps) -> Rotary | None:
+        """What resolves rotary words; None without a machine."""
+        if self.machine is None:
+            return None
+        return Rotary(self.machine, self.tcp, self.tolerance, self.axis_length, steps.tip, steps.second or 1.0)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """All that holds at a place of a text where no curve is open.
+
+    Parameters
+    ----------
+    modal : Modal
+    tip_control : str
+        See `dialects.State`.
+    memory : dict
+        See `dialects.State`.
+    """
+
+    modal: Modal
+    tip_control: str = ""
+    memory: dict[str, Any] = field(default_factory=dict)
+
+
+class Reader:
+    """Collects what the lines say; holds the modal state of the control (`dialects.State`).
+
+    Parameters
+    ----------
+    name : str or None
+        For messages.
+    style : Style
+    steps : Steps
+    standing : Standing, optional
+        What holds in front of the first line.
+    """
+
+    def __init__(self, name: str | None, style: Style, steps: Steps, standing: Standing | None = None) -> None:
+        self.name, self.style, self.dialect, self.steps = name, style, style.dialect, steps
+        self.rotary = style.rotary(steps)
+        if standing is None:
+            standing = Standing(Modal(rotary=self.rotary.names if self.rotary is not None else ""))
+        self.began = standing
+        self.modal, self.tip_control, self.memory = standing.modal, standing.tip_control, dict(standing.memory)
         self.pile = Pile()
         self.waiting: list[Table | tuple[int, dict[str, float]]] = []
         self.events: list[Event] = []
@@ -126,13 +214,47 @@ class _Reader:
         self.comments: list[tuple[int, str]] = []
         self.problems: list[Problem] = []
         self.complained: set[tuple[str, str]] = set()
+        self.feed_units: set[float] = set()
         self.lever = 0.0
         self.elements = 0
         self.blocks = 0
 
+    def take(self, items: Iterable[Table | Line]) -> None:
+        """Take runs of motion blocks and other lines, to the end of a text or to where no curve is open."""
+        for item in items:
+            self.take_one(item)
+        self.flush()
+
+    def take_one(self, item: Table | Line) -> None:
+        """Take a run of motion blocks, or another line."""
+        if isinstance(item, Table):
+            self.rows(item)
+        else:
+            self.line(item)
+
+    @property
+    def standing(self) -> Standing:
+        """What holds now, all lines being executed."""
+        return Standing(self.modal, self.tip_control, dict(self.memory))
+
+    def began_with(self, standing: Standing | None) -> bool:
+        """Whether all would be the same if this had held in front of the first line, but for feeds not known there."""
+        if standing is None or (self.began.tip_control, self.began.memory) != (standing.tip_control, standing.memory):
+            return False
+        mine, true = self.began.modal, standing.modal
+        if math.isnan(mine.feed):
+            mine = mine.but(feed=true.feed)
+        return repr(mine) == repr(true) and len(self.feed_units) <= 1  # NaN is not equal to itself
+
+    def know_feed(self, feed: float) -> None:
+        """Say which feed, in units of the text, held in front of the first line, where that was not known."""
+        if math.isnan(self.began.modal.feed) and self.feed_units:
+            rows = self.pile.feed.rows
+            rows[np.isnan(rows) & (self.pile.kind.rows != Element.RAPID)] = feed * next(iter(self.feed_units))
+
     def rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
-        if _closed(table):
+        if closed(table):
             self.flush()
         self.waiting.append(table)
         self.blocks += len(table)
@@ -163,6 +285,8 @@ class _Reader:
             self.problems.extend(piece.problems)
             unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
             unit = 1.0 if before.inverse_time else unit
+            if math.isnan(before.feed):
+                self.feed_units.add(1.0 if factor == 1.0 else unit)
             piece = _in_mm(piece, factor, unit, points=self.modal.points)
             piece.feed_room += self.dialect.feed_step / 2 * unit
             if self.rotary is not None:
@@ -233,9 +357,9 @@ class _Reader:
         self.complained.add((kind, self.tip_control))
         need = " or ".join(word or "no tool tip control" for word in wanted)
         text = f"{_NEEDS[kind]} under {self.tip_control or 'no tool tip control'}, where {need} must be in force"
-        self.problems.append(Problem("CS506", 0, int(table.line[0]), text))
+        self.problems.append(Problem(CONTROL_WORDS, 0, int(table.line[0]), text))
 
-    def result(self, tip_step: float, second_step: float, fixed_room: float) -> NcProgram:
+    def result(self) -> NcProgram:
         """Put all pieces together, in millimetres."""
         second_is: Second = "point" if self.modal.points else "vector"
         scale = MM_PER_UNIT[self.units]
@@ -246,14 +370,14 @@ class _Reader:
             for element, (number, text) in zip(place, self.comments, strict=True)
         )
         self.events.sort(key=lambda event: event.line)
-        steps = (tip_step * scale, second_step * (scale if second_is == "point" else 1.0))
+        steps = (self.steps.tip * scale, self.steps.second * (scale if second_is == "point" else 1.0))
         if self.rotary is not None:
             steps = replace(self.rotary, tip_step=steps[0]).steps(self.lever)
         room = np.zeros(len(elements["kind"]))
         if self.rotary is not None:
             room = self.rotary.pole_room(elements["second"])
-        elif second_is == "vector" and not second_step:  # no word says anything of the tool axis
-            room += fixed_room
+        elif second_is == "vector" and not self.steps.second:  # no word says anything of the tool axis
+            room += FIXED_SHARE * self.style.tolerance / self.style.axis_length
         return NcProgram(
             **elements,
             curves=curves,
@@ -285,14 +409,14 @@ def _joined(waiting: list[Table | tuple[int, dict[str, float]]]) -> Iterable[Tab
             rows.append(item)
     if rows:
         tables.append(table_of(rows))
-    if all(_closed(table) for table in tables):
+    if all(closed(table) for table in tables):
         return tables
     letters = sorted({letter for table in tables for letter in table.columns})
     line = np.concatenate([table.line for table in tables])
     return [Table(line, {name: np.concatenate([table.column(name) for table in tables]) for name in letters})]
 
 
-def _closed(table: Table) -> bool:
+def closed(table: Table) -> bool:
     """Whether a table starts with a G word, so that what stands before it ends no curve in it."""
     first = table.columns.get("G")
     return first is not None and not np.isnan(first[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,22 @@ _SPEAKS = bytes(code not in b"0123456789.-+ \t\r" for code in range(256))
 _LINE_END, _BLANK = 10, 32
 
 
-def read_lines(data: bytes | BinaryIO, name: str | None, spelling: Spelling | None = None) -> Iterator[Table | Line]:
+class Readable(Protocol):
+    """What text is read from."""
+
+    def read(self, size: int, /) -> bytes:
+        """Next bytes, at most so many; none at the end."""
+
+
+def read_lines(
+    data: bytes | Readable,
+    name: str | None,
+    spelling: Spelling | None = None,
+    *,
+    layouts: Layouts | None = None,
+    number: int = 1,
+    size: int = CHUNK,
+) -> Iterator[Table | Line]:
     """Give out the text in order, as runs of motion blocks and as other lines.
 
     Parameters
@@ -37,6 +52,12 @@ def read_lines(data: bytes | BinaryIO, name: str | None, spelling: Spelling | No
         For messages.
     spelling : Spelling, optional
         Of the control; single letters by default.
+    layouts : Layouts, optional
+        Those met so far in the same text.
+    number : int
+        Of the first line.
+    size : int
+        Bytes read at a time.
 
     Raises
     ------
@@ -44,18 +65,18 @@ def read_lines(data: bytes | BinaryIO, name: str | None, spelling: Spelling | No
         CS501 where a line is not made of words.
     """
     spelling = spelling or Spelling()
-    layouts = Layouts(spelling.columns, numbered=spelling.numbered)
+    if layouts is None:
+        layouts = Layouts(spelling.columns, numbered=spelling.numbered)
+    for chunk, first in _chunks(data, spelling, number, size):
+        yield from _read_chunk(chunk, first, spelling, layouts, name)
 
-    for chunk, number in _chunks(data, spelling):
-        yield from _read_chunk(chunk, number, spelling, layouts, name)
 
-
-def _chunks(data: bytes | BinaryIO, spelling: Spelling) -> Iterator[tuple[bytes, int]]:
+def _chunks(data: bytes | Readable, spelling: Spelling, number: int, size: int) -> Iterator[tuple[bytes, int]]:
     """Pieces of the text, cut where no curve is cut in two, each with the number of its first line."""
     file = io.BytesIO(data) if isinstance(data, bytes) else data
-    number, rest = 1, b""
+    rest = b""
     while True:
-        more = file.read(CHUNK)
+        more = file.read(size)
         chunk = rest + more
         if not chunk:
             return

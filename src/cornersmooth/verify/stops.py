@@ -10,6 +10,7 @@ import difflib
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.verify.ncprogram import Element, NcProgram, Problem
@@ -147,29 +148,40 @@ def _match_part(
     element_last: int,
 ) -> tuple[tuple[Ints, Ints], list[Problem]]:
     """Match the stops of a range of moves with those of a range of elements."""
-    program = original.program
-    kind = program.kind[original.pose]
-    tip, axis = program.tip[original.pose], program.axis[original.pose]
-    theirs = _stops(kind == Move.RAPID, tip, axis * axis_length, nc.tip_step, move_first, move_last)
-    ours = _stops(nc.kind == Element.RAPID, nc.tip, nc.second, 0.0, element_first, element_last)
+    theirs = stops_of_original(original, axis_length, nc.tip_step, move_first, move_last)
+    ours = stops_of_text(nc, element_first, element_last)
     pairs, problems = _match(original, nc, theirs, ours, axis_length)
-    if kind[move_first] == Move.RAPID and nc.kind[element_first] != Element.RAPID:
+    if original.program.kind[original.pose[move_first]] == Move.RAPID and nc.kind[element_first] != Element.RAPID:
         text = "the first rapid is written as a feed move"
         problems.insert(0, _problem("CS532", original, move_first, nc, element_first, text))
     return pairs, problems
 
 
-def _stops(is_stop: Bools, tip: Floats, other: Floats, step: float, first: int, last: int) -> Ints:
-    """Indices from `first` to `last` of the stops that move the tool in steps of `step`, and of the first of all."""
-    index = np.flatnonzero(is_stop[first : last + 1]) + first
-    index = index[index > first]
+def stops_of_original(original: Original, axis_length: float, step: float, first: int = 0, last: int = -1) -> Ints:
+    """Moves from `first` to `last` that are rapid and move the tool in printed steps, and the first of all."""
+    pose = original.pose[first : None if last < 0 else last + 1]
+    index = np.flatnonzero(original.program.kind[pose] == Move.RAPID)
+    index = index[index > 0]
     moved = np.zeros(len(index), np.bool_)
-    for values in (tip, other):
-        here, before = values[index], values[index - 1]
-        if step > 0:
-            here, before = np.round(here / step), np.round(before / step)
+    for values, length in ((original.program.tip, 1.0), (original.program.axis, axis_length)):
+        here, before = (np.round(length * values[rows] / step) for rows in (pose[index], pose[index - 1]))
         moved |= (here != before).any(axis=1)
-    return np.concatenate(([first], index[moved]))
+    return np.concatenate(([first], index[moved] + first))
+
+
+def stops_of_text(nc: NcProgram, first: int, last: int) -> Ints:
+    """Elements from `first` to `last` that are rapid and move the tool, and the first of all, if there is any."""
+    if last < first:
+        return np.zeros(0, np.int64)
+    return np.concatenate(([first], moving_rapids(nc.kind, nc.tip, nc.second, first + 1, last + 1)))
+
+
+def moving_rapids(kind: NDArray[np.uint8], tip: Floats, second: Floats, first: int, stop: int) -> Ints:
+    """Elements from `first` (at least 1) to `stop` (excluded) that are rapid and move the tool."""
+    index = np.flatnonzero(kind[first:stop] == Element.RAPID) + first
+    moved = (tip[index] != tip[index - 1]).any(axis=1) | (second[index] != second[index - 1]).any(axis=1)
+    found: Ints = index[moved]
+    return found
 
 
 def _match(

@@ -73,6 +73,19 @@ class Original:
     trail: Trail
     arc: Ints
 
+    def part(self, first: int, last: int) -> Original:
+        """Moves from the end of `first` to the end of `last`."""
+        trail = self.trail
+        begin, end = int(trail.last[first]), int(trail.last[last]) + 1
+        own = Trail(
+            trail.tip[begin:end],
+            trail.axis[begin:end],
+            trail.owner[begin:end] - first,
+            trail.fraction[begin:end],
+            trail.last[first : last + 1] - begin,
+        )
+        return Original(self.program, self.pose[first : last + 1], own, self.arc[first : last + 1])
+
     def at(self, owner: Ints, fraction: Floats) -> tuple[Floats, Floats]:
         """Tip and unit axis (k, 3) at a fraction of moves: the ruled motion, or the true arc."""
         program = self.program

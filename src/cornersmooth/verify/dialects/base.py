@@ -23,6 +23,8 @@ class State(Protocol):
     modal: Modal
     #: what keeps the tip where it is told, in the words of the dialect; empty for nothing
     tip_control: str
+    #: what else a dialect has to remember from line to line
+    memory: dict[str, Any]
 
     def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
         """Say a word that stands beside the motion; a late one acts after the motion of its block."""
@@ -41,7 +43,7 @@ class State(Protocol):
 
 
 class Dialect:
-    """A control's way to say things.
+    """A control's way to say things; nothing in it changes while a text is read.
 
     Parameters
     ----------

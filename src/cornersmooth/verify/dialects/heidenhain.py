@@ -67,7 +67,6 @@ class Heidenhain(Dialect):
 
     def __init__(self, rotary: str = "") -> None:
         super().__init__(_Spelling(rotary), rotary)
-        self._centre: dict[str, float] = {}
 
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""
@@ -99,7 +98,7 @@ class Heidenhain(Dialect):
             else:
                 state.refuse(line, f"{text} is not understood here", "see that the control is the one the text is for")
         if "centre" in motion:
-            self._centre = {axis: motion[axis] for axis in "XY" if axis in motion}
+            state.memory["centre"] = {axis: motion[axis] for axis in "XY" if axis in motion}
         elif "circle" in motion:
             state.move(line, self._circle(motion, line, state))
         else:
@@ -109,11 +108,12 @@ class Heidenhain(Dialect):
 
     def _circle(self, motion: dict[str, float], line: Line, state: State) -> dict[str, float]:
         """C: about the centre that CC has said, in the plane XY."""
-        if "turn" not in motion or len(self._centre) != 2 or {*motion} & {"Z", *self.rotary}:
+        centre = state.memory.get("centre", {})
+        if "turn" not in motion or len(centre) != 2 or {*motion} & {"Z", *self.rotary}:
             state.refuse(line, "an arc that is not in the plane XY about a CC", "write it as lines")
         x, y, _ = state.modal.tip
         row: dict[str, float] = {name: motion[name] for name in ("X", "Y", "F") if name in motion}
-        return {**row, "G": motion["turn"], "I": self._centre["X"] - x, "J": self._centre["Y"] - y}
+        return {**row, "G": motion["turn"], "I": centre["X"] - x, "J": centre["Y"] - y}
 
     def _miscellaneous(self, value: float, text: str, line: Line, state: State) -> None:
         if value in (136.0, 137.0):

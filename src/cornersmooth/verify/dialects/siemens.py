@@ -81,7 +81,6 @@ class Siemens(Dialect):
 
     def __init__(self, rotary: str = "") -> None:
         super().__init__(_Spelling(rotary), rotary)
-        self._orientation = ""
 
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""
@@ -138,10 +137,10 @@ class Siemens(Dialect):
     def _transform(self, name: str, state: State) -> None:
         on = state.tip_control.startswith("TRAORI")
         if name in _ORIENTATIONS:
-            self._orientation = name
+            state.memory["orientation"] = name
         else:
             on = name == "TRAORI"
-        state.tip_control = f"TRAORI {self._orientation}".rstrip() if on else ""
+        state.tip_control = f"TRAORI {state.memory.get('orientation', '')}".rstrip() if on else ""
 
     def _mode(self, code: float, line: Line, state: State) -> None:
         if code in (17.0, 18.0, 19.0):
