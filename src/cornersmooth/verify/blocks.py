@@ -11,16 +11,17 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.anchors import cut_finely, cut_lane
 from cornersmooth.verify.careful import assign, doubtful_windows
+from cornersmooth.verify.gliding import glide
 from cornersmooth.verify.ncprogram import NcProgram
 from cornersmooth.verify.stops import Stretches
 from cornersmooth.verify.trails import CHORD_SHARE, Original, Written, directions, written_motion
-from cornersmooth.verify.walking import Lane, Lanes, Track, walk
+from cornersmooth.verify.walking import Lane, Lanes, Track, Walked, nowhere, walk
 
 #: path elements in a block
 BLOCK = 1 << 16
 
 #: written vertices between anchors
-LANE = 150
+LANE = 300
 
 #: blocks are cut at anchors that are no nearer to the ends of their original segment than this part of it: there is no
 #: doubt then in which of two blocks an original vertex belongs
@@ -56,6 +57,8 @@ class Block:
     backward : (v,) bool
     distance : (v,) float64, mm
         See `walking.walk`.
+    nearest : bool
+        Whether no segment next to that of a vertex is nearer.
     low, high : (v,) int64
         First and last original segment of the stretch a vertex belongs to.
     until : float
@@ -70,6 +73,7 @@ class Block:
     fraction: Floats
     backward: Bools
     distance: Floats
+    nearest: bool
     low: Ints
     high: Ints
     until: float
@@ -216,7 +220,7 @@ class Matcher:
             else:
                 lanes.append(lane)
         table = Lanes(*(np.array(column) for column in zip(*lanes, strict=True)))
-        segment, fraction, backward, distance = walk(six, self.track, table, self.margin, self.near)
+        (segment, fraction, backward, distance), nearest = self._places(six, length, table)
         spans = [(int(ends[a - first]), int(ends[b - first]), start, stop) for a, b, start, stop, _ in pieces]
         on = fraction >= 0
         number = np.full(len(six), -1, np.int64)
@@ -231,14 +235,35 @@ class Matcher:
             vertex = np.repeat(firsts - np.cumsum(size) + size, size) + np.arange(len(index))
             number[vertex], low[vertex], high[vertex] = index, starts[index], stops[index] - 1
         self._look_again(six, number, segment, fraction, backward, distance)
-        return Block(written, six, on, number, segment, fraction, backward, distance, low, high, until)
+        return Block(written, six, on, number, segment, fraction, backward, distance, nearest, low, high, until)
+
+    def _places(self, six: Floats, length: Floats, lanes: Lanes) -> tuple[Walked, bool]:
+        """Place of every vertex of the lanes, as `walk` returns it, and whether it is nearest for all of them."""
+        vertex, *own, good = glide(six, length, self.track, lanes, self.doubtful)
+        nearest = bool(good.all())
+        if nearest:
+            found = nowhere(len(six))
+        else:
+            found = walk(six, self.track, lanes.only(~good), self.margin, self.near)
+            rows = np.repeat(good, lanes.last - lanes.first)
+            vertex, own, lanes = vertex[rows], [values[rows] for values in own], lanes.only(good)
+        segment, fraction, _, distance = found
+        segment[vertex], fraction[vertex], distance[vertex] = own
+        starts = np.flatnonzero(fraction[lanes.first] < 0)  # what no other lane ends with
+        segment[lanes.first[starts]], fraction[lanes.first[starts]] = lanes.start[starts], lanes.fraction[starts]
+        return found, nearest
+
+    @property
+    def doubtful(self) -> float:
+        """Distance of a vertex from its place, in six dimensions, from which on it is looked at with more care, mm."""
+        return float(np.sqrt(2) * self.tolerance + self.margin)
 
     def _look_again(
         self, six: Floats, piece: Ints, segment: Ints, fraction: Floats, backward: Bools, distance: Floats
     ) -> None:
         """Assign anew, and with more care, what the walker has found too far away or in the wrong order."""
         known = np.isfinite(distance)
-        doubtful = backward | (known & (distance > np.sqrt(2) * self.tolerance + self.margin))
+        doubtful = backward | (known & (distance > self.doubtful))
         for first, last in doubtful_windows(doubtful & (piece >= 0), piece):
             part = slice(first, last + 1)
             start, stop = (float(segment[k] + fraction[k]) for k in (first, last))

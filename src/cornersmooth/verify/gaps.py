@@ -15,14 +15,11 @@ from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.curves import CurveGroup
 from cornersmooth.verify.ncprogram import Element
-from cornersmooth.verify.nearest import Gap, Metric, gap_between, nearest_segments
+from cornersmooth.verify.nearest import Gap, Metric, climb, gap_between, nearest_segments
 from cornersmooth.verify.trails import directions, written_at
 
 #: a Newton step from a knot longer than this part of the parameter range is followed up
 _SHORT_STEP = 0.02
-
-#: segments that the nearest place may be away from where it is looked for
-_MOST_STEPS = 200
 
 #: samples and rounds of the search on single elements
 _SAMPLES, _ROUNDS, _ZOOM = 17, 4, 9
@@ -64,10 +61,10 @@ def from_written(matcher: Matcher, block: Block) -> Reached:
     gap = Gap(bound.copy(), bound.copy(), np.zeros(len(vertex)))
     loose = np.flatnonzero(bound > min(matcher.margin, known.max(initial=0.0) / 2))
     rows = vertex[loose]
-    # the walker stays on a segment until the next is nearer by a margin
-    segment[loose], at[loose] = nearest_segments(
-        block.six.take(rows, axis=0), matcher.track.six, segment[loose], 1, block.low[rows], block.high[rows]
-    )
+    if not block.nearest:  # the walker stays on a segment until the next is nearer by a margin
+        segment[loose], at[loose] = nearest_segments(
+            block.six.take(rows, axis=0), matcher.track.six, segment[loose], 1, block.low[rows], block.high[rows]
+        )
     better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
     gap.tip[loose], gap.axis_point[loose], gap.angle[loose] = better.tip, better.axis_point, better.angle
     return Reached(vertex, gap, segment + at)
@@ -86,7 +83,7 @@ def from_original(matcher: Matcher, block: Block) -> Reached:
     trail, six = matcher.original.trail, matcher.track.six
     point = six.take(vertex, axis=0)
     segment, at = nearest_segments(point, block.six, middle, 1, low, high)
-    _climb(point, block.six, middle, low, high, segment, at)
+    climb(point, block.six, middle, low, high, segment, at)
     tip = _on(block.written.trail.tip, segment, at)
     axis = _unit_on(block.written.trail.axis, segment, at)
     owner = block.written.trail.owner[segment + 1]
@@ -96,29 +93,6 @@ def from_original(matcher: Matcher, block: Block) -> Reached:
     own = trail.tip.take(vertex, axis=0), trail.axis.take(vertex, axis=0)
     gap = gap_between(tip, axis, *own, matcher.axis_length)
     return Reached(vertex, gap, segment + at)
-
-
-def _climb(
-    point: Floats,
-    vertices: Floats,
-    middle: Ints,
-    low: Ints,
-    high: Ints,
-    segment: Ints,
-    at: Floats,
-    metric: Metric = "both",
-) -> None:
-    """Go on to nearer segments, in place, from where the look around `middle` has led away from it.
-
-    Blocks in rotary words may have become many short lines, and the nearest is then not next door.
-    """
-    rows = np.flatnonzero(segment != middle)
-    for _ in range(_MOST_STEPS):
-        if not len(rows):
-            return
-        before = segment[rows]
-        segment[rows], at[rows] = nearest_segments(point[rows], vertices, before, 1, low[rows], high[rows], metric)
-        rows = rows[segment[rows] != before]
 
 
 def _brackets(block: Block) -> tuple[Ints, Ints, Ints, Ints]:
@@ -192,7 +166,10 @@ def _newton_from_knot(
 
     Distances are taken between control-point curves and a pose whose axis point is as far from its tip as theirs.
     """
-    value, slope, bend = (part.take(curve, axis=0) for part in group.jet(u))
+    if 2 * len(curve) < len(group.index):
+        value, slope, bend = group.only(curve).jet(u)
+    else:
+        value, slope, bend = (part.take(curve, axis=0) for part in group.jet(u))
     target = point.copy()
     vectors = matcher.nc.second_is == "vector"
     if vectors:  # of length one
@@ -324,7 +301,7 @@ def own_gaps_of_original(matcher: Matcher, block: Block, reached: Reached, rows:
     )
     for metric, column, known in ways:
         near, at = nearest_segments(point, block.six, segment, _REACH * matcher.parts, low, high, metric)
-        _climb(point, block.six, segment, low, high, near, at, metric)
+        climb(point, block.six, segment, low, high, near, at, metric)
         owner = written.trail.owner[near + 1]
         elements = np.clip(owner[:, None] + np.arange(-_REACH, _REACH + 1), first, last)
         elements = np.where(nc.kind[elements] == Element.RAPID, owner[:, None], elements)

@@ -105,14 +105,15 @@ def _plain_corners(matcher: Matcher, block: Block, group: CurveGroup, end: Ints)
         return np.zeros(len(points), np.bool_)
     corner = np.minimum(block.segment[end - 2] + 1, len(matcher.track.six) - 1)
     off = points[:, 2] - matcher.track.six.take(corner, axis=0)
-    plain: Bools = np.abs(off).max(axis=1) <= matcher.margin
+    room = matcher.margin**2
+    plain: Bools = np.einsum("ij,ij->i", off, off) <= room
     for outer, inner in ((0, 1), (4, 3)):
         leg = points[:, outer] - points[:, 2]
         way = points[:, inner] - points[:, 2]
         size = np.einsum("ij,ij->i", leg, leg)
         share = np.divide(np.einsum("ij,ij->i", way, leg), size, out=np.zeros(len(leg)), where=size > 0)
         way -= share[:, None] * leg
-        plain &= (share >= 0) & (share <= 1) & (np.abs(way).max(axis=1) <= matcher.margin)
+        plain &= (share >= 0) & (share <= 1) & (np.einsum("ij,ij->i", way, way) <= room)
     return plain
 
 

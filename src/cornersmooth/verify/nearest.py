@@ -12,6 +12,9 @@ from cornersmooth.model import Floats, Ints
 #: which distance is made smallest: tip and axis point together, or one of them
 Metric = Literal["both", "tip", "axis point"]
 
+#: segments that the nearest place may be away from where it is looked for
+_MOST_STEPS = 200
+
 #: rows taken at a time, so that the work arrays stay in the cache
 _BLOCK = 16384
 
@@ -52,7 +55,20 @@ def gap_between(tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats
 def nearest_segments(
     point: Floats, vertices: Floats, middle: Ints, reach: int, low: Ints, high: Ints, metric: Metric = "both"
 ) -> tuple[Ints, Floats]:
-    """Nearest place on a trail among the segments around a given one.
+    """Nearest place on a trail among the segments around a given one; see `nearest_places`.
+
+    Returns
+    -------
+    segment : (k,) int64
+    fraction : (k,) float64
+    """
+    return nearest_places(point, vertices, middle, reach, low, high, metric)[:2]
+
+
+def nearest_places(
+    point: Floats, vertices: Floats, middle: Ints, reach: int, low: Ints, high: Ints, metric: Metric = "both"
+) -> tuple[Ints, Floats, Floats]:
+    """Nearest place on a trail among the segments around a given one, and the distance.
 
     Parameters
     ----------
@@ -72,14 +88,16 @@ def nearest_segments(
     -------
     segment : (k,) int64
     fraction : (k,) float64
+    square : (k,) float64, mm²
+        Of the distance.
     """
     columns = {"both": slice(0, 6), "tip": slice(0, 3), "axis point": slice(3, 6)}[metric]
-    segment, fraction = np.empty(len(point), np.int64), np.empty(len(point))
+    segment, fraction, square = np.empty(len(point), np.int64), np.empty(len(point)), np.empty(len(point))
     for begin in range(0, len(point), _BLOCK):
         part = slice(begin, begin + _BLOCK)
         own = point[part, columns]
         whole = columns == slice(0, 6)
-        best = np.full(len(own), np.inf)
+        best = square[part]
         for step in (0, *(sign * k for k in range(1, reach + 1) for sign in (-1, 1))):
             j = np.clip(middle[part] + step, low[part], high[part])
             start, difference = vertices.take(j, axis=0), vertices.take(j + 1, axis=0)
@@ -95,10 +113,34 @@ def nearest_segments(
             away -= difference
             d = np.einsum("ij,ij->i", away, away)
             if step == 0:
-                best, segment[part], fraction[part] = d, j, t
+                square[part], segment[part], fraction[part] = d, j, t
             else:
                 nearer = d < best
-                best = np.where(nearer, d, best)
-                segment[part] = np.where(nearer, j, segment[part])
-                fraction[part] = np.where(nearer, t, fraction[part])
-    return segment, fraction
+                np.copyto(best, d, where=nearer)
+                np.copyto(segment[part], j, where=nearer)
+                np.copyto(fraction[part], t, where=nearer)
+    return segment, fraction, square
+
+
+def climb(
+    point: Floats,
+    vertices: Floats,
+    middle: Ints,
+    low: Ints,
+    high: Ints,
+    segment: Ints,
+    at: Floats,
+    metric: Metric = "both",
+) -> Ints:
+    """Go on to nearer segments, in place, from where the look around `middle` has led away from it; say which rows.
+
+    Blocks in rotary words may have become many short lines, and the nearest is then not next door.
+    """
+    moved = rows = np.flatnonzero(segment != middle)
+    for _ in range(_MOST_STEPS):
+        if not len(rows):
+            break
+        before = segment[rows]
+        segment[rows], at[rows] = nearest_segments(point[rows], vertices, before, 1, low[rows], high[rows], metric)
+        rows = rows[segment[rows] != before]
+    return moved

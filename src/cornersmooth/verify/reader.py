@@ -215,6 +215,7 @@ class Reader:
         self.problems: list[Problem] = []
         self.complained: set[tuple[str, str]] = set()
         self.feed_units: set[float] = set()
+        self.lines = 0
         self.lever = 0.0
         self.elements = 0
         self.blocks = 0
@@ -229,8 +230,10 @@ class Reader:
         """Take a run of motion blocks, or another line."""
         if isinstance(item, Table):
             self.rows(item)
+            self.lines = int(item.line[-1])
         else:
             self.line(item)
+            self.lines = item.number
 
     @property
     def standing(self) -> Standing:

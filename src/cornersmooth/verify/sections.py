@@ -296,12 +296,11 @@ class _Worker:
     def _read(self, start: int, stop: int | None, standing: Standing | None) -> _Read:
         """Read a section, and on to the next stop."""
         reader = self._reader(standing)
-        part = self.source.part(start, self.source.size(start) if stop is None else stop)
-        lines = self._lines(part)
+        lines = self._lines(self.source.part(start, self.source.size(start) if stop is None else stop))
         reader.take(self._severed(lines) if start else lines)
-        length = Baton(reader.standing, part.lines, reader.blocks, reader.elements, reader.pile.curves)
+        length = Baton(reader.standing, reader.lines, reader.blocks, reader.elements, reader.pile.curves)
         first = reader.pile.next_stop(1) if start else 0
-        following = reader.elements if stop is None else self._read_on(reader, stop, part.lines)
+        following = reader.elements if stop is None else self._read_on(reader, stop)
         return _Read(reader, length, following if first is None else first, following)
 
     def _severed(self, lines: Iterator[Table | Line]) -> Iterator[Table | Line]:
@@ -313,10 +312,10 @@ class _Worker:
                     raise Irregular
             yield item
 
-    def _read_on(self, reader: Reader, stop: int, lines: int) -> int:
-        """Read behind a section, of so many lines, to the next stop, and return its element."""
+    def _read_on(self, reader: Reader, stop: int) -> int:
+        """Read behind a section to the next stop, and return its element."""
         looked, farthest = reader.elements + 1, stop + _FARTHEST
-        for item in self._lines(self.source.part(stop, farthest), lines + 1, _BEHIND):
+        for item in self._lines(self.source.part(stop, farthest), reader.lines + 1, _BEHIND):
             reader.take_one(item)
             found = reader.pile.next_stop(looked)
             if found is not None:

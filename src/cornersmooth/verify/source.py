@@ -115,11 +115,9 @@ class Part:
 
     def __init__(self, source: Source, start: int, stop: int) -> None:
         self.source, self._place, self._stop = source, start, stop
-        self.lines = 0
 
     def read(self, size: int) -> bytes:
         """Next bytes, at most so many."""
         data = self.source.read(self._place, min(self._place + size, self._stop))
         self._place += len(data)
-        self.lines += data.count(b"\n")
         return data

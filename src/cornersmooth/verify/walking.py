@@ -79,8 +79,21 @@ class Lanes:
     def __len__(self) -> int:
         return len(self.first)
 
+    def only(self, rows: Bools) -> Lanes:
+        """Some of the lanes."""
+        return Lanes(*(column[rows] for column in vars(self).values()))
 
-def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) -> tuple[Ints, Floats, Bools, Floats]:
+
+#: what `walk` returns
+Walked = tuple[Ints, Floats, Bools, Floats]
+
+
+def nowhere(count: int) -> Walked:
+    """Vertices in no lane."""
+    return np.zeros(count, np.int64), np.full(count, -1.0), np.zeros(count, np.bool_), np.full(count, np.inf)
+
+
+def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) -> Walked:
     """Assign the vertices of all lanes.
 
     Parameters
@@ -102,12 +115,9 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
     backward : (v,) bool
         Whether the vertex lies more than `margin` behind the one before it, as seen from its segment.
     distance : (v,) float64, mm
-        From its place, in six dimensions: neither tip nor axis point is farther.
+        From its place, in six dimensions: neither tip nor axis point is farther; inf where a lane starts.
     """
-    segment = np.zeros(len(six), np.int64)
-    fraction = np.full(len(six), -1.0)
-    backward = np.zeros(len(six), np.bool_)
-    distance = np.full(len(six), np.inf)  # what a lane starts with has not been measured
+    segment, fraction, backward, distance = nowhere(len(six))
     vertex, last = lanes.first.copy(), lanes.last
     here, least, end = lanes.start.copy(), lanes.fraction.copy(), lanes.stop - 1
     segment[vertex], fraction[vertex] = here, least
@@ -123,19 +133,18 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
         point = six.take(vertex, axis=0)
         own = track.row.take(here, axis=0)
         after = track.following.take(here)
-        follow = track.row.take(np.minimum(after, end), axis=0)
         away = point - own[:, :6]
         t = np.einsum("ij,ij->i", away, own[:, 6:12]) * own[:, 12]
         on = np.minimum(np.maximum(t, least), 1.0)
         away -= on[:, None] * own[:, 6:12]
         d = np.sqrt(np.einsum("ij,ij->i", away, away))
-        away = point - follow[:, :6]
-        s = np.minimum(np.maximum(np.einsum("ij,ij->i", away, follow[:, 6:12]) * follow[:, 12], 0.0), 1.0)
-        away -= s[:, None] * follow[:, 6:12]
-        d_follow = np.sqrt(np.einsum("ij,ij->i", away, away))
         more = after <= end
         ended = (t >= 1.0) | (own[:, 12] == 0)
-        advance = more & ((ended & (d_follow <= d)) | (d_follow < d - margin))
+        # elsewhere the next segment cannot be nearer by the margin
+        ask = np.flatnonzero((ended | (d > margin)) & more)
+        d_follow = np.full(len(d), np.inf)
+        d_follow[ask] = _distance(point.take(ask, axis=0), track.row.take(after.take(ask), axis=0))
+        advance = (ended & (d_follow <= d)) | (d_follow < d - margin)
         behind = (least - t) > 0
         jump = np.flatnonzero(more & ~advance & ((d > lost) | (behind & (d > margin))))
         if len(jump):
@@ -154,15 +163,22 @@ def walk(six: Floats, track: Track, lanes: Lanes, margin: float, lost: float) ->
         active = vertex <= last
 
 
+def _distance(point: Floats, row: Floats) -> Floats:
+    """Distance of points (k, 6) from segments, rows of a track."""
+    away = point - row[:, :6]
+    t = np.einsum("ij,ij->i", away, row[:, 6:12])
+    t *= row[:, 12]
+    np.clip(t, 0.0, 1.0, out=t)
+    away -= t[:, None] * row[:, 6:12]
+    distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
+    return distance
+
+
 def _look_ahead(point: Floats, track: Track, here: Ints, end: Ints, beat: Floats, margin: float) -> Ints:
     """Nearest of the next segments, if nearer than `beat`, a later one only by a margin; `here` where there is none."""
     best = here.copy()
     for step in range(1, LOOK_AHEAD + 1):
-        row = track.row[np.minimum(here + step, end)]
-        away = point - row[:, :6]
-        t = np.clip(np.einsum("ij,ij->i", away, row[:, 6:12]) * row[:, 12], 0.0, 1.0)
-        away -= t[:, None] * row[:, 6:12]
-        d = np.sqrt(np.einsum("ij,ij->i", away, away))
+        d = _distance(point, track.row[np.minimum(here + step, end)])
         nearer = (d < beat) & (here + step <= end)
         best[nearer] = here[nearer] + step
         beat = np.where(nearer, d - margin, beat)
