@@ -1,0 +1,84 @@
+"""Texts that were written rightly and once refused: each holds what made the verification object.
+
+The numbers come from random programs, cut down to the moves that matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.model import Program
+from cornersmooth.settings import Settings
+from cornersmooth.verify import Verification, verify
+from nc.cases import Case
+from nc.promise import written
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """A text that must pass.
+
+    Parameters
+    ----------
+    case : Case
+    tolerance, axis_length : float, mm
+    cl : str
+        Statements after those that every program begins with.
+    inch : bool
+    """
+
+    case: Case
+    tolerance: float
+    axis_length: float
+    cl: str
+    inch: bool = False
+
+    @property
+    def program(self) -> Program:
+        """The CL program."""
+        units = "INCHES" if self.inch else "MM"
+        return read(f"UNITS/{units}\nLOADTL/1\nRAPID\n{self.cl}FINI\n".encode(), name="part.cls")
+
+    @property
+    def text(self) -> str:
+        """What is written for it."""
+        settings = Settings(tolerance=self.tolerance, axis_length=self.axis_length)
+        return written(self.program, self.case.choose(endless=True), settings)[0]
+
+    def verified(self, text: str) -> Verification:
+        """What is found in a text."""
+        form = self.case.choose(endless=True)
+        return verify(
+            self.program,
+            text.encode(),
+            tolerance=self.tolerance,
+            axis_length=self.axis_length,
+            control=self.case.control,
+            machine=form.machine,
+            tcp=self.case.tcp,
+        )
+
+
+#: without tip control, timed blocks in which the tip creeps by less than the digits of the linear axes show
+CREEPING = Alarm(
+    Case("fanuc", "g1", "head-ac", tcp=False),
+    0.001,
+    50.0,
+    """GOTO/0.1211,-1.6194,-1.3692,-0.7642257,-0.0481552,0.6431487
+FEDRAT/MMPM,27.7727
+GOTO/0.1406,-1.6284,-1.3692,-0.6131925,0.0049931,0.7899178
+GOTO/-58.3760,-5.7811,-1.3692,-0.6131925,0.0049931,0.7899178
+""",
+)
+
+ALARMS = {
+    "creeping": CREEPING,
+}
+
+
+@pytest.mark.parametrize("alarm", ALARMS.values(), ids=ALARMS.keys())
+def test_what_is_written_passes(alarm: Alarm) -> None:
+    assert alarm.verified(alarm.text).problems == ()
