@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,12 +36,15 @@ class Token:
         Path length from the start of the original motion.
     line : int
         CL or NC line.
+    room : float, mm
+        How far the place is uncertain beyond what printed digits account for: rotary words near the pole.
     """
 
     kind: str
     value: float
     place: float
     line: int
+    room: float = 0.0
 
 
 _NAMES = {
@@ -233,13 +236,13 @@ def _of_m(value: float, place: float, line: int) -> list[Token]:
     return [Token("auxiliary", value, place, line)]
 
 
-def said(events: Sequence[Event], places: Sequence[float]) -> list[Token]:
-    """What the words of the NC text do."""
+def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float]) -> list[Token]:
+    """What the words of the NC text do; `places` are where they stand, and `rooms` how far that is uncertain, mm."""
     tokens: list[Token] = []
     chosen: float | None = None
-    speaking = [pair for pair in zip(events, places, strict=True) if pair[0].letter != "("]
-    for k, (event, place) in enumerate(speaking):
-        value, line = event.value, event.line
+    speaking = [row for row in zip(events, places, rooms, strict=True) if row[0].letter != "("]
+    for k, (event, place, room) in enumerate(speaking):
+        value, line, before = event.value, event.line, len(tokens)
         if event.letter == "T":
             chosen = value
             following = speaking[k + 1][0] if k + 1 < len(speaking) else None
@@ -259,6 +262,8 @@ def said(events: Sequence[Event], places: Sequence[float]) -> list[Token]:
         elif event.letter in _PLAIN:
             number = round(value, SPEED_DECIMALS) if event.letter == "S" else value
             tokens.append(Token(_PLAIN[event.letter], number, place, line))
+        if room > 0.0:
+            tokens[before:] = [replace(token, room=room) for token in tokens[before:]]
     return tokens
 
 
@@ -296,7 +301,7 @@ def compare(
                 label = name.format(theirs[i].value)
                 if tag != "equal":
                     text = f"{name.format(ours[j].value)} where the CL file asks for {label}"
-                elif abs(theirs[i].place - ours[j].place) > room:
+                elif abs(theirs[i].place - ours[j].place) > room + ours[j].room:
                     text = f"{label} is {ours[j].place - theirs[i].place:+.3f} mm of path away from its place"
                 else:
                     continue

@@ -175,7 +175,9 @@ class Verifier:
             places.append(section.places + length[section.vertex])
         if self._words:
             unsaid = style.dialect.unsaid
-            problems += _statement_problems(original, length, events, np.concatenate(places), found.margin, unsaid)
+            whole = np.concatenate(places)
+            rooms = np.zeros(len(whole))
+            problems += _statement_problems(original, length, events, whole, rooms, found.margin, unsaid)
         if problems:
             return None
         return Verification.of(
@@ -208,7 +210,8 @@ def _whole(
     if words and len(nc):  # without any motion nothing has a place
         places = compared.places[np.searchsorted(elements, own)]
         length, margin = comparison.matcher.track.length, comparison.matcher.margin
-        problems += _statement_problems(original, length, nc.events, places, margin, nc.unsaid)
+        rooms = np.where(nc.rotary & (own >= 0), axis_length * nc.second_room[own], 0.0)
+        problems += _statement_problems(original, length, nc.events, places, rooms, margin, nc.unsaid)
     return Verification.of(
         compared,
         problems,
@@ -226,6 +229,7 @@ def _statement_problems(
     length: Floats,
     events: Sequence[Event],
     places: Floats,
+    rooms: Floats,
     margin: float,
     unsaid: frozenset[str | tuple[str, float]],
 ) -> list[Problem]:
@@ -236,7 +240,8 @@ def _statement_problems(
     end = float(length[-1]) if moves else 0.0
     asked_at = np.where(move >= 0, length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0, BEFORE)
     theirs = asked(program, asked_at.tolist(), end)
-    return compare(theirs, said(events, np.nan_to_num(places, nan=0.0).tolist()), margin, unsaid)
+    ours = said(events, np.nan_to_num(places, nan=0.0).tolist(), rooms.tolist())
+    return compare(theirs, ours, margin, unsaid)
 
 
 def _units_problems(program: Program, units: Units) -> list[Problem]:
