@@ -93,9 +93,28 @@ GOTO/0.7710,-0.5236,0.0831,-0.0368166,-0.0189319,0.9991427
     inch=True,
 )
 
+#: a change of feed near the pole, where the tool stands already as it should only after it
+FEED_AT_THE_POLE = Alarm(
+    Case("haas", "g1", "head-ac"),
+    0.15,
+    10.0,
+    """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000
+FEDRAT/IPM,441.0106
+GOTO/-0.8513,1.7448,0.0000,0.0004237,-0.0004888,0.9999998
+FEDRAT/IPM,330.7936
+GOTO/-0.8513,1.7448,0.0000,0.0004237,-0.0004888,0.9999998
+GOTO/-0.8513,1.7448,0.0000,-0.0000603,0.0001530,1.0000000
+GOTO/-0.8514,1.7447,-0.0002,-0.5918873,-0.4427668,0.6735184
+GOTO/-0.8514,1.7450,-0.0002,-0.5429070,-0.4419728,0.7140812
+GOTO/-0.8431,1.7470,0.0102,-0.5429070,-0.4419728,0.7140812
+""",
+    inch=True,
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
+    "feed at the pole": FEED_AT_THE_POLE,
 }
 
 

@@ -59,6 +59,11 @@ def check_feeds(matcher: Matcher, block: Block, off: Floats) -> list[tuple[float
             good[k] = bool(_same(own[0], own[1], own[2], feed, mode, among).any())
     wrong = np.flatnonzero(~good)
     for k in wrong[:_MOST_SINGLE].tolist():
+        among = _ahead(matcher, block, int(element[k]), int(start[k]), int(end[k]))
+        own = tuple(np.full(len(among), column[k]) for column in (said, per_revolution, room))
+        if _same(own[0], own[1], own[2], feed, mode, among).any():
+            good[k] = True
+            continue
         pair = float(said[k]), float(room[k])
         good[k] = _inside_rounding(matcher, block, off, int(start[k]), int(end[k]), int(low[k]), pair, feed)
     wrong = np.flatnonzero(~good)
@@ -89,6 +94,21 @@ def _same(said: Floats, per_revolution: Bools, room: Floats, feed: Floats, mode:
     room = room + ARITHMETIC * np.maximum(np.abs(asked), 1.0)
     same: Bools = np.isnan(asked) | ((np.abs(said - asked) <= room) & (per_revolution == mode[move]))
     return same
+
+
+def _ahead(matcher: Matcher, block: Block, element: int, start: int, end: int) -> Ints:
+    """Moves at whose feed an element may run because near the pole the axis turns ahead of time; mostly none."""
+    nc, length = matcher.nc, matcher.track.length
+    room = matcher.axis_length * float(nc.second_room[element - 1 : element + 1].max())
+    if not (nc.rotary and room > 0.0):
+        return np.zeros(0, np.int64)
+    here, there = (
+        length[block.segment[k]] + block.fraction[k] * (length[block.segment[k] + 1] - length[block.segment[k]])
+        for k in (start, end)
+    )
+    low = max(int(np.searchsorted(length, here - room)) - 1, int(block.low[start]))
+    high = min(int(np.searchsorted(length, there + room, side="right")) - 1, int(block.high[end]))
+    return np.unique(matcher.original.trail.owner[low + 1 : high + 2])
 
 
 def _inside_rounding(
