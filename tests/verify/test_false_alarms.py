@@ -111,10 +111,26 @@ GOTO/-0.8431,1.7470,0.0102,-0.5429070,-0.4419728,0.7140812
     inch=True,
 )
 
+#: where the walk leaves a corner late, its nearest blocks are many blocks before
+LATE_AT_THE_POLE = Alarm(
+    Case("fanuc", "g1", "xyzbc-trt", tcp=False),
+    0.001,
+    10.0,
+    """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000
+FEDRAT/IPM,843.4290
+GOTO/0.0267,-0.0242,-0.3811,-0.0000180,0.0020016,0.9999980
+GOTO/-0.6215,-0.0084,-0.3811,-0.0000180,0.0020016,0.9999980
+GOTO/-0.6215,-0.0084,-0.3811,0.3616019,0.1972559,0.9112267
+GOTO/-0.6596,-1.6179,-0.3811,0.3616019,0.1972559,0.9112267
+""",
+    inch=True,
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
     "feed at the pole": FEED_AT_THE_POLE,
+    "late at the pole": LATE_AT_THE_POLE,
 }
 
 

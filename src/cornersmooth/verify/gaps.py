@@ -14,6 +14,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.curves import CurveGroup
+from cornersmooth.verify.farther import look_farther
 from cornersmooth.verify.ncprogram import Element
 from cornersmooth.verify.nearest import Gap, Metric, gap_between, nearest_segments
 from cornersmooth.verify.trails import directions, written_at
@@ -87,6 +88,7 @@ def from_original(matcher: Matcher, block: Block) -> Reached:
     point = six.take(vertex, axis=0)
     segment, at = nearest_segments(point, block.six, middle, 1, low, high)
     _climb(point, block.six, middle, low, high, segment, at)
+    look_farther(matcher, block, vertex, low, high, segment, at)
     tip = _on(block.written.trail.tip, segment, at)
     axis = _unit_on(block.written.trail.axis, segment, at)
     owner = block.written.trail.owner[segment + 1]

@@ -1,0 +1,64 @@
+"""A second, wider look for what an original vertex is near to, where the first one has found nothing near enough.
+
+The walk stays on a segment as long as the next is not clearly nearer. Where many short blocks lie within a digit or two
+of a corner - the pole, and machines that know nothing of the tip, have such - it leaves the segment late, and the
+nearest blocks are then farther back than a look around its place goes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.blocks import Block, Matcher
+
+#: original vertices of a block that are looked at once more, and written segments looked at for each
+_MOST_ROWS, _MOST_SEGMENTS = 2048, 1 << 14
+
+
+def look_farther(
+    matcher: Matcher, block: Block, vertex: Ints, low: Ints, high: Ints, segment: Ints, at: Floats
+) -> None:
+    """Find nearer written segments for original vertices that are farther than the tolerance, in place.
+
+    All written vertices are looked at whose places are within `Matcher.near` of the vertex, along the original.
+
+    Parameters
+    ----------
+    matcher : Matcher
+    block : Block
+    vertex : (k,) int64
+    low, high : (k,) int64
+        First and last segment allowed.
+    segment, at : (k,) int64, float64
+        Where they have been found.
+    """
+    six, track = block.six, matcher.track
+    start = six.take(segment, axis=0)
+    away = track.six.take(vertex, axis=0) - start - at[:, None] * (six.take(segment + 1, axis=0) - start)
+    square = away * away
+    rows = np.flatnonzero(np.maximum(square[:, :3].sum(axis=1), square[:, 3:].sum(axis=1)) > matcher.tolerance**2)
+    if not len(rows):
+        return
+    on = np.flatnonzero(block.on)
+    own = block.segment[on]
+    place = np.maximum.accumulate(track.length[own] + block.fraction[on] * (track.length[own + 1] - track.length[own]))
+    for k in rows[:_MOST_ROWS].tolist():
+        middle = track.length[vertex[k]]
+        first = on[max(int(np.searchsorted(place, middle - matcher.near)) - 1, 0)]
+        last = on[min(int(np.searchsorted(place, middle + matcher.near, side="right")), len(on) - 1)]
+        first = max(int(first), int(low[k]), int(segment[k]) - _MOST_SEGMENTS // 2)
+        last = min(int(last), int(high[k]) + 1, int(segment[k]) + _MOST_SEGMENTS // 2)
+        if last <= first:
+            continue
+        begin = six[first:last]
+        way = six[first + 1 : last + 1] - begin
+        rest = track.six[vertex[k]] - begin
+        size = np.einsum("ij,ij->i", way, way)
+        share = np.einsum("ij,ij->i", rest, way)
+        share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+        rest -= share[:, None] * way
+        off = np.einsum("ij,ij->i", rest, rest)
+        best = int(np.argmin(off))
+        if off[best] < square[k].sum():
+            segment[k], at[k] = first + best, share[best]
