@@ -126,11 +126,29 @@ GOTO/-0.6596,-1.6179,-0.3811,0.3616019,0.1972559,0.9112267
     inch=True,
 )
 
+#: a pose that must be passed is two blocks before the one it is looked for in
+EXACT_WITHIN_DIGITS = Alarm(
+    Case("haas", "g1", "xyzbc-trt"),
+    0.01,
+    50.0,
+    """GOTO/90.6764,-23.5104,-30.1309,0.0000000,0.0000000,1.0000000
+CUTCOM/LEFT,XYPLAN
+FEDRAT/MMPM,100.0
+GOTO/55.0152,-50.9585,-30.1309
+GOTO/55.0153,-50.9582,-30.1309
+GOTO/55.0153,-50.9582,-30.1309
+GOTO/55.0153,-50.9583,-30.1310
+GOTO/55.0913,-51.1766,-30.1310
+GOTO/54.9992,-51.7100,-30.1310
+""",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
     "feed at the pole": FEED_AT_THE_POLE,
     "late at the pole": LATE_AT_THE_POLE,
+    "exact within digits": EXACT_WITHIN_DIGITS,
 }
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Keep
 from cornersmooth.verify.blocks import Block, Matcher
+from cornersmooth.verify.farther import passed_nearby
 from cornersmooth.verify.gaps import (
     Reached,
     from_original,
@@ -305,6 +306,9 @@ class _Part:
             exact |= same
             nearest = np.where(off < amount, element, nearest)
             amount = np.minimum(amount, off)
+        last = first + len(trail.last) - 1
+        for k in np.flatnonzero(~exact)[:_MOST_OWN_ROWS].tolist():
+            exact[k] = passed_nearby(matcher, int(owner[k]), first, last, tip[k : k + 1], axis[k : k + 1])
         missed = np.flatnonzero(~exact)
         if len(missed):
             self.violations.add(

@@ -11,6 +11,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.blocks import Block, Matcher
+from cornersmooth.verify.stops import digit_errors
 
 #: original vertices of a block that are looked at once more, and written segments looked at for each
 _MOST_ROWS, _MOST_SEGMENTS = 2048, 1 << 14
@@ -62,3 +63,28 @@ def look_farther(
         best = int(np.argmin(off))
         if off[best] < square[k].sum():
             segment[k], at[k] = first + best, share[best]
+
+
+def passed_nearby(matcher: Matcher, element: int, first: int, last: int, tip: Floats, axis: Floats) -> bool:
+    """Whether a pose is named exactly by an element near the one it was found at.
+
+    All elements count up to the first that ends elsewhere: poses a digit apart are not told apart by their distance.
+
+    Parameters
+    ----------
+    matcher : Matcher
+    element : int
+    first, last : int
+        Elements allowed.
+    tip, axis : (1, 3) float64
+    """
+    for begin, step in ((element - 1, -1), (element, 1)):
+        k = begin
+        while first <= k <= last:
+            same, off = digit_errors(matcher.nc, np.array([k]), tip, axis, matcher.axis_length)
+            if same[0]:
+                return True
+            if off[0] > matcher.margin:
+                break
+            k += step
+    return False
