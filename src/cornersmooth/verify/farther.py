@@ -12,6 +12,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.stops import digit_errors
+from cornersmooth.verify.walking import Track
 
 #: original vertices of a block that are looked at once more, and written segments looked at for each
 _MOST_ROWS, _MOST_SEGMENTS = 2048, 1 << 14
@@ -88,3 +89,20 @@ def passed_nearby(matcher: Matcher, element: int, first: int, last: int, tip: Fl
                 break
             k += step
     return False
+
+
+def way_apart(track: Track, here: float, there: float) -> float:
+    """How far the original goes away from one place on its way to another, mm; places are path lengths.
+
+    Less than the length of the way where it goes to and fro.
+    """
+    length = track.length
+    low, high = np.searchsorted(length, sorted((here, there)))
+    if min(here, there) < 0 or high == len(length) or high - low > _MOST_SEGMENTS:
+        return abs(there - here)
+    ends = []
+    for place in (here, there):
+        k = min(int(np.searchsorted(length, place, side="right")), len(length) - 1)
+        share = (place - length[k - 1]) / max(length[k] - length[k - 1], 1e-300)
+        ends.append(track.six[k - 1] + share * (track.six[k] - track.six[k - 1]))
+    return float(np.linalg.norm(np.vstack((track.six[low:high], ends[1])) - ends[0], axis=1).max())

@@ -271,8 +271,17 @@ def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float
 _PLAIN = {"S": "speed", "H": "offset", "D": "register"}
 
 
+def way_between(here: float, there: float) -> float:
+    """How far two places are apart along the path, mm."""
+    return abs(there - here)
+
+
 def compare(
-    asked_for: list[Token], found: list[Token], room: float, unsaid: frozenset[str | tuple[str, float]] = frozenset()
+    asked_for: list[Token],
+    found: list[Token],
+    room: float,
+    unsaid: frozenset[str | tuple[str, float]] = frozenset(),
+    apart: Callable[[float, float], float] = way_between,
 ) -> list[Problem]:
     """Compare the two, kind by kind.
 
@@ -283,6 +292,8 @@ def compare(
         How far apart along the path the places of the same token may be.
     unsaid : frozenset
         Kinds, and pairs of kind and value, that the control has no words for.
+    apart : callable
+        How far, in mm, two places along the path are apart that differ by more than the room.
     """
     problems: list[Problem] = []
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
@@ -301,7 +312,7 @@ def compare(
                 label = name.format(theirs[i].value)
                 if tag != "equal":
                     text = f"{name.format(ours[j].value)} where the CL file asks for {label}"
-                elif abs(theirs[i].place - ours[j].place) > room + ours[j].room:
+                elif _away(theirs[i], ours[j], room, apart):
                     text = f"{label} is {ours[j].place - theirs[i].place:+.3f} mm of path away from its place"
                 else:
                     continue
@@ -315,6 +326,12 @@ def compare(
                 text = f"{name.format(ours[j].value)} is nothing that the CL file asks for"
                 problems.append(Problem(f"CS{code}", 0, ours[j].line, text))
     return problems
+
+
+def _away(theirs: Token, ours: Token, room: float, apart: Callable[[float, float], float]) -> bool:
+    """Whether a token is elsewhere than asked for."""
+    allowed = room + ours.room
+    return abs(theirs.place - ours.place) > allowed and apart(theirs.place, ours.place) > allowed
 
 
 def _tidies(token: Token, end: float) -> bool:

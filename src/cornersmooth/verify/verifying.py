@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
@@ -17,11 +17,12 @@ from cornersmooth.verify import sections
 from cornersmooth.verify.blocks import lengths
 from cornersmooth.verify.comparison import BEFORE, Compared, Comparison, Joints
 from cornersmooth.verify.deviation import Largest, exact_poses
+from cornersmooth.verify.farther import way_apart
 from cornersmooth.verify.holes import divide_at_holes
 from cornersmooth.verify.ncprogram import Event, NcProgram, Problem
 from cornersmooth.verify.reader import CONTROL_WORDS, Style, read_styled
 from cornersmooth.verify.source import Source
-from cornersmooth.verify.statements import asked, compare, said
+from cornersmooth.verify.statements import asked, compare, said, way_between
 from cornersmooth.verify.stops import find_stretches
 from cornersmooth.verify.trails import Original, original_motion
 from cornersmooth.verify.verification import Verification
@@ -211,7 +212,8 @@ def _whole(
         places = compared.places[np.searchsorted(elements, own)]
         length, margin = comparison.matcher.track.length, comparison.matcher.margin
         rooms = np.where(nc.rotary & (own >= 0), axis_length * nc.second_room[own], 0.0)
-        problems += _statement_problems(original, length, nc.events, places, rooms, margin, nc.unsaid)
+        apart = partial(way_apart, comparison.matcher.track)
+        problems += _statement_problems(original, length, nc.events, places, rooms, margin, nc.unsaid, apart)
     return Verification.of(
         compared,
         problems,
@@ -232,6 +234,7 @@ def _statement_problems(
     rooms: Floats,
     margin: float,
     unsaid: frozenset[str | tuple[str, float]],
+    apart: Callable[[float, float], float] = way_between,
 ) -> list[Problem]:
     """What words beside the motion say wrongly; `length` is that of the original path up to its vertices."""
     program = original.program
@@ -241,7 +244,7 @@ def _statement_problems(
     asked_at = np.where(move >= 0, length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0, BEFORE)
     theirs = asked(program, asked_at.tolist(), end)
     ours = said(events, np.nan_to_num(places, nan=0.0).tolist(), rooms.tolist())
-    return compare(theirs, ours, margin, unsaid)
+    return compare(theirs, ours, margin, unsaid, apart)
 
 
 def _units_problems(program: Program, units: Units) -> list[Problem]:
