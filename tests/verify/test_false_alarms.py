@@ -169,3 +169,29 @@ ALARMS = {
 @pytest.mark.parametrize("alarm", ALARMS.values(), ids=ALARMS.keys())
 def test_what_is_written_passes(alarm: Alarm) -> None:
     assert alarm.verified(alarm.text).problems == ()
+
+
+#: the tip stands, so only the axis point tells how fast a block is
+STANDING = Alarm(
+    Case("fanuc", "g1", "head-ac", tcp=False),
+    0.01,
+    10.0,
+    """GOTO/10.0,20.0,-30.0,0.0,0.5,0.8660254
+FEDRAT/MMPM,40.0
+GOTO/10.0,20.0,-30.0,0.3,0.4,0.8660254
+GOTO/30.0,20.0,-30.0,0.3,0.4,0.8660254
+""",
+)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_time_of_a_standing_tip_is_still_compared(factor: float) -> None:
+    assert STANDING.verified(STANDING.text).problems == ()
+    lines = STANDING.text.splitlines()
+    timed = [k for k, line in enumerate(lines) if line.startswith("G1 ")]
+    assert lines.index("G93") < timed[0]
+    for k in timed[1 : len(timed) // 2 : 3]:
+        words, rate = lines[k].split(" F")
+        wrong = [*lines[:k], f"{words} F{factor * float(rate):.4f}", *lines[k + 1 :]]
+        found = STANDING.verified("\n".join(wrong)).problems
+        assert [(problem.code, problem.nc_line) for problem in found] == [("CS541", k + 1)]

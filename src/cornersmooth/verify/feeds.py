@@ -10,10 +10,14 @@ import numpy as np
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.ncprogram import Element, NcProgram, Problem
+from cornersmooth.verify.rotary import SHORT_STEPS
 from cornersmooth.verify.stops import ARITHMETIC
 
 #: a rounding reaches at most so many times as far as its first vertex that is visibly off the line
 _BEYOND_VISIBLE = 3.0
+
+#: a tip that creeps goes at most so many times the room of the feed: `SHORT_STEPS` and two of which the room is two
+_CREEPING = (SHORT_STEPS + 2) / 2
 
 #: roundings that are looked at one by one in a block
 _MOST_SINGLE = 5000
@@ -91,8 +95,9 @@ def _touched(matcher: Matcher, block: Block, start: Ints, end: Ints) -> tuple[In
 
 def _same(said: Floats, per_revolution: Bools, room: Floats, feed: Floats, mode: Bools, move: Ints) -> Bools:
     asked = feed[move]
-    room = room + ARITHMETIC * np.maximum(np.abs(asked), 1.0)
-    same: Bools = np.isnan(asked) | ((np.abs(said - asked) <= room) & (per_revolution == mode[move]))
+    slack = ARITHMETIC * np.maximum(np.abs(asked), 1.0)
+    near = (np.abs(said - asked) <= np.abs(room) + slack) | (asked <= -_CREEPING * room)
+    same: Bools = np.isnan(asked) | (near & (per_revolution == mode[move]))
     return same
 
 
@@ -123,7 +128,8 @@ def _inside_rounding(
 ) -> bool:
     """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
     length, trail = matcher.track.length, matcher.original.trail
-    said, room = pair[0], pair[1] + ARITHMETIC * max(abs(pair[0]), 1.0)
+    said, room = pair[0], abs(pair[1]) + ARITHMETIC * max(abs(pair[0]), 1.0)
+    creeping = -_CREEPING * pair[1]
     visible = matcher.margin / 2
     low, high = int(block.low[start]), int(block.high[start])
 
@@ -149,7 +155,7 @@ def _inside_rounding(
     ):
         if not low < pose_vertex <= high:
             continue
-        if not any(abs(feed[neighbour] - said) <= room for neighbour in beyond(step)):
+        if not any(abs(feed[other] - said) <= room or feed[other] <= creeping for other in beyond(step)):
             continue
         pose = length[pose_vertex]
         begin, other = length[trail.last[move - 1]], length[trail.last[move]]
