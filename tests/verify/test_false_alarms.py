@@ -156,6 +156,17 @@ GOTO/54.9992,-51.7100,-30.1310
 """,
 )
 
+#: the way of the axis point that timed a block is not what its rotary words say
+TIMED_AT_THE_POLE = Alarm(
+    Case("siemens", "g1", "xyzac-trt", tcp=False),
+    0.15,
+    10.0,
+    """FEDRAT/MMPM,294.3645
+GOTO/-1.1920,5.1496,-4.5329,0.0000000,0.0000000,1.0000000
+GOTO/-1.1920,5.1496,-4.5329,0.0001991,0.0000301,1.0000000
+""",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -163,6 +174,7 @@ ALARMS = {
     "late at the pole": LATE_AT_THE_POLE,
     "end within digits": END_WITHIN_DIGITS,
     "exact within digits": EXACT_WITHIN_DIGITS,
+    "timed at the pole": TIMED_AT_THE_POLE,
 }
 
 

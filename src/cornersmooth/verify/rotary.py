@@ -219,7 +219,9 @@ class Rotary:
         short = length < SHORT_STEPS * step
         still = length < 0.5 * self.tip_step if self.tip_control else short
         way = np.where(still, swing, length)
-        room = np.maximum(rate * np.where(still, 2 * step + self.axis_length * turn_step, 2 * step), _F_STEP * way)
+        pole = self.pole_room(vector)
+        off = 2 * step + np.where(still, self.axis_length * (turn_step + pole[1:] + pole[:-1]), 0.0)
+        room = np.maximum(rate * off, _F_STEP * way)
         if not self.tip_control:
             room[still] *= -1.0
         room[(rate * turn > FAST_TURN) | (~still & short)] = np.inf
