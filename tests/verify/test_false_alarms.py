@@ -167,6 +167,22 @@ GOTO/-1.1920,5.1496,-4.5329,0.0001991,0.0000301,1.0000000
 """,
 )
 
+#: several poses a digit apart, each with a feed, between which the path goes to and fro
+FEED_WITHIN_DIGITS = Alarm(
+    Case("siemens", "g1", "head-table-bc", tcp=False),
+    0.15,
+    50.0,
+    """GOTO/-0.3808,-0.2326,0.3426,0.0014362,-0.0016092,0.9999977
+FEDRAT/MMPM,1.9795
+GOTO/-0.3262,0.4129,0.3426,-0.3200766,0.4127683,0.8527446
+GOTO/-0.3261,0.4127,0.3426,-0.3200766,0.4127683,0.8527446
+GOTO/-0.3261,0.4128,0.3427,-0.3200766,0.4127683,0.8527446
+GOTO/-0.3262,0.4129,0.3420,-0.3200766,0.4127683,0.8527446
+FEDRAT/0.3757,MMPR
+GOTO/-0.3263,0.4129,0.3420,-0.3200766,0.4127683,0.8527446
+""",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -175,6 +191,7 @@ ALARMS = {
     "end within digits": END_WITHIN_DIGITS,
     "exact within digits": EXACT_WITHIN_DIGITS,
     "timed at the pole": TIMED_AT_THE_POLE,
+    "feed within digits": FEED_WITHIN_DIGITS,
 }
 
 

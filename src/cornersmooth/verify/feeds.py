@@ -63,7 +63,7 @@ def check_feeds(matcher: Matcher, block: Block, off: Floats) -> list[tuple[float
             good[k] = bool(_same(own[0], own[1], own[2], feed, mode, among).any())
     wrong = np.flatnonzero(~good)
     for k in wrong[:_MOST_SINGLE].tolist():
-        among = _ahead(matcher, block, int(element[k]), int(start[k]), int(end[k]))
+        among = _alike(matcher, block, int(element[k]), int(start[k]), int(end[k]))
         own = tuple(np.full(len(among), column[k]) for column in (said, per_revolution, room))
         if _same(own[0], own[1], own[2], feed, mode, among).any():
             good[k] = True
@@ -101,19 +101,24 @@ def _same(said: Floats, per_revolution: Bools, room: Floats, feed: Floats, mode:
     return same
 
 
-def _ahead(matcher: Matcher, block: Block, element: int, start: int, end: int) -> Ints:
-    """Moves at whose feed an element may run because near the pole the axis turns ahead of time; mostly none."""
-    nc, length = matcher.nc, matcher.track.length
-    room = matcher.axis_length * float(nc.second_room[element - 1 : element + 1].max())
-    if not (nc.rotary and room > 0.0):
-        return np.zeros(0, np.int64)
-    here, there = (
-        length[block.segment[k]] + block.fraction[k] * (length[block.segment[k] + 1] - length[block.segment[k]])
-        for k in (start, end)
-    )
-    low = max(int(np.searchsorted(length, here - room)) - 1, int(block.low[start]))
-    high = min(int(np.searchsorted(length, there + room, side="right")) - 1, int(block.high[end]))
-    return np.unique(matcher.original.trail.owner[low + 1 : high + 2])
+def _alike(matcher: Matcher, block: Block, element: int, start: int, end: int) -> Ints:
+    """Moves that an element may run along as well: its ends are as far from theirs as nobody can tell.
+
+    Digits do not tell apart what poses a digit apart lie between, and near the pole the axis turns ahead of time.
+    """
+    nc, six = matcher.nc, matcher.track.six
+    pole = matcher.axis_length * float(nc.second_room[element - 1 : element + 1].max()) if nc.rotary else 0.0
+    room = 2 * matcher.margin + pole  # a pose is a rounding off, and its place as far from it as the margin
+    found = []
+    for vertex, step in ((start, -1), (end, 1)):
+        segment, fraction = int(block.segment[vertex]), block.fraction[vertex]
+        here = six[segment] + fraction * (six[segment + 1] - six[segment])
+        low, high = int(block.low[vertex]), int(block.high[vertex])
+        k = segment
+        while low <= k <= high and np.linalg.norm(six[k + (step > 0)] - here) <= room:
+            k += step
+        found.append(min(max(k, low), high))
+    return np.unique(matcher.original.trail.owner[found[0] + 1 : found[1] + 2])
 
 
 def _inside_rounding(
