@@ -183,6 +183,18 @@ GOTO/-0.3263,0.4129,0.3420,-0.3200766,0.4127683,0.8527446
 """,
 )
 
+#: a pose that must be passed, found several blocks from where it is since the axis tells little
+EXACT_AT_THE_POLE = Alarm(
+    Case("heidenhain", "spl", "table-ac"),
+    0.15,
+    10.0,
+    """GOTO/0.0030,0.0024,-0.0000,0.0002552,0.0008903,0.9999996
+GOTO/0.0027,0.0036,0.0000,0.0002552,0.0008903,0.9999996
+GOTO/0.0026,0.0037,0.0001,-0.0001103,-0.0001169,1.0000000
+GOTO/0.0228,-0.0085,0.0001,0.1479951,0.0243007,-0.9886895
+""",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -192,6 +204,7 @@ ALARMS = {
     "exact within digits": EXACT_WITHIN_DIGITS,
     "timed at the pole": TIMED_AT_THE_POLE,
     "feed within digits": FEED_WITHIN_DIGITS,
+    "exact at the pole": EXACT_AT_THE_POLE,
 }
 
 

@@ -306,9 +306,8 @@ class _Part:
             exact |= same
             nearest = np.where(off < amount, element, nearest)
             amount = np.minimum(amount, off)
-        last = first + len(trail.last) - 1
-        for k in np.flatnonzero(~exact)[:_MOST_OWN_ROWS].tolist():
-            exact[k] = passed_nearby(matcher, int(owner[k]), first, last, tip[k : k + 1], axis[k : k + 1])
+        missed = np.flatnonzero(~exact)
+        exact[missed] = passed_nearby(matcher, block, theirs.vertex[rows[missed]], tip[missed], axis[missed])
         missed = np.flatnonzero(~exact)
         if len(missed):
             self.violations.add(

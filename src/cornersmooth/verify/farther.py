@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.stops import digit_errors
 from cornersmooth.verify.walking import Track
@@ -42,15 +42,11 @@ def look_farther(
     rows = np.flatnonzero(np.maximum(square[:, :3].sum(axis=1), square[:, 3:].sum(axis=1)) > matcher.tolerance**2)
     if not len(rows):
         return
-    on = np.flatnonzero(block.on)
-    own = block.segment[on]
-    place = np.maximum.accumulate(track.length[own] + block.fraction[on] * (track.length[own + 1] - track.length[own]))
+    around = _Around(matcher, block)
     for k in rows[:_MOST_ROWS].tolist():
-        middle = track.length[vertex[k]]
-        first = on[max(int(np.searchsorted(place, middle - matcher.near)) - 1, 0)]
-        last = on[min(int(np.searchsorted(place, middle + matcher.near, side="right")), len(on) - 1)]
-        first = max(int(first), int(low[k]), int(segment[k]) - _MOST_SEGMENTS // 2)
-        last = min(int(last), int(high[k]) + 1, int(segment[k]) + _MOST_SEGMENTS // 2)
+        first, last = around.vertices(int(vertex[k]))
+        first = max(first, int(low[k]), int(segment[k]) - _MOST_SEGMENTS // 2)
+        last = min(last, int(high[k]) + 1, int(segment[k]) + _MOST_SEGMENTS // 2)
         if last <= first:
             continue
         begin = six[first:last]
@@ -66,29 +62,47 @@ def look_farther(
             segment[k], at[k] = first + best, share[best]
 
 
-def passed_nearby(matcher: Matcher, element: int, first: int, last: int, tip: Floats, axis: Floats) -> bool:
-    """Whether a pose is named exactly by an element near the one it was found at.
+def passed_nearby(matcher: Matcher, block: Block, vertex: Ints, tip: Floats, axis: Floats) -> Bools:
+    """(k,) whether poses are named exactly by any element whose place is within `Matcher.near` of theirs.
 
-    All elements count up to the first that ends elsewhere: poses a digit apart are not told apart by their distance.
+    Poses a digit apart are not told apart by their distance, nor are those between which the path goes to and fro.
 
     Parameters
     ----------
     matcher : Matcher
-    element : int
-    first, last : int
-        Elements allowed.
-    tip, axis : (1, 3) float64
+    block : Block
+    vertex : (k,) int64
+        The poses as vertices of the original.
+    tip, axis : (k, 3) float64
     """
-    for begin, step in ((element - 1, -1), (element, 1)):
-        k = begin
-        while first <= k <= last:
-            same, off = digit_errors(matcher.nc, np.array([k]), tip, axis, matcher.axis_length)
-            if same[0]:
-                return True
-            if off[0] > matcher.margin:
-                break
-            k += step
-    return False
+    found = np.zeros(len(vertex), np.bool_)
+    if not len(vertex):
+        return found
+    around = _Around(matcher, block)
+    for k in range(min(len(vertex), _MOST_ROWS)):
+        first, last = around.vertices(int(vertex[k]))
+        element = np.unique(block.written.trail.owner[first : min(last, first + _MOST_SEGMENTS) + 1])
+        same, _ = digit_errors(matcher.nc, element, tip[k], axis[k], matcher.axis_length)
+        found[k] = same.any()
+    return found
+
+
+class _Around:
+    """Written vertices by their places along the original."""
+
+    def __init__(self, matcher: Matcher, block: Block) -> None:
+        self.length, self.near = matcher.track.length, matcher.near
+        self.on = np.flatnonzero(block.on)
+        own = block.segment[self.on]
+        step = self.length[own + 1] - self.length[own]
+        self.place = np.maximum.accumulate(self.length[own] + block.fraction[self.on] * step)
+
+    def vertices(self, vertex: int) -> tuple[int, int]:
+        """First and last written vertex that may have to do with an original one."""
+        middle = self.length[vertex]
+        first = max(int(np.searchsorted(self.place, middle - self.near)) - 1, 0)
+        last = min(int(np.searchsorted(self.place, middle + self.near, side="right")), len(self.on) - 1)
+        return int(self.on[first]), int(self.on[last])
 
 
 def way_apart(track: Track, here: float, there: float) -> float:
