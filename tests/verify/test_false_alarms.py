@@ -195,6 +195,22 @@ GOTO/0.0228,-0.0085,0.0001,0.1479951,0.0243007,-0.9886895
 """,
 )
 
+#: a turn that begins with a tiny move, at which the walk stays
+PURE_TURN = Alarm(
+    Case("generic", "g6.2", "nutated-bc"),
+    0.04,
+    10.0,
+    """GOTO/0.0000,0.0000,0.0000,-0.0024753,-0.0002965,0.9999969
+GOTO/-0.0000,0.0000,-0.0000,0.0338193,-0.0009954,0.9994275
+GOTO/-0.0000,0.0000,-0.0000,0.0001778,-0.0000205,1.0000000
+GOTO/-0.0000,0.0000,-0.0000,-0.0027428,-0.0125998,0.9999169
+GOTO/1.8534,-1.0989,1.0331,0.0000111,0.0004129,0.9999999
+GOTO/1.8534,-1.0989,1.0331,0.0000075,-0.0000093,1.0000000
+GOTO/1.8534,-1.0989,1.0331,-0.5004361,-0.0168184,0.8656101
+""",
+    inch=True,
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -205,6 +221,7 @@ ALARMS = {
     "timed at the pole": TIMED_AT_THE_POLE,
     "feed within digits": FEED_WITHIN_DIGITS,
     "exact at the pole": EXACT_AT_THE_POLE,
+    "pure turn": PURE_TURN,
 }
 
 

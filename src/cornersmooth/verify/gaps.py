@@ -70,6 +70,14 @@ def from_written(matcher: Matcher, block: Block) -> Reached:
         block.six.take(rows, axis=0), matcher.track.six, segment[loose], 1, block.low[rows], block.high[rows]
     )
     better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
+    # nor does it go on where the next is a tiny one: from there another may be nearer
+    over = np.flatnonzero(better.larger > matcher.tolerance)
+    if len(over):
+        own = rows[over]
+        segment[loose[over]], at[loose[over]] = nearest_segments(
+            block.six[own], matcher.track.six, segment[loose[over]], _REACH, block.low[own], block.high[own]
+        )
+        better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
     gap.tip[loose], gap.axis_point[loose], gap.angle[loose] = better.tip, better.axis_point, better.angle
     return Reached(vertex, gap, segment + at)
 
