@@ -211,6 +211,29 @@ GOTO/1.8534,-1.0989,1.0331,-0.5004361,-0.0168184,0.8656101
     inch=True,
 )
 
+#: compensation ends with the program, near the pole
+LAST_TIDIED = Alarm(
+    Case("fanuc", "g6.2", "xyzbc-trt"),
+    0.15,
+    50.0,
+    """GOTO/0.7261,0.6440,-0.0003,0.0108990,-0.0259442,0.9996040
+CUTCOM/LEFT,XYPLAN
+GOTO/0.7261,0.6440,-0.0003,-0.0004832,-0.0006688,0.9999997
+""",
+)
+
+#: the last pose is a margin from where the walk ends, and a rounding more from the end
+END_TWO_DIGITS_BACK = Alarm(
+    Case("generic", "g6.2", "head-ac"),
+    0.15,
+    50.0,
+    """GOTO/-0.1857,0.1952,-0.0008,-0.2044695,-0.9785411,0.0254853
+GOTO/-0.3333,-0.0281,0.0293,-0.2044695,-0.9785411,0.0254853
+GOTO/-0.3332,-0.0281,0.0293,-0.2044695,-0.9785411,0.0254853
+GOTO/-0.3334,-0.0282,0.0291,-0.2044695,-0.9785411,0.0254853
+""",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -222,6 +245,8 @@ ALARMS = {
     "feed within digits": FEED_WITHIN_DIGITS,
     "exact at the pole": EXACT_AT_THE_POLE,
     "pure turn": PURE_TURN,
+    "last tidied": LAST_TIDIED,
+    "end two digits back": END_TWO_DIGITS_BACK,
 }
 
 

@@ -298,9 +298,16 @@ def compare(
     problems: list[Problem] = []
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
     found = [token for token in found if token.kind not in unsaid]
-    end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf) - room
-    if not any(_tidies(token, end) for token in asked_for):
-        found = [token for token in found if not _tidies(token, end)]
+    end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
+
+    def tidies(token: Token) -> bool:
+        """Whether a token only ends what ends with the program anyway."""
+        if token.kind != "compensation" or token.value != 40.0:
+            return False
+        return token.place >= end or not _away(end, token, room, apart)
+
+    if not any(map(tidies, asked_for)):
+        found = [token for token in found if not tidies(token)]
     for kind, (name, code) in _NAMES.items():
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
         matcher = difflib.SequenceMatcher(
@@ -312,7 +319,7 @@ def compare(
                 label = name.format(theirs[i].value)
                 if tag != "equal":
                     text = f"{name.format(ours[j].value)} where the CL file asks for {label}"
-                elif _away(theirs[i], ours[j], room, apart):
+                elif _away(theirs[i].place, ours[j], room, apart):
                     text = f"{label} is {ours[j].place - theirs[i].place:+.3f} mm of path away from its place"
                 else:
                     continue
@@ -328,15 +335,12 @@ def compare(
     return problems
 
 
-def _away(theirs: Token, ours: Token, room: float, apart: Callable[[float, float], float]) -> bool:
+def _away(place: float, ours: Token, room: float, apart: Callable[[float, float], float]) -> bool:
     """Whether a token is elsewhere than asked for."""
-    allowed = room + ours.room
-    return abs(theirs.place - ours.place) > allowed and apart(theirs.place, ours.place) > allowed
-
-
-def _tidies(token: Token, end: float) -> bool:
-    """Whether a token only ends what ends with the program anyway."""
-    return token.kind == "compensation" and token.value == 40.0 and token.place >= end
+    if abs(place - ours.place) <= room + ours.room:
+        return False
+    # a pose is a rounding off, and its place as far from it as the room
+    return apart(place, ours.place) > 2 * room + ours.room
 
 
 def _effective(tokens: list[Token], kind: str) -> list[Token]:
