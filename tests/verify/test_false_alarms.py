@@ -251,6 +251,23 @@ GOTO/8.8318,-38.4309,26.2529,-0.0008265,0.0033310,0.9999941
 """,
 )
 
+#: standing at the pole is as near to what comes later, and many blocks stand there
+PAST_THE_POLE = Alarm(
+    Case("siemens", "g1", "xyzac-trt", tcp=False),
+    0.001,
+    10.0,
+    """CUTCOM/LEFT,XYPLAN
+GOTO/-2.9031,1.6844,-1.0032,0.0007930,-0.0017922,0.9999981
+GOTO/-2.9026,1.6840,-1.0032,-0.0001548,0.0000209,1.0000000
+GOTO/-2.9049,1.5044,-1.2539,0.0332062,0.0102047,0.9993964
+GOTO/-2.8722,1.5100,-1.2563,-0.0064349,0.0065858,0.9999576
+GOTO/-2.8722,1.5100,-1.2563,0.0024546,-0.0009847,0.9999965
+GOTO/-2.8724,1.5097,-1.2563,0.0000000,0.0000000,1.0000000
+GOTO/-3.0042,1.4590,-1.2672,-0.0806423,-0.0293891,0.9963097
+""",
+    inch=True,
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -265,6 +282,7 @@ ALARMS = {
     "last tidied": LAST_TIDIED,
     "end two digits back": END_TWO_DIGITS_BACK,
     "there and back": THERE_AND_BACK,
+    "past the pole": PAST_THE_POLE,
 }
 
 

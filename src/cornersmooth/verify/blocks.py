@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.anchors import cut_finely, cut_lane
-from cornersmooth.verify.careful import assign, doubtful_windows
+from cornersmooth.verify.careful import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.ncprogram import NcProgram
 from cornersmooth.verify.stops import Stretches
 from cornersmooth.verify.trails import CHORD_SHARE, Original, Written, directions, written_motion
@@ -230,30 +230,43 @@ class Matcher:
             index = np.repeat(np.arange(len(spans)), size)
             vertex = np.repeat(firsts - np.cumsum(size) + size, size) + np.arange(len(index))
             number[vertex], low[vertex], high[vertex] = index, starts[index], stops[index] - 1
-        self._look_again(six, number, segment, fraction, backward, distance)
+        goal = np.where(np.append(number[1:] != number[:-1], np.isinf(until)), high + 1.0, np.nan)
+        self._look_again(six, number, goal, segment, fraction, backward, distance)
         return Block(written, six, on, number, segment, fraction, backward, distance, low, high, until)
 
     def _look_again(
-        self, six: Floats, piece: Ints, segment: Ints, fraction: Floats, backward: Bools, distance: Floats
+        self,
+        six: Floats,
+        piece: Ints,
+        goal: Floats,
+        segment: Ints,
+        fraction: Floats,
+        backward: Bools,
+        distance: Floats,
     ) -> None:
-        """Assign anew, and with more care, what the walker has found too far away or in the wrong order."""
+        """Assign anew, and with more care, what the walker has found too far away or in the wrong order.
+
+        `goal` is where the last vertex of a stretch must be, NaN for all others.
+        """
         known = np.isfinite(distance)
-        doubtful = backward | (known & (distance > np.sqrt(2) * self.tolerance + self.margin))
-        for first, last in doubtful_windows(doubtful & (piece >= 0), piece):
-            part = slice(first, last + 1)
-            start, stop = (float(segment[k] + fraction[k]) for k in (first, last))
-            found = assign(six[part], self.track, start, stop, self.tolerance)
-            if found is None:
-                continue
-            row = self.track.row[found[0]]
-            away = six[part] - row[:, :6] - found[1][:, None] * row[:, 6:12]
-            off = np.sqrt(np.einsum("ij,ij->i", away, away))
-            if off[1:].max() <= distance[first + 1 : last + 1].max():
-                segment[part], fraction[part] = found[0], found[1]
-                distance[first + 1 : last + 1] = off[1:]
-                length = self.track.length[found[0] + 1] - self.track.length[found[0]]
-                behind = np.einsum("ij,ij->i", six[part] - row[:, :6], row[:, 6:12]) * row[:, 12]
-                backward[part] = found[2] & ((found[1] - np.clip(behind, 0.0, 1.0)) * length > self.margin)
+        for around, most_pairs, most_windows in ROUNDS:
+            doubtful = (backward | (known & (distance > np.sqrt(2) * self.tolerance + self.margin))) & (piece >= 0)
+            for first, last in doubtful_windows(doubtful, piece, around, most_windows):
+                part = slice(first, last + 1)
+                start, stop = (float(segment[k] + fraction[k]) for k in (first, last))
+                stop = stop if np.isnan(goal[last]) else float(goal[last])
+                found = assign(six[part], self.track, start, stop, self.tolerance, most_pairs)
+                if found is None:
+                    continue
+                row = self.track.row[found[0]]
+                away = six[part] - row[:, :6] - found[1][:, None] * row[:, 6:12]
+                off = np.sqrt(np.einsum("ij,ij->i", away, away))
+                if off[1:].max() <= distance[first + 1 : last + 1].max():
+                    segment[part], fraction[part] = found[0], found[1]
+                    distance[first + 1 : last + 1] = off[1:]
+                    length = self.track.length[found[0] + 1] - self.track.length[found[0]]
+                    behind = np.einsum("ij,ij->i", six[part] - row[:, :6], row[:, 6:12]) * row[:, 12]
+                    backward[part] = found[2] & ((found[1] - np.clip(behind, 0.0, 1.0)) * length > self.margin)
 
 
 def lengths(six: Floats) -> Floats:
