@@ -261,12 +261,35 @@ class Matcher:
                 row = self.track.row[found[0]]
                 away = six[part] - row[:, :6] - found[1][:, None] * row[:, 6:12]
                 off = np.sqrt(np.einsum("ij,ij->i", away, away))
-                if off[1:].max() <= distance[first + 1 : last + 1].max():
-                    segment[part], fraction[part] = found[0], found[1]
-                    distance[first + 1 : last + 1] = off[1:]
+                begin, end = 1, len(off)
+                if around > ROUNDS[0][0]:  # most of so wide a window has its place already
+                    begin, end = self._moved(segment[part], fraction[part], found[0], found[1], doubtful[part])
+                new, at = slice(begin, end), slice(first + begin, first + end)
+                if end > begin and off[new].max() <= distance[at].max():
+                    segment[at], fraction[at], distance[at] = found[0][new], found[1][new], off[new]
                     length = self.track.length[found[0] + 1] - self.track.length[found[0]]
                     behind = np.einsum("ij,ij->i", six[part] - row[:, :6], row[:, 6:12]) * row[:, 12]
-                    backward[part] = found[2] & ((found[1] - np.clip(behind, 0.0, 1.0)) * length > self.margin)
+                    backward[at] = (found[2] & ((found[1] - np.clip(behind, 0.0, 1.0)) * length > self.margin))[new]
+
+    def _moved(
+        self, segment: Ints, fraction: Floats, new_segment: Ints, new_fraction: Floats, doubtful: Bools
+    ) -> tuple[int, int]:
+        """First vertex of a window, and last plus one, that get another place with the doubtful ones; all in order."""
+        length = self.track.length
+        old = length[segment] + fraction * (length[segment + 1] - length[segment])
+        new = length[new_segment] + new_fraction * (length[new_segment + 1] - length[new_segment])
+        rows = np.flatnonzero(doubtful[1:]) + 1
+        if not len(rows):
+            return 0, 0
+        kept = np.flatnonzero(np.abs(new - old) <= self.margin)
+        before, behind = kept[kept < rows[0]], kept[kept > rows[-1]]
+        begin = int(before[-1]) + 1 if len(before) else 1
+        end = int(behind[0]) if len(behind) else len(new)
+        while begin > 1 and old[begin - 1] > new[begin]:
+            begin -= 1
+        while end < len(new) and new[end - 1] > old[end]:
+            end += 1
+        return begin, end
 
 
 def lengths(six: Floats) -> Floats:

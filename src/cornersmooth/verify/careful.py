@@ -17,7 +17,7 @@ from cornersmooth.verify.walking import Track
 _POWER = 3
 
 #: squared distance, in tolerances, beyond which all is equally bad: sums of larger ones would drown what decides
-_FARTHEST = 1e4
+_FARTHEST = 400.0
 
 #: written vertices around a doubtful one that are assigned anew with it; then those around what is still in doubt, for
 #: near the pole many blocks stand still; of both the largest number of pairs that are looked at for one window, and of
