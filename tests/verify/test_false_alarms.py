@@ -268,6 +268,22 @@ GOTO/-3.0042,1.4590,-1.2672,-0.0806423,-0.0293891,0.9963097
     inch=True,
 )
 
+#: compensation cancelled before the last moves, which are within what the pole leaves open
+CANCELLED_NEAR_THE_END = Alarm(
+    Case("linuxcnc", "g1", "xyzbc-trt"),
+    0.15,
+    10.0,
+    """GOTO/-31.1036,-38.9167,43.3778,0.0060038,0.0018345,0.9999803
+FEDRAT/MMPM,557.6766
+CUTCOM/LEFT,XYPLAN
+GOTO/-8.5474,-56.3122,57.7454,0.0060038,0.0018345,0.9999803
+CUTCOM/OFF
+GOTO/-8.5473,-56.3127,57.7454,0.0067936,0.0020855,0.9999747
+SPINDL/CLW,RPM,500
+GOTO/-8.5473,-56.3127,57.7454,0.0000530,0.0000230,1.0000000
+""",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -283,6 +299,7 @@ ALARMS = {
     "end two digits back": END_TWO_DIGITS_BACK,
     "there and back": THERE_AND_BACK,
     "past the pole": PAST_THE_POLE,
+    "cancelled near the end": CANCELLED_NEAR_THE_END,
 }
 
 

@@ -306,7 +306,11 @@ def compare(
             return False
         return token.place >= end or not _away(end, token, room, apart)
 
-    if not any(map(tidies, asked_for)):
+    def cancelled(tokens: list[Token]) -> int:
+        """How often compensation is cancelled."""
+        return sum(token.value == 40.0 for token in _effective(tokens, "compensation"))
+
+    if cancelled(found) > cancelled(asked_for) and not any(map(tidies, asked_for)):
         found = [token for token in found if not tidies(token)]
     for kind, (name, code) in _NAMES.items():
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
