@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.walking import Lane, Track
 
 #: how much longer or shorter than the written path the original may be between two anchors, as a first guess
@@ -14,6 +14,10 @@ _LENGTH_LOW, _LENGTH_HIGH = 0.97, 1.25
 
 #: places tried for an anchor before the lane is made longer, and written vertices between them
 _ANCHOR_TRIALS, _ANCHOR_STRIDE = 5, 7
+
+#: a vertex is in doubt where the path comes back to it after so many times its distances, and this part of `near`
+_FOLD: Final = 4.0
+_SLACK: Final = 0.05
 
 #: lanes that are cut at once between two anchors
 _COARSE: Final = 16
@@ -95,8 +99,26 @@ def _find_anchor(
             continue
         if track.length[a + close[-1]] - track.length[a + close[0] + 1] > 8 * near:
             return None
+        place = track.length[a:b] + t * (track.length[a + 1 : b + 1] - track.length[a:b])
+        if _folded(d[close], d[best], place[close] - place[best], near).any():
+            return None
         return a + best, float(t[best])
     return None
+
+
+def _folded(square: Floats, least: Floats, way: Floats, near: float) -> Bools:
+    """Whether the path comes back to a vertex after `way` mm: there it is in doubt which of both is its place.
+
+    Parameters
+    ----------
+    square, least : (k,) float64, mm²
+        Squared distances of one place and of the nearest.
+    way : (k,) float64, mm
+        Path between the two.
+    near : float, mm
+    """
+    folded: Bools = np.abs(way) > _FOLD * (np.sqrt(square) + np.sqrt(least)) + _SLACK * near
+    return folded
 
 
 def cut_finely(
@@ -173,7 +195,11 @@ def _find_anchors(
         best = best[np.searchsorted(best, begin)]
         close = np.flatnonzero(d <= 4 * near * near)
         ends = begin + count
-        clear = least <= near * near
+        place = track.length[segment] + t * (track.length[segment + 1] - track.length[segment])
+        way = place - np.repeat(place[best], count)
+        folded = (d <= 4 * near * near) & _folded(d, np.repeat(least, count), way, near)
+        clear = ~np.logical_or.reduceat(folded, begin)
+        clear &= least <= near * near
         clear[clear] &= (
             track.length[segment[close[np.searchsorted(close, ends[clear]) - 1]]]
             - track.length[segment[close[np.searchsorted(close, begin[clear])]] + 1]

@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.anchors import cut_finely, cut_lane
-from cornersmooth.verify.careful import assign, doubtful_windows
+from cornersmooth.verify.careful import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.gliding import glide
 from cornersmooth.verify.ncprogram import NcProgram
 from cornersmooth.verify.stops import Stretches
@@ -234,7 +234,8 @@ class Matcher:
             index = np.repeat(np.arange(len(spans)), size)
             vertex = np.repeat(firsts - np.cumsum(size) + size, size) + np.arange(len(index))
             number[vertex], low[vertex], high[vertex] = index, starts[index], stops[index] - 1
-        self._look_again(six, number, segment, fraction, backward, distance)
+        goal = np.where(np.append(number[1:] != number[:-1], np.isinf(until)), high + 1.0, np.nan)
+        self._look_again(six, number, goal, segment, fraction, backward, distance)
         return Block(written, six, on, number, segment, fraction, backward, distance, nearest, low, high, until)
 
     def _places(self, six: Floats, length: Floats, lanes: Lanes) -> tuple[Walked, bool]:
@@ -259,26 +260,61 @@ class Matcher:
         return float(np.sqrt(2) * self.tolerance + self.margin)
 
     def _look_again(
-        self, six: Floats, piece: Ints, segment: Ints, fraction: Floats, backward: Bools, distance: Floats
+        self,
+        six: Floats,
+        piece: Ints,
+        goal: Floats,
+        segment: Ints,
+        fraction: Floats,
+        backward: Bools,
+        distance: Floats,
     ) -> None:
-        """Assign anew, and with more care, what the walker has found too far away or in the wrong order."""
+        """Assign anew, and with more care, what the walker has found too far away or in the wrong order.
+
+        `goal` is where the last vertex of a stretch must be, NaN for all others.
+        """
         known = np.isfinite(distance)
-        doubtful = backward | (known & (distance > self.doubtful))
-        for first, last in doubtful_windows(doubtful & (piece >= 0), piece):
-            part = slice(first, last + 1)
-            start, stop = (float(segment[k] + fraction[k]) for k in (first, last))
-            found = assign(six[part], self.track, start, stop, self.tolerance)
-            if found is None:
-                continue
-            row = self.track.row[found[0]]
-            away = six[part] - row[:, :6] - found[1][:, None] * row[:, 6:12]
-            off = np.sqrt(np.einsum("ij,ij->i", away, away))
-            if off[1:].max() <= distance[first + 1 : last + 1].max():
-                segment[part], fraction[part] = found[0], found[1]
-                distance[first + 1 : last + 1] = off[1:]
-                length = self.track.length[found[0] + 1] - self.track.length[found[0]]
-                behind = np.einsum("ij,ij->i", six[part] - row[:, :6], row[:, 6:12]) * row[:, 12]
-                backward[part] = found[2] & ((found[1] - np.clip(behind, 0.0, 1.0)) * length > self.margin)
+        for around, most_pairs, most_windows in ROUNDS:
+            doubtful = (backward | (known & (distance > self.doubtful))) & (piece >= 0)
+            for first, last in doubtful_windows(doubtful, piece, around, most_windows):
+                part = slice(first, last + 1)
+                start, stop = (float(segment[k] + fraction[k]) for k in (first, last))
+                stop = stop if np.isnan(goal[last]) else float(goal[last])
+                found = assign(six[part], self.track, start, stop, self.tolerance, most_pairs)
+                if found is None:
+                    continue
+                row = self.track.row[found[0]]
+                away = six[part] - row[:, :6] - found[1][:, None] * row[:, 6:12]
+                off = np.sqrt(np.einsum("ij,ij->i", away, away))
+                begin, end = 1, len(off)
+                if around > ROUNDS[0][0]:  # most of so wide a window has its place already
+                    begin, end = self._moved(segment[part], fraction[part], found[0], found[1], doubtful[part])
+                new, at = slice(begin, end), slice(first + begin, first + end)
+                if end > begin and off[new].max() <= distance[at].max():
+                    segment[at], fraction[at], distance[at] = found[0][new], found[1][new], off[new]
+                    length = self.track.length[found[0] + 1] - self.track.length[found[0]]
+                    behind = np.einsum("ij,ij->i", six[part] - row[:, :6], row[:, 6:12]) * row[:, 12]
+                    backward[at] = (found[2] & ((found[1] - np.clip(behind, 0.0, 1.0)) * length > self.margin))[new]
+
+    def _moved(
+        self, segment: Ints, fraction: Floats, new_segment: Ints, new_fraction: Floats, doubtful: Bools
+    ) -> tuple[int, int]:
+        """First vertex of a window, and last plus one, that get another place with the doubtful ones; all in order."""
+        length = self.track.length
+        old = length[segment] + fraction * (length[segment + 1] - length[segment])
+        new = length[new_segment] + new_fraction * (length[new_segment + 1] - length[new_segment])
+        rows = np.flatnonzero(doubtful[1:]) + 1
+        if not len(rows):
+            return 0, 0
+        kept = np.flatnonzero(np.abs(new - old) <= self.margin)
+        before, behind = kept[kept < rows[0]], kept[kept > rows[-1]]
+        begin = int(before[-1]) + 1 if len(before) else 1
+        end = int(behind[0]) if len(behind) else len(new)
+        while begin > 1 and old[begin - 1] > new[begin]:
+            begin -= 1
+        while end < len(new) and new[end - 1] > old[end]:
+            end += 1
+        return begin, end
 
 
 def lengths(six: Floats) -> Floats:

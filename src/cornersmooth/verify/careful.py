@@ -16,30 +16,34 @@ from cornersmooth.verify.walking import Track
 #: of the squared distance, in tolerances
 _POWER = 3
 
-#: largest number of pairs that are looked at for one window, and of windows in a block
-MOST_PAIRS, MOST_WINDOWS = 4_000_000, 40
+#: squared distance, in tolerances, beyond which all is equally bad: sums of larger ones would drown what decides
+_FARTHEST = 400.0
 
-#: written vertices around a doubtful one that are assigned anew with it
-AROUND = 60
+#: written vertices around a doubtful one that are assigned anew with it; then those around what is still in doubt, for
+#: near the pole many blocks stand still; of both the largest number of pairs that are looked at for one window, and of
+#: windows in a block
+ROUNDS = ((60, 4_000_000, 40), (500, 1_000_000, 16), (3000, 2_000_000, 4))
 
 
-def doubtful_windows(doubtful: Bools, piece: Ints) -> list[tuple[int, int]]:
-    """First and last vertex of the windows to assign anew; both ends are taken to be right."""
+def doubtful_windows(doubtful: Bools, piece: Ints, around: int, most: int) -> list[tuple[int, int]]:
+    """First and last vertex of the windows to assign anew, `most` of them; both ends are taken to be right."""
     rows = np.flatnonzero(doubtful)
     if not len(rows):
         return []
     edges = np.flatnonzero(np.append(True, np.diff(piece) != 0))
     ends = np.append(edges[1:], len(piece)) - 1
     number = np.searchsorted(edges, rows, side="right") - 1
-    first = np.maximum(rows - AROUND, edges[number])
-    last = np.minimum(rows + AROUND, ends[number])
+    first = np.maximum(rows - around, edges[number])
+    last = np.minimum(rows + around, ends[number])
     new = np.append(True, (first[1:] > last[:-1]) | (np.diff(number) != 0))
     starts = np.flatnonzero(new)
     stops = np.append(starts[1:], len(rows)) - 1
-    return list(zip(first[starts].tolist(), last[stops].tolist(), strict=True))[:MOST_WINDOWS]
+    return list(zip(first[starts].tolist(), last[stops].tolist(), strict=True))[:most]
 
 
-def assign(six: Floats, track: Track, start: float, stop: float, tolerance: float) -> tuple[Ints, Floats, Bools] | None:
+def assign(
+    six: Floats, track: Track, start: float, stop: float, tolerance: float, most_pairs: int
+) -> tuple[Ints, Floats, Bools] | None:
     """Assign the vertices of a window whose ends are at known places.
 
     Parameters
@@ -50,6 +54,8 @@ def assign(six: Floats, track: Track, start: float, stop: float, tolerance: floa
     start, stop : float
         Places (segment plus fraction) of the first and the last vertex.
     tolerance : float, mm
+    most_pairs : int
+        Of vertices and segments.
 
     Returns
     -------
@@ -61,17 +67,19 @@ def assign(six: Floats, track: Track, start: float, stop: float, tolerance: floa
     """
     low, high = int(start), max(int(np.ceil(stop)) - 1, int(start))
     count = high - low + 1
-    if len(six) < 3 or len(six) * count > MOST_PAIRS:
+    if len(six) < 3 or len(six) * count > most_pairs:
         return None
     row = track.row[low : high + 1]
     fraction, square = _project(six, row[:, :6], row[:, 6:12], row[:, 12])
-    cost = (square / tolerance**2) ** _POWER
+    cost = np.minimum(square / tolerance**2, _FARTHEST) ** _POWER
     # original vertices between the segments, against written segments
     way = six[1:] - six[:-1]
     size = np.einsum("ij,ij->i", way, way)
     inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
     _, passed = _project(row[1:, :6], six[:-1], way, inverse)
-    passing = np.concatenate(([np.zeros(len(way))], np.cumsum((passed / tolerance**2) ** _POWER, axis=0))).T
+    passing = np.concatenate(
+        ([np.zeros(len(way))], np.cumsum(np.minimum(passed / tolerance**2, _FARTHEST) ** _POWER, axis=0))
+    ).T
     columns = np.arange(count)
     best = np.where(columns == 0, 0.0, np.inf)
     came = np.zeros((len(six), count), np.int32)

@@ -8,6 +8,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Keep
 from cornersmooth.verify.blocks import Block, Matcher
+from cornersmooth.verify.farther import passed_nearby
 from cornersmooth.verify.gaps import (
     Reached,
     from_original,
@@ -305,6 +306,8 @@ class _Part:
             exact |= same
             nearest = np.where(off < amount, element, nearest)
             amount = np.minimum(amount, off)
+        missed = np.flatnonzero(~exact)
+        exact[missed] = passed_nearby(matcher, block, theirs.vertex[rows[missed]], tip[missed], axis[missed])
         missed = np.flatnonzero(~exact)
         if len(missed):
             self.violations.add(

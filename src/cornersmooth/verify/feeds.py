@@ -10,10 +10,14 @@ import numpy as np
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.ncprogram import Element, NcProgram, Problem
+from cornersmooth.verify.rotary import SHORT_STEPS
 from cornersmooth.verify.stops import ARITHMETIC
 
 #: a rounding reaches at most so many times as far as its first vertex that is visibly off the line
 _BEYOND_VISIBLE = 3.0
+
+#: a tip that creeps goes at most so many times the room of the feed: `SHORT_STEPS` and two of which the room is two
+_CREEPING = (SHORT_STEPS + 2) / 2
 
 #: roundings that are looked at one by one in a block
 _MOST_SINGLE = 5000
@@ -59,6 +63,11 @@ def check_feeds(matcher: Matcher, block: Block, off: Floats) -> list[tuple[float
             good[k] = bool(_same(own[0], own[1], own[2], feed, mode, among).any())
     wrong = np.flatnonzero(~good)
     for k in wrong[:_MOST_SINGLE].tolist():
+        among = _alike(matcher, block, int(element[k]), int(start[k]), int(end[k]))
+        own = tuple(np.full(len(among), column[k]) for column in (said, per_revolution, room))
+        if _same(own[0], own[1], own[2], feed, mode, among).any():
+            good[k] = True
+            continue
         pair = float(said[k]), float(room[k])
         good[k] = _inside_rounding(matcher, block, off, int(start[k]), int(end[k]), int(low[k]), pair, feed)
     wrong = np.flatnonzero(~good)
@@ -86,9 +95,30 @@ def _touched(matcher: Matcher, block: Block, start: Ints, end: Ints) -> tuple[In
 
 def _same(said: Floats, per_revolution: Bools, room: Floats, feed: Floats, mode: Bools, move: Ints) -> Bools:
     asked = feed[move]
-    room = room + ARITHMETIC * np.maximum(np.abs(asked), 1.0)
-    same: Bools = np.isnan(asked) | ((np.abs(said - asked) <= room) & (per_revolution == mode[move]))
+    slack = ARITHMETIC * np.maximum(np.abs(asked), 1.0)
+    near = (np.abs(said - asked) <= np.abs(room) + slack) | (asked <= -_CREEPING * room)
+    same: Bools = np.isnan(asked) | (near & (per_revolution == mode[move]))
     return same
+
+
+def _alike(matcher: Matcher, block: Block, element: int, start: int, end: int) -> Ints:
+    """Moves that an element may run along as well: its ends are as far from theirs as nobody can tell.
+
+    Digits do not tell apart what poses a digit apart lie between, and near the pole the axis turns ahead of time.
+    """
+    nc, six = matcher.nc, matcher.track.six
+    pole = matcher.axis_length * float(nc.second_room[element - 1 : element + 1].max()) if nc.rotary else 0.0
+    room = 2 * matcher.margin + pole  # a pose is a rounding off, and its place as far from it as the margin
+    found = []
+    for vertex, step in ((start, -1), (end, 1)):
+        segment, fraction = int(block.segment[vertex]), block.fraction[vertex]
+        here = six[segment] + fraction * (six[segment + 1] - six[segment])
+        low, high = int(block.low[vertex]), int(block.high[vertex])
+        k = segment
+        while low <= k <= high and np.linalg.norm(six[k + (step > 0)] - here) <= room:
+            k += step
+        found.append(min(max(k, low), high))
+    return np.unique(matcher.original.trail.owner[found[0] + 1 : found[1] + 2])
 
 
 def _inside_rounding(
@@ -103,7 +133,8 @@ def _inside_rounding(
 ) -> bool:
     """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
     length, trail = matcher.track.length, matcher.original.trail
-    said, room = pair[0], pair[1] + ARITHMETIC * max(abs(pair[0]), 1.0)
+    said, room = pair[0], abs(pair[1]) + ARITHMETIC * max(abs(pair[0]), 1.0)
+    creeping = -_CREEPING * pair[1]
     visible = matcher.margin / 2
     low, high = int(block.low[start]), int(block.high[start])
 
@@ -129,7 +160,7 @@ def _inside_rounding(
     ):
         if not low < pose_vertex <= high:
             continue
-        if not any(abs(feed[neighbour] - said) <= room for neighbour in beyond(step)):
+        if not any(abs(feed[other] - said) <= room or feed[other] <= creeping for other in beyond(step)):
             continue
         pose = length[pose_vertex]
         begin, other = length[trail.last[move - 1]], length[trail.last[move]]

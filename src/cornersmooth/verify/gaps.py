@@ -14,6 +14,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.curves import CurveGroup
+from cornersmooth.verify.farther import look_farther
 from cornersmooth.verify.ncprogram import Element
 from cornersmooth.verify.nearest import Gap, Metric, climb, gap_between, nearest_segments
 from cornersmooth.verify.trails import directions, written_at
@@ -66,6 +67,14 @@ def from_written(matcher: Matcher, block: Block) -> Reached:
             block.six.take(rows, axis=0), matcher.track.six, segment[loose], 1, block.low[rows], block.high[rows]
         )
     better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
+    # nor does it go on where the next is a tiny one: from there another may be nearer
+    over = np.flatnonzero(better.larger > matcher.tolerance)
+    if len(over):
+        own = rows[over]
+        segment[loose[over]], at[loose[over]] = nearest_segments(
+            block.six[own], matcher.track.six, segment[loose[over]], _REACH, block.low[own], block.high[own]
+        )
+        better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
     gap.tip[loose], gap.axis_point[loose], gap.angle[loose] = better.tip, better.axis_point, better.angle
     return Reached(vertex, gap, segment + at)
 
@@ -84,6 +93,7 @@ def from_original(matcher: Matcher, block: Block) -> Reached:
     point = six.take(vertex, axis=0)
     segment, at = nearest_segments(point, block.six, middle, 1, low, high)
     climb(point, block.six, middle, low, high, segment, at)
+    look_farther(matcher, block, vertex, low, high, segment, at)
     tip = _on(block.written.trail.tip, segment, at)
     axis = _unit_on(block.written.trail.axis, segment, at)
     owner = block.written.trail.owner[segment + 1]

@@ -179,7 +179,8 @@ class _Search:
                 if k == group[0] and np.isnan(before):
                     problems.append(Problem("CS563", cl_line, line, "a feed move enters a hole from the side"))
                 wrong = not np.isnan(cycle.feed) and (
-                    abs(nc.feed[k] - cycle.feed) > 2 * nc.feed_room[k] or nc.per_revolution[k] != cycle.per_revolution
+                    abs(nc.feed[k] - cycle.feed) > 2 * abs(nc.feed_room[k])
+                    or nc.per_revolution[k] != cycle.per_revolution
                 )
                 if wrong:
                     text = f"the feed is {nc.feed[k]:g}, the cycle says {cycle.feed:g}"

@@ -9,7 +9,6 @@ from numpy.typing import DTypeLike, NDArray
 
 from cornersmooth.verify.motion import Piece
 from cornersmooth.verify.ncprogram import Curves, NcArcs
-from cornersmooth.verify.stops import moving_rapids
 
 #: an array that is full grows by this part
 _GROWTH: Final = 0.125
@@ -78,11 +77,6 @@ class Pile:
     def curves(self) -> int:
         """Curves so far."""
         return self.curve_element.size
-
-    def next_stop(self, first: int) -> int | None:
-        """First element from `first` (at least 1) on that is rapid and moves the tool; None where there is none yet."""
-        found = moving_rapids(self.kind.rows, self.tip.rows, self.second.rows, first, len(self))
-        return int(found[0]) if len(found) else None
 
     def add(self, piece: Piece) -> None:
         """Add a piece, in millimetres."""

@@ -20,6 +20,7 @@ from cornersmooth.verify.ncprogram import Element, Event, NcProgram, Problem, Se
 from cornersmooth.verify.pile import Pile
 from cornersmooth.verify.rotary import Rotary
 from cornersmooth.verify.runs import read_lines
+from cornersmooth.verify.stops import moving_rapids
 from cornersmooth.verify.words import Line, Table, table_of
 
 if TYPE_CHECKING:
@@ -254,6 +255,19 @@ class Reader:
         if math.isnan(self.began.modal.feed) and self.feed_units:
             rows = self.pile.feed.rows
             rows[np.isnan(rows) & (self.pile.kind.rows != Element.RAPID)] = feed * next(iter(self.feed_units))
+
+    def next_stop(self, first: int) -> int | None:
+        """First element from `first` on that is rapid and moves the tool; None where there is none yet."""
+        pile = self.pile
+        if first == 0 and self.elements:
+            began, factor = self.began.modal, MM_PER_UNIT[self.units]
+            place = [factor * value for value in began.tip]
+            second = [factor * value for value in began.second] if began.points else began.second
+            moves = (pile.tip.rows[0] != place).any() or (pile.second.rows[0] != second).any()
+            if moves and pile.kind.rows[0] == Element.RAPID:
+                return 0
+        found = moving_rapids(pile.kind.rows, pile.tip.rows, pile.second.rows, max(first, 1), self.elements)
+        return int(found[0]) if len(found) else None
 
     def rows(self, table: Table) -> None:
         """Take a run of motion blocks."""

@@ -34,6 +34,9 @@ _ORDER, _HALVINGS = 8, 6
 #: last digit of F where it is moves per minute
 _F_STEP = 1e-4
 
+#: ways of the tip shorter than so many steps of what is printed say little
+SHORT_STEPS = 3.0
+
 #: an axis that turns faster (deg/min) may make a block slower than its feed where the text times it (G93)
 FAST_TURN = 30_000.0
 
@@ -205,16 +208,23 @@ class Rotary:
     ) -> tuple[Floats, Floats]:
         """Feeds (mm/min) of blocks whose F is moves per minute, and how far they are uncertain.
 
-        Where the tip stands still the axis point runs with the feed.
+        Where the tip stands still the axis point runs with the feed. Without tip control the printed digits do not
+        tell whether the tip stands or creeps: either may have timed the block then, see `NcProgram.feed_room`.
         """
-        step, turn_step = self.steps(float(self.levers(position).max(initial=0.0)))
+        levers = self.levers(position)
+        step, turn_step = self.steps(float(levers.max(initial=0.0, where=~np.isnan(levers))))
         length = np.linalg.norm(np.diff(tip, axis=0), axis=1)
         swing = np.linalg.norm(np.diff(tip + self.axis_length * vector, axis=0), axis=1)
         turn = np.abs(np.diff(angles, axis=0)).max(axis=1)
-        still = length < 0.5 * self.tip_step
+        short = length < SHORT_STEPS * step
+        still = length < 0.5 * self.tip_step if self.tip_control else short
         way = np.where(still, swing, length)
-        room = np.maximum(rate * np.where(still, 2 * step + self.axis_length * turn_step, 2 * step), _F_STEP * way)
-        room[(rate * turn > FAST_TURN) | (~still & (length < 3 * step))] = np.inf
+        pole = self.pole_room(vector)
+        off = 2 * step + np.where(still, self.axis_length * (turn_step + pole[1:] + pole[:-1]), 0.0)
+        room = np.maximum(rate * off, _F_STEP * way)
+        if not self.tip_control:
+            room[still] *= -1.0
+        room[(rate * turn > FAST_TURN) | (~still & short)] = np.inf
         return rate * way, room
 
     def _curves(self, curves: CurveTable) -> CurveTable:

@@ -299,7 +299,7 @@ class _Worker:
         lines = self._lines(self.source.part(start, self.source.size(start) if stop is None else stop))
         reader.take(self._severed(lines) if start else lines)
         length = Baton(reader.standing, reader.lines, reader.blocks, reader.elements, reader.pile.curves)
-        first = reader.pile.next_stop(1) if start else 0
+        first = reader.next_stop(0) if start else 0
         following = reader.elements if stop is None else self._read_on(reader, stop)
         return _Read(reader, length, following if first is None else first, following)
 
@@ -314,15 +314,15 @@ class _Worker:
 
     def _read_on(self, reader: Reader, stop: int) -> int:
         """Read behind a section to the next stop, and return its element."""
-        looked, farthest = reader.elements + 1, stop + _FARTHEST
+        looked, farthest = reader.elements, stop + _FARTHEST
         for item in self._lines(self.source.part(stop, farthest), reader.lines + 1, _BEHIND):
             reader.take_one(item)
-            found = reader.pile.next_stop(looked)
+            found = reader.next_stop(looked)
             if found is not None:
                 return found
             looked = max(looked, reader.elements)
         reader.flush()
-        found = reader.pile.next_stop(looked)
+        found = reader.next_stop(looked)
         if found is None and self.source.size(farthest + 1) > farthest:
             raise Irregular
         return reader.elements if found is None else found

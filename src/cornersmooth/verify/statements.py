@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,12 +36,15 @@ class Token:
         Path length from the start of the original motion.
     line : int
         CL or NC line.
+    room : float, mm
+        How far the place is uncertain beyond what printed digits account for: rotary words near the pole.
     """
 
     kind: str
     value: float
     place: float
     line: int
+    room: float = 0.0
 
 
 _NAMES = {
@@ -233,13 +236,13 @@ def _of_m(value: float, place: float, line: int) -> list[Token]:
     return [Token("auxiliary", value, place, line)]
 
 
-def said(events: Sequence[Event], places: Sequence[float]) -> list[Token]:
-    """What the words of the NC text do."""
+def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float]) -> list[Token]:
+    """What the words of the NC text do; `places` are where they stand, and `rooms` how far that is uncertain, mm."""
     tokens: list[Token] = []
     chosen: float | None = None
-    speaking = [pair for pair in zip(events, places, strict=True) if pair[0].letter != "("]
-    for k, (event, place) in enumerate(speaking):
-        value, line = event.value, event.line
+    speaking = [row for row in zip(events, places, rooms, strict=True) if row[0].letter != "("]
+    for k, (event, place, room) in enumerate(speaking):
+        value, line, before = event.value, event.line, len(tokens)
         if event.letter == "T":
             chosen = value
             following = speaking[k + 1][0] if k + 1 < len(speaking) else None
@@ -259,6 +262,8 @@ def said(events: Sequence[Event], places: Sequence[float]) -> list[Token]:
         elif event.letter in _PLAIN:
             number = round(value, SPEED_DECIMALS) if event.letter == "S" else value
             tokens.append(Token(_PLAIN[event.letter], number, place, line))
+        if room > 0.0:
+            tokens[before:] = [replace(token, room=room) for token in tokens[before:]]
     return tokens
 
 
@@ -266,8 +271,17 @@ def said(events: Sequence[Event], places: Sequence[float]) -> list[Token]:
 _PLAIN = {"S": "speed", "H": "offset", "D": "register"}
 
 
+def way_between(here: float, there: float) -> float:
+    """How far two places are apart along the path, mm."""
+    return abs(there - here)
+
+
 def compare(
-    asked_for: list[Token], found: list[Token], room: float, unsaid: frozenset[str | tuple[str, float]] = frozenset()
+    asked_for: list[Token],
+    found: list[Token],
+    room: float,
+    unsaid: frozenset[str | tuple[str, float]] = frozenset(),
+    apart: Callable[[float, float], float] = way_between,
 ) -> list[Problem]:
     """Compare the two, kind by kind.
 
@@ -278,13 +292,26 @@ def compare(
         How far apart along the path the places of the same token may be.
     unsaid : frozenset
         Kinds, and pairs of kind and value, that the control has no words for.
+    apart : callable
+        How far, in mm, two places along the path are apart that differ by more than the room.
     """
     problems: list[Problem] = []
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
     found = [token for token in found if token.kind not in unsaid]
-    end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf) - room
-    if not any(_tidies(token, end) for token in asked_for):
-        found = [token for token in found if not _tidies(token, end)]
+    end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
+
+    def tidies(token: Token) -> bool:
+        """Whether a token only ends what ends with the program anyway."""
+        if token.kind != "compensation" or token.value != 40.0:
+            return False
+        return token.place >= end or not _away(end, token, room, apart)
+
+    def cancelled(tokens: list[Token]) -> int:
+        """How often compensation is cancelled."""
+        return sum(token.value == 40.0 for token in _effective(tokens, "compensation"))
+
+    if cancelled(found) > cancelled(asked_for) and not any(map(tidies, asked_for)):
+        found = [token for token in found if not tidies(token)]
     for kind, (name, code) in _NAMES.items():
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
         matcher = difflib.SequenceMatcher(
@@ -296,7 +323,7 @@ def compare(
                 label = name.format(theirs[i].value)
                 if tag != "equal":
                     text = f"{name.format(ours[j].value)} where the CL file asks for {label}"
-                elif abs(theirs[i].place - ours[j].place) > room:
+                elif _away(theirs[i].place, ours[j], room, apart):
                     text = f"{label} is {ours[j].place - theirs[i].place:+.3f} mm of path away from its place"
                 else:
                     continue
@@ -312,9 +339,12 @@ def compare(
     return problems
 
 
-def _tidies(token: Token, end: float) -> bool:
-    """Whether a token only ends what ends with the program anyway."""
-    return token.kind == "compensation" and token.value == 40.0 and token.place >= end
+def _away(place: float, ours: Token, room: float, apart: Callable[[float, float], float]) -> bool:
+    """Whether a token is elsewhere than asked for."""
+    if abs(place - ours.place) <= room + ours.room:
+        return False
+    # a pose is a rounding off, and its place as far from it as the room
+    return apart(place, ours.place) > 2 * room + ours.room
 
 
 def _effective(tokens: list[Token], kind: str) -> list[Token]:

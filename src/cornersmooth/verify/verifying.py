@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
@@ -17,11 +17,12 @@ from cornersmooth.verify import sections
 from cornersmooth.verify.blocks import lengths
 from cornersmooth.verify.comparison import BEFORE, Compared, Comparison, Joints
 from cornersmooth.verify.deviation import Largest, exact_poses
+from cornersmooth.verify.farther import way_apart
 from cornersmooth.verify.holes import divide_at_holes
 from cornersmooth.verify.ncprogram import Event, NcProgram, Problem
 from cornersmooth.verify.reader import CONTROL_WORDS, Style, read_styled
 from cornersmooth.verify.source import Source
-from cornersmooth.verify.statements import asked, compare, said
+from cornersmooth.verify.statements import asked, compare, said, way_between
 from cornersmooth.verify.stops import find_stretches
 from cornersmooth.verify.trails import Original, original_motion
 from cornersmooth.verify.verification import Verification
@@ -175,7 +176,9 @@ class Verifier:
             places.append(section.places + length[section.vertex])
         if self._words:
             unsaid = style.dialect.unsaid
-            problems += _statement_problems(original, length, events, np.concatenate(places), found.margin, unsaid)
+            whole = np.concatenate(places)
+            rooms = np.zeros(len(whole))
+            problems += _statement_problems(original, length, events, whole, rooms, found.margin, unsaid)
         if problems:
             return None
         return Verification.of(
@@ -208,7 +211,9 @@ def _whole(
     if words and len(nc):  # without any motion nothing has a place
         places = compared.places[np.searchsorted(elements, own)]
         length, margin = comparison.matcher.track.length, comparison.matcher.margin
-        problems += _statement_problems(original, length, nc.events, places, margin, nc.unsaid)
+        rooms = np.where(nc.rotary & (own >= 0), axis_length * nc.second_room[own], 0.0)
+        apart = partial(way_apart, comparison.matcher.track)
+        problems += _statement_problems(original, length, nc.events, places, rooms, margin, nc.unsaid, apart)
     return Verification.of(
         compared,
         problems,
@@ -226,8 +231,10 @@ def _statement_problems(
     length: Floats,
     events: Sequence[Event],
     places: Floats,
+    rooms: Floats,
     margin: float,
     unsaid: frozenset[str | tuple[str, float]],
+    apart: Callable[[float, float], float] = way_between,
 ) -> list[Problem]:
     """What words beside the motion say wrongly; `length` is that of the original path up to its vertices."""
     program = original.program
@@ -236,7 +243,8 @@ def _statement_problems(
     end = float(length[-1]) if moves else 0.0
     asked_at = np.where(move >= 0, length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0, BEFORE)
     theirs = asked(program, asked_at.tolist(), end)
-    return compare(theirs, said(events, np.nan_to_num(places, nan=0.0).tolist()), margin, unsaid)
+    ours = said(events, np.nan_to_num(places, nan=0.0).tolist(), rooms.tolist())
+    return compare(theirs, ours, margin, unsaid, apart)
 
 
 def _units_problems(program: Program, units: Units) -> list[Problem]:

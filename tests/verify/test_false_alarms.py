@@ -1,0 +1,334 @@
+"""Texts that were written rightly and once refused: each holds what made the verification object.
+
+The numbers come from random programs, cut down to the moves that matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.model import Program
+from cornersmooth.settings import Settings
+from cornersmooth.verify import Verification, verify
+from nc.cases import Case
+from nc.promise import written
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """A text that must pass.
+
+    Parameters
+    ----------
+    case : Case
+    tolerance, axis_length : float, mm
+    cl : str
+        Statements after those that every program begins with.
+    inch : bool
+    """
+
+    case: Case
+    tolerance: float
+    axis_length: float
+    cl: str
+    inch: bool = False
+
+    @property
+    def program(self) -> Program:
+        """The CL program."""
+        units = "INCHES" if self.inch else "MM"
+        return read(f"UNITS/{units}\nLOADTL/1\nRAPID\n{self.cl}FINI\n".encode(), name="part.cls")
+
+    @property
+    def text(self) -> str:
+        """What is written for it."""
+        settings = Settings(tolerance=self.tolerance, axis_length=self.axis_length)
+        return written(self.program, self.case.choose(endless=True), settings)[0]
+
+    def verified(self, text: str) -> Verification:
+        """What is found in a text."""
+        form = self.case.choose(endless=True)
+        return verify(
+            self.program,
+            text.encode(),
+            tolerance=self.tolerance,
+            axis_length=self.axis_length,
+            control=self.case.control,
+            machine=form.machine,
+            tcp=self.case.tcp,
+        )
+
+
+#: without tip control, timed blocks in which the tip creeps by less than the digits of the linear axes show
+CREEPING = Alarm(
+    Case("fanuc", "g1", "head-ac", tcp=False),
+    0.001,
+    50.0,
+    """GOTO/0.1211,-1.6194,-1.3692,-0.7642257,-0.0481552,0.6431487
+FEDRAT/MMPM,27.7727
+GOTO/0.1406,-1.6284,-1.3692,-0.6131925,0.0049931,0.7899178
+GOTO/-58.3760,-5.7811,-1.3692,-0.6131925,0.0049931,0.7899178
+""",
+)
+
+#: a dwell near the pole, where the first axis stays what it was: the pose is not quite where the CL file has it
+DWELL_AT_THE_POLE = Alarm(
+    Case("heidenhain", "spl", "head-ac"),
+    0.15,
+    10.0,
+    """GOTO/0.8411,-0.3935,0.2380,0.0000000,0.0000000,1.0000000
+FEDRAT/IPM,441.1154
+GOTO/0.8372,-0.4039,0.2464,0.0000000,0.0000000,1.0000000
+GOTO/0.8433,-0.3951,0.2464,0.0003544,0.0018964,0.9999981
+DELAY/1.5
+GOTO/0.7948,-0.4921,0.2464,0.0003544,0.0018964,0.9999981
+FEDRAT/IPM,712.9694
+GOTO/0.7681,-0.5148,0.0831,0.0003544,0.0018964,0.9999981
+GOTO/0.7684,-0.5148,0.0831,-0.0000465,0.0011347,0.9999994
+GOTO/0.7710,-0.5236,0.0831,-0.0368166,-0.0189319,0.9991427
+""",
+    inch=True,
+)
+
+#: a change of feed near the pole, where the tool stands already as it should only after it
+FEED_AT_THE_POLE = Alarm(
+    Case("haas", "g1", "head-ac"),
+    0.15,
+    10.0,
+    """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000
+FEDRAT/IPM,441.0106
+GOTO/-0.8513,1.7448,0.0000,0.0004237,-0.0004888,0.9999998
+FEDRAT/IPM,330.7936
+GOTO/-0.8513,1.7448,0.0000,0.0004237,-0.0004888,0.9999998
+GOTO/-0.8513,1.7448,0.0000,-0.0000603,0.0001530,1.0000000
+GOTO/-0.8514,1.7447,-0.0002,-0.5918873,-0.4427668,0.6735184
+GOTO/-0.8514,1.7450,-0.0002,-0.5429070,-0.4419728,0.7140812
+GOTO/-0.8431,1.7470,0.0102,-0.5429070,-0.4419728,0.7140812
+""",
+    inch=True,
+)
+
+#: where the walk leaves a corner late, its nearest blocks are many blocks before
+LATE_AT_THE_POLE = Alarm(
+    Case("fanuc", "g1", "xyzbc-trt", tcp=False),
+    0.001,
+    10.0,
+    """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000
+FEDRAT/IPM,843.4290
+GOTO/0.0267,-0.0242,-0.3811,-0.0000180,0.0020016,0.9999980
+GOTO/-0.6215,-0.0084,-0.3811,-0.0000180,0.0020016,0.9999980
+GOTO/-0.6215,-0.0084,-0.3811,0.3616019,0.1972559,0.9112267
+GOTO/-0.6596,-1.6179,-0.3811,0.3616019,0.1972559,0.9112267
+""",
+    inch=True,
+)
+
+#: the last poses are so near that the walk takes the end of the text for one of them
+END_WITHIN_DIGITS = Alarm(
+    Case("fanuc", "g1", "xyzac-trt"),
+    0.001,
+    50.0,
+    """GOTO/-31.8783,-69.6021,12.3322,0.9961650,-0.0820129,-0.0304816
+FEDRAT/MMPM,730.5880
+GOTO/-28.4166,-72.4353,12.3322,0.0546999,0.7345930,-0.6762995
+GOTO/-28.4166,-72.4354,12.3321,0.0546999,0.7345930,-0.6762995
+GOTO/-28.4165,-72.4355,12.3322,0.0546999,0.7345930,-0.6762995
+""",
+)
+
+#: a pose that must be passed is two blocks before the one it is looked for in
+EXACT_WITHIN_DIGITS = Alarm(
+    Case("haas", "g1", "xyzbc-trt"),
+    0.01,
+    50.0,
+    """GOTO/90.6764,-23.5104,-30.1309,0.0000000,0.0000000,1.0000000
+CUTCOM/LEFT,XYPLAN
+FEDRAT/MMPM,100.0
+GOTO/55.0152,-50.9585,-30.1309
+GOTO/55.0153,-50.9582,-30.1309
+GOTO/55.0153,-50.9582,-30.1309
+GOTO/55.0153,-50.9583,-30.1310
+GOTO/55.0913,-51.1766,-30.1310
+GOTO/54.9992,-51.7100,-30.1310
+""",
+)
+
+#: the way of the axis point that timed a block is not what its rotary words say
+TIMED_AT_THE_POLE = Alarm(
+    Case("siemens", "g1", "xyzac-trt", tcp=False),
+    0.15,
+    10.0,
+    """FEDRAT/MMPM,294.3645
+GOTO/-1.1920,5.1496,-4.5329,0.0000000,0.0000000,1.0000000
+GOTO/-1.1920,5.1496,-4.5329,0.0001991,0.0000301,1.0000000
+""",
+)
+
+#: several poses a digit apart, each with a feed, between which the path goes to and fro
+FEED_WITHIN_DIGITS = Alarm(
+    Case("siemens", "g1", "head-table-bc", tcp=False),
+    0.15,
+    50.0,
+    """GOTO/-0.3808,-0.2326,0.3426,0.0014362,-0.0016092,0.9999977
+FEDRAT/MMPM,1.9795
+GOTO/-0.3262,0.4129,0.3426,-0.3200766,0.4127683,0.8527446
+GOTO/-0.3261,0.4127,0.3426,-0.3200766,0.4127683,0.8527446
+GOTO/-0.3261,0.4128,0.3427,-0.3200766,0.4127683,0.8527446
+GOTO/-0.3262,0.4129,0.3420,-0.3200766,0.4127683,0.8527446
+FEDRAT/0.3757,MMPR
+GOTO/-0.3263,0.4129,0.3420,-0.3200766,0.4127683,0.8527446
+""",
+)
+
+#: a pose that must be passed, found several blocks from where it is since the axis tells little
+EXACT_AT_THE_POLE = Alarm(
+    Case("heidenhain", "spl", "table-ac"),
+    0.15,
+    10.0,
+    """GOTO/0.0030,0.0024,-0.0000,0.0002552,0.0008903,0.9999996
+GOTO/0.0027,0.0036,0.0000,0.0002552,0.0008903,0.9999996
+GOTO/0.0026,0.0037,0.0001,-0.0001103,-0.0001169,1.0000000
+GOTO/0.0228,-0.0085,0.0001,0.1479951,0.0243007,-0.9886895
+""",
+)
+
+#: a turn that begins with a tiny move, at which the walk stays
+PURE_TURN = Alarm(
+    Case("generic", "g6.2", "nutated-bc"),
+    0.04,
+    10.0,
+    """GOTO/0.0000,0.0000,0.0000,-0.0024753,-0.0002965,0.9999969
+GOTO/-0.0000,0.0000,-0.0000,0.0338193,-0.0009954,0.9994275
+GOTO/-0.0000,0.0000,-0.0000,0.0001778,-0.0000205,1.0000000
+GOTO/-0.0000,0.0000,-0.0000,-0.0027428,-0.0125998,0.9999169
+GOTO/1.8534,-1.0989,1.0331,0.0000111,0.0004129,0.9999999
+GOTO/1.8534,-1.0989,1.0331,0.0000075,-0.0000093,1.0000000
+GOTO/1.8534,-1.0989,1.0331,-0.5004361,-0.0168184,0.8656101
+""",
+    inch=True,
+)
+
+#: compensation ends with the program, near the pole
+LAST_TIDIED = Alarm(
+    Case("fanuc", "g6.2", "xyzbc-trt"),
+    0.15,
+    50.0,
+    """GOTO/0.7261,0.6440,-0.0003,0.0108990,-0.0259442,0.9996040
+CUTCOM/LEFT,XYPLAN
+GOTO/0.7261,0.6440,-0.0003,-0.0004832,-0.0006688,0.9999997
+""",
+)
+
+#: the last pose is a margin from where the walk ends, and a rounding more from the end
+END_TWO_DIGITS_BACK = Alarm(
+    Case("generic", "g6.2", "head-ac"),
+    0.15,
+    50.0,
+    """GOTO/-0.1857,0.1952,-0.0008,-0.2044695,-0.9785411,0.0254853
+GOTO/-0.3333,-0.0281,0.0293,-0.2044695,-0.9785411,0.0254853
+GOTO/-0.3332,-0.0281,0.0293,-0.2044695,-0.9785411,0.0254853
+GOTO/-0.3334,-0.0282,0.0291,-0.2044695,-0.9785411,0.0254853
+""",
+)
+
+#: the tool turns aside and back the same way: nearest is as well the way back
+THERE_AND_BACK = Alarm(
+    Case("fanuc", "g1", "head-table-bc", tcp=False),
+    0.04,
+    50.0,
+    """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000
+GOTO/-2.2270,11.2304,9.4196,0.0011097,0.0002101,0.9999994
+GOTO/-2.1731,11.1019,9.4196,0.0012436,0.0002134,0.9999992
+GOTO/-2.1613,11.0862,9.4278,0.0012436,0.0002134,0.9999992
+GOTO/-2.1435,11.0910,9.4139,-0.0477237,0.0243034,0.9985649
+GOTO/-2.1435,11.0910,9.4139,0.0000000,0.0000000,1.0000000
+GOTO/-2.1554,11.0854,9.4360,-0.0002197,0.0000106,1.0000000
+GOTO/-1.6508,45.1454,26.2528,-0.0001353,0.0000065,1.0000000
+GOTO/8.8318,-38.4309,26.2529,-0.0008265,0.0033310,0.9999941
+""",
+)
+
+#: standing at the pole is as near to what comes later, and many blocks stand there
+PAST_THE_POLE = Alarm(
+    Case("siemens", "g1", "xyzac-trt", tcp=False),
+    0.001,
+    10.0,
+    """CUTCOM/LEFT,XYPLAN
+GOTO/-2.9031,1.6844,-1.0032,0.0007930,-0.0017922,0.9999981
+GOTO/-2.9026,1.6840,-1.0032,-0.0001548,0.0000209,1.0000000
+GOTO/-2.9049,1.5044,-1.2539,0.0332062,0.0102047,0.9993964
+GOTO/-2.8722,1.5100,-1.2563,-0.0064349,0.0065858,0.9999576
+GOTO/-2.8722,1.5100,-1.2563,0.0024546,-0.0009847,0.9999965
+GOTO/-2.8724,1.5097,-1.2563,0.0000000,0.0000000,1.0000000
+GOTO/-3.0042,1.4590,-1.2672,-0.0806423,-0.0293891,0.9963097
+""",
+    inch=True,
+)
+
+#: compensation cancelled before the last moves, which are within what the pole leaves open
+CANCELLED_NEAR_THE_END = Alarm(
+    Case("linuxcnc", "g1", "xyzbc-trt"),
+    0.15,
+    10.0,
+    """GOTO/-31.1036,-38.9167,43.3778,0.0060038,0.0018345,0.9999803
+FEDRAT/MMPM,557.6766
+CUTCOM/LEFT,XYPLAN
+GOTO/-8.5474,-56.3122,57.7454,0.0060038,0.0018345,0.9999803
+CUTCOM/OFF
+GOTO/-8.5473,-56.3127,57.7454,0.0067936,0.0020855,0.9999747
+SPINDL/CLW,RPM,500
+GOTO/-8.5473,-56.3127,57.7454,0.0000530,0.0000230,1.0000000
+""",
+)
+
+ALARMS = {
+    "creeping": CREEPING,
+    "dwell at the pole": DWELL_AT_THE_POLE,
+    "feed at the pole": FEED_AT_THE_POLE,
+    "late at the pole": LATE_AT_THE_POLE,
+    "end within digits": END_WITHIN_DIGITS,
+    "exact within digits": EXACT_WITHIN_DIGITS,
+    "timed at the pole": TIMED_AT_THE_POLE,
+    "feed within digits": FEED_WITHIN_DIGITS,
+    "exact at the pole": EXACT_AT_THE_POLE,
+    "pure turn": PURE_TURN,
+    "last tidied": LAST_TIDIED,
+    "end two digits back": END_TWO_DIGITS_BACK,
+    "there and back": THERE_AND_BACK,
+    "past the pole": PAST_THE_POLE,
+    "cancelled near the end": CANCELLED_NEAR_THE_END,
+}
+
+
+@pytest.mark.parametrize("alarm", ALARMS.values(), ids=ALARMS.keys())
+def test_what_is_written_passes(alarm: Alarm) -> None:
+    assert alarm.verified(alarm.text).problems == ()
+
+
+#: the tip stands, so only the axis point tells how fast a block is
+STANDING = Alarm(
+    Case("fanuc", "g1", "head-ac", tcp=False),
+    0.01,
+    10.0,
+    """GOTO/10.0,20.0,-30.0,0.0,0.5,0.8660254
+FEDRAT/MMPM,40.0
+GOTO/10.0,20.0,-30.0,0.3,0.4,0.8660254
+GOTO/30.0,20.0,-30.0,0.3,0.4,0.8660254
+""",
+)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_time_of_a_standing_tip_is_still_compared(factor: float) -> None:
+    assert STANDING.verified(STANDING.text).problems == ()
+    lines = STANDING.text.splitlines()
+    timed = [k for k, line in enumerate(lines) if line.startswith("G1 ")]
+    assert lines.index("G93") < timed[0]
+    for k in timed[1 : len(timed) // 2 : 3]:
+        words, rate = lines[k].split(" F")
+        wrong = [*lines[:k], f"{words} F{factor * float(rate):.4f}", *lines[k + 1 :]]
+        found = STANDING.verified("\n".join(wrong)).problems
+        assert [(problem.code, problem.nc_line) for problem in found] == [("CS541", k + 1)]

@@ -1,0 +1,256 @@
+"""Long texts section by section: the same as a whole, with any number of processes, also while the text grows."""
+
+from __future__ import annotations
+
+import io
+import sys
+import threading
+import time
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from cornersmooth.errors import InputError
+from cornersmooth.model import FeedMode, Move, Program, Statement
+from cornersmooth.nc import Frame, choose_form, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from cornersmooth.verify import Verifier, Where, sections, verify, verifying
+
+from .writing import unit, wavy
+
+TOLERANCE = 0.02
+forks = pytest.param(3, marks=pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks safely"))
+
+
+@pytest.fixture
+def used(monkeypatch):
+    """Small sections for all texts; takes down how many there were, 0 where a text was looked at as a whole."""
+    found = []
+    together = sections.put_together
+
+    def noted(shares):
+        result = together(shares)
+        found.append(0 if result is None else len(result.sections))
+        return result
+
+    monkeypatch.setattr(sections, "put_together", noted)
+    monkeypatch.setattr(sections, "SECTION", 6000)
+    monkeypatch.setattr(verifying, "LONG", 0)
+    return found
+
+
+def part(count=900, every=45, units="mm", seed=0, fixed=False):
+    """Passes between rapids, with changes of feed, tools, stops and an axis that stands still for a while."""
+    tip, axis = wavy(count, seed=seed)
+    axis[count // 3 : count // 2] = axis[count // 3]
+    if fixed:
+        axis[:] = [0, 0, 1]
+    kind = np.where(np.arange(count) % every, Move.LINEAR, Move.RAPID).astype(np.uint8)
+    feed = np.full(count, 250.0)
+    feed[count // 4 : count // 2] = 400.0
+    feed[-count // 5 :] = 123.5
+    statements = (
+        Statement(0, 1, "LOADTL", (3.0,), "LOADTL/3"),
+        Statement(0, 2, "SPINDL", (9000.0, "RPM", "CLW"), "SPINDL/9000,RPM,CLW"),
+        Statement(min(every * 4, count), 3, "COOLNT", ("ON",), "COOLNT/ON"),
+        Statement(min(every * 7, count), 4, "OPSTOP", (), "OPSTOP"),
+        Statement(min(every * 9 + 11, count), 5, "DELAY", (1.5,), "DELAY/1.5"),
+        Statement(min(every * 12, count), 6, "COOLNT", ("OFF",), "COOLNT/OFF"),
+        Statement(count, 7, "FINI", (), "FINI"),
+    )
+    line = np.arange(100, 100 + count)
+    return Program.from_poses(tip, unit(axis), kind=kind, feed=feed, line=line, statements=statements, units=units)
+
+
+def text_of(program, control="fanuc", form="g1", frame=None, **settings):
+    stream = io.BytesIO()
+    smoothed = smooth(program, Settings(tolerance=TOLERANCE, **settings))
+    write(smoothed, stream, form=choose_form(control, form), frame=frame or Frame())
+    return stream.getvalue()
+
+
+def check(program, text, used, processes=1, whole=False, **reading):
+    """Verify in sections and as a whole, and compare; return the result."""
+    used.clear()
+    found = verify(program, text, tolerance=TOLERANCE, processes=processes, **reading)
+    assert (used[-1] == 0) if whole else used[-1] > 4
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(verifying, "LONG", 10**9)
+        expected = verify(program, text, tolerance=TOLERANCE, **reading)
+    for field in fields(expected):
+        mine, theirs = getattr(found, field.name), getattr(expected, field.name)
+        if field.name == "pose_nc_line":  # a pose at the joint of two blocks is near both
+            assert np.abs(mine - theirs).max() <= 3
+        elif isinstance(theirs, np.ndarray):
+            np.testing.assert_allclose(mine, theirs, atol=1e-9, rtol=0)
+        elif isinstance(theirs, Where):
+            assert mine.value == pytest.approx(theirs.value, abs=1e-9)
+        else:
+            assert mine == theirs, field.name
+    return found
+
+
+@pytest.mark.parametrize("processes", [1, forks])
+@pytest.mark.parametrize(
+    ("control", "form"),
+    [
+        ("fanuc", "g1"),
+        ("fanuc", "g6.2"),
+        ("siemens", "g1"),
+        ("siemens", "bspline"),
+        ("siemens", "poly"),
+        ("heidenhain", "g1"),
+        ("generic", "g1"),
+    ],
+)
+def test_same_as_the_whole(used, control, form, processes):
+    program = part()
+    assert check(program, text_of(program, control, form), used, processes, control=control).passed
+
+
+@pytest.mark.parametrize("processes", [1, forks])
+def test_inches_block_numbers_and_a_fixed_tool(used, processes):
+    for program, frame in ((part(units="inch"), None), (part(fixed=True), None), (part(), Frame(block_numbers=True))):
+        assert check(program, text_of(program, frame=frame), used, processes).passed
+
+
+def test_feed_said_long_before(used):
+    """A feed that holds for many sections is not known where they begin."""
+    program = part()
+    text = text_of(program)
+    assert text.count(b"F250.") == 2
+    assert check(program, text, used, 3 if sys.platform == "linux" else 1).passed
+    per_revolution = np.full(len(program), FeedMode.PER_REVOLUTION, np.uint8)
+    program = Program.from_poses(
+        program.tip, program.axis, kind=program.kind, feed=0.1 + 0 * program.feed, feed_mode=per_revolution
+    )
+    assert check(program, text_of(program), used, 3 if sys.platform == "linux" else 1).passed
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks safely")
+def test_wrong_guess_is_read_again(used, monkeypatch):
+    program = part()
+    text = text_of(program)
+    wrong = []
+    guess = sections._Worker._guess
+
+    def tipless(worker, start):
+        wrong.append(start)
+        standing = guess(worker, start)
+        return type(standing)(standing.modal.but(tip=(0.0, 0.0, 0.0), inch=True), "", {})
+
+    monkeypatch.setattr(sections._Worker, "_guess", tipless)
+    assert check(program, text, used, 3).passed
+
+
+def _spoilt(lines):
+    """Texts that are wrong in one of the later sections."""
+    motion = [k for k, line in enumerate(lines) if line.startswith("G1 ")]
+    rapids = [k for k, line in enumerate(lines) if line.startswith("G0 ")]
+    middle = motion[len(motion) // 2]
+    yield "block left out", [*lines[:middle], *lines[middle + 20 :]], "CS52"
+    yield "rapid left out", [*lines[: rapids[9]], *lines[rapids[9] + 1 :]], "CS5"
+    yield "another feed", [line.replace("F400.", "F40.") for line in lines], "CS541"
+    yield "stop left out", [line for line in lines if line != "M1"], "CS555"
+    yield "units", [*lines[:middle], "G20", *lines[middle:]], "CS505"
+    yield "end left out", [*lines[: motion[-200]], "M30", "%"], "CS5"
+    yield "bad number", [*lines[:middle], lines[middle].replace("X", "X9"), *lines[middle + 1 :]], "CS521"
+    yield "other tool", [line.replace("T3 M6", "T4 M6") for line in lines], "CS551"
+    yield "no control", [line for line in lines if not line.startswith("G43.5")], "CS506"
+
+
+@pytest.mark.parametrize("processes", [1, forks])
+def test_what_is_wrong_is_reported_as_for_the_whole(used, processes):
+    program = part()
+    lines = text_of(program).decode().splitlines()
+    for name, spoilt, code in _spoilt(lines):
+        found = check(program, ("\n".join(spoilt) + "\n").encode(), used, processes, whole=True)
+        assert not found.passed, name
+        assert any(problem.code.startswith(code) for problem in found.problems), name
+
+
+@pytest.mark.parametrize("processes", [1, forks])
+def test_what_cannot_be_read_says_its_line(used, processes):
+    program = part()
+    lines = text_of(program).decode().splitlines()
+    lines.insert(700, "G91")
+    with pytest.raises(InputError) as failure:
+        verify(program, "\n".join(lines).encode(), tolerance=TOLERANCE, processes=processes)
+    assert failure.value.line == 701
+
+
+def test_pass_longer_than_sections_is_looked_at_as_a_whole(used, monkeypatch):
+    program = part(every=890)
+    monkeypatch.setattr(sections, "_FARTHEST", 12000)
+    assert check(program, text_of(program), used, whole=True).passed
+
+
+def test_other_texts_are_looked_at_as_a_whole(used):
+    kind = part().kind.copy()
+    kind[100] = Move.HOLE
+    program = part(200)
+    holes = Program.from_poses(program.tip, program.axis, kind=kind[:200], feed=program.feed)
+    assert verify(holes, text_of(holes), tolerance=TOLERANCE).passed
+    assert not used
+
+
+@pytest.mark.parametrize("processes", [1, forks])
+def test_text_that_is_still_being_written(used, tmp_path, processes):
+    program = part()
+    text = text_of(program)
+    path = tmp_path / "growing.nc"
+    path.write_bytes(b"")
+    with Verifier(program, path, tolerance=TOLERANCE, processes=processes) as verifier:
+        with path.open("ab") as file:
+            for begin in range(0, len(text), 7001):
+                file.write(text[begin : begin + 7001])
+                file.flush()
+                time.sleep(0.002)
+        found = verifier.result()
+    assert used[-1] > 4
+    assert found.passed
+    assert found.blocks == verify(program, text, tolerance=TOLERANCE).blocks
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks safely")
+def test_nobody_waits_for_a_text_that_is_not_finished(used, tmp_path):
+    from multiprocessing import active_children
+
+    path = tmp_path / "growing.nc"
+    path.write_bytes(b"%\n")
+    verifier = Verifier(part(), path, tolerance=TOLERANCE, processes=2)
+    with verifier:
+        assert len(active_children()) == 2
+    assert not active_children()
+
+
+def test_text_is_read_by_one_thread_while_another_writes(used, tmp_path):
+    """What is not there yet is waited for; nothing is read twice or left out."""
+    from cornersmooth.verify.source import GivenUp, Source
+
+    path = tmp_path / "growing"
+    path.write_bytes(b"")
+    source = Source(path)
+    whole = bytes(range(256)) * 40
+
+    def fill():
+        with path.open("ab") as file:
+            for begin in range(0, len(whole), 999):
+                file.write(whole[begin : begin + 999])
+                file.flush()
+                time.sleep(0.001)
+        source.finish()
+
+    writer = threading.Thread(target=fill)
+    writer.start()
+    part_of = source.part(100, 20_000)
+    read = b"".join(iter(lambda: part_of.read(700), b""))
+    writer.join()
+    assert read == whole[100:20_000]
+    assert source.size(0) == len(whole)
+    source.give_up()
+    with pytest.raises(GivenUp):
+        source.read(0, 10)
+    source.close()
