@@ -118,3 +118,48 @@ def _counted(start, used):
         return start(crew, item)
 
     return counted
+
+
+def test_ring_hands_on_in_turn():
+    def work(place):
+        said = []
+        for k in range(place.index, 10, place.count):
+            total = (place.take() if k else 0) + k
+            said.append((k, total))
+            place.give(total)
+        return said
+
+    for count in (1, 2, 3):
+        if count == 1:
+            found = [work(workers.Place())]
+        else:
+            ring = workers.Ring(work, count)
+            found = ring.results()
+            ring.end()
+        assert sorted(pair for part in found for pair in part) == [(k, k * (k + 1) // 2) for k in range(10)]
+
+
+@pytest.mark.parametrize("who", [0, 1, 2])
+def test_ring_raises_what_one_of_it_has_raised(who):
+    def work(place):
+        if place.index == who:
+            raise ValueError(f"place {who}")
+        return place.take()
+
+    ring = workers.Ring(work, 3)
+    with pytest.raises(ValueError, match=f"place {who}"):
+        ring.results()
+    ring.end()
+
+
+def test_ring_with_a_killed_process_is_want_of_memory():
+    def work(place):
+        if place.index == 1:
+            os.kill(os.getpid(), signal.SIGKILL)
+        place.give(1)
+        return bytes(1_000_000)
+
+    ring = workers.Ring(work, 2)
+    with pytest.raises(MemoryError):
+        ring.results()
+    ring.end()
