@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
 
 Bytes = NDArray[np.uint8]
 Words = NDArray[np.uint64]
@@ -28,6 +28,9 @@ MARGIN: Final = 24
 #: bits of a word that can be had from any bit on, and words that tell the digits of a line
 _BITS: Final = 57
 _MOST_WORDS: Final = 4
+
+#: lines up to so many bytes are compared with their layouts apart from longer ones
+_SHORT: Final = 16
 
 #: longest line, its end included, that is read in runs
 LONGEST: Final = 224
@@ -141,8 +144,8 @@ class Lines:
     ----------
     raw : (n,) uint8
         The text between line ends, `MARGIN` before it.
-    pairs : (n - 15,) of 16 bytes
-        What stands from every place of it on: two words.
+    words : (n - 7,) of 8 bytes
+        What stands from every place of it on.
     start, stop : (l,) int64
         First byte of every line, and its end.
     label : (l,) int64
@@ -151,7 +154,7 @@ class Lines:
     """
 
     raw: Bytes
-    pairs: NDArray[np.void]
+    words: NDArray[np.void]
     start: Ints
     stop: Ints
     label: Ints
@@ -198,40 +201,38 @@ class Lines:
     def _numbers(self, start: Ints, label: Ints, table: Ints) -> list[Floats]:
         """Numbers of lines with the same letters, one array for each of them; `table` as in `Layout.fields`."""
         found: list[Floats] = []
-        at, spare = np.empty(len(start), np.int64), np.empty(len(start), np.uint64)
+        at = np.empty(len(start), np.int64)
         for end, digits, decimals, minus in table.transpose(1, 2, 0):
-            np.add(start, _each(end - 2 * _DIGITS, label), out=at)
-            pair = self.pairs[at].view(np.uint64).reshape(-1, 2)
-            before, word = pair[:, 0], pair[:, 1]
+            np.add(start, _each(end - _DIGITS, label), out=at)
+            word = self.words[at].view(np.uint64)
             size = digits + (decimals >= 0)
             if (size <= 4).all() and (size == size[0]).all() and (minus == minus[0]).all():
-                np.right_shift(word, np.uint64(64 - 8 * (int(size[0]) + int(minus[0]))), out=spare)
-                if (spare == spare[0]).all():
-                    last = int(at[0]) + 2 * _DIGITS
+                same = word >> np.uint64(64 - 8 * (int(size[0]) + int(minus[0])))
+                if (same == same[0]).all():
+                    last = int(at[0]) + _DIGITS
                     text = self.raw[last - int(size[0]) : last].tobytes()
                     found.append(np.full(len(at), -float(text) if minus[0] else float(text)))
                     continue
             if (decimals >= 0).any():  # close the gap that the point leaves
-                behind = _each(_BEHIND[decimals], label)
-                np.left_shift(word, _EIGHT, out=spare)
+                closed = word << _EIGHT
                 if (size > _DIGITS).any():
+                    at -= _DIGITS
+                    before = self.words[at].view(np.uint64)
                     before >>= _REST
-                    spare |= before
-                word = np.bitwise_and(word, behind, out=pair[:, 1])
-                spare &= ~behind
-                spare |= word
-            else:
-                np.copyto(spare, word)
-            spare &= _each(_KEEP[digits], label)
+                    closed |= before
+                word ^= closed
+                word &= _each(_BEHIND[decimals], label)
+                word ^= closed
+            word &= _each(_KEEP[digits], label)
             # eight decimal digits to an integer: pairs, then fours, then all (first digit in the lowest byte)
-            high = at.view(np.uint64)
             for factor, shift, mask in _STEPS:
-                np.right_shift(spare, shift, out=high)
-                spare *= factor
-                spare += high
-                spare &= mask
+                word *= factor
+                word >>= shift
+                word &= mask
+            word *= _LAST_FACTOR
+            word >>= _LAST_SHIFT
             divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]
-            found.append(np.divide(spare.view(np.int64), _each(divisor, label)))
+            found.append(np.divide(word.view(np.int64), _each(divisor, label)))
         return found
 
 
@@ -242,11 +243,12 @@ def _each(values: NDArray[Any], label: Ints) -> Any:
 
 _TENS = np.array([10.0**k for k in range(9)])
 _EIGHT, _REST = np.uint64(8), np.uint64(56)
+#: a digit and the one behind it make a pair: ten times the one plus the other, and so on
 _STEPS = (
-    (np.uint64(10), np.uint64(8), np.uint64(0x00FF00FF00FF00FF)),
-    (np.uint64(100), np.uint64(16), np.uint64(0x0000FFFF0000FFFF)),
-    (np.uint64(10000), np.uint64(32), np.uint64(0x00000000FFFFFFFF)),
+    (np.uint64(10 * 2**8 + 1), np.uint64(8), np.uint64(0x00FF00FF00FF00FF)),
+    (np.uint64(100 * 2**16 + 1), np.uint64(16), np.uint64(0x0000FFFF0000FFFF)),
 )
+_LAST_FACTOR, _LAST_SHIFT = np.uint64(10000 * 2**32 + 1), np.uint64(32)
 
 
 def lines_of(text: bytes, layouts: Layouts) -> Lines | None:
@@ -270,7 +272,7 @@ def lines_of(text: bytes, layouts: Layouts) -> Lines | None:
     width = int(size.max())
     if width > LONGEST:
         return None
-    pairs = np.ndarray((len(raw) - 15,), "V16", buffer=raw.data, strides=(1,))
+    words = np.ndarray((len(raw) - 7,), "V8", buffer=raw.data, strides=(1,))
     keys = _digit_keys(raw, start, size, -(-width // _BITS))
     mixed = keys[0]
     for key in keys[1:]:
@@ -280,7 +282,7 @@ def lines_of(text: bytes, layouts: Layouts) -> Lines | None:
     if len(first) > max(_FEW_LAYOUTS, len(start) // _FEWEST_LINES):
         return None
     label = np.repeat(inverse, np.diff(np.append(head, len(start))))
-    return _labelled(raw, pairs, start, stop, label, head[first], keys, layouts, width)
+    return _labelled(raw, words, start, stop, label, head[first], keys, layouts)
 
 
 def _digit_keys(raw: Bytes, start: Ints, size: Ints, count: int) -> list[Words]:
@@ -300,20 +302,18 @@ def _digit_keys(raw: Bytes, start: Ints, size: Ints, count: int) -> list[Words]:
 
 def _labelled(
     raw: Bytes,
-    pairs: NDArray[np.void],
+    words: NDArray[np.void],
     start: Ints,
     stop: Ints,
     label: Ints,
     sample: Ints,
     keys: list[Words],
     layouts: Layouts,
-    width: int,
 ) -> Lines | None:
     """Give every line the layout of the line that stands for its label, or a new label where it differs."""
-    wide = -(-width // 8)
-    windows = np.ndarray((len(raw) - 8 * wide,), f"V{8 * wide}", buffer=raw.data, strides=(1,))
+    size = stop - start + 1
     known: list[Layout] = []
-    rows: Ints | None = None
+    rows = np.arange(len(start))
     stands = sample[:0]
     while len(sample):
         stands = np.append(stands, sample)
@@ -324,22 +324,34 @@ def _labelled(
             known.append(layout)
         if len(known) > max(_FEW_LAYOUTS, len(start) // _FEWEST_LINES):
             return None
-        literal, care = (
-            np.frombuffer(b"".join([text[: 8 * wide] for text in texts]), f"V{8 * wide}")
-            for texts in ([layout.literal for layout in known], [layout.care for layout in known])
-        )
-        mine = label if rows is None else label[rows]
-        found = windows[start if rows is None else start[rows]].view(np.uint64)
-        found ^= literal[mine].view(np.uint64)
-        found &= care[mine].view(np.uint64)
-        differs = found.reshape(-1, wide).any(axis=1) if found.any() else np.zeros(len(mine), np.bool_)
+        differs = np.zeros(len(rows), np.bool_)
+        short = size[rows] <= _SHORT
+        for part in (np.flatnonzero(short), np.flatnonzero(~short)) if short.any() else (slice(None),):
+            own = rows[part]
+            differs[part] = _unlike(raw, start[own], size[own], label[own], known)
         for key in keys:
-            differs |= (key if rows is None else key[rows]) != key[stands][mine]
-        wrong = np.flatnonzero(differs)
-        if not len(wrong):
-            break
-        rows = wrong if rows is None else rows[wrong]
+            differs |= key[rows] != key[stands][label[rows]]
+        rows = rows[differs]
         _, first, inverse = np.unique(label[rows], return_index=True, return_inverse=True)
         label[rows] = len(known) + inverse
         sample = rows[first]
-    return Lines(raw, pairs, start, stop, label, known)
+    return Lines(raw, words, start, stop, label, known)
+
+
+def _unlike(raw: Bytes, start: Ints, size: Ints, label: Ints, known: list[Layout]) -> Bools | bool:
+    """Whether lines have other bytes that are no digits than their layouts."""
+    if not len(start):
+        return False
+    wide = -(-int(size.max()) // 8)
+    windows = np.ndarray((len(raw) - 8 * wide,), f"V{8 * wide}", buffer=raw.data, strides=(1,))
+    literal, care = (
+        np.frombuffer(b"".join([text[: 8 * wide] for text in texts]), f"V{8 * wide}")
+        for texts in ([layout.literal for layout in known], [layout.care for layout in known])
+    )
+    found = windows[start].view(np.uint64)
+    found ^= literal[label].view(np.uint64)
+    found &= care[label].view(np.uint64)
+    if not found.any():
+        return False
+    differs: Bools = np.logical_or.reduce(found.reshape(-1, wide) != 0, axis=1)
+    return differs

@@ -255,12 +255,13 @@ def _check_starts(piece: Piece, modal: Modal, exact: Bools) -> None:
     """First control points must be where the tool is, digit for digit (FANUC alarm PS1009)."""
     element = piece.curve_element[exact]
     points = piece.curves.points
-    control = piece.curves.control[(np.cumsum(points) - points)[exact]]
+    control = piece.curves.control.take((np.cumsum(points) - points)[exact], axis=0)
     wrong = np.zeros(len(element), np.bool_)
-    for ends, start, columns in ((piece.tip, modal.tip, slice(0, 3)), (piece.second, modal.second, slice(3, 6))):
-        position = ends[element - 1]
-        position[element == 0] = start
-        wrong |= (control[:, columns] != position).any(axis=1)
+    for ends, start, columns in ((piece.tip, modal.tip, (0, 1, 2)), (piece.second, modal.second, (3, 4, 5))):
+        for k, column in enumerate(columns):
+            position = ends[element - 1, k]
+            position[element == 0] = start[k]
+            wrong |= control[:, column] != position
     for k in np.flatnonzero(wrong).tolist():
         text = "first control point is not the current position"
         piece.problems.append(Problem("CS519", 0, int(piece.line[element[k]]), text))

@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 from cornersmooth.verify.motion import Piece
 from cornersmooth.verify.ncprogram import Curves, NcArcs
 
-#: an array that is full grows by this part
+#: a large array that is full grows by this part, a small one to twice its size
 _GROWTH: Final = 0.125
 
 #: arrays of so many bytes are asked for anew, smaller ones may be moved: numpy asks for large pages then
@@ -32,7 +32,7 @@ class _Column:
         """Add rows at the end."""
         end = self.size + len(rows)
         if end > len(self._rows):
-            self._grow(end + int(end * _GROWTH))
+            self._grow(end + int(end * (_GROWTH if self._rows.nbytes >= _LARGE else 1)))
         self._rows[self.size : end] = rows
         self.size = end
 

@@ -34,7 +34,7 @@ from cornersmooth.verify.words import Line, Table
 from cornersmooth.verify.workers import LeftAlone, Place
 
 #: bytes of a section
-SECTION: Final = 1 << 23
+SECTION: Final = 1 << 24
 
 #: a cut is looked for in so many bytes before the end of a section, then in more
 _REACHES: Final = (1 << 16, 1 << 20)

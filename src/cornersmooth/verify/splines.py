@@ -126,13 +126,14 @@ def knot_curves(
     complain(np.append(False, late), "CS515", "a control point after the blocks with only a knot")
     falls = np.append(False, (np.diff(knot) < 0) & ~starts[rows][1:])
     complain(falls, "CS516", "a knot below the one before it")
-    complain_curve(_unclamped(knot, start, size, order), "CS517", "first or last knots that are not all equal")
+    unclamped = _unclamped(knot, start, size, order)
+    complain_curve(unclamped, "CS517", "first or last knots that are not all equal")
     point_rows = rows[is_point]
     wrong = np.flatnonzero((weight <= 0) | ~np.isfinite(weight))
     text = "a weight R that is not positive"
     problems.extend(Problem("CS518", 0, int(table.line[row]), text) for row in point_rows[wrong].tolist())
     weight[wrong] = 1.0  # has been said; what follows wants curves that can be measured
-    bad = (single != order) | (points < order) | (order < 2) | _unclamped(knot, start, size, order)
+    bad = (single != order) | (points < order) | (order < 2) | unclamped
     bad |= np.logical_or.reduceat(falls, start)
     own = _exactly(knot, start, size, points + order)
     if bad.any():
