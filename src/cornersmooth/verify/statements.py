@@ -280,6 +280,8 @@ def compare(
         Kinds, and pairs of kind and value, that the control has no words for.
     """
     problems: list[Problem] = []
+    # what shifts the path counts wherever it is said
+    unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
     found = [token for token in found if token.kind not in unsaid]
     end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf) - room
