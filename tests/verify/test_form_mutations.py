@@ -19,8 +19,11 @@ from .writing import encode
 
 #: every control in every form; Mitsubishi's lines and those of the neutral form are FANUC's
 CASES = [case for case in RUNNABLE if case.machine in ("", "xyzac-trt" if case.control == "linuxcnc" else "table-ac")]
-CASES = [case for case in CASES if case.control not in ("generic", "mitsubishi") or str(case) == "generic-g6.2"]
-CASES = [case for case in CASES if (case.form, case.machine) != ("spl", "")]  # the tool is not parallel to Z
+CASES = [
+    case
+    for case in CASES
+    if case.control not in ("generic", "mitsubishi") or str(case) in ("generic-g6.2", "mitsubishi-g6.2")
+]
 
 
 def text_of(case: Case) -> list[str]:
@@ -28,7 +31,7 @@ def text_of(case: Case) -> list[str]:
     form = case.choose()
     settings = fit_settings(Settings(tolerance=EPS, axis_length=H), form, "mm")
     stream = io.BytesIO()
-    write(smooth(program_of(), settings), stream, form=form)
+    write(smooth(program_of(case), settings), stream, form=form)
     return stream.getvalue().decode("ascii").splitlines()
 
 
@@ -37,7 +40,7 @@ def lines_named(case: Case, text: bytes) -> list[tuple[int, str]]:
     machine = case.choose().machine
     try:
         found = verify(
-            program_of(),
+            program_of(case),
             text,
             tolerance=EPS,
             axis_length=H,
