@@ -38,6 +38,9 @@ FIXED_SHARE: Final = 0.1
 #: code of words that want another state of the control
 CONTROL_WORDS: Final = "CS506"
 
+#: runs of fewer blocks are executed together: each folded block of Klartext is a run of its own
+FEW_ROWS: Final = 64
+
 #: words that say what is in force when it must be
 _NEEDS = {
     "vector": "a tool vector",
@@ -259,7 +262,7 @@ class Reader:
 
     def rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
-        if closed(table):
+        if closed(table) and len(table) + len(self.waiting) > FEW_ROWS:
             self.flush()
         self.waiting.append(table)
         self.blocks += len(table)
@@ -427,7 +430,7 @@ def _joined(waiting: list[Table | tuple[int, dict[str, float]]]) -> Iterable[Tab
             rows.append(item)
     if rows:
         tables.append(table_of(rows))
-    if all(closed(table) for table in tables):
+    if all(closed(table) for table in tables) and sum(map(len, tables)) > FEW_ROWS * len(tables):
         return tables
     letters = sorted({letter for table in tables for letter in table.columns})
     line = np.concatenate([table.line for table in tables])
