@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -28,6 +29,7 @@ TURN = {
 RAPID = {"heidenhain": " FMAX"}
 
 
+@cache
 def program_of(case: Case) -> Program:
     """Program with everything in it; the tool is parallel to Z where the form has no words for its axis."""
     program: Program = job("g1", EPS, H, 0)[0]
@@ -310,7 +312,9 @@ def of_splines(text: Text, rng: np.random.Generator):
     """Heidenhain's SPL: where a spline begins follows from its coefficients."""
     lines = text.lines
     # the control's own rule: no more than a micrometre beside the end of the block before
-    for i in rng.choice([i for i in text.curved if text.is_straight(lines[i - 1])], 6, replace=False).tolist():
+    # with a machine each corner is many splines, and the text long
+    count = 2 if text.case.machine else 6
+    for i in rng.choice([i for i in text.curved if i - 1 in text.straight], count, replace=False).tolist():
         line, here = lines[i], (i + 1, i + 3)
         folded = line.endswith("~")
         rest = lines[i + 2 if folded else i + 1 :]

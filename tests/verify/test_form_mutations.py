@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import io
 from collections import Counter
+from functools import cache
 
 import pytest
 
 from cornersmooth.errors import InputError
+from cornersmooth.kinematics import Machine
 from cornersmooth.nc import fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
@@ -35,9 +37,14 @@ def text_of(case: Case) -> list[str]:
     return stream.getvalue().decode("ascii").splitlines()
 
 
+@cache
+def machine_of(case: Case) -> Machine | None:
+    """Machine of the control."""
+    return case.choose().machine
+
+
 def lines_named(case: Case, text: bytes) -> list[tuple[int, str]]:
     """What is wrong, and where."""
-    machine = case.choose().machine
     try:
         found = verify(
             program_of(case),
@@ -45,7 +52,7 @@ def lines_named(case: Case, text: bytes) -> list[tuple[int, str]]:
             tolerance=EPS,
             axis_length=H,
             control=case.control,
-            machine=machine,
+            machine=machine_of(case),
             tcp=case.tcp,
         )
     except InputError as error:
