@@ -7,7 +7,7 @@ over the samples, and over the real files of the corpus.
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -93,8 +93,11 @@ def test_random_chains_keep_the_tolerance(case: Case) -> None:
     verdict = judge(case.paths, originals, case.axis_length, case.tolerance)
     assert verdict.deviation.worst <= case.tolerance, verdict
     if case.written.form == "g1" and case.axis_length == max(AXIS_LENGTHS):  # controls turn vectors either way
-        paths = runs_of(case.written, case.axis_length, case.tolerance, "great circle")
-        verdict = judge(paths, originals, case.axis_length, case.tolerance)
+        # a quarter of the chains, without the one that is cut in two
+        part = replace(case.written, blocks=case.written.blocks[: len(case.written.blocks) // 4])
+        paths = runs_of(part, case.axis_length, case.tolerance, "great circle")[:-1]
+        assert len(paths) > len(originals) // 8
+        verdict = judge(paths, originals[: len(paths)], case.axis_length, case.tolerance)
         assert verdict.deviation.worst <= case.tolerance, verdict
 
 

@@ -43,7 +43,7 @@ def random_limits(rng: np.random.Generator) -> tuple[float, float] | None:
     ]
 
 
-def random_machine(rng: np.random.Generator) -> Machine:
+def altered_machine(rng: np.random.Generator) -> Machine:
     base = load_machine(machine_names()[rng.integers(len(machine_names()))])
     axes = tuple(
         replace(
@@ -80,7 +80,7 @@ def random_axes(rng: np.random.Generator, n: int) -> np.ndarray:
 
 def random_case(seed: int) -> tuple[Machine, np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
-    machine, n = random_machine(rng), int(rng.integers(2, 60))
+    machine, n = altered_machine(rng), int(rng.integers(2, 60))
     axis = random_axes(rng, n)
     tip = np.cumsum(rng.uniform(0, 1, (n, 3)) * rng.choice([0, 1, 1]), axis=0)
     rapid = rng.random(n) < rng.choice([0, 0.05, 0.3])

@@ -5,38 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cornersmooth.errors import SettingsError
-from cornersmooth.kinematics import Machine, RotaryAxis, load_machine, machine_names, tip_position, tool_axis
+from cornersmooth.kinematics import Machine, load_machine, machine_names, tip_position, tool_axis
 from cornersmooth.kinematics.bends import axis_bend, ruled_bend, tip_bend
+from kinematics.random_machines import random_machine
 
 STEPS = 200
-
-
-def random_machine(seed: int) -> Machine:
-    rng = np.random.default_rng(seed)
-    carriers = [("table", "table"), ("table", "head"), ("head", "head")][seed % 3]
-    while True:
-        try:
-            first, second = (
-                RotaryAxis(
-                    name,
-                    tuple(rng.normal(size=3)),
-                    carrier,
-                    point=tuple(rng.normal(size=3) * 100),
-                    positive="table" if carrier == "table" and rng.random() < 0.5 else "tool",
-                )
-                for name, carrier in zip("CB", carriers, strict=True)
-            )
-            return Machine(
-                "random",
-                (first, second),
-                tool_direction=tuple(rng.normal(size=3)),
-                tool_length=80,
-                part_zero=tuple(rng.normal(size=3) * 50),
-            )
-        except SettingsError:  # nearly parallel directions
-            continue
-
 
 MACHINES = [load_machine(name) for name in machine_names()] + [random_machine(seed) for seed in range(6)]
 IDS = [f"{machine.name}-{index}" for index, machine in enumerate(MACHINES)]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import (
     Machine,
     RotaryAxis,
@@ -18,30 +17,9 @@ from cornersmooth.kinematics import (
     tool_axis,
 )
 from cornersmooth.kinematics.orientation import closest_second, passes_pole, wrap
+from kinematics.random_machines import random_machine
 
 RNG = np.random.default_rng(20160713)
-
-
-def random_machine(seed: int) -> Machine:
-    rng = np.random.default_rng(seed)
-    carriers = [("table", "table"), ("table", "head"), ("head", "head")][seed % 3]
-    while True:
-        try:
-            axes = [
-                RotaryAxis(
-                    name,
-                    tuple(rng.normal(size=3)),
-                    carrier,
-                    point=tuple(rng.normal(size=3) * 100),
-                    positive="table" if carrier == "table" and rng.random() < 0.5 else "tool",
-                )
-                for name, carrier in zip("CB", carriers, strict=True)
-            ]
-            return Machine("random", (axes[0], axes[1]), tool_direction=tuple(rng.normal(size=3)), tool_length=80)
-        except SettingsError:  # nearly parallel directions
-            continue
-
-
 MACHINES = [load_machine(name) for name in machine_names()] + [random_machine(seed) for seed in range(6)]
 IDS = [f"{machine.name}-{index}" for index, machine in enumerate(MACHINES)]
 

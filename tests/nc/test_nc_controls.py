@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import pytest
 
-from cornersmooth.cl import read
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc import Form, Frame, choose_form, control_names, fit_settings, load_control, write
+from cornersmooth.nc import Frame, choose_form, control_names, fit_settings, load_control
 from cornersmooth.nc.tables import parse_control
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
+from nc.writing import lines_of
 
 CL = (
     "UNITS/MM\nPPRINT FIRST\nLOADTL/3\nSPINDL/9000,RPM,CLW\nCOOLNT/ON\nRAPID\nGOTO/0,0,50\nFEDRAT/800,MMPM\n"
     "GOTO/0,0,0\nGOTO/20,0,0\nGOTO/20,20,0\nDELAY/0.5\nSTOP\nSPINDL/OFF\nFINI\n"
 )
-
-
-def text_of(chosen: Form, cl: str = CL, frame: Frame | None = None, tolerance: float = 0.05) -> list[str]:
-    program = read(cl.encode(), name="part.cls")
-    smoothed = smooth(program, fit_settings(Settings(tolerance=tolerance), chosen, program.units))
-    stream = io.BytesIO()
-    written = write(smoothed, stream, form=chosen, frame=frame)
-    lines = stream.getvalue().decode("ascii").splitlines()
-    assert written.blocks == len(lines)
-    return lines
 
 
 def test_all_controls_are_there() -> None:
@@ -38,7 +26,7 @@ def test_all_controls_are_there() -> None:
 @pytest.mark.parametrize("control", control_names())
 def test_a_statement_is_said_in_the_words_of_the_control(control: str) -> None:
     machine = load_machine("table-bc") if control in ("haas", "linuxcnc") else None
-    lines = text_of(choose_form(control, machine=machine))
+    lines = lines_of(choose_form(control, machine=machine), CL)
     wanted = {
         "heidenhain": ["; FIRST", "TOOL CALL 3 Z", "TOOL CALL Z S9000", "M3", "M8", "CYCL DEF 9.1 DWELL 0.5", "STOP"],
         "siemens": ["; FIRST", "T3", "M6", "D1", "S9000 M3", "M8", "G4 F0.5", "M0"],
@@ -92,10 +80,10 @@ def test_what_cannot_run_is_refused_with_what_can(
 
 def test_a_tilted_tool_is_refused_where_no_word_can_say_it() -> None:
     chosen = choose_form("mitsubishi", "g6.2")
-    assert "G5 P10000" in text_of(chosen)
+    assert "G5 P10000" in lines_of(chosen, CL)
     tilted = CL.replace("GOTO/20,20,0", "GOTO/20,20,0,0,0.6,0.8")
     with pytest.raises(SettingsError, match=r"part.cls:11: error: the tool is not parallel to Z"):
-        text_of(chosen, tilted)
+        lines_of(chosen, tilted)
 
 
 @pytest.mark.parametrize("weights", [(1.0, 2.0), (0.5, 0.5)])
@@ -130,7 +118,7 @@ def test_a_table_of_the_users_says_only_what_is_different(tmp_path: Path) -> Non
     chosen = choose_form(file)
     assert chosen.control == "mine"
     assert list(load_control(str(file)).forms) == ["g1"]
-    lines = text_of(chosen, CL.replace("COOLNT/ON", "COOLNT/FLOOD\nCOOLNT/THRU"))
+    lines = lines_of(chosen, CL.replace("COOLNT/ON", "COOLNT/FLOOD\nCOOLNT/THRU"))
     assert lines[:3] == ["%", "O7777 (MY MILL)", "G21 G90"]
     assert lines[-2:] == ["M30", "%"]
     assert "M108" in lines
@@ -178,25 +166,25 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 
 def test_name_numbers_header_and_footer() -> None:
     frame = Frame("O4711", block_numbers=True, header=("({program} {units})",), footer=("G91 G28 Z0.", "G90"))
-    lines = text_of(choose_form("fanuc"), frame=frame)
+    lines = lines_of(choose_form("fanuc"), CL, frame=frame)
     assert lines[:4] == ["%", "N10 O4711", "N20 G21 G90 G94 G17 G40 G49 G80", "N30 (O4711 G21)"]
     numbers = [int(line.split()[0][1:]) for line in lines[1:-1]]
     assert numbers == list(range(10, 10 * len(lines) - 10, 10))
     assert [line.partition(" ")[2] for line in lines[-5:-1]] == ["G49", "G91 G28 Z0.", "G90", "M30"]
     with pytest.raises(SettingsError, match=r"unknown braces; use \{program\}, \{units\}"):
-        text_of(choose_form("fanuc"), frame=Frame(header=("{date}",)))
+        lines_of(choose_form("fanuc"), CL, frame=Frame(header=("{date}",)))
     with pytest.raises(SettingsError, match="characters that NC text cannot hold"):
-        text_of(choose_form("fanuc"), frame=Frame(footer=("Grüße",)))
+        lines_of(choose_form("fanuc"), CL, frame=Frame(footer=("Grüße",)))
 
 
 def test_heidenhain_numbers_every_block() -> None:
-    lines = text_of(choose_form("heidenhain"))
+    lines = lines_of(choose_form("heidenhain"), CL)
     assert [int(line.split()[0]) for line in lines] == list(range(len(lines)))
     assert lines[0] == "0 BEGIN PGM CORNERSMOOTH MM"
     assert lines[-1].endswith(" END PGM CORNERSMOOTH MM")
 
 
 def test_inches_have_their_own_word_and_digits() -> None:
-    lines = text_of(choose_form("siemens"), CL.replace("UNITS/MM", "UNITS/INCHES").replace("MMPM", "IPM"))
+    lines = lines_of(choose_form("siemens"), CL.replace("UNITS/MM", "UNITS/INCHES").replace("MMPM", "IPM"))
     assert "G90 G94 G17 G40 G700" in lines
     assert "G0 X0.00000 Y0.00000 Z50.00000 A3=0.0000000 B3=0.0000000 C3=1.0000000" in lines

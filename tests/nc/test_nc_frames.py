@@ -11,27 +11,18 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.errors import OutputError, SettingsError
-from cornersmooth.nc import Form, Frame, choose_form, control_names, control_table, fit_settings, write
+from cornersmooth.nc import Frame, choose_form, control_names, control_table, write
 from cornersmooth.nc.tables import parse_control
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from nc.cases import RUNNABLE, Case
+from nc.writing import lines_of
 
 CL = (
     "UNITS/MM\nPPRINT FIRST\nLOADTL/3\nSPINDL/9000,RPM,CLW\nCOOLNT/ON\nRAPID\nGOTO/0,0,50,0,0,1\nFEDRAT/800,MMPM\n"
     "GOTO/0,0,0\nGOTO/20,0,0\nGOTO/20,20,0\nLOADTL/4\nSPINDL/9000,RPM,CLW\nRAPID\nGOTO/20,20,50\nFEDRAT/800,MMPM\n"
     "GOTO/0,20,0\nFINI\n"
 )
-
-
-def text_of(form: Form, cl: str = CL, frame: Frame | None = None, tolerance: float = 0.05) -> list[str]:
-    program = read(cl.encode(), name="part.cls")
-    smoothed = smooth(program, fit_settings(Settings(tolerance=tolerance), form, program.units))
-    stream = io.BytesIO()
-    found = write(smoothed, stream, form=form, frame=frame)
-    lines = stream.getvalue().decode("ascii").splitlines()
-    assert found.blocks == sum(not line.endswith(" ~") for line in lines)
-    return lines
 
 
 def without_numbers(lines: list[str], control: str) -> list[str]:
@@ -45,7 +36,7 @@ def without_numbers(lines: list[str], control: str) -> list[str]:
 def test_a_tool_is_changed_before_tip_control_is_on(case: Case) -> None:
     """On behind the tool and before the motion, off before the next tool and at the end."""
     form = case.choose()
-    lines = without_numbers(text_of(form), case.control)
+    lines = without_numbers(lines_of(form, CL), case.control)
     change = {"siemens": "M6", "heidenhain": "TOOL CALL {} Z"}.get(case.control, "T{} M6")
     first, second = lines.index(change.format(3)), lines.index(change.format(4))
     if change == "M6":
@@ -73,7 +64,7 @@ ENDS = {
 @pytest.mark.parametrize("control", control_names())
 def test_head_and_tail(control: str) -> None:
     case = next(case for case in RUNNABLE if case.control == control)
-    lines = without_numbers(text_of(case.choose()), control)
+    lines = without_numbers(lines_of(case.choose(), CL), control)
     head, tail = ENDS[control]
     assert lines[: len(head)] == head
     assert lines[-len(tail) :] == tail
@@ -90,14 +81,14 @@ def test_head_and_tail(control: str) -> None:
     ],
 )
 def test_what_is_on_at_the_end_is_cancelled(statements: str, left: list[str]) -> None:
-    lines = text_of(
+    lines = lines_of(
         choose_form("fanuc"), "UNITS/MM\nLOADTL/1\nFEDRAT/500,MMPM\nGOTO/0,0,0\nGOTO/5,0,0\n" + statements + "FINI\n"
     )
     assert lines[-2 - len(left) : -2] == left
 
 
 def test_a_machine_without_tip_control_ends_in_feed_per_minute() -> None:
-    lines = text_of(
+    lines = lines_of(
         Case("siemens", "g1", "table-ac", tcp=False).choose(), CL.replace("/0,20,0\n", "/0,20,0,0,0.6,0.8\n")
     )
     assert "G93" in lines
@@ -121,17 +112,17 @@ def test_a_machine_without_tip_control_ends_in_feed_per_minute() -> None:
 def test_names_of_programs_are_those_of_the_control(control: str, good: list[str], bad: list[str]) -> None:
     form = next(case for case in RUNNABLE if case.control == control).choose()
     for name in good:
-        assert any(name in line for line in text_of(form, frame=Frame(name))[:3])
+        assert any(name in line for line in lines_of(form, CL, frame=Frame(name))[:3])
     for name in bad:
         with pytest.raises(SettingsError, match="takes no program name"):
-            text_of(form, frame=Frame(name))
+            lines_of(form, CL, frame=Frame(name))
 
 
 @pytest.mark.parametrize("control", control_names())
 def test_block_numbers_start_again_behind_the_last(control: str) -> None:
     form = next(case for case in RUNNABLE if case.control == control).choose()
     layout = replace(form.table.layout, number_last=5 * form.table.layout.number_step)
-    lines = text_of(replace(form, table=replace(form.table, layout=layout)), frame=Frame(block_numbers=True))
+    lines = lines_of(replace(form, table=replace(form.table, layout=layout)), CL, frame=Frame(block_numbers=True))
     numbers = [int(re.match(r"N?(\d+) ", line)[1]) for line in lines if line != "%"]  # type: ignore[index]
     step, start = layout.number_step, layout.number_start
     cycle = list(range(start, layout.number_last + 1, step))
@@ -143,7 +134,7 @@ def test_block_numbers_start_again_behind_the_last(control: str) -> None:
 
 
 def test_a_spline_of_five_axes_goes_on_in_the_next_line() -> None:
-    lines = text_of(Case("heidenhain", "spl", "table-ac").choose(), CL.replace("20,20,0\n", "20,20,0,0,0.6,0.8\n"))
+    lines = lines_of(Case("heidenhain", "spl", "table-ac").choose(), CL.replace("20,20,0\n", "20,20,0,0,0.6,0.8\n"))
     parts = [line for line in lines if "SPL" in line]
     assert parts
     assert all(line.endswith(" ~") for line in parts)
@@ -153,15 +144,15 @@ def test_a_spline_of_five_axes_goes_on_in_the_next_line() -> None:
 
 def test_lines_too_long_for_a_control_are_refused() -> None:
     form = Case("linuxcnc", "g1", "xyzac-trt").choose()
-    assert text_of(form, frame=Frame(header=("(" + 250 * "x" + ")",)))
+    assert lines_of(form, CL, frame=Frame(header=("(" + 250 * "x" + ")",)))
     with pytest.raises(OutputError, match="a block of 253 characters is too long for the control, which takes 252"):
-        text_of(form, frame=Frame(header=("(" + 251 * "x" + ")",)))
+        lines_of(form, CL, frame=Frame(header=("(" + 251 * "x" + ")",)))
 
 
 def test_long_comments_are_divided_for_every_control() -> None:
     for case in RUNNABLE:
         if case.machine in ("", "table-ac"):
-            lines = text_of(case.choose(), CL.replace("FIRST", 500 * "x"), Frame(block_numbers=True))
+            lines = lines_of(case.choose(), CL.replace("FIRST", 500 * "x"), frame=Frame(block_numbers=True))
             assert sum(line.count("x") for line in lines) == 500
             assert max(map(len, lines)) <= (case.choose().table.layout.longest_block or 255)
 
@@ -174,8 +165,8 @@ COMPACT = "like = 'fanuc'\n[motion]\nspaces = false\nleading_zeros = false\ntrai
 @pytest.mark.parametrize("form", ["g1", "g6.2"])
 def test_words_may_stand_close_and_zeros_be_left_out(form: str) -> None:
     """The same numbers word by word."""
-    plain = text_of(choose_form("fanuc", form))
-    tight = text_of(choose_form(parse_control(COMPACT), form))
+    plain = lines_of(choose_form("fanuc", form), CL)
+    tight = lines_of(choose_form(parse_control(COMPACT), form), CL)
     assert len(plain) == len(tight)
     assert sum(map(len, tight)) < 0.75 * sum(map(len, plain))
     words = re.compile(r"([A-Z])([+-]?[\d.]+)")
@@ -206,7 +197,7 @@ def test_words_may_stand_close_and_zeros_be_left_out(form: str) -> None:
     ],
 )
 def test_functions_are_switched_on_and_off(control: str, form: str, name: str, on: list[str], off: list[str]) -> None:
-    lines = text_of(choose_form(control, form, extras=(name, name)))
+    lines = lines_of(choose_form(control, form, extras=(name, name)), CL)
     for pair in (on, off):
         places = [number for number, line in enumerate(lines) if line == pair[0]]
         assert places
@@ -235,8 +226,8 @@ def test_comments_may_be_left_out(control: str) -> None:
     form = next(case for case in RUNNABLE if case.control == control).choose()
     mark = form.table.layout.comment[0]
     cl = CL.replace("GOTO/0,20,0", "CYCLE/TAP,4\nGOTO/0,20,0\nCYCLE/OFF\nABC/3")
-    with_comments = without_numbers(text_of(form, cl), control)
-    bare = without_numbers(text_of(form, cl, Frame(comments=False)), control)
+    with_comments = without_numbers(lines_of(form, cl), control)
+    bare = without_numbers(lines_of(form, cl, frame=Frame(comments=False)), control)
     head = form.table.layout.head
     assert sum(line.startswith(mark) for line in with_comments) > 3
     assert sum(line.startswith(mark) for line in bare) == sum(line.startswith(mark) for line in head)
@@ -249,14 +240,14 @@ def test_comments_hold_what_controls_take() -> None:
     """No brackets, percent signs, ends of blocks or letters beyond ASCII; LinuxCNC's orders are no orders any more."""
     said = "Fräsen (links) 50% ø8 ~; Ende – fertig 漢"
     cl = CL.replace("PPRINT FIRST", f"PPRINT {said}")
-    assert "(Frasen [links] 50/ o8 -, Ende ? fertig ?)" in text_of(choose_form("fanuc"), cl)
-    assert "; Frasen [links] 50/ o8 -, Ende ? fertig ?" in text_of(choose_form("siemens"), cl)
-    assert "2 ; Frasen [links] 50/ o8 -, Ende ? fertig ?" in text_of(choose_form("heidenhain"), cl)
+    assert "(Frasen [links] 50/ o8 -, Ende ? fertig ?)" in lines_of(choose_form("fanuc"), cl)
+    assert "; Frasen [links] 50/ o8 -, Ende ? fertig ?" in lines_of(choose_form("siemens"), cl)
+    assert "2 ; Frasen [links] 50/ o8 -, Ende ? fertig ?" in lines_of(choose_form("heidenhain"), cl)
     trunnion = Case("linuxcnc", "g1", "xyzac-trt").choose()
     for order in ("MSG, stop", "logopen,/tmp/x", "DEBUG,#1", "py,import os", "Probeopen x"):
-        lines = text_of(trunnion, CL.replace("PPRINT FIRST", f"PPRINT {order}"))
+        lines = lines_of(trunnion, CL.replace("PPRINT FIRST", f"PPRINT {order}"))
         assert f"(- {order})" in lines
-    assert "(FIRST)" in text_of(trunnion)
+    assert "(FIRST)" in lines_of(trunnion, CL)
 
 
 @pytest.mark.parametrize(
@@ -277,4 +268,4 @@ def test_tables_can_be_started_from(tmp_path: Path) -> None:
         file.write_text(control_table(name))
         case = next(case for case in RUNNABLE if case.control == name)
         form = choose_form(file, case.form, machine=case.choose().machine, tcp=case.tcp)
-        assert text_of(form) == text_of(case.choose())
+        assert lines_of(form, CL) == lines_of(case.choose(), CL)

@@ -242,31 +242,40 @@ def test_its_splines_are_our_curves(weights: tuple[float, float], tmp_path: Path
     cl, _ = flat(7, 12)
     smoothed = smooth(read(cl, name="chains.cls"), Settings(tolerance=0.5, weights=weights))
     rows = rng.choice(np.flatnonzero(smoothed.corners.smoothed), 6, replace=False)
-    for points in nurbs.control_points(smoothed.program, smoothed.corners, rows, 10.0):
-        for curve in points:
-            for plane in ((0, 1), (1, 2), (2, 0)):
-                flat_points = np.round(curve[:, plane], 9)
-                found = _spline(flat_points, weights, tmp_path)
-                dense = nurbs.evaluate(
-                    np.pad(flat_points, ((0, 0), (0, 1)))[None], np.array([weights]), np.linspace(0, 1, 20001)
-                )[0, :, :2]
-                start, step = dense[:-1], np.diff(dense, axis=0)
-                for point in found:
-                    size = np.einsum("ij,ij->i", step, step)
-                    share = np.einsum("ij,ij->i", point - start, step) / np.where(size > 0, size, 1.0)
-                    foot = start + np.clip(share, 0, 1)[:, None] * step
-                    assert np.linalg.norm(foot - point, axis=1).min() < 1e-6
+    curves = [
+        np.round(curve[:, plane], 9)
+        for points in nurbs.control_points(smoothed.program, smoothed.corners, rows, 10.0)
+        for curve in points
+        for plane in ((0, 1), (1, 2), (2, 0))
+    ]
+    for flat_points, found in zip(curves, _splines(curves, weights, tmp_path), strict=True):
+        dense = nurbs.evaluate(
+            np.pad(flat_points, ((0, 0), (0, 1)))[None], np.array([weights]), np.linspace(0, 1, 8001)
+        )[0, :, :2]
+        start, step = dense[:-1], np.diff(dense, axis=0)
+        size = np.einsum("ij,ij->i", step, step)
+        for point in found:
+            share = np.einsum("ij,ij->i", point - start, step) / np.where(size > 0, size, 1.0)
+            foot = start + np.clip(share, 0, 1)[:, None] * step
+            assert np.linalg.norm(foot - point, axis=1).min() < 1e-6
 
 
-def _spline(points: Floats, weights: tuple[float, float], folder: Path) -> Floats:
-    """Points that the interpreter makes of a curve."""
+def _splines(curves: list[Floats], weights: tuple[float, float], folder: Path) -> list[Floats]:
+    """Points that the interpreter makes of each curve; a rapid leads to its start."""
     w1, w2 = weights
-    places = [f"X{x:.9f} Y{y:.9f}" for x, y in points.tolist()]
-    lines = ["G21 G90 G17 G94 F100", f"G1 {places[0]}"]
-    lines += [f"G5.2 {places[1]} P{w1} L4", f"{places[2]} P{w2}", f"{places[3]} P{w1}", f"{places[4]} P1", "G5.3", "M2"]
-    found = [place[:2] for _, place in positions("\n".join(lines) + "\n", folder)]
-    assert len(found) > 10
-    return np.array(found)
+    lines = ["G21 G90 G17 G94 F100"]
+    for points in curves:
+        places = [f"X{x:.9f} Y{y:.9f}" for x, y in points.tolist()]
+        lines += [f"G0 {places[0]}", f"G5.2 {places[1]} P{w1} L4", f"{places[2]} P{w2}", f"{places[3]} P{w1}"]
+        lines += [f"{places[4]} P1", "G5.3"]
+    found: list[list[Floats]] = []
+    for kind, place in positions("\n".join([*lines, "M2"]) + "\n", folder):
+        if kind == "rapid":
+            found.append([])
+        else:
+            found[-1].append(place[:2])
+    assert min(map(len, found)) > 10
+    return [np.array(points) for points in found]
 
 
 def test_its_direction_of_the_tool_is_ours() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.cl import read
 from cornersmooth.model import Arcs, Move, Program
-from cornersmooth.nc import Written, choose_form, fit_settings, write
+from cornersmooth.nc import Form, Frame, Written, choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 
@@ -26,6 +26,17 @@ def text_of(program: Program, form: str = "g1", **settings: Any) -> tuple[list[s
 def text_of_cl(cl: str, form: str = "g1", **settings: Any) -> tuple[list[str], Written]:
     """Lines of the NC text of a CL text."""
     return text_of(read(cl.encode(), name="test.cls"), form, **settings)
+
+
+def lines_of(form: Form, cl: str, *, frame: Frame | None = None) -> list[str]:
+    """Lines of the NC text of a CL text in any form; as many blocks are reported as stand in it."""
+    program = read(cl.encode(), name="part.cls")
+    smoothed = smooth(program, fit_settings(Settings(tolerance=0.05), form, program.units))
+    stream = io.BytesIO()
+    found = write(smoothed, stream, form=form, frame=frame)
+    lines = stream.getvalue().decode("ascii").splitlines()
+    assert found.blocks == sum(not line.endswith(" ~") for line in lines)
+    return lines
 
 
 def codes(written: Written) -> dict[str, int]:

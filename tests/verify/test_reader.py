@@ -107,6 +107,39 @@ def test_arcs_by_radius_and_by_centre():
     assert codes(HEAD + b"G43 H1\nG0 X0. Y0. Z0.\nG2 X30. Y0. R10. F100.\n") == [("CS520", 6)]
 
 
+def test_where_the_tool_is_must_be_known_before_it_cuts():
+    nc = read_nc(HEAD + b"G43 H1\nG0 X1. Y2.\nZ50.\nG1 Z0. F100.\n")
+    assert nc.tip.tolist() == [[1, 2, 50], [1, 2, 50], [1, 2, 0]]
+    for text in (b"G0 X1. Y2.\nG1 Z0. F100.\n", b"G0 X1.\nG1 X3. F100.\n", b"G0 Z5.\nG1 X1. Y2. F100.\n"):
+        with pytest.raises(InputError, match="not all of the position is known") as caught:
+            read_nc(HEAD + b"G43 H1\n" + text)
+        assert caught.value.line == 6
+    # points on the axis that begin in the middle
+    with pytest.raises(InputError, match="not all of the position is known") as caught:
+        read_nc(HEAD + b"G43 H1\nG0 X1. Y2. Z3.\nG1 X2. F100.\nM8\nX3. U3. V2. W13.\n")
+    assert caught.value.line == 8
+    nc = read_nc(HEAD + b"G43 H1\nG0 Z90.\nM8\nX1. Y2. Z3. U1. V2. W13.\nG1 X2. U2. F100.\n")
+    assert nc.second.tolist() == [[1, 2, 13], [1, 2, 13], [2, 2, 13]]
+
+
+def test_vectors_must_be_in_force_and_have_a_length():
+    lines = b"G43 H1\nG0 X0. Y0. Z0.\nG1 X1. F100.\nG2 X2. Y1. I0. J1.\nG1 X3. I0.1 J0. K1.\n"
+    assert codes(HEAD + lines) == [("CS506", 8)]
+    assert codes(HEAD + b"G43.5 H1\nG0 X0. Y0. Z0. I0. J0. K1.\nG1 X1. F100.\nX2. I0. J0. K0.\n") == [("CS507", 7)]
+
+
+def test_curves_name_their_axes_at_once_and_where_they_may_stand():
+    def text(on: bytes, word: bytes) -> bytes:
+        start = HEAD + b"G43 H1\n" + on + b"G0 X0. Y0. Z0.\nG1 X1. F100.\nG6.2 P2 K0. X1. Y0." + word
+        return start + b"\nK0. X2. Y1. Z1.\nK1. X3. Y0. Z0.\nK2.\nK2.\n"
+
+    assert codes(text(b"", b"")) == [("CS511", 8), ("CS511", 9)]
+    assert codes(text(b"", b" Z0.")) == []
+    for on, wrong in ((b"", 1), (b"G5 P0\n", 1), (b"G5 P1\n", 1), (b"G5 P10000\n", 0)):
+        found = read_nc(text(on, b" Z0."), control="mitsubishi").problems
+        assert [problem.code for problem in found] == wrong * ["CS506"]
+
+
 def test_events_stand_where_they_stand():
     nc = read_nc(
         HEAD + b"T3 M6\nS1200 M3\nG43.5 H3\nG0 X0. Y0. Z0. I0. J0. K1.\nM8\nG4 P1500\nG1 X1. F10.\nM0\nG1 X2.\nM30\n"

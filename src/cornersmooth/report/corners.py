@@ -111,7 +111,7 @@ def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:
 
 
 @dataclass(frozen=True)
-class Worst:
+class WorstCorners:
     """The largest errors, and the smoothed corners nearest to the tolerance.
 
     Parameters
@@ -127,7 +127,7 @@ class Worst:
     rows: Ints
 
 
-def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = True) -> Worst:
+def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = True) -> WorstCorners:
     """Find the `count` worst corners; most corners are settled by what bounds their errors."""
     corners = smoothed.corners
     rows = np.flatnonzero(corners.smoothed)
@@ -149,4 +149,4 @@ def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = Tru
         seen, tip, axis_point = np.append(seen, more), np.append(tip, more_tip), np.append(axis_point, more_axis_point)
         larger = np.maximum(tip, axis_point)
     best = np.lexsort((seen, -larger))[:count]
-    return Worst(float(tip.max(initial=0.0)), float(axis_point.max(initial=0.0)), seen[best])
+    return WorstCorners(float(tip.max(initial=0.0)), float(axis_point.max(initial=0.0)), seen[best])

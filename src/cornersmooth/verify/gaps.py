@@ -127,6 +127,10 @@ def _brackets(block: Block) -> tuple[Ints, Ints, Ints, Ints]:
     return vertex, np.clip(on[k], low, high), low, high
 
 
+#: vectors shorter than this have no direction
+_LEAST = 1e-300
+
+
 def _on(values: Floats, segment: Ints, at: Floats) -> Floats:
     start = values.take(segment, axis=0)
     between: Floats = values.take(segment + 1, axis=0)
@@ -138,7 +142,8 @@ def _on(values: Floats, segment: Ints, at: Floats) -> Floats:
 
 def _unit_on(values: Floats, segment: Ints, at: Floats) -> Floats:
     between = _on(values, segment, at)
-    between /= np.sqrt(np.einsum("ij,ij->i", between, between))[:, None]
+    size = np.sqrt(np.einsum("ij,ij->i", between, between))
+    between /= np.maximum(size, _LEAST, out=size)[:, None]
     return between
 
 

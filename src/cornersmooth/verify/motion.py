@@ -106,11 +106,12 @@ def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
     straight = (code <= 1) | np.isnan(code)
     is_arc = np.zeros(len(table), np.bool_) if straight.all() else (code == 2) | (code == 3)
     letters = modal.rotary or (_POINT if points else _VECTOR)
-    if modal.rotary or points:
-        placed |= held.columns(table, letters, modal.second, second)
-    else:
-        placed |= _vectors(table, modal, straight, second)
     problems: list[Problem] = []
+    if modal.rotary or points:
+        known = modal.rotary or modal.points  # else there has been a vector, which is no point
+        placed |= held.columns(table, letters, modal.second if known else (np.nan,) * 3, second)
+    else:
+        placed |= _vectors(table, modal, straight, second, problems)
     curves = CurveTable()
     element_rows = placed
     if not (straight | is_arc).all():
@@ -209,7 +210,7 @@ class _Held:
         return given
 
 
-def _vectors(table: Table, modal: Modal, straight: Bools, values: Floats) -> Bools:
+def _vectors(table: Table, modal: Modal, straight: Bools, values: Floats, problems: list[Problem]) -> Bools:
     """Put the tool vector after every block into `values`; say which blocks have any of its words.
 
     In a vector some of whose words are missing they are zero; without any the last vector holds (FANUC G43.5,
@@ -226,6 +227,11 @@ def _vectors(table: Table, modal: Modal, straight: Bools, values: Floats) -> Boo
     for k, letter in enumerate(_VECTOR):
         column = np.where(missing[k], 0.0, table.column(letter)) if missing[k].any() else table.column(letter)
         values[:, k] = held.fill(column, before[k], ~given)
+    bare = values[:, 2] == 0
+    if bare.any():  # seldom: only then the others are looked at
+        bare &= given & (values[:, 0] == 0) & (values[:, 1] == 0)
+        text = "a tool vector without length"
+        problems.extend(Problem("CS507", 0, int(table.line[row]), text) for row in np.flatnonzero(bare).tolist())
     return given
 
 
@@ -242,7 +248,7 @@ def _curves(
     found = []
     if (nurbs := code == NURBS).any():
         starts = nurbs & (table.column("G") == NURBS)
-        found.append(knot_curves(table, six, placed, nurbs, starts, problems))
+        found.append(knot_curves(table, six, placed, nurbs, starts, letters, problems))
     if (spline := placed & (code == BSPLINE)).any():
         found.append(interval_curves(table, six, spline, before, problems))
     for kind, read in ((POLY, poly_curves), (SPL, spl_curves)):

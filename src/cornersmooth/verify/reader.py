@@ -15,13 +15,15 @@ import numpy as np
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.verify.dialects import CONTROLS, Dialect, dialect_of
+from cornersmooth.verify.dialects.base import HIGH_SPEED
 from cornersmooth.verify.motion import Modal, Piece, execute
 from cornersmooth.verify.ncprogram import Element, Event, NcProgram, Problem, Second
 from cornersmooth.verify.pile import Pile
 from cornersmooth.verify.rotary import Rotary
 from cornersmooth.verify.runs import read_lines
 from cornersmooth.verify.stops import moving_rapids
-from cornersmooth.verify.words import Line, Table, table_of
+from cornersmooth.verify.unknown import settle
+from cornersmooth.verify.words import NURBS, Line, Table, table_of
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -36,6 +38,9 @@ FIXED_SHARE: Final = 0.1
 
 #: code of words that want another state of the control
 CONTROL_WORDS: Final = "CS506"
+
+#: runs of fewer blocks are executed together: each folded block of Klartext is a run of its own
+FEW_ROWS: Final = 64
 
 #: words that say what is in force when it must be
 _NEEDS = {
@@ -218,7 +223,7 @@ class Reader:
         self.feed_units: set[float] = set()
         self.lines = 0
         self.lever = 0.0
-        self.elements = 0
+        self.elements = self.pointless = 0
         self.blocks = 0
 
     def take(self, items: Iterable[Table | Line]) -> None:
@@ -271,7 +276,7 @@ class Reader:
 
     def rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
-        if closed(table):
+        if closed(table) and len(table) + len(self.waiting) > FEW_ROWS:
             self.flush()
         self.waiting.append(table)
         self.blocks += len(table)
@@ -298,7 +303,9 @@ class Reader:
         for table in _joined(self.waiting):
             before = self.modal
             piece, self.modal = execute(table, before)
-            self._check_control(table)
+            self._check_control(table, before.code)
+            if self.modal.points and not before.points:
+                self.pointless = self.elements
             self.problems.extend(piece.problems)
             unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
             unit = 1.0 if before.inverse_time else unit
@@ -356,31 +363,42 @@ class Reader:
         """Give up: words that make it impossible to tell where the tool is."""
         raise InputError("CS503", what, hint, file=self.name, line=line.number)
 
-    def _check_control(self, table: Table) -> None:
+    def _check_control(self, table: Table, code: float) -> None:
         """Complain, once for each state, of words that the control would not take for what they are."""
+        needed = self.dialect.curves_need
+        if needed and not self.memory.get(HIGH_SPEED) and (curves := np.flatnonzero(table.column("G") == NURBS)).size:
+            text = f"a curve where {needed} must be in force"
+            self.problems.append(Problem(CONTROL_WORDS, 0, int(table.line[curves[0]]), text))
         letters = table.columns.keys()
         if self.rotary is not None:
             kind = "angles" if self.rotary.tip_control else "machine"
-            used = bool(letters & set(self.rotary.names))
+            used = letters & set(self.rotary.names)
         else:
             kind = "point" if self.modal.points else "vector"
-            used = bool(letters & set("UVW" if self.modal.points else "IJ"))
+            used = letters & set("UVW" if self.modal.points else "IJ")
         wanted = self.dialect.controls.get(kind)
         if wanted is None or not used or self.tip_control in wanted or (kind, self.tip_control) in self.complained:
             return
-        code = table.columns.get("G")
-        if kind == "vector" and code is not None and (code >= 2).any():  # I J of an arc
+        rows = table.rows_with(used, code)
+        if not len(rows):
             return
         self.complained.add((kind, self.tip_control))
         need = " or ".join(word or "no tool tip control" for word in wanted)
         text = f"{_NEEDS[kind]} under {self.tip_control or 'no tool tip control'}, where {need} must be in force"
-        self.problems.append(Problem(CONTROL_WORDS, 0, int(table.line[0]), text))
+        self.problems.append(Problem(CONTROL_WORDS, 0, int(table.line[rows[0]]), text))
 
     def result(self) -> NcProgram:
         """Put all pieces together, in millimetres."""
         second_is: Second = "point" if self.modal.points else "vector"
         scale = MM_PER_UNIT[self.units]
         elements, curves, arcs = self.pile.whole()
+        elements["second"][: self.pointless] = np.nan
+        line = settle(elements, ("tip", "second"))
+        if line is not None:
+            hint = "say X Y Z, and U V W where there are any, before the first feed"
+            raise InputError(
+                "CS503", "a feed move where not all of the position is known", hint, file=self.name, line=line
+            )
         place = np.searchsorted(elements["line"], [number for number, _ in self.comments])
         self.events.extend(
             Event(int(element), number, "(", 0.0, text)
@@ -426,7 +444,7 @@ def _joined(waiting: list[Table | tuple[int, dict[str, float]]]) -> Iterable[Tab
             rows.append(item)
     if rows:
         tables.append(table_of(rows))
-    if all(closed(table) for table in tables):
+    if all(closed(table) for table in tables) and sum(map(len, tables)) > FEW_ROWS * len(tables):
         return tables
     letters = sorted({letter for table in tables for letter in table.columns})
     line = np.concatenate([table.line for table in tables])

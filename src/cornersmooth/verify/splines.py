@@ -69,7 +69,7 @@ def slices(size: Ints, chosen: Ints) -> Ints:
 
 
 def knot_curves(
-    table: Table, six: Floats, placed: Bools, curve: Bools, starts: Bools, problems: list[Problem]
+    table: Table, six: Floats, placed: Bools, curve: Bools, starts: Bools, letters: str, problems: list[Problem]
 ) -> CurveTable:
     """Curves of FANUC's G06.2 (B-63324EN/03 4.17): a knot K and a weight R in every block.
 
@@ -85,6 +85,8 @@ def knot_curves(
         Blocks that belong to curves.
     starts : (r,) bool
         Those with which one begins.
+    letters : str
+        Addresses of the axes.
     problems : list of Problem
         Takes what breaks the rules.
     """
@@ -124,6 +126,12 @@ def knot_curves(
     late = is_point[1:] & ~is_point[:-1]
     late &= ~starts[rows][1:]
     complain(np.append(False, late), "CS515", "a control point after the blocks with only a knot")
+    late = np.zeros(len(rows), np.bool_)
+    for letter in sorted({*letters} & table.columns.keys() - {"K"}):
+        named = ~np.isnan(table.columns[letter].take(rows[start]))
+        if not named.all():
+            late |= ~np.isnan(table.columns[letter][rows]) & ~np.repeat(named, size)
+    complain(late, "CS511", "an axis that the first block of the curve does not name")
     falls = np.append(False, (np.diff(knot) < 0) & ~starts[rows][1:])
     complain(falls, "CS516", "a knot below the one before it")
     unclamped = _unclamped(knot, start, size, order)

@@ -296,6 +296,8 @@ def compare(
         How far, in mm, two places along the path are apart that differ by more than the room.
     """
     problems: list[Problem] = []
+    # what shifts the path counts wherever it is said
+    unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
     found = [token for token in found if token.kind not in unsaid]
     end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)

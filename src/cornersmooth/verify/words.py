@@ -7,6 +7,7 @@ them make up nearly all of a file and are read by `runs`; every other line is ta
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +53,15 @@ class Table:
         """(r,) float64: the words of one letter, NaN where there is none."""
         found = self.columns.get(letter)
         return np.full(len(self), np.nan) if found is None else found
+
+    def rows_with(self, letters: Iterable[str], code: float) -> Ints:
+        """Rows with any of some words, but for arcs, whose I J K are no vector; `code` is the G word before the run."""
+        given = np.any([~np.isnan(self.column(letter)) for letter in letters], axis=0)
+        own = self.column("G")
+        last = np.maximum.accumulate(np.where(np.isnan(own), -1, np.arange(len(own))))
+        own = np.where(last < 0, code, own[last])
+        rows: Ints = np.flatnonzero(given & (own != 2) & (own != 3))
+        return rows
 
 
 @dataclass(frozen=True)

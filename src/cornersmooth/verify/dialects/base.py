@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 AFTER_MOTION = (0.0, 1.0, 2.0, 5.0, 9.0, 30.0)
 
 
+#: name in `State.memory` of whether look ahead of the kind that some controls ask for with curves is on
+HIGH_SPEED = "high speed"
+
+
 class State(Protocol):
     """What a dialect may ask of the reader, and tell it."""
 
@@ -60,6 +64,8 @@ class Dialect:
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
     #: what must be in force for words of a kind: ``"vector"``, ``"point"``, ``"angles"``, ``"machine"``
     controls: Mapping[str, tuple[str, ...]] = {}
+    #: what must be in force for curves; empty for nothing
+    curves_need: str = ""
     #: the first letter, or letters, of tip and second triple in the spelling, with their decimals
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 

@@ -104,7 +104,12 @@ class Heidenhain(Dialect):
         else:
             if motion and "PATH" not in motion and motion.keys() - {"F"}:
                 state.refuse(line, "words of a path without L, LN or SPL", "give the whole block")
-            state.move(line, _coded(motion) or {})
+            coded = _coded(motion)
+            if coded is None:
+                state.refuse(
+                    line, "words that this kind of block does not take", "give L, LN or SPL what belongs to it"
+                )
+            state.move(line, coded or {})
 
     def _circle(self, motion: dict[str, float], line: Line, state: State) -> dict[str, float]:
         """C: about the centre that CC has said, in the plane XY."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cornersmooth.verify.dialects.base import AFTER_MOTION, Dialect, State
+from cornersmooth.verify.dialects.base import AFTER_MOTION, HIGH_SPEED, Dialect, State
 from cornersmooth.verify.spelling import Spelling
 from cornersmooth.verify.words import MOTION_CODES, MOTION_LETTERS, PLACE_LETTERS, Line, Table
 
@@ -37,6 +37,8 @@ class IsoWords:
         Letters that say nothing here.
     unsaid : frozenset
         `Dialect.unsaid`.
+    curves_need : str
+        `Dialect.curves_need`.
     """
 
     tip_control: Mapping[float, str]
@@ -45,6 +47,7 @@ class IsoWords:
     dwell: float = 1.0
     others: str = "NOQ"
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
+    curves_need: str = ""
 
 
 _FANUC = {43.0: "G43", 43.4: "G43.4", 43.5: "G43.5", 49.0: ""}
@@ -56,7 +59,8 @@ _HIGH_SPEED = frozenset((5.0, 5.1, 8.0))
 
 ISO_WORDS: Mapping[str, IsoWords] = {
     "fanuc": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH),
-    "mitsubishi": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH),
+    # high-speed high-accuracy control II, or III (P20000): program error P29 without it
+    "mitsubishi": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH, curves_need="G5 P10000"),
     "haas": IsoWords(
         {43.0: "G43", 234.0: "G234", 49.0: ""},
         {"angles": ("G234",), "machine": ("", "G43"), "vector": ("G234",)},
@@ -90,7 +94,7 @@ class Iso(Dialect):
             letters = "".join(letter for letter in letters if letter not in "IJUVW") + rotary
             places = (places - set("IJUVW")) | set(rotary)
         super().__init__(_IsoSpelling(letters, places, rotary), rotary)
-        self.controls, self.unsaid = self.iso.controls, self.iso.unsaid
+        self.controls, self.unsaid, self.curves_need = self.iso.controls, self.iso.unsaid, self.iso.curves_need
         self.letters = frozenset(letters) | ({"I", "J"} if rotary else set())
 
     def row(self, line: Line) -> dict[str, float] | None:
@@ -107,6 +111,8 @@ class Iso(Dialect):
         """Interpret a line that is no motion block."""
         motion: dict[str, float] = {}
         given = {letter: value for letter, value, _ in line.words}
+        if given.get("G") == 5.0:
+            state.memory[HIGH_SPEED] = given.get("P", 0.0) >= 10000.0
         for letter, value, text in line.words:
             if letter == "G":
                 if value in MOTION_CODES:
