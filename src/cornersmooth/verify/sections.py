@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import count
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import Bools, Floats, Ints, Move, Units
+from cornersmooth.model import Bools, Floats, Ints, Move, Program, Units
 from cornersmooth.verify.comparison import Compared, Comparison
 from cornersmooth.verify.deviation import Largest, exact_poses
 from cornersmooth.verify.layouts import Layouts
@@ -29,12 +30,12 @@ from cornersmooth.verify.reader import CONTROL_WORDS, DIGITS_SAMPLE, Reader, Sta
 from cornersmooth.verify.runs import CHUNK, read_lines
 from cornersmooth.verify.source import GivenUp, Part, Source
 from cornersmooth.verify.stops import Stretches, digit_errors, stops_of_original, stops_of_text
-from cornersmooth.verify.trails import Original
+from cornersmooth.verify.trails import Original, original_motion
 from cornersmooth.verify.words import Line, Table
 from cornersmooth.verify.workers import LeftAlone, Place
 
 #: bytes of a section
-SECTION: Final = 1 << 24
+SECTION: Final = 1 << 23
 
 #: a cut is looked for in so many bytes before the end of a section, then in more
 _REACHES: Final = (1 << 16, 1 << 20)
@@ -61,26 +62,34 @@ class Task:
 
     Parameters
     ----------
-    original : Original
-    exact : (m,) bool
+    program : Program
     source : Source
     style : Style
     words : bool
         See `verify`.
     """
 
-    original: Original
-    exact: Bools
+    program: Program
     source: Source
     style: Style
     words: bool
 
     @classmethod
-    def of(cls, original: Original, source: Source, style: Style, *, words: bool) -> Task | None:
+    def of(cls, program: Program, source: Source, style: Style, *, words: bool) -> Task | None:
         """Make it; None for what is not looked at in sections: texts for a machine's axes, and CL files with holes."""
-        if style.machine is not None or not len(original.pose) or (original.program.kind == Move.HOLE).any():
+        if style.machine is not None or (program.kind == Move.HOLE).any() or (program.kind == Move.FROM).all():
             return None
-        return cls(original, exact_poses(original), source, style, words)
+        return cls(program, source, style, words)
+
+    @cached_property
+    def original(self) -> Original:
+        """The CL motion; every process makes it for itself, while there is no text yet."""
+        return original_motion(self.program, self.style.tolerance, self.style.axis_length)
+
+    @cached_property
+    def exact(self) -> Bools:
+        """(m,) moves whose end must be passed exactly."""
+        return exact_poses(self.original)
 
 
 @dataclass(frozen=True)
@@ -227,6 +236,7 @@ class _Worker:
 
     def __init__(self, task: Task, place: Place) -> None:
         self.task, self.place, self.source = task, place, task.source
+        self.original, self.exact = task.original, task.exact
         self.spelling = task.style.dialect.spelling
         self.layouts = Layouts(self.spelling.columns, numbered=self.spelling.numbered)
         self.steps = task.style.steps(self.source.read(0, DIGITS_SAMPLE))
@@ -342,12 +352,12 @@ class _Worker:
     def _theirs(self, nc: NcProgram) -> Ints:
         """Stops of the original."""
         if self._stops is None:
-            self._stops = stops_of_original(self.task.original, self.task.style.axis_length, nc.tip_step)
+            self._stops = stops_of_original(self.original, self.task.style.axis_length, nc.tip_step)
         return self._stops
 
     def _stretches(self, nc: NcProgram, read: _Read, baton: Baton) -> Stretches:
         """What lies between the stops of a section, if these are exactly those of the original that come next."""
-        original, program = self.task.original, self.task.original.program
+        original, program = self.original, self.original.program
         ours = stops_of_text(nc, read.first, read.stop - 1)
         stops = self._theirs(nc)
         behind = baton.stops + len(ours)
@@ -368,7 +378,7 @@ class _Worker:
 
     def _compare(self, read: _Read, baton: Baton, nc: NcProgram, stretches: Stretches) -> tuple[Section, float]:
         """Measure a section; also its margin."""
-        style, whole = self.task.style, self.task.original
+        style, whole = self.task.style, self.original
         first, last = int(stretches.move_first[0]), int(stretches.move_last[-1])
         stretches = replace(stretches, move_first=stretches.move_first - first, move_last=stretches.move_last - first)
         # words beside the motion belong to the element in front of them
@@ -377,7 +387,7 @@ class _Worker:
         own = np.array([event.element - 1 for event in events], np.int64)
         elements = np.unique(own)
         comparison = Comparison(
-            whole.part(first, last), self.task.exact[first : last + 1], nc, style.tolerance, style.axis_length
+            whole.part(first, last), self.exact[first : last + 1], nc, style.tolerance, style.axis_length
         )
         compared = comparison.compare(stretches, elements, so_far=self._largest)
         if compared.problems:

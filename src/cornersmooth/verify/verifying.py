@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
 
@@ -124,10 +124,9 @@ class Verifier:
         self._program, self._nc, self._words, self._processes = program, nc, words, processes
         self._style = Style.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._source = Source(nc)
-        self._original = original_motion(program, tolerance, axis_length)
         self._task: sections.Task | None = None
         if len(program) >= LONG:
-            self._task = sections.Task.of(self._original, self._source, self._style, words=words)
+            self._task = sections.Task.of(program, self._source, self._style, words=words)
         self._ring: Ring | None = None
 
     def __enter__(self) -> Self:
@@ -152,7 +151,11 @@ class Verifier:
         """
         self._source.finish()
         if self._task is not None:
-            shares = [sections.work_on(self._task, Place())] if self._ring is None else self._ring.results()
+            if self._ring is None:
+                shares = [sections.work_on(self._task, Place())]
+            else:
+                _ = self._length  # while the others are still at work
+                shares = self._ring.results()
             found = sections.put_together(shares)
             verification = None if found is None else self._of_sections(found)
             if verification is not None:
@@ -160,14 +163,24 @@ class Verifier:
         nc = read_styled(self._nc, self._style)
         return _whole(self._original, nc, self._style.tolerance, self._style.axis_length, self._words, self._processes)
 
+    @cached_property
+    def _original(self) -> Original:
+        if self._task is not None:
+            return self._task.original
+        return original_motion(self._program, self._style.tolerance, self._style.axis_length)
+
+    @cached_property
+    def _length(self) -> Floats:
+        """Length of the original path up to its vertices, mm."""
+        return lengths(self._original.trail.six(self._style.axis_length))
+
     def _of_sections(self, found: sections.Found) -> Verification | None:
         """Put the sections together; None where something is wrong."""
-        original, style, program = self._original, self._style, self._program
+        original, length, style, program = self._original, self._length, self._style, self._program
         problems = _units_problems(program, found.units)
         compared = Compared(Largest(), Joints(), [], [], np.zeros(0))
         events: list[Event] = []
         places: list[Floats] = []
-        length = lengths(original.trail.six(style.axis_length))
         for section in found.sections:
             compared.largest.take(section.compared.largest)
             compared.joints.take(section.compared.joints)
