@@ -212,47 +212,59 @@ class Matcher:
         six = written.trail.six(self.axis_length)
         length = lengths(six)
         ends = written.trail.last
-        lanes: list[Lane] = []
-        for piece in pieces:
-            lane = (int(ends[piece[0] - first]), int(ends[piece[1] - first]), *piece[2:])
-            if lane[1] - lane[0] > 2 * LANE:
-                lanes += cut_finely(six, length, self.track, lane, LANE, self.near, ends)
-            else:
-                lanes.append(lane)
-        table = Lanes(*(np.array(column) for column in zip(*lanes, strict=True)))
-        (segment, fraction, backward, distance), nearest = self._places(six, length, table)
-        spans = [(int(ends[a - first]), int(ends[b - first]), start, stop) for a, b, start, stop, _ in pieces]
+        lanes = [(int(ends[a - first]), int(ends[b - first]), start, stop, at) for a, b, start, stop, at in pieces]
+        (segment, fraction, backward, distance), nearest = self._places(six, length, lanes, ends)
         on = fraction >= 0
         number = np.full(len(six), -1, np.int64)
         low, high = np.zeros(len(six), np.int64), np.zeros(len(six), np.int64)
-        if len(spans) == 1:
-            a, b, start, stop = spans[0]
+        if len(lanes) == 1:
+            a, b, start, stop, _ = lanes[0]
             number[a : b + 1], low[a : b + 1], high[a : b + 1] = 0, start, stop - 1
         else:
-            firsts, lasts, starts, stops = np.array(spans).T
+            firsts, lasts, starts, stops = np.array([lane[:4] for lane in lanes]).T
             size = lasts - firsts + 1
-            index = np.repeat(np.arange(len(spans)), size)
+            index = np.repeat(np.arange(len(lanes)), size)
             vertex = np.repeat(firsts - np.cumsum(size) + size, size) + np.arange(len(index))
             number[vertex], low[vertex], high[vertex] = index, starts[index], stops[index] - 1
         goal = np.where(np.append(number[1:] != number[:-1], np.isinf(until)), high + 1.0, np.nan)
         self._look_again(six, number, goal, segment, fraction, backward, distance)
         return Block(written, six, on, number, segment, fraction, backward, distance, nearest, low, high, until)
 
-    def _places(self, six: Floats, length: Floats, lanes: Lanes) -> tuple[Walked, bool]:
-        """Place of every vertex of the lanes, as `walk` returns it, and whether it is nearest for all of them."""
-        vertex, *own, good = glide(six, length, self.track, lanes, self.doubtful)
-        nearest = bool(good.all())
-        if nearest:
-            found = nowhere(len(six))
-        else:
-            found = walk(six, self.track, lanes.only(~good), self.margin, self.near)
-            rows = np.repeat(good, lanes.last - lanes.first)
-            vertex, own, lanes = vertex[rows], [values[rows] for values in own], lanes.only(good)
+    def _places(self, six: Floats, length: Floats, lanes: list[Lane], candidates: Ints) -> tuple[Walked, bool]:
+        """Place of every vertex of the lanes, as `walk` returns it, and whether it is nearest for all of them.
+
+        Lanes in which not everything can be told at once are cut at anchors, for which there are candidates; and what
+        is then still in doubt is walked.
+        """
+        found = nowhere(len(six))
         segment, fraction, _, distance = found
-        segment[vertex], fraction[vertex], distance[vertex] = own
-        starts = np.flatnonzero(fraction[lanes.first] < 0)  # what no other lane ends with
-        segment[lanes.first[starts]], fraction[lanes.first[starts]] = lanes.start[starts], lanes.fraction[starts]
-        return found, nearest
+        for again in (False, True):
+            if again:
+                lanes = self._cut(six, length, lanes, candidates)
+            table = Lanes.of(lanes)
+            segment[table.first], fraction[table.first] = table.start, table.fraction
+            vertex, *places, good = glide(six, length, self.track, table, self.doubtful)
+            sure = np.repeat(good, table.last - table.first)
+            own = vertex[sure]
+            segment[own], fraction[own], distance[own] = (values[sure] for values in places)
+            lanes = [lane for lane, well in zip(lanes, good.tolist(), strict=True) if not well]
+            if not lanes:
+                return found, True
+        walked = walk(six, self.track, Lanes.of(lanes), self.margin, self.near)
+        rest = vertex[~sure]
+        for values, theirs in zip(found, walked, strict=True):
+            values[rest] = theirs[rest]
+        return found, False
+
+    def _cut(self, six: Floats, length: Floats, lanes: list[Lane], candidates: Ints) -> list[Lane]:
+        """Cut long lanes at anchors."""
+        cut: list[Lane] = []
+        for lane in lanes:
+            if lane[1] - lane[0] > 2 * LANE:
+                cut += cut_finely(six, length, self.track, lane, LANE, self.near, candidates)
+            else:
+                cut.append(lane)
+        return cut
 
     @property
     def doubtful(self) -> float:

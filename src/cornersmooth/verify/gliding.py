@@ -1,8 +1,9 @@
 """Places of written vertices on the original, found for all of them at once where there is no doubt.
 
-Between two anchors both motions are nearly equally long, so that the path length tells where about a vertex is, and
-the nearest segment is found from there. Where the places of a lane then follow one another and none is far off, they
-are what a walker would find, and more exactly; every other lane is left to the walker.
+Both motions are nearly equally long, so that the path length tells where about a vertex is, and the nearest segment is
+found from there: first for few vertices, which tell more exactly where about those between them are. Where the places
+of a lane then follow one another and none is far off, they are what a walker would find, and more exactly; every other
+lane is left to the walker.
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.nearest import climb, nearest_places
 from cornersmooth.verify.stops import ARITHMETIC
 from cornersmooth.verify.walking import Lanes, Track
+
+#: of so many vertices the place of one is found first
+_STRIDE = 32
 
 #: how much longer one motion may be than the other between neighbouring vertices, in distances that are doubtful
 _SHORTCUT = 2.0
@@ -42,7 +46,7 @@ def glide(
     good : (k,) bool
         Lanes whose places leave no doubt.
     """
-    first, start, high = lanes.first, lanes.start, lanes.stop - 1
+    first, start = lanes.first, lanes.start
     count = lanes.last - first
     owner = np.repeat(np.arange(len(lanes)), count)
     head = np.cumsum(count) - count
@@ -57,17 +61,20 @@ def glide(
     about -= length[first][owner]
     about *= scale[owner]
     about += begin[owner]
-    low, high = start[owner], high[owner]
-    middle = np.clip(np.searchsorted(track.length, about, side="right") - 1, low, high)
     point = six.take(vertex, axis=0)
-    segment, fraction, square = nearest_places(point, track.six, middle, 1, low, high)
-    moved = climb(point, track.six, middle, low, high, segment, fraction)
-    square[moved] = _squares(point[moved], track, segment[moved], fraction[moved])
+    low, high = start[owner], (lanes.stop - 1)[owner]
+    few = np.arange(_STRIDE - 1, len(owner), _STRIDE)
+    segment, fraction, _ = _nearest(point[few], track, about[few], low[few], high[few])
+    off = track.length[segment] + fraction * (track.length[segment + 1] - track.length[segment]) - about[few]
+    some = np.flatnonzero(count)
+    known = np.concatenate((head[some], (head + count)[some] - 1, few))
+    order = np.argsort(known, kind="stable")
+    about += np.interp(np.arange(len(owner)), known[order], np.append(np.zeros(2 * len(some)), off)[order])
+    segment, fraction, square = _nearest(point, track, about, low, high)
     distance = np.sqrt(square)
     gone = track.length[segment]
     gone += fraction * (track.length[segment + 1] - gone)
     step = gone - np.concatenate(([0.0], gone[:-1]))
-    some = np.flatnonzero(count)
     step[head[some]] = gone[head[some]] - begin[some]
     # a rounding is shorter than its corner by no more than twice its deviation: else a part is left out, or run again
     apart = np.abs(step - (length[vertex] - length[vertex - 1]))
@@ -80,8 +87,12 @@ def glide(
     return vertex, segment, fraction, distance, good
 
 
-def _squares(point: Floats, track: Track, segment: Ints, fraction: Floats) -> Floats:
-    row = track.row[segment]
-    away = point - row[:, :6] - fraction[:, None] * row[:, 6:12]
-    square: Floats = np.einsum("ij,ij->i", away, away)
-    return square
+def _nearest(point: Floats, track: Track, about: Floats, low: Ints, high: Ints) -> tuple[Ints, Floats, Floats]:
+    """Nearest places of points (k, 6) from path lengths on: segment, fraction, and square of the distance."""
+    middle = np.clip(np.searchsorted(track.length, about, side="right") - 1, low, high)
+    segment, fraction, square = nearest_places(point, track.six, middle, 1, low, high)
+    moved = climb(point, track.six, middle, low, high, segment, fraction)
+    row = track.row[segment[moved]]
+    away = point[moved] - row[:, :6] - fraction[moved, None] * row[:, 6:12]
+    square[moved] = np.einsum("ij,ij->i", away, away)
+    return segment, fraction, square

@@ -79,9 +79,10 @@ class Lanes:
     def __len__(self) -> int:
         return len(self.first)
 
-    def only(self, rows: Bools) -> Lanes:
-        """Some of the lanes."""
-        return Lanes(*(column[rows] for column in vars(self).values()))
+    @classmethod
+    def of(cls, lanes: list[Lane]) -> Lanes:
+        """Make a table of them."""
+        return cls(*(np.array(column) for column in zip(*lanes, strict=True)))
 
 
 #: what `walk` returns
