@@ -91,8 +91,9 @@ def compile_baseline(folder: Path) -> Path:
 
 def compare(form: str, path: Path, folder: Path, programs: dict[str, Path], runs: int) -> None:
     """Time one output form and print its table."""
-    names = ("cornersmooth", "without verification", "baseline.c")
+    names = ("smooth", "smooth --no-verify", "verify", "baseline.c")
     written = {name: folder / f"{number}-{form}.nc" for number, name in enumerate(names)}
+    written["verify"] = written["smooth"]
     report = folder / "report.json"
     options: list[str | Path] = [
         "-e",
@@ -108,8 +109,9 @@ def compare(form: str, path: Path, folder: Path, programs: dict[str, Path], runs
     ]
     smooth = [programs["cornersmooth"], "smooth", path, *options, "-o"]
     commands: dict[str, list[str | Path]] = {
-        "cornersmooth": [*smooth, written["cornersmooth"]],
-        "without verification": [*smooth, written["without verification"], "--no-verify"],
+        "smooth": [*smooth, written["smooth"]],
+        "smooth --no-verify": [*smooth, written["smooth --no-verify"], "--no-verify"],
+        "verify": [programs["cornersmooth"], "verify", path, written["verify"], "-e", f"{TOLERANCE}", "-q"],
         "baseline.c": [programs["baseline.c"], path, written["baseline.c"], f"{TOLERANCE}", f"{AXIS_LENGTH}"],
     }
     if form == "g6.2":
@@ -119,7 +121,7 @@ def compare(form: str, path: Path, folder: Path, programs: dict[str, Path], runs
     for _ in range(runs):
         for name, command in commands.items():
             taken[name].append(run(command))
-            if name == "cornersmooth":
+            if name == "smooth":
                 seconds = json.loads(report.read_text())["summary"]["seconds"]
 
     print(f"\n{form}: {'':17}    wall s   user+sys s   peak MB        lines")
@@ -131,6 +133,11 @@ def compare(form: str, path: Path, folder: Path, programs: dict[str, Path], runs
     for name in names[:2]:
         one = summary[name]
         print(f"  {name + ', ratio':27} {one.wall / plain.wall:2.2f}   {one.processor / plain.processor:10.2f}")
+    writing = summary["smooth --no-verify"].wall
+    added = (summary["smooth"].wall - writing) / writing
+    print(
+        f"  verification beside writing: {added:.2f} times as long; afterwards: {summary['verify'].wall / writing:.2f}"
+    )
     print("  stages of the last run: " + ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
@@ -131,7 +132,8 @@ class Verifier:
 
     def __enter__(self) -> Self:
         if self._task is not None and self._processes > 1 and can_fork():
-            self._ring = Ring(partial(sections.work_on, self._task), self._processes)
+            with contextlib.suppress(OSError):  # without them it takes longer
+                self._ring = Ring(partial(sections.work_on, self._task), self._processes)
         return self
 
     def __exit__(

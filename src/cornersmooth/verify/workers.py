@@ -141,6 +141,11 @@ class Ring:
     work : callable
         Called with a `Place` in each process; what it returns is the process's result.
     processes : int
+
+    Raises
+    ------
+    OSError
+        The system allows no more processes.
     """
 
     def __init__(self, work: Callable[[Place], Any], processes: int) -> None:
@@ -149,14 +154,19 @@ class Ring:
         every = [end for pair in (*links, *reports) for end in pair]
         self._reports = [receiving for receiving, _ in reports]
         self._processes: list[BaseProcess] = []
-        for k in range(processes):
-            place = Place(k, processes, links[k][0], links[(k + 1) % processes][1])
-            own = (place.before, place.behind, reports[k][1])
-            others = [end for end in every if end not in own]
-            self._processes.append(_forked(_take_part, work, place, reports[k][1], others))
-        for end in every:
-            if end not in self._reports:
-                end.close()
+        try:
+            for k in range(processes):
+                place = Place(k, processes, links[k][0], links[(k + 1) % processes][1])
+                own = (place.before, place.behind, reports[k][1])
+                others = [end for end in every if end not in own]
+                self._processes.append(_forked(_take_part, work, place, reports[k][1], others))
+        except OSError:
+            self.end()
+            raise
+        finally:
+            for end in every:
+                if end not in self._reports:
+                    end.close()
 
     def results(self) -> list[Any]:
         """Wait for the results of all; the first exception of any is raised.
