@@ -46,6 +46,9 @@ _TO_ZERO: Final = bytes(ord("0") if code in b"0123456789" else code for code in 
 _FIELD: Final = re.compile(rb"[^-+.0 \t\r](?P<minus>-?)(?:(?P<whole>0+)(?P<point>\.?)|(?=\.0))(?P<part>\.?0*)[ \t\r]*")
 _NUMBER: Final = re.compile(rb"0{1,8} ")
 
+#: numbers of so few bytes are compared before they are read: they may all be the same
+_FEW: Final = 4
+
 #: digits that one word holds
 _DIGITS: Final = 8
 
@@ -202,28 +205,26 @@ class Lines:
         """Numbers of lines with the same letters, one array for each of them; `table` as in `Layout.fields`."""
         found: list[Floats] = []
         at = np.empty(len(start), np.int64)
-        for end, digits, decimals, minus in table.transpose(1, 2, 0):
-            np.add(start, _each(end - _DIGITS, label), out=at)
+        for column in _columns(table):
+            np.add(start, _each(column.begin, label), out=at)
             word = self.words[at].view(np.uint64)
-            size = digits + (decimals >= 0)
-            if (size <= 4).all() and (size == size[0]).all() and (minus == minus[0]).all():
-                same = word >> np.uint64(64 - 8 * (int(size[0]) + int(minus[0])))
+            if column.short:
+                same = word >> np.uint64(64 - 8 * column.short)
                 if (same == same[0]).all():
                     last = int(at[0]) + _DIGITS
-                    text = self.raw[last - int(size[0]) : last].tobytes()
-                    found.append(np.full(len(at), -float(text) if minus[0] else float(text)))
+                    found.append(np.full(len(at), float(self.raw[last - column.short : last].tobytes())))
                     continue
-            if (decimals >= 0).any():  # close the gap that the point leaves
+            if column.point:  # close the gap that it leaves
                 closed = word << _EIGHT
-                if (size > _DIGITS).any():
+                if column.long:
                     at -= _DIGITS
                     before = self.words[at].view(np.uint64)
                     before >>= _REST
                     closed |= before
                 word ^= closed
-                word &= _each(_BEHIND[decimals], label)
+                word &= _each(column.behind, label)
                 word ^= closed
-            word &= _each(_KEEP[digits], label)
+            word &= _each(column.keep, label)
             # eight decimal digits to an integer: pairs, then fours, then all (first digit in the lowest byte)
             for factor, shift, mask in _STEPS:
                 word *= factor
@@ -231,14 +232,63 @@ class Lines:
                 word &= mask
             word *= _LAST_FACTOR
             word >>= _LAST_SHIFT
-            divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]
-            found.append(np.divide(word.view(np.int64), _each(divisor, label)))
+            found.append(np.divide(word.view(np.int64), _each(column.divisor, label)))
         return found
 
 
-def _each(values: NDArray[Any], label: Ints) -> Any:
+@dataclass(frozen=True)
+class _Column:
+    """How to read one number of lines with the same letters; values of every layout, or the one of all.
+
+    Parameters
+    ----------
+    begin : int64
+        From the start of the line to eight bytes before the end of the number.
+    behind, keep : uint64
+        The bytes behind the point, and all digits.
+    divisor : float64
+    point, long : bool
+        Whether there is a point, and more bytes than a word has, in any layout.
+    short : int
+        Bytes of the number, its sign included, where they are few and as many in all layouts; else 0.
+    """
+
+    begin: Any
+    behind: Any
+    keep: Any
+    divisor: Any
+    point: bool
+    long: bool
+    short: int
+
+
+def _columns(table: Ints) -> list[_Column]:
+    """Columns of a table as in `Layout.fields`."""
+    end, digits, decimals, minus = np.ascontiguousarray(table.transpose(2, 0, 1))
+    size = digits + (decimals >= 0)
+    divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]
+    short = (size <= _FEW) & (size == size[0]) & (minus == minus[0])
+    return [
+        _Column(*column)
+        for column in zip(
+            *(_alike(values) for values in (end - _DIGITS, _BEHIND[decimals], _KEEP[digits], divisor)),
+            (decimals >= 0).any(axis=0).tolist(),
+            (size > _DIGITS).any(axis=0).tolist(),
+            np.where(short.all(axis=0), size[0] + minus[0], 0).tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _alike(values: NDArray[Any]) -> list[Any]:
+    """Columns of a table, those that are all the same as one value."""
+    same = (values == values[0]).all(axis=0).tolist()
+    return [values[0, k] if one else values[:, k] for k, one in enumerate(same)]
+
+
+def _each(values: Any, label: Ints) -> Any:
     """Value for every line, or the one of all."""
-    return values[0] if (values == values[0]).all() else values.take(label)
+    return values.take(label) if isinstance(values, np.ndarray) else values
 
 
 _TENS = np.array([10.0**k for k in range(9)])

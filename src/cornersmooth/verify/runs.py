@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -67,12 +67,12 @@ def read_lines(
     spelling = spelling or Spelling()
     if layouts is None:
         layouts = Layouts(spelling.columns, numbered=spelling.numbered)
-    for chunk, first in _chunks(data, spelling, number, size):
-        yield from _read_chunk(chunk, first, spelling, layouts, name)
+    for chunk in _chunks(data, spelling, size):
+        number += yield from _read_chunk(chunk, number, spelling, layouts, name)
 
 
-def _chunks(data: bytes | Readable, spelling: Spelling, number: int, size: int) -> Iterator[tuple[bytes, int]]:
-    """Pieces of the text, cut where no curve is cut in two, each with the number of its first line."""
+def _chunks(data: bytes | Readable, spelling: Spelling, size: int) -> Iterator[bytes]:
+    """Pieces of the text, cut where no curve is cut in two."""
     file = io.BytesIO(data) if isinstance(data, bytes) else data
     rest = b""
     while True:
@@ -86,8 +86,7 @@ def _chunks(data: bytes | Readable, spelling: Spelling, number: int, size: int) 
             continue
         if not chunk.endswith(b"\n"):
             chunk += b"\n"
-        yield chunk, number
-        number += int(np.count_nonzero(np.frombuffer(chunk, np.uint8) == _LINE_END))
+        yield chunk
 
 
 class _Signatures:
@@ -163,18 +162,20 @@ class _Chunk:
 
 def _read_chunk(
     chunk: bytes, number: int, spelling: Spelling, layouts: Layouts, name: str | None
-) -> Iterator[Table | Line]:
+) -> Generator[Table | Line, None, int]:
+    """Give out the lines of a chunk and return how many there are."""
     chunk = spelling.unfolded(chunk)
     text = spelling.respell(chunk)
     lines = lines_of(text, layouts)
     if lines is None:
         yield from _read_carefully(chunk, text, number, _Signatures(spelling), name)
-        return
+        return text.count(b"\n")
 
     def table(start: int, stop: int) -> Table | None:
         return spelling.table(Table(np.arange(number + start, number + stop), lines.columns(start, stop)))
 
     yield from _in_order(lines.bulk(), table, lines.text, chunk, text, number, spelling, name)
+    return len(lines.start)
 
 
 def _in_order(
