@@ -16,7 +16,7 @@ from cornersmooth.model import FeedMode, Move, Program, Statement
 from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import Verifier, Where, sections, verify, verifying
+from cornersmooth.verify import Verifier, Where, sectionwork, verify, verifying
 
 from .writing import unit, wavy
 
@@ -28,15 +28,16 @@ forks = pytest.param(3, marks=pytest.mark.skipif(sys.platform != "linux", reason
 def used(monkeypatch):
     """Small sections for all texts; takes down how many there were, 0 where a text was looked at as a whole."""
     found = []
-    together = sections.put_together
+    together = verifying.put_together
 
     def noted(shares):
         result = together(shares)
         found.append(0 if result is None else len(result.sections))
         return result
 
-    monkeypatch.setattr(sections, "put_together", noted)
-    monkeypatch.setattr(sections, "SECTION", 6000)
+    monkeypatch.setattr(verifying, "put_together", noted)
+    monkeypatch.setattr(sectionwork, "SECTION", 6000)
+    monkeypatch.setattr(sectionwork, "_SECTIONS_BEHIND", 10)
     monkeypatch.setattr(verifying, "LONG", 0)
     return found
 
@@ -134,14 +135,14 @@ def test_wrong_guess_is_read_again(used, monkeypatch):
     program = part()
     text = text_of(program)
     wrong = []
-    guess = sections._Worker._guess
+    guess = sectionwork._Worker._guess
 
     def tipless(worker, start):
         wrong.append(start)
         standing = guess(worker, start)
         return type(standing)(standing.modal.but(tip=(0.0, 0.0, 0.0), inch=True), "", {})
 
-    monkeypatch.setattr(sections._Worker, "_guess", tipless)
+    monkeypatch.setattr(sectionwork._Worker, "_guess", tipless)
     assert check(program, text, used, 3).passed
 
 
@@ -181,9 +182,8 @@ def test_what_cannot_be_read_says_its_line(used, processes):
     assert failure.value.line == 701
 
 
-def test_pass_longer_than_sections_is_looked_at_as_a_whole(used, monkeypatch):
+def test_pass_longer_than_sections_is_looked_at_as_a_whole(used):
     program = part(every=890)
-    monkeypatch.setattr(sections, "_FARTHEST", 12000)
     assert check(program, text_of(program), used, sections_used=False).passed
     assert used == [0]
 

@@ -16,6 +16,7 @@ from cornersmooth.nc import write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import blocks, read_nc, verify, workers
+from cornersmooth.verify import ring as ring_of
 
 from .writing import wavy
 
@@ -131,9 +132,9 @@ def test_ring_hands_on_in_turn():
 
     for count in (1, 2, 3):
         if count == 1:
-            found = [work(workers.Place())]
+            found = [work(ring_of.Place())]
         else:
-            ring = workers.Ring(work, count)
+            ring = ring_of.Ring(work, count)
             found = ring.results()
             ring.end()
         assert sorted(pair for part in found for pair in part) == [(k, k * (k + 1) // 2) for k in range(10)]
@@ -146,7 +147,7 @@ def test_ring_raises_what_one_of_it_has_raised(who):
             raise ValueError(f"place {who}")
         return place.take()
 
-    ring = workers.Ring(work, 3)
+    ring = ring_of.Ring(work, 3)
     with pytest.raises(ValueError, match=f"place {who}"):
         ring.results()
     ring.end()
@@ -159,7 +160,7 @@ def test_ring_with_a_killed_process_is_want_of_memory():
         place.give(1)
         return bytes(1_000_000)
 
-    ring = workers.Ring(work, 2)
+    ring = ring_of.Ring(work, 2)
     with pytest.raises(MemoryError):
         ring.results()
     ring.end()

@@ -210,7 +210,7 @@ def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
         verifier = None
         if not unread:
             from cornersmooth.verify import Verifier
-            from cornersmooth.verify.workers import useful_processes
+            from cornersmooth.verify.processes import useful_processes
 
             verifier = stack.enter_context(
                 Verifier(

@@ -64,7 +64,7 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.cl import read
     from cornersmooth.cli.readback import readback
     from cornersmooth.verify import deviation_along, verify
-    from cornersmooth.verify.workers import useful_processes
+    from cornersmooth.verify.processes import useful_processes
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, NoReturn
 
 import numpy as np
 
-from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Units
-from cornersmooth.verify.dialects import CONTROLS, Dialect, dialect_of
+from cornersmooth.verify.dialects import CONTROLS
 from cornersmooth.verify.dialects.base import HIGH_SPEED
 from cornersmooth.verify.motion import Modal, Piece, execute
 from cornersmooth.verify.ncprogram import Element, Event, NcProgram, Problem, Second
 from cornersmooth.verify.pile import Pile
-from cornersmooth.verify.rotary import Rotary
 from cornersmooth.verify.runs import read_lines
 from cornersmooth.verify.stops import moving_rapids
+from cornersmooth.verify.style import DIGITS_SAMPLE, Steps, Style
 from cornersmooth.verify.unknown import settle
 from cornersmooth.verify.words import NURBS, Line, Table, table_of
 
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
 
 __all__ = ["CONTROLS", "read_nc"]
-
-#: decimals are looked for in so many bytes from the first motion block on
-DIGITS_SAMPLE: Final = 1 << 16
 
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1
@@ -112,67 +109,6 @@ def read_styled(data: bytes | str | os.PathLike[str], style: Style, name: str | 
             return read(file, label)
     except OSError as error:
         raise InputError("CS500", f"cannot read: {error.strerror}", "check name and rights", file=label) from error
-
-
-@dataclass(frozen=True)
-class Steps:
-    """What the last printed digit is worth.
-
-    Parameters
-    ----------
-    tip : float
-        In units of the text.
-    second : float
-        Of the second triple; 0 without any.
-    """
-
-    tip: float
-    second: float
-
-
-@dataclass(frozen=True)
-class Style:
-    """How a text is to be understood.
-
-    Parameters
-    ----------
-    dialect : Dialect
-    machine : Machine or None
-    tcp : bool
-    tolerance, axis_length : float, mm
-        As in `read_nc`.
-    """
-
-    dialect: Dialect
-    machine: Machine | None
-    tcp: bool
-    tolerance: float
-    axis_length: float
-
-    @classmethod
-    def of(cls, control: str, machine: Machine | None, *, tcp: bool, tolerance: float, axis_length: float) -> Style:
-        """Choose it.
-
-        Raises
-        ------
-        SettingsError
-            CS204 for an unknown control, CS215 for positions of a machine that is not named.
-        """
-        dialect = dialect_of(control, "".join(machine.names) if machine is not None else "")
-        if machine is None and not tcp:
-            raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
-        return cls(dialect, machine, tcp, tolerance, axis_length)
-
-    def steps(self, sample: bytes) -> Steps:
-        """Printed digits, from the beginning of a text (`DIGITS_SAMPLE`)."""
-        tip, second = self.dialect.decimals(sample)
-        return Steps(10.0**-tip, 0.0 if second is None else 10.0**-second)
-
-    def rotary(self, steps: Steps) -> Rotary | None:
-        """What resolves rotary words; None without a machine."""
-        if self.machine is None:
-            return None
-        return Rotary(self.machine, self.tcp, self.tolerance, self.axis_length, steps.tip, steps.second or 1.0)
 
 
 @dataclass(frozen=True)

@@ -14,20 +14,23 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Floats, Program, Units
 from cornersmooth.settings import BOUNDS
-from cornersmooth.verify import sections
 from cornersmooth.verify.blocks import lengths
 from cornersmooth.verify.comparison import BEFORE, Compared, Comparison, Joints
 from cornersmooth.verify.deviation import Largest, exact_poses
 from cornersmooth.verify.farther import way_apart
 from cornersmooth.verify.holes import divide_at_holes
 from cornersmooth.verify.ncprogram import Event, NcProgram, Problem
-from cornersmooth.verify.reader import CONTROL_WORDS, Style, read_styled
+from cornersmooth.verify.processes import can_fork
+from cornersmooth.verify.reader import CONTROL_WORDS, read_styled
+from cornersmooth.verify.ring import Place, Ring
+from cornersmooth.verify.sections import Found, Task, put_together
+from cornersmooth.verify.sectionwork import work_on
 from cornersmooth.verify.source import Source
 from cornersmooth.verify.statements import asked, compare, said, way_between
 from cornersmooth.verify.stops import find_stretches
+from cornersmooth.verify.style import Style
 from cornersmooth.verify.trails import Original, original_motion
 from cornersmooth.verify.verification import Verification
-from cornersmooth.verify.workers import Place, Ring, can_fork
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -125,15 +128,15 @@ class Verifier:
         self._program, self._nc, self._words, self._processes = program, nc, words, processes
         self._style = Style.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._source = Source(nc)
-        self._task: sections.Task | None = None
+        self._task: Task | None = None
         if len(program) >= LONG:
-            self._task = sections.Task.of(program, self._source, self._style, words=words)
+            self._task = Task.of(program, self._source, self._style, words=words)
         self._ring: Ring | None = None
 
     def __enter__(self) -> Self:
         if self._task is not None and self._processes > 1 and can_fork():
             with contextlib.suppress(OSError):  # without them it takes longer
-                self._ring = Ring(partial(sections.work_on, self._task), self._processes)
+                self._ring = Ring(partial(work_on, self._task), self._processes)
         return self
 
     def __exit__(
@@ -154,11 +157,11 @@ class Verifier:
         self._source.finish()
         if self._task is not None:
             if self._ring is None:
-                shares = [sections.work_on(self._task, Place())]
+                shares = [work_on(self._task, Place())]
             else:
                 _ = self._length  # while the others are still at work
                 shares = self._ring.results()
-            found = sections.put_together(shares)
+            found = put_together(shares)
             verification = None if found is None else self._of_sections(found)
             if verification is not None:
                 return verification
@@ -176,7 +179,7 @@ class Verifier:
         """Length of the original path up to its vertices, mm."""
         return lengths(self._original.trail.six(self._style.axis_length))
 
-    def _of_sections(self, found: sections.Found) -> Verification | None:
+    def _of_sections(self, found: Found) -> Verification | None:
         """Put the sections together; None where something is wrong."""
         original, length, style, program = self._original, self._length, self._style, self._program
         problems = _units_problems(program, found.units)

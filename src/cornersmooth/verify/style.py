@@ -1,0 +1,77 @@
+"""How a text is to be understood: its control, its machine, its digits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.verify.dialects import Dialect, dialect_of
+from cornersmooth.verify.rotary import Rotary
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
+
+#: decimals are looked for in so many bytes from the first motion block on
+DIGITS_SAMPLE: Final = 1 << 16
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What the last printed digit is worth.
+
+    Parameters
+    ----------
+    tip : float
+        In units of the text.
+    second : float
+        Of the second triple; 0 without any.
+    """
+
+    tip: float
+    second: float
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a text is to be understood.
+
+    Parameters
+    ----------
+    dialect : Dialect
+    machine : Machine or None
+    tcp : bool
+    tolerance, axis_length : float, mm
+        As in `read_nc`.
+    """
+
+    dialect: Dialect
+    machine: Machine | None
+    tcp: bool
+    tolerance: float
+    axis_length: float
+
+    @classmethod
+    def of(cls, control: str, machine: Machine | None, *, tcp: bool, tolerance: float, axis_length: float) -> Style:
+        """Choose it.
+
+        Raises
+        ------
+        SettingsError
+            CS204 for an unknown control, CS215 for positions of a machine that is not named.
+        """
+        dialect = dialect_of(control, "".join(machine.names) if machine is not None else "")
+        if machine is None and not tcp:
+            raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
+        return cls(dialect, machine, tcp, tolerance, axis_length)
+
+    def steps(self, sample: bytes) -> Steps:
+        """Printed digits, from the beginning of a text (`DIGITS_SAMPLE`)."""
+        tip, second = self.dialect.decimals(sample)
+        return Steps(10.0**-tip, 0.0 if second is None else 10.0**-second)
+
+    def rotary(self, steps: Steps) -> Rotary | None:
+        """What resolves rotary words; None without a machine."""
+        if self.machine is None:
+            return None
+        return Rotary(self.machine, self.tcp, self.tolerance, self.axis_length, steps.tip, steps.second or 1.0)
