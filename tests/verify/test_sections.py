@@ -37,7 +37,7 @@ def used(monkeypatch):
 
     monkeypatch.setattr(verifying, "put_together", noted)
     monkeypatch.setattr(sectionwork, "SECTION", 6000)
-    monkeypatch.setattr(sectionwork, "_SECTIONS_BEHIND", 10)
+    monkeypatch.setattr(sectionwork, "_SECTIONS_BEHIND", 200)
     monkeypatch.setattr(verifying, "LONG", 0)
     return found
 
@@ -182,7 +182,8 @@ def test_what_cannot_be_read_says_its_line(used, processes):
     assert failure.value.line == 701
 
 
-def test_pass_longer_than_sections_is_looked_at_as_a_whole(used):
+def test_pass_longer_than_sections_is_looked_at_as_a_whole(used, monkeypatch):
+    monkeypatch.setattr(sectionwork, "_SECTIONS_BEHIND", 2)
     program = part(every=890)
     assert check(program, text_of(program), used, sections_used=False).passed
     assert used == [0]
@@ -234,7 +235,7 @@ def test_text_is_read_by_one_thread_while_another_writes(used, tmp_path):
     path = tmp_path / "growing"
     path.write_bytes(b"")
     source = Source(path)
-    whole = bytes(range(256)) * 40
+    whole = b"".join(b"N%d G1 X%d\n" % (k, k) for k in range(900))
 
     def fill():
         with path.open("ab") as file:
@@ -246,10 +247,12 @@ def test_text_is_read_by_one_thread_while_another_writes(used, tmp_path):
 
     writer = threading.Thread(target=fill)
     writer.start()
-    part_of = source.part(100, 20_000)
+    part_of = source.part(100, 10_000)
     read = b"".join(iter(lambda: part_of.read(700), b""))
     writer.join()
-    assert read == whole[100:20_000]
+    assert read == whole[100 : whole.rfind(b"\n", 0, 10_000) + 1]
+    part_of = source.part(100, 20_000)
+    assert b"".join(iter(lambda: part_of.read(700), b"")) == whole[100:]
     assert source.size(0) == len(whole)
     source.give_up()
     with pytest.raises(GivenUp):

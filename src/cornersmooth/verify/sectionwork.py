@@ -154,7 +154,7 @@ class _Worker:
     def _read(self, start: int, stop: int | None, standing: Standing | None) -> _Read:
         """Read a section, and on to the next stop."""
         reader = self._reader(standing)
-        lines = self._lines(self.source.part(start, self.source.size(start) if stop is None else stop))
+        lines = self._lines(self.source.part(start, self.source.size(start) + 1 if stop is None else stop))
         reader.take(self._severed(lines) if start else lines)
         length = Baton(reader.standing, reader.lines, reader.blocks, reader.elements, reader.pile.curves)
         first = reader.next_stop(0) if start else 0

@@ -105,7 +105,7 @@ class Source:
 
 
 class Part:
-    """Part of a source, as a file.
+    """Part of a source, as a file; of a line that goes on behind its end nothing is read.
 
     Parameters
     ----------
@@ -120,4 +120,4 @@ class Part:
         """Next bytes, at most so many."""
         data = self.source.read(self._place, min(self._place + size, self._stop))
         self._place += len(data)
-        return data
+        return data[: data.rfind(b"\n") + 1] if self._place == self._stop else data
