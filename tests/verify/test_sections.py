@@ -37,7 +37,7 @@ def used(monkeypatch):
 
     monkeypatch.setattr(verifying, "put_together", noted)
     monkeypatch.setattr(sectionwork, "SECTION", 6000)
-    monkeypatch.setattr(sectionwork, "_SECTIONS_BEHIND", 200)
+    monkeypatch.setattr(sectionwork, "_BEHIND", 8000)
     monkeypatch.setattr(verifying, "LONG", 0)
     return found
 
@@ -182,9 +182,26 @@ def test_what_cannot_be_read_says_its_line(used, processes):
     assert failure.value.line == 701
 
 
-def test_pass_longer_than_sections_is_looked_at_as_a_whole(used, monkeypatch):
-    monkeypatch.setattr(sectionwork, "_SECTIONS_BEHIND", 2)
+@pytest.mark.parametrize("processes", [1, forks])
+@pytest.mark.parametrize(("control", "form"), [("fanuc", "g1"), ("fanuc", "g6.2"), ("siemens", "bspline")])
+def test_pass_longer_than_sections_is_cut_at_anchors(used, control, form, processes):
     program = part(every=890)
+    text = text_of(program, control, form)
+    assert check(program, text, used, processes, control=control).passed
+    lines = text.decode().splitlines()
+    number = len(lines) // 2
+    while not lines[number].startswith("G1 X"):
+        number += 1
+    spoilt = [*lines[:number], lines[number].replace("X", "X9", 1), *lines[number + 1 :]]
+    found = check(program, ("\n".join(spoilt) + "\n").encode(), used, processes, sections_used=False, control=control)
+    assert abs(found.problems[0].nc_line - number) < 3
+
+
+def test_pass_without_anchors_is_looked_at_as_a_whole(used):
+    """Where a path runs to and fro on the same line there is doubt everywhere."""
+    steps = np.tile([0.0, 4.0], 450)
+    tip = np.stack((steps, 0 * steps, 0 * steps), axis=1)
+    program = Program.from_poses(tip, np.tile([0.0, 0.0, 1.0], (900, 1)), feed=np.full(900, 250.0))
     assert check(program, text_of(program), used, sections_used=False).passed
     assert used == [0]
 

@@ -62,7 +62,7 @@ def cut_lane(
         for trial in range(_ANCHOR_TRIALS):
             vertex = target + trial * _ANCHOR_STRIDE
             if vertex < last:
-                anchor = _find_anchor(
+                anchor = find_anchor(
                     six[vertex], written_length[vertex] - written_length[first], track, start, stop, near
                 )
             if anchor is not None:
@@ -78,7 +78,7 @@ def cut_lane(
     return lanes
 
 
-def _find_anchor(
+def find_anchor(
     point: Floats, gone: float, track: Track, start: int, stop: int, near: float
 ) -> tuple[int, float] | None:
     """Place of a written vertex on the original, `gone` mm after segment `start`; None where it is in doubt."""
@@ -164,7 +164,7 @@ def cut_finely(
 def _find_anchors(
     six: Floats, vertex: Ints, first: Ints, written_length: Floats, track: Track, start: Ints, stop: Ints, near: float
 ) -> tuple[Ints, Floats]:
-    """(k,) places of written vertices on the original, as `_find_anchor` does, -1 where they are in doubt.
+    """(k,) places of written vertices on the original, as `find_anchor` does, -1 where they are in doubt.
 
     Each is looked for between the segments `start` and `stop`, from vertex `first` on which is at `start`.
     """

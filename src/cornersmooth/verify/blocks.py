@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.anchors import cut_finely, cut_lane
+from cornersmooth.verify.anchors import cut_finely, cut_lane, find_anchor
 from cornersmooth.verify.careful import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.gliding import glide
 from cornersmooth.verify.ncprogram import NcProgram
@@ -29,6 +29,9 @@ _INNER = 0.2
 
 #: path elements between the anchors that lead to where a block is cut
 _HOP = 1 << 12
+
+#: elements between those tried for an anchor behind a given one
+_STRIDE = 3
 
 #: last printed digits by which the next segment must be nearer to be taken
 MARGIN_STEPS = 4.0
@@ -154,10 +157,25 @@ class Matcher:
         """Give out all stretches, in blocks of about `BLOCK` elements, each vertex with its place."""
         return map(self.walked, self.cuts(stretches))
 
-    def cuts(self, stretches: Stretches) -> Iterator[Cut]:
-        """Give out all stretches, in parts of about `BLOCK` elements."""
-        last_vertex = self.original.trail.last
+    def cuts(self, stretches: Stretches, until: float = np.inf) -> Iterator[Cut]:
+        """Give out all stretches, in parts of about `BLOCK` elements; see `Block.until` for the end of the last."""
         pending: list[Lane] = []
+        for first, last, start, stop, fraction in self.pieces(stretches):
+            while True:
+                if pending and last - pending[0][0] > BLOCK:
+                    yield Cut(pending)
+                    pending = []
+                if last - first <= BLOCK + BLOCK // 2:
+                    pending.append((first, last, start, stop, fraction))
+                    break
+                done, (first, start, fraction) = self._begin((first, first + BLOCK, start, stop, fraction))
+                yield done
+        if pending:
+            yield Cut(pending, until)
+
+    def pieces(self, stretches: Stretches) -> Iterator[Lane]:
+        """Give out the stretches in which both motions move, with vertices of the original."""
+        last_vertex = self.original.trail.last
         columns = (
             stretches.move_first,
             stretches.move_last,
@@ -173,24 +191,12 @@ class Matcher:
             start, fraction = start + int(along), float(along - int(along))
             if start == stop:
                 start, fraction = stop - 1, 1.0
-            while True:
-                if pending and last - pending[0][0] > BLOCK:
-                    yield Cut(pending)
-                    pending = []
-                if last - first <= BLOCK + BLOCK // 2:
-                    pending.append((first, last, start, stop, fraction))
-                    break
-                done, (first, start, fraction) = self._begin((first, first + BLOCK, start, stop, fraction))
-                yield done
-        if pending:
-            yield Cut(pending)
+            yield first, last, start, stop, fraction
 
     def _begin(self, piece: Lane) -> tuple[Cut, tuple[int, int, float]]:
         """Cut off the beginning of a stretch, at an anchor if there is one, and say where the rest begins."""
         first, last, start, stop, fraction = piece
-        part = slice(first, last + 1)
-        tip = self.nc.tip[part]
-        six = np.hstack((tip, tip + self.axis_length * directions(self.nc, tip, self.nc.second[part])))
+        six = ends(self.nc, first, last, self.axis_length)
         lanes = cut_lane(six, lengths(six), self.track, (0, last - first, start, stop, fraction), _HOP, self.near)
         while len(lanes) > 2 and not _INNER <= lanes[-1][-1] <= 1 - _INNER:
             lanes.pop()
@@ -201,6 +207,20 @@ class Matcher:
         tail = block.written.trail.last[-1]
         segment, at = int(block.segment[tail]), float(block.fraction[tail])
         return Cut([piece], segment + at, replace(block, until=segment + at)), (last, segment, at)
+
+    def anchor(self, piece: Lane, wanted: int) -> tuple[int, int, float] | None:
+        """Find an anchor on a stretch, at the end of element `wanted` or soon behind: element, segment, fraction."""
+        first, last, start, stop, fraction = piece
+        six = ends(self.nc, first, last, self.axis_length)
+        length = lengths(six)
+        begin, _, segment, _, _ = cut_lane(
+            six, length, self.track, (0, wanted - first, start, stop, fraction), _HOP, self.near
+        )[-1]
+        for vertex in range(max(wanted - first, begin + 1), len(six), _STRIDE):
+            found = find_anchor(six[vertex], length[vertex] - length[begin], self.track, segment, stop, self.near)
+            if found is not None and _INNER <= found[1] <= 1 - _INNER:
+                return first + vertex, *found
+        return None
 
     def walked(self, cut: Cut) -> Block:
         """Assign a place on the original to every vertex of a part."""
@@ -327,6 +347,13 @@ class Matcher:
         while end < len(new) and new[end - 1] > old[end]:
             end += 1
         return begin, end
+
+
+def ends(nc: NcProgram, first: int, last: int, axis_length: float) -> Floats:
+    """(k, 6) tips and axis points at the ends of elements, both included."""
+    part = slice(first, last + 1)
+    tip = nc.tip[part]
+    return np.hstack((tip, tip + axis_length * directions(nc, tip, nc.second[part])))
 
 
 def lengths(six: Floats) -> Floats:

@@ -93,6 +93,7 @@ class Comparison:
         *,
         holes: dict[int, int] | None = None,
         so_far: Largest | None = None,
+        until: float = np.inf,
         processes: int = 1,
     ) -> Compared:
         """Measure all stretches.
@@ -106,6 +107,8 @@ class Comparison:
             Move of the hole that an element belongs to.
         so_far : Largest
             What was met before: places with less are not looked at closely.
+        until : float
+            Where on the original the last stretch ends when it goes on elsewhere; see `Block`.
         processes : int
             To work with, see `workers.apart`.
         """
@@ -126,7 +129,7 @@ class Comparison:
             measured = replace(measured, off=measured.off[:0])
             return _Examined(measured, feeds, self._places(block, elements), self._joints(block))
 
-        cuts = ((cut, found.largest.copy()) for cut in self.matcher.cuts(stretches))
+        cuts = ((cut, found.largest.copy()) for cut in self.matcher.cuts(stretches, until))
         for here in apart(examine, cuts, processes, lambda item: item[0].block is not None):
             found.largest.take(here.measured.largest)
             violations.extend(here.measured.violations)
@@ -179,6 +182,8 @@ class Comparison:
         place[(k < 0) & np.isnan(place)] = BEFORE
         at = np.flatnonzero(k >= 0)
         stop = at[stretches.element_first[k[at]] == elements[at]]
+        if not holes:  # a stretch that begins on its way does so at no stop
+            stop = stop[stretches.fraction[k[stop]] == 0]
         place[stop] = length[last[stretches.move_first[k[stop]]]]
         return place
 

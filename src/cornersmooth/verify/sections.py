@@ -1,10 +1,12 @@
 """A long text, read and measured section by section, by several processes at once, also while it is being written.
 
 A text is cut at fixed distances into *sections*. What a section is to be measured against is known from the stops:
-when the stops of all sections so far are exactly those of the CL file, one after the other, then so are its own. And
-what holds at its beginning - the modal state of the control - is what held at the end of the section before. A process
-need not wait for that: it guesses, from the head of the text and a few lines in front of its section, reads, and
-compares with the truth when it is handed on; a section that was read from a wrong guess is read again.
+when the stops of all sections so far are exactly those of the CL file, one after the other, then so are its own. Where
+there is no stop near a cut, an anchor takes its place: an end of a block of which there is no doubt where on the
+original it is. And what holds at the beginning of a section - the modal state of the control - is what held at the end
+of the section before. A process need not wait for that: it guesses, from the head of the text and a few lines in front
+of its section, reads, and compares with the truth when it is handed on; a section that was read from a wrong guess is
+read again.
 
 All this is for texts that are as they should be. Whenever something is not, the attempt is abandoned, and the text is
 read and measured as a whole: sections find out nothing but that nothing is wrong.
@@ -19,6 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Move, Program, Units
+from cornersmooth.verify.blocks import lengths
 from cornersmooth.verify.comparison import Compared
 from cornersmooth.verify.deviation import exact_poses
 from cornersmooth.verify.ncprogram import Event, Second
@@ -63,6 +66,11 @@ class Task:
         return original_motion(self.program, self.style.tolerance, self.style.axis_length)
 
     @cached_property
+    def length(self) -> Floats:
+        """Length of the original path up to its vertices, mm."""
+        return lengths(self.original.trail.six(self.style.axis_length))
+
+    @cached_property
     def exact(self) -> Bools:
         """(m,) moves whose end must be passed exactly."""
         return exact_poses(self.original)
@@ -79,6 +87,10 @@ class Baton:
         In front of it.
     stops : int
         Stops of the original that belong to what is in front of it.
+    first : int
+        Element at the end of which it is the section's turn, counted from where the section begins.
+    inside : (segment, fraction), optional
+        Where on the original that is, if it is no stop.
     """
 
     standing: Standing | None = None
@@ -87,8 +99,10 @@ class Baton:
     elements: int = 0
     curves: int = 0
     stops: int = 0
+    first: int = 0
+    inside: tuple[int, float] | None = None
 
-    def plus(self, length: Baton, stops: int) -> Baton:
+    def plus(self, length: Baton) -> Baton:
         """Return what is known behind a section that adds so much; a feed not known there is the one held here."""
         standing = length.standing
         if standing is not None and self.standing is not None and np.isnan(standing.modal.feed):
@@ -99,7 +113,9 @@ class Baton:
             self.blocks + length.blocks,
             self.elements + length.elements,
             self.curves + length.curves,
-            self.stops + stops,
+            self.stops + length.stops,
+            length.first,
+            length.inside,
         )
 
 

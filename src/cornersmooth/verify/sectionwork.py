@@ -11,6 +11,7 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Ints, Move
+from cornersmooth.verify.blocks import Matcher, ends, lengths
 from cornersmooth.verify.comparison import Comparison
 from cornersmooth.verify.deviation import Largest
 from cornersmooth.verify.layouts import Layouts
@@ -37,9 +38,11 @@ _BEGIN: Final = 1 << 14
 #: bytes of the head of the text that tell which modes are in force
 _HEAD: Final = 1 << 18
 
-#: bytes read at a time behind a section, up to its next stop, and sections to look for one in
-_BEHIND: Final = 1 << 17
-_SECTIONS_BEHIND: Final = 2
+#: bytes read behind a section, in which its next stop, or an anchor, is looked for
+_BEHIND: Final = 1 << 18
+
+#: how much longer than the text the original may be
+_LONGER: Final = 1.3
 
 
 def work_on(task: Task, place: Place) -> Share | None:
@@ -66,16 +69,42 @@ class _Read:
     Parameters
     ----------
     reader : Reader
-        It has read on to the next stop.
+        It has read on to the next stop, or some way behind the section.
     length : Baton
         What the section adds, and what holds at its end.
-    first, stop : int
-        Its own elements: from its first stop to the first behind it (excluded).
+    following : int or None
+        Element that is the first stop behind the section, or the end of the text; None where it is farther.
     """
 
     reader: Reader
     length: Baton
-    first: int
+    following: int | None
+
+
+@dataclass
+class _Own:
+    """What belongs to a section.
+
+    Parameters
+    ----------
+    stretches : Stretches
+    until : float
+        See `Block`.
+    comparison : Comparison, optional
+        None where nothing belongs to it.
+    move : int
+        Original move with which the comparison begins.
+    length : Baton
+        What the section adds, stops and the turn of the next included.
+    stop : int
+        Element behind the last that belongs to it.
+    """
+
+    stretches: Stretches
+    until: float
+    comparison: Comparison | None
+    move: int
+    length: Baton
     stop: int
 
 
@@ -107,17 +136,17 @@ class _Worker:
                 if not read.reader.began_with(baton.standing):
                     read = self._read(start, stop, baton.standing)
             nc = self._program(read, baton)
-            stretches = self._stretches(nc, read, baton)
-            behind = baton.plus(read.length, len(stretches))
+            own = self._own(nc, read, baton)
+            behind = baton.plus(own.length)
             if stop is not None:
                 place.give(behind)
-            elif behind.stops < len(self._theirs(nc)):
+            elif behind.stops < len(self._theirs(nc)) or behind.inside is not None:
                 raise Irregular
             else:
                 share.end = behind
-            if len(stretches):
-                share.sections[k], margin = self._compare(read, baton, nc, stretches)
-                share.manners.add((nc.units, nc.second_is, margin))
+            if own.comparison is not None:
+                share.sections[k] = self._compare(own, own.comparison, baton)
+                share.manners.add((nc.units, nc.second_is, own.comparison.matcher.margin))
         return share
 
     def _edge(self, k: int) -> int | None:
@@ -157,9 +186,7 @@ class _Worker:
         lines = self._lines(self.source.part(start, self.source.size(start) + 1 if stop is None else stop))
         reader.take(self._severed(lines) if start else lines)
         length = Baton(reader.standing, reader.lines, reader.blocks, reader.elements, reader.pile.curves)
-        first = reader.next_stop(0) if start else 0
-        following = reader.elements if stop is None else self._read_on(reader, stop)
-        return _Read(reader, length, following if first is None else first, following)
+        return _Read(reader, length, reader.elements if stop is None else self._read_on(reader, stop))
 
     def _severed(self, lines: Iterator[Table | Line]) -> Iterator[Table | Line]:
         """Lines of a section, which must not go on with a curve of the one before."""
@@ -170,20 +197,14 @@ class _Worker:
                     raise Irregular
             yield item
 
-    def _read_on(self, reader: Reader, stop: int) -> int:
-        """Read behind a section to the next stop, and return its element."""
-        looked, farthest = reader.elements, stop + _SECTIONS_BEHIND * SECTION
-        for item in self._lines(self.source.part(stop, farthest), reader.lines + 1, _BEHIND):
-            reader.take_one(item)
-            found = reader.next_stop(looked)
-            if found is not None:
-                return found
-            looked = max(looked, reader.elements)
-        reader.flush()
-        found = reader.next_stop(looked)
-        if found is None and self.source.size(farthest + 1) > farthest:
-            raise Irregular
-        return reader.elements if found is None else found
+    def _read_on(self, reader: Reader, stop: int) -> int | None:
+        """Read some way behind a section, and return the first stop there, or the end of the text."""
+        before, farthest = reader.elements, stop + _BEHIND
+        end = stop + self.spelling.cut(self.source.read(stop, farthest))
+        ends = self.source.size(farthest + 1) <= farthest
+        reader.take(self._lines(self.source.part(stop, farthest if ends else end), reader.lines + 1))
+        found = reader.next_stop(before)
+        return reader.elements if found is None and ends else found
 
     def _program(self, read: _Read, baton: Baton) -> NcProgram:
         """What a section says, with the lines of the whole text."""
@@ -203,10 +224,45 @@ class _Worker:
             self._stops = stops_of_original(self.original, self.task.style.axis_length, nc.tip_step)
         return self._stops
 
-    def _stretches(self, nc: NcProgram, read: _Read, baton: Baton) -> Stretches:
-        """What lies between the stops of a section, if these are exactly those of the original that come next."""
+    def _own(self, nc: NcProgram, read: _Read, baton: Baton) -> _Own:
+        """What belongs to a section, if its stops are exactly those of the original that come next."""
+        length, first = read.length, baton.first
+        none = np.zeros(0, np.int64)
+        if first >= length.elements and baton.lines:  # nothing: the turn is handed on
+            length = replace(length, first=first - length.elements, inside=baton.inside)
+            return _Own(Stretches(none, none, none, none, np.zeros(0)), np.inf, None, 0, length, first)
+        end = len(nc) if read.following is None else read.following
+        ours = stops_of_text(nc, first, end - 1)
+        theirs, move_last = self._paired(nc, ours if baton.inside is None else ours[1:], baton)
+        fraction = np.zeros(len(ours))
+        length = replace(length, stops=len(theirs), first=end - length.elements)
+        if baton.inside is not None:
+            move, fraction[0] = self._move(*baton.inside)
+            theirs = np.append(move, theirs)
+        if not len(ours):
+            return _Own(Stretches(none, none, none, none, fraction), np.inf, None, 0, length, end)
+        move_first, element_last = theirs, np.append(ours[1:], end) - 1
+        move, until = int(move_first[0]), np.inf
+        if read.following is None:
+            move_last[-1] = self._reach(nc, int(ours[-1]), int(move_first[-1]), int(move_last[-1]))
+        last = int(move_last[-1])
+        style = self.task.style
+        comparison = Comparison(
+            self.original.part(move, last), self.exact[move : last + 1], nc, style.tolerance, style.axis_length
+        )
+        stretches = Stretches(move_first - move, move_last - move, ours, element_last, fraction)
+        if read.following is None:
+            end, segment, at = self._anchor(comparison.matcher, stretches, read.length.elements, len(nc) - 1)
+            trail = comparison.matcher.original.trail
+            stretches.element_last[-1], stretches.move_last[-1] = end, trail.owner[segment + 1]
+            until = segment + at
+            inside = segment + int(self.original.trail.last[move]), at
+            length = replace(length, first=end - length.elements, inside=inside)
+        return _Own(stretches, until, comparison, move, length, end)
+
+    def _paired(self, nc: NcProgram, ours: Ints, baton: Baton) -> tuple[Ints, Ints]:
+        """Stops of the original for stops of the text, and the last move of every stretch that they divide."""
         original, program = self.original, self.original.program
-        ours = stops_of_text(nc, read.first, read.stop - 1)
         stops = self._theirs(nc)
         behind = baton.stops + len(ours)
         theirs = stops[baton.stops : behind]
@@ -219,30 +275,45 @@ class _Worker:
         if not baton.lines and len(nc) and program.kind[original.pose[0]] == Move.RAPID and nc.kind[0] != Element.RAPID:
             raise Irregular
         end = stops[behind] if behind < len(stops) else len(original.pose)
-        size = len(ours)
-        move_last = np.append(theirs[1:], end)[:size] - 1
-        element_last = np.append(ours[1:], read.stop)[:size] - 1
-        return Stretches(theirs, move_last, ours, element_last, np.zeros(size))
+        inside = baton.inside is not None
+        return theirs, np.append(theirs if inside else theirs[1:], end)[: len(ours) + inside] - 1
 
-    def _compare(self, read: _Read, baton: Baton, nc: NcProgram, stretches: Stretches) -> tuple[Section, float]:
-        """Measure a section; also its margin."""
-        style, whole = self.task.style, self.original
-        first, last = int(stretches.move_first[0]), int(stretches.move_last[-1])
-        stretches = replace(stretches, move_first=stretches.move_first - first, move_last=stretches.move_last - first)
+    def _move(self, segment: int, at: float) -> tuple[int, float]:
+        """Original move in front of a place, and how much of the next one is in front of it."""
+        trail = self.original.trail
+        owner = int(trail.owner[segment + 1])
+        begin, end = int(trail.last[owner - 1]), int(trail.last[owner])
+        return owner - 1, (segment + at - begin) / (end - begin)
+
+    def _reach(self, nc: NcProgram, element: int, move: int, last: int) -> int:
+        """Last original move that the text from an element on may come to, at most a given one."""
+        length, trail = self.task.length, self.original.trail
+        way = _LONGER * lengths(ends(nc, element, len(nc) - 1, self.task.style.axis_length))[-1]
+        vertex = int(np.searchsorted(length, length[trail.last[move + 1]] + way, side="right"))
+        return min(int(trail.owner[min(vertex, len(trail) - 1)]) + 1, last)
+
+    def _anchor(self, matcher: Matcher, stretches: Stretches, wanted: int, last: int) -> tuple[int, int, float]:
+        """End of an element, from `wanted` on, of which there is no doubt where it is: element, segment, fraction."""
+        *_, piece = matcher.pieces(stretches)
+        found = matcher.anchor((piece[0], last, *piece[2:]), wanted)
+        if found is None:
+            raise Irregular
+        return found
+
+    def _compare(self, own: _Own, comparison: Comparison, baton: Baton) -> Section:
+        """Measure a section."""
         # words beside the motion belong to the element in front of them
-        before = read.first if baton.lines else -1
-        events = [event for event in nc.events if before < event.element <= read.stop and event.letter != "("]
-        own = np.array([event.element - 1 for event in events], np.int64)
-        elements = np.unique(own)
-        comparison = Comparison(
-            whole.part(first, last), self.exact[first : last + 1], nc, style.tolerance, style.axis_length
-        )
-        compared = comparison.compare(stretches, elements, so_far=self._largest)
+        before = baton.first if baton.lines else -1
+        nc = comparison.nc
+        events = [event for event in nc.events if before < event.element <= own.stop and event.letter != "("]
+        at = np.array([event.element - 1 for event in events], np.int64)
+        elements = np.unique(at)
+        compared = comparison.compare(own.stretches, elements, so_far=self._largest, until=own.until)
         if compared.problems:
             raise Irregular
         self._largest = compared.largest
-        places = compared.places[np.searchsorted(elements, own)]
+        places = compared.places[np.searchsorted(elements, at)]
         events = [
             replace(event, element=event.element + baton.elements, line=event.line + baton.lines) for event in events
         ]
-        return Section(compared, events, places, int(whole.trail.last[first])), comparison.matcher.margin
+        return Section(compared, events, places, int(self.original.trail.last[own.move]))

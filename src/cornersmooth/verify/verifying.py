@@ -14,7 +14,6 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Floats, Program, Units
 from cornersmooth.settings import BOUNDS
-from cornersmooth.verify.blocks import lengths
 from cornersmooth.verify.comparison import BEFORE, Compared, Comparison, Joints
 from cornersmooth.verify.deviation import Largest, exact_poses
 from cornersmooth.verify.farther import way_apart
@@ -159,10 +158,10 @@ class Verifier:
             if self._ring is None:
                 shares = [work_on(self._task, Place())]
             else:
-                _ = self._length  # while the others are still at work
+                _ = self._task.length  # while the others are still at work
                 shares = self._ring.results()
             found = put_together(shares)
-            verification = None if found is None else self._of_sections(found)
+            verification = None if found is None else self._of_sections(self._task, found)
             if verification is not None:
                 return verification
         nc = read_styled(self._nc, self._style)
@@ -174,14 +173,9 @@ class Verifier:
             return self._task.original
         return original_motion(self._program, self._style.tolerance, self._style.axis_length)
 
-    @cached_property
-    def _length(self) -> Floats:
-        """Length of the original path up to its vertices, mm."""
-        return lengths(self._original.trail.six(self._style.axis_length))
-
-    def _of_sections(self, found: Found) -> Verification | None:
+    def _of_sections(self, task: Task, found: Found) -> Verification | None:
         """Put the sections together; None where something is wrong."""
-        original, length, style, program = self._original, self._length, self._style, self._program
+        original, length, style, program = task.original, task.length, task.style, task.program
         problems = _units_problems(program, found.units)
         compared = Compared(Largest(), Joints(), [], [], np.zeros(0))
         events: list[Event] = []
