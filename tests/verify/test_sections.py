@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 import threading
 import time
@@ -243,6 +244,19 @@ def test_nobody_waits_for_a_text_that_is_not_finished(used, tmp_path):
     with verifier:
         assert len(active_children()) == 2
     assert not active_children()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+@pytest.mark.parametrize("processes", [1, forks])
+def test_text_from_a_pipe(used, tmp_path, processes):
+    program = part()
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_bytes, args=(text_of(program),))
+    writer.start()
+    assert verify(program, pipe, tolerance=TOLERANCE, processes=processes).passed
+    writer.join()
+    assert used[-1] > 4
 
 
 def test_text_is_read_by_one_thread_while_another_writes(used, tmp_path):

@@ -65,6 +65,7 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.cli.readback import readback
     from cornersmooth.verify import deviation_along, verify
     from cornersmooth.verify.processes import useful_processes
+    from cornersmooth.verify.source import readable_twice
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
@@ -78,6 +79,8 @@ def command(source: str, text: str, **given: Any) -> int:
     program = read(data, name=name, format=given["input_format"], **{key: given[key] for key in _READING})
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
     nc = read_input(text)[0] if text == STANDARD else text
+    if given["plot"] or given["verbose"]:  # it is looked at more than once
+        nc = readable_twice(nc)
     found = verify(program, nc, **measures, **how.reading, words=not how.own, processes=useful_processes())
     _write_reports(program, found, given["reports"])
     if given["plot"]:

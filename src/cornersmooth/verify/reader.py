@@ -20,6 +20,7 @@ from cornersmooth.verify.motion import Modal, Piece, execute
 from cornersmooth.verify.ncprogram import Element, Event, NcProgram, Problem, Second
 from cornersmooth.verify.pile import Pile
 from cornersmooth.verify.runs import read_lines
+from cornersmooth.verify.source import readable_twice
 from cornersmooth.verify.stops import moving_rapids
 from cornersmooth.verify.style import DIGITS_SAMPLE, Steps, Style
 from cornersmooth.verify.unknown import settle
@@ -100,10 +101,11 @@ def read_styled(data: bytes | str | os.PathLike[str], style: Style, name: str | 
         reader.take(read_lines(file, label, style.dialect.spelling))
         return reader.result()
 
+    label = name if name is not None or isinstance(data, bytes) else str(data)
+    data = readable_twice(data)
     if isinstance(data, bytes):
-        return read(io.BytesIO(data), name)
+        return read(io.BytesIO(data), label)
     path = Path(data)
-    label = name if name is not None else str(path)
     try:
         with path.open("rb") as file:
             return read(file, label)

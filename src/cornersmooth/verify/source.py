@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import mmap
 import os
+import stat
 import time
+from pathlib import Path
 from typing import BinaryIO, Final
 
 from cornersmooth.errors import InputError
@@ -13,6 +15,17 @@ from cornersmooth.errors import InputError
 _PAUSE: Final = 0.003
 
 _GROWING, _WHOLE, _GIVEN_UP = 0, 1, 2
+
+
+def readable_twice(text: bytes | str | os.PathLike[str]) -> bytes | str | os.PathLike[str]:
+    """Return the path of a file as it is, and all that comes out of a pipe or device."""
+    if isinstance(text, bytes):
+        return text
+    try:
+        mode = os.stat(text).st_mode
+        return text if stat.S_ISREG(mode) or stat.S_ISDIR(mode) else Path(text).read_bytes()
+    except OSError:  # who opens it says why
+        return text
 
 
 class GivenUp(Exception):  # noqa: N818 - no error: who waits for the text need not wait any more

@@ -24,7 +24,7 @@ from cornersmooth.verify.reader import CONTROL_WORDS, read_styled
 from cornersmooth.verify.ring import Place, Ring
 from cornersmooth.verify.sections import Found, Task, put_together
 from cornersmooth.verify.sectionwork import work_on
-from cornersmooth.verify.source import Source
+from cornersmooth.verify.source import Source, readable_twice
 from cornersmooth.verify.statements import asked, compare, said, way_between
 from cornersmooth.verify.stops import find_stretches
 from cornersmooth.verify.style import Style
@@ -124,6 +124,8 @@ class Verifier:
         processes: int = 1,
     ) -> None:
         _check_bounds(tolerance, axis_length)
+        self._name = None if isinstance(nc, bytes) else str(nc)
+        nc = readable_twice(nc)
         self._program, self._nc, self._words, self._processes = program, nc, words, processes
         self._style = Style.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._source = Source(nc)
@@ -164,7 +166,7 @@ class Verifier:
             verification = None if found is None else self._of_sections(self._task, found)
             if verification is not None:
                 return verification
-        nc = read_styled(self._nc, self._style)
+        nc = read_styled(self._nc, self._style, self._name)
         return _whole(self._original, nc, self._style.tolerance, self._style.axis_length, self._words, self._processes)
 
     @cached_property
