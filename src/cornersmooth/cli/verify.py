@@ -78,7 +78,7 @@ def command(source: str, text: str, **given: Any) -> int:
     data, name = read_input(source)
     program = read(data, name=name, format=given["input_format"], **{key: given[key] for key in _READING})
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
-    nc = read_input(text)[0] if text == STANDARD else text
+    nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     if given["plot"] or given["verbose"]:  # it is looked at more than once
         nc = readable_twice(nc)
     found = verify(program, nc, **measures, **how.reading, words=not how.own, processes=useful_processes())
