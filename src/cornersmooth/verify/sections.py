@@ -21,7 +21,6 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Move, Program, Units
-from cornersmooth.verify.blocks import lengths
 from cornersmooth.verify.comparison import Compared
 from cornersmooth.verify.deviation import exact_poses
 from cornersmooth.verify.ncprogram import Event, Second
@@ -68,7 +67,7 @@ class Task:
     @cached_property
     def length(self) -> Floats:
         """Length of the original path up to its vertices, mm."""
-        return lengths(self.original.trail.six(self.style.axis_length))
+        return self.original.trail.lengths(self.style.axis_length)
 
     @cached_property
     def exact(self) -> Bools:

@@ -52,6 +52,18 @@ class Trail:
         """(v, 6) tip and axis point side by side, mm."""
         return np.hstack((self.tip, self.tip + axis_length * self.axis))
 
+    def lengths(self, axis_length: float) -> Floats:
+        """(v,) path length up to every vertex, of tip and axis point together, mm."""
+        step = np.diff(self.tip, axis=0)
+        square = np.einsum("ij,ij->i", step, step)
+        turn = np.diff(self.axis, axis=0)
+        turn *= axis_length
+        step += turn
+        square += np.einsum("ij,ij->i", step, step)
+        length = np.zeros(len(self))
+        np.cumsum(np.sqrt(square, out=square), out=length[1:])
+        return length
+
 
 @dataclass(frozen=True)
 class Original:
