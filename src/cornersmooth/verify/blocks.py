@@ -308,7 +308,10 @@ class Matcher:
         known = np.isfinite(distance)
         for around, most_pairs, most_windows in ROUNDS:
             doubtful = (backward | (known & (distance > self.doubtful))) & (piece >= 0)
-            for first, last in doubtful_windows(doubtful, piece, around, most_windows):
+            windows = doubtful_windows(doubtful, piece, around, most_windows + 1)
+            if around > ROUNDS[0][0] and len(windows) > most_windows:
+                return  # no mishap of the walk: the text is off everywhere
+            for first, last in windows[:most_windows]:
                 part = slice(first, last + 1)
                 start, stop = (float(segment[k] + fraction[k]) for k in (first, last))
                 stop = stop if np.isnan(goal[last]) else float(goal[last])
