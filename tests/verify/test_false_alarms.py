@@ -284,6 +284,34 @@ GOTO/-8.5473,-56.3127,57.7454,0.0000530,0.0000230,1.0000000
 """,
 )
 
+#: the same line to and fro: all of it is as near to its first run
+TO_AND_FRO = Alarm(
+    Case("siemens", "g1", "table-bc"),
+    0.04,
+    10.0,
+    """GOTO/0.0133,-0.3122,0.2502,-0.0014866,-0.0000357,0.9999989
+GOTO/0.0134,-0.3122,0.2504,0.4305919,0.4442340,0.7856506
+GOTO/0.5291,-0.1036,0.0988,0.4304429,0.4441337,0.7857889
+GOTO/0.0139,-0.3120,0.2503,0.4304425,0.4441338,0.7857891
+GOTO/0.5286,-0.1038,0.0990,0.4304417,0.4441343,0.7857892
+""",
+)
+
+#: the vertex that is farthest off keeps its place when those about it are assigned anew
+AS_FAR_AS_BEFORE = Alarm(
+    Case("heidenhain", "spl", "head-table-bc"),
+    0.15,
+    50.0,
+    """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000
+GOTO/0.0120,0.0069,0.0000,-0.0579961,0.0018127,0.9983152
+GOTO/0.0123,0.0068,0.0000,0.0010441,0.0003911,0.9999994
+STOP
+GOTO/-0.7346,1.8036,0.0724,0.0000317,-0.0000153,1.0000000
+GOTO/-0.7345,1.8036,0.0724,0.0170473,-0.0069459,0.9998306
+""",
+    inch=True,
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -300,6 +328,8 @@ ALARMS = {
     "there and back": THERE_AND_BACK,
     "past the pole": PAST_THE_POLE,
     "cancelled near the end": CANCELLED_NEAR_THE_END,
+    "to and fro": TO_AND_FRO,
+    "as far as before": AS_FAR_AS_BEFORE,
 }
 
 

@@ -13,7 +13,7 @@ from cornersmooth.verify.anchors import cut_finely, cut_lane
 from cornersmooth.verify.careful import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.gliding import glide
 from cornersmooth.verify.ncprogram import NcProgram
-from cornersmooth.verify.stops import Stretches
+from cornersmooth.verify.stops import ARITHMETIC, Stretches
 from cornersmooth.verify.trails import CHORD_SHARE, Original, Written, directions, written_motion
 from cornersmooth.verify.walking import Lane, Lanes, Track, Walked, nowhere, walk
 
@@ -302,7 +302,7 @@ class Matcher:
                 if around > ROUNDS[0][0]:  # most of so wide a window has its place already
                     begin, end = self._moved(segment[part], fraction[part], found[0], found[1], doubtful[part])
                 new, at = slice(begin, end), slice(first + begin, first + end)
-                if end > begin and off[new].max() <= distance[at].max():
+                if end > begin and off[new].max() <= distance[at].max() + ARITHMETIC:  # no worse, not to the last bit
                     segment[at], fraction[at], distance[at] = found[0][new], found[1][new], off[new]
                     length = self.track.length[found[0] + 1] - self.track.length[found[0]]
                     behind = np.einsum("ij,ij->i", six[part] - row[:, :6], row[:, 6:12]) * row[:, 12]
