@@ -312,6 +312,22 @@ GOTO/-0.7345,1.8036,0.0724,0.0170473,-0.0069459,0.9998306
     inch=True,
 )
 
+#: written longer than the original near the pole, where it comes back to where a long move has ended
+ANCHOR_ON_A_LONG_MOVE = Alarm(
+    Case("mitsubishi", "g1", "table-ac", tcp=False),
+    0.001,
+    50.0,
+    """GOTO/7.6171,-11.8520,-35.4199,-0.0402707,0.0418393,0.9983124
+GOTO/-33.8614,-28.3096,-63.2653,0.0075584,-0.0009417,0.9999710
+GOTO/-4.8880,-47.9598,-44.4754,-0.0000066,0.0000032,1.0000000
+GOTO/-4.8879,-47.9597,-44.4754,-0.0000066,0.0000032,1.0000000
+GOTO/-4.8869,-47.9685,-44.4754,-0.0000066,0.0000032,1.0000000
+GOTO/-4.8864,-47.9685,-44.4754,0.0304149,0.1084979,0.9936313
+GOTO/-4.8864,-47.9685,-44.4754,-0.0000017,-0.0000091,1.0000000
+GOTO/-4.8864,-47.9685,-44.4754,0.0000015,0.0000009,1.0000000
+""",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -330,6 +346,7 @@ ALARMS = {
     "cancelled near the end": CANCELLED_NEAR_THE_END,
     "to and fro": TO_AND_FRO,
     "as far as before": AS_FAR_AS_BEFORE,
+    "anchor on a long move": ANCHOR_ON_A_LONG_MOVE,
 }
 
 
