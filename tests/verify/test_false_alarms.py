@@ -328,6 +328,20 @@ GOTO/-4.8864,-47.9685,-44.4754,0.0000015,0.0000009,1.0000000
 """,
 )
 
+#: written longer than the original near the pole, where what is nearest has been passed by path length
+ANCHOR_PASSED_BY = Alarm(
+    Case("linuxcnc", "g1", "table-bc", tcp=False),
+    0.003,
+    10.0,
+    """GOTO/61.0623,15.0665,-2.5191,-0.0201316,-0.0088294,0.9997584
+GOTO/60.8274,15.1905,-2.5191,0.0574267,-0.0083738,0.9983146
+GOTO/60.8256,15.1883,-2.5194,-0.0000227,-0.0000093,1.0000000
+GOTO/60.8260,15.1881,-2.5186,0.0000389,-0.0004899,0.9999999
+GOTO/24.4357,45.9188,-2.5186,-0.3011295,-0.6747439,-0.6738262
+GOTO/24.4357,45.9188,-2.5186,-0.0000006,-0.0000070,1.0000000
+""",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -347,6 +361,7 @@ ALARMS = {
     "to and fro": TO_AND_FRO,
     "as far as before": AS_FAR_AS_BEFORE,
     "anchor on a long move": ANCHOR_ON_A_LONG_MOVE,
+    "anchor passed by": ANCHOR_PASSED_BY,
 }
 
 

@@ -96,9 +96,11 @@ def _find_anchor(
         best = int(np.argmin(d))
         if d[best] > near * near:
             continue
+        place = track.length[a:b] + t * (track.length[a + 1 : b + 1] - track.length[a:b])
+        if a > start and place[best] - track.length[a] <= 2 * near:  # what comes before may be nearer
+            continue
         if track.length[a + close[-1]] - track.length[a + close[0] + 1] > 8 * near:
             return None
-        place = track.length[a:b] + t * (track.length[a + 1 : b + 1] - track.length[a:b])
         if _folded(d[close], d[best], place[close] - place[best], near).any():
             return None
         return a + best, float(t[best])
@@ -202,6 +204,7 @@ def _find_anchors(
         folded = (d <= 4 * near * near) & _folded(d, np.repeat(least, count), way, near)
         clear = ~np.logical_or.reduceat(folded, begin)
         clear &= least <= near * near
+        clear &= (low[rows] == start[rows]) | (place[best] - track.length[low[rows]] > 2 * near)
         clear[clear] &= (
             track.length[segment[close[np.searchsorted(close, ends[clear]) - 1]]]
             - track.length[segment[close[np.searchsorted(close, begin[clear])]] + 1]
