@@ -342,6 +342,35 @@ GOTO/24.4357,45.9188,-2.5186,-0.0000006,-0.0000070,1.0000000
 """,
 )
 
+#: a rapid within one digit of the pose before it, on axes that a turned table has turned as well
+RAPID_WITHIN_DIGITS = Alarm(
+    Case("mitsubishi", "g1", "table-bc", tcp=False),
+    0.15,
+    50.0,
+    """GOTO/-0.3497,-0.3117,0.0008,-0.7089245,0.5751762,0.4081646
+RAPID
+GOTO/-0.3496,-0.3117,0.0009,-0.7089245,0.5751762,0.4081646
+""",
+)
+
+#: a stop where the path goes a digit aside, stands and comes back: nearest is beyond the repeated pose
+STOP_AND_REPEATED = Alarm(
+    Case("fanuc", "g6.2"),
+    0.04,
+    10.0,
+    """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000
+GOTO/0.0000,-0.0000,0.0000,-0.0039287,0.0321197,0.9994763
+GOTO/-0.0000,0.0000,0.0000,-0.2416650,-0.0156529,0.9702335
+GOTO/-0.4324,1.0075,-1.3139,0.1060130,-0.7250320,-0.6805070
+STOP
+GOTO/-0.4325,1.0075,-1.3139,0.1060130,-0.7250320,-0.6805070
+GOTO/-0.4325,1.0075,-1.3139,0.1060130,-0.7250320,-0.6805070
+GOTO/-0.4324,1.0075,-1.3139,0.1045133,-0.7251242,-0.6806407
+GOTO/-0.4325,1.0075,-1.3139,0.1045133,-0.7251242,-0.6806407
+""",
+    inch=True,
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -362,6 +391,8 @@ ALARMS = {
     "as far as before": AS_FAR_AS_BEFORE,
     "anchor on a long move": ANCHOR_ON_A_LONG_MOVE,
     "anchor passed by": ANCHOR_PASSED_BY,
+    "rapid within digits": RAPID_WITHIN_DIGITS,
+    "stop and repeated": STOP_AND_REPEATED,
 }
 
 
