@@ -6,6 +6,7 @@ The numbers come from random programs, cut down to the moves that matter.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import pytest
 
@@ -28,6 +29,7 @@ class Alarm:
     cl : str
         Statements after those that every program begins with.
     inch : bool
+    allocation : str
     """
 
     case: Case
@@ -35,6 +37,7 @@ class Alarm:
     axis_length: float
     cl: str
     inch: bool = False
+    allocation: Literal["half", "fair"] = "half"
 
     @property
     def program(self) -> Program:
@@ -45,7 +48,7 @@ class Alarm:
     @property
     def text(self) -> str:
         """What is written for it."""
-        settings = Settings(tolerance=self.tolerance, axis_length=self.axis_length)
+        settings = Settings(tolerance=self.tolerance, axis_length=self.axis_length, allocation=self.allocation)
         return written(self.program, self.case.choose(endless=True), settings)[0]
 
     def verified(self, text: str) -> Verification:
@@ -371,6 +374,24 @@ GOTO/-0.4325,1.0075,-1.3139,0.1045133,-0.7251242,-0.6806407
     inch=True,
 )
 
+#: the axis point alone is too far off, but tip and axis point together could be so far
+AXIS_ALONE = Alarm(
+    Case("mitsubishi", "g1", "table-bc", tcp=False),
+    0.003,
+    50.0,
+    """GOTO/-0.0003,0.0182,0.0000,0.9506276,-0.3100454,-0.0133807
+GOTO/-0.0112,0.0246,0.0000,0.9506276,-0.3100454,-0.0133807
+GOTO/-0.0112,0.0246,0.0000,0.9506276,-0.3100454,-0.0133807
+GOTO/-0.0112,0.0246,0.0000,0.9506274,-0.3100461,-0.0133797
+GOTO/-0.0112,0.0246,0.0000,0.9506274,-0.3100461,-0.0133797
+GOTO/-0.0112,0.0246,0.0000,0.9506274,-0.3100461,-0.0133798
+GOTO/-0.0112,0.0246,0.0000,0.9506282,-0.3100353,-0.0135660
+GOTO/-0.0112,0.0246,0.0000,0.9512436,-0.3081481,-0.0134286
+""",
+    inch=True,
+    allocation="fair",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -393,6 +414,7 @@ ALARMS = {
     "anchor passed by": ANCHOR_PASSED_BY,
     "rapid within digits": RAPID_WITHIN_DIGITS,
     "stop and repeated": STOP_AND_REPEATED,
+    "axis alone": AXIS_ALONE,
 }
 
 

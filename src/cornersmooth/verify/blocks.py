@@ -288,6 +288,14 @@ class Matcher:
         known = np.isfinite(distance)
         for around, most_pairs, most_windows in ROUNDS:
             doubtful = (backward | (known & (distance > self.doubtful))) & (piece >= 0)
+            # both together may be so far, but not one of them alone
+            rows = np.flatnonzero(known & ~doubtful & (distance > self.tolerance + self.margin))
+            row = self.track.row[segment[rows]]
+            away = six[rows] - row[:, :6] - fraction[rows, None] * row[:, 6:12]
+            square = np.maximum(
+                np.einsum("ij,ij->i", away[:, :3], away[:, :3]), np.einsum("ij,ij->i", away[:, 3:], away[:, 3:])
+            )
+            doubtful[rows] = square > (self.tolerance + self.margin) ** 2
             for first, last in doubtful_windows(doubtful, piece, around, most_windows):
                 part = slice(first, last + 1)
                 start, stop = (float(segment[k] + fraction[k]) for k in (first, last))
