@@ -6,6 +6,7 @@ The numbers come from random programs, cut down to the moves that matter.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import pytest
 
@@ -28,6 +29,7 @@ class Alarm:
     cl : str
         Statements after those that every program begins with.
     inch : bool
+    allocation : str
     """
 
     case: Case
@@ -35,6 +37,7 @@ class Alarm:
     axis_length: float
     cl: str
     inch: bool = False
+    allocation: Literal["half", "fair"] = "half"
 
     @property
     def program(self) -> Program:
@@ -45,7 +48,7 @@ class Alarm:
     @property
     def text(self) -> str:
         """What is written for it."""
-        settings = Settings(tolerance=self.tolerance, axis_length=self.axis_length)
+        settings = Settings(tolerance=self.tolerance, axis_length=self.axis_length, allocation=self.allocation)
         return written(self.program, self.case.choose(endless=True), settings)[0]
 
     def verified(self, text: str) -> Verification:
@@ -284,6 +287,111 @@ GOTO/-8.5473,-56.3127,57.7454,0.0000530,0.0000230,1.0000000
 """,
 )
 
+#: the same line to and fro: all of it is as near to its first run
+TO_AND_FRO = Alarm(
+    Case("siemens", "g1", "table-bc"),
+    0.04,
+    10.0,
+    """GOTO/0.0133,-0.3122,0.2502,-0.0014866,-0.0000357,0.9999989
+GOTO/0.0134,-0.3122,0.2504,0.4305919,0.4442340,0.7856506
+GOTO/0.5291,-0.1036,0.0988,0.4304429,0.4441337,0.7857889
+GOTO/0.0139,-0.3120,0.2503,0.4304425,0.4441338,0.7857891
+GOTO/0.5286,-0.1038,0.0990,0.4304417,0.4441343,0.7857892
+""",
+)
+
+#: the vertex that is farthest off keeps its place when those about it are assigned anew
+AS_FAR_AS_BEFORE = Alarm(
+    Case("heidenhain", "spl", "head-table-bc"),
+    0.15,
+    50.0,
+    """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000
+GOTO/0.0120,0.0069,0.0000,-0.0579961,0.0018127,0.9983152
+GOTO/0.0123,0.0068,0.0000,0.0010441,0.0003911,0.9999994
+STOP
+GOTO/-0.7346,1.8036,0.0724,0.0000317,-0.0000153,1.0000000
+GOTO/-0.7345,1.8036,0.0724,0.0170473,-0.0069459,0.9998306
+""",
+    inch=True,
+)
+
+#: written longer than the original near the pole, where it comes back to where a long move has ended
+ANCHOR_ON_A_LONG_MOVE = Alarm(
+    Case("mitsubishi", "g1", "table-ac", tcp=False),
+    0.001,
+    50.0,
+    """GOTO/7.6171,-11.8520,-35.4199,-0.0402707,0.0418393,0.9983124
+GOTO/-33.8614,-28.3096,-63.2653,0.0075584,-0.0009417,0.9999710
+GOTO/-4.8880,-47.9598,-44.4754,-0.0000066,0.0000032,1.0000000
+GOTO/-4.8879,-47.9597,-44.4754,-0.0000066,0.0000032,1.0000000
+GOTO/-4.8869,-47.9685,-44.4754,-0.0000066,0.0000032,1.0000000
+GOTO/-4.8864,-47.9685,-44.4754,0.0304149,0.1084979,0.9936313
+GOTO/-4.8864,-47.9685,-44.4754,-0.0000017,-0.0000091,1.0000000
+GOTO/-4.8864,-47.9685,-44.4754,0.0000015,0.0000009,1.0000000
+""",
+)
+
+#: written longer than the original near the pole, where what is nearest has been passed by path length
+ANCHOR_PASSED_BY = Alarm(
+    Case("linuxcnc", "g1", "table-bc", tcp=False),
+    0.003,
+    10.0,
+    """GOTO/61.0623,15.0665,-2.5191,-0.0201316,-0.0088294,0.9997584
+GOTO/60.8274,15.1905,-2.5191,0.0574267,-0.0083738,0.9983146
+GOTO/60.8256,15.1883,-2.5194,-0.0000227,-0.0000093,1.0000000
+GOTO/60.8260,15.1881,-2.5186,0.0000389,-0.0004899,0.9999999
+GOTO/24.4357,45.9188,-2.5186,-0.3011295,-0.6747439,-0.6738262
+GOTO/24.4357,45.9188,-2.5186,-0.0000006,-0.0000070,1.0000000
+""",
+)
+
+#: a rapid within one digit of the pose before it, on axes that a turned table has turned as well
+RAPID_WITHIN_DIGITS = Alarm(
+    Case("mitsubishi", "g1", "table-bc", tcp=False),
+    0.15,
+    50.0,
+    """GOTO/-0.3497,-0.3117,0.0008,-0.7089245,0.5751762,0.4081646
+RAPID
+GOTO/-0.3496,-0.3117,0.0009,-0.7089245,0.5751762,0.4081646
+""",
+)
+
+#: a stop where the path goes a digit aside, stands and comes back: nearest is beyond the repeated pose
+STOP_AND_REPEATED = Alarm(
+    Case("fanuc", "g6.2"),
+    0.04,
+    10.0,
+    """GOTO/0.0000,0.0000,0.0000,0.0000000,0.0000000,1.0000000
+GOTO/0.0000,-0.0000,0.0000,-0.0039287,0.0321197,0.9994763
+GOTO/-0.0000,0.0000,0.0000,-0.2416650,-0.0156529,0.9702335
+GOTO/-0.4324,1.0075,-1.3139,0.1060130,-0.7250320,-0.6805070
+STOP
+GOTO/-0.4325,1.0075,-1.3139,0.1060130,-0.7250320,-0.6805070
+GOTO/-0.4325,1.0075,-1.3139,0.1060130,-0.7250320,-0.6805070
+GOTO/-0.4324,1.0075,-1.3139,0.1045133,-0.7251242,-0.6806407
+GOTO/-0.4325,1.0075,-1.3139,0.1045133,-0.7251242,-0.6806407
+""",
+    inch=True,
+)
+
+#: the axis point alone is too far off, but tip and axis point together could be so far
+AXIS_ALONE = Alarm(
+    Case("mitsubishi", "g1", "table-bc", tcp=False),
+    0.003,
+    50.0,
+    """GOTO/-0.0003,0.0182,0.0000,0.9506276,-0.3100454,-0.0133807
+GOTO/-0.0112,0.0246,0.0000,0.9506276,-0.3100454,-0.0133807
+GOTO/-0.0112,0.0246,0.0000,0.9506276,-0.3100454,-0.0133807
+GOTO/-0.0112,0.0246,0.0000,0.9506274,-0.3100461,-0.0133797
+GOTO/-0.0112,0.0246,0.0000,0.9506274,-0.3100461,-0.0133797
+GOTO/-0.0112,0.0246,0.0000,0.9506274,-0.3100461,-0.0133798
+GOTO/-0.0112,0.0246,0.0000,0.9506282,-0.3100353,-0.0135660
+GOTO/-0.0112,0.0246,0.0000,0.9512436,-0.3081481,-0.0134286
+""",
+    inch=True,
+    allocation="fair",
+)
+
 ALARMS = {
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
@@ -300,6 +408,13 @@ ALARMS = {
     "there and back": THERE_AND_BACK,
     "past the pole": PAST_THE_POLE,
     "cancelled near the end": CANCELLED_NEAR_THE_END,
+    "to and fro": TO_AND_FRO,
+    "as far as before": AS_FAR_AS_BEFORE,
+    "anchor on a long move": ANCHOR_ON_A_LONG_MOVE,
+    "anchor passed by": ANCHOR_PASSED_BY,
+    "rapid within digits": RAPID_WITHIN_DIGITS,
+    "stop and repeated": STOP_AND_REPEATED,
+    "axis alone": AXIS_ALONE,
 }
 
 

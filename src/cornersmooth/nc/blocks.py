@@ -178,12 +178,18 @@ class BlockWriter:
         motion, digits = self.form.mode.motion, self.form.table.digits
         table = [b"\n", f"{motion.rapid_end}\n".encode()]
         chosen = run.rapid.astype(np.int64)
-        feeding = np.flatnonzero(~run.rapid & (run.curve == 0))
+        curved = run.curve > 0
+        within = curved.copy()
+        within[:1] = False
+        within[1:] &= curved[:-1] & (run.move[1:] == run.move[:-1])
+        feeding = np.flatnonzero(~run.rapid & ~within)
+        on_curves: list[tuple[int, bytes]] = []
         if len(feeding):
             feed = run.feed[feeding]
             missing = np.isnan(feed)
-            if missing.any():
-                self._count_missing(run.move[feeding[missing]])
+            uncounted = missing & ~curved[feeding]
+            if uncounted.any():
+                self._count_missing(run.move[feeding[uncounted]])
             inverse = run.mode[feeding] == INVERSE_TIME
             unit = np.where(missing, 0.0, feed) / np.where(inverse, 1.0, self.program.mm_per_unit)
             if motion.inch_feed != 1 and self.program.units == "inch":
@@ -201,8 +207,15 @@ class BlockWriter:
                 word = f"{self._blank}{motion.feed}"
                 table += [f"{word}{self._feed_digits(value)}\n".encode() for value in values.tolist()]
                 self._feed = int(keys[-1])
-        if (run.curve > 0).any():
+                rows = given[changed]
+                on_curves = [(row, table[chosen[row]]) for row in rows[curved[rows]].tolist()]
+        if curved.any():
             self._curves.add_suffixes(run, table, chosen)
+        # the line before a curve brings the feed; where it is nothing in the written digits the curve must
+        for row, given_feed in on_curves:
+            end, others = table[chosen[row]].split(b"\n", 1)
+            chosen[row] = len(table)
+            table.append(end + given_feed + others)
         if run.dwell is not None and run.dwell.any():
             blocks = self.statements.dwell(dwell)
             chosen[run.dwell] += len(table)

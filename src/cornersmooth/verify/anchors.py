@@ -62,9 +62,8 @@ def cut_lane(
         for trial in range(_ANCHOR_TRIALS):
             vertex = target + trial * _ANCHOR_STRIDE
             if vertex < last:
-                anchor = find_anchor(
-                    six[vertex], written_length[vertex] - written_length[first], track, start, stop, near
-                )
+                gone = written_length[vertex] - written_length[first]
+                anchor = find_anchor(six[vertex], gone, track, start, fraction, stop, near)
             if anchor is not None:
                 break
         if anchor is None:
@@ -79,10 +78,10 @@ def cut_lane(
 
 
 def find_anchor(
-    point: Floats, gone: float, track: Track, start: int, stop: int, near: float
+    point: Floats, gone: float, track: Track, start: int, fraction: float, stop: int, near: float
 ) -> tuple[int, float] | None:
-    """Place of a written vertex on the original, `gone` mm after segment `start`; None where it is in doubt."""
-    origin = track.length[start]
+    """Place of a written vertex on the original, `gone` mm after `fraction` of `start`; None where it is in doubt."""
+    origin = track.length[start] + fraction * (track.length[start + 1] - track.length[start])
     for low, high in ((_LENGTH_LOW, _LENGTH_HIGH), (0.0, 2 * _LENGTH_HIGH)):
         a, b = np.searchsorted(track.length, (origin + low * gone - near, origin + high * gone + 2 * near))
         a, b = max(int(a) - 1, start), min(int(b) + 1, stop)
@@ -97,9 +96,11 @@ def find_anchor(
         best = int(np.argmin(d))
         if d[best] > near * near:
             continue
+        place = track.length[a:b] + t * (track.length[a + 1 : b + 1] - track.length[a:b])
+        if a > start and place[best] - track.length[a] <= 2 * near:  # what comes before may be nearer
+            continue
         if track.length[a + close[-1]] - track.length[a + close[0] + 1] > 8 * near:
             return None
-        place = track.length[a:b] + t * (track.length[a + 1 : b + 1] - track.length[a:b])
         if _folded(d[close], d[best], place[close] - place[best], near).any():
             return None
         return a + best, float(t[best])
@@ -139,7 +140,8 @@ def cut_finely(
         At least one; they join where they are cut.
     """
     coarse = cut_lane(six, written_length, track, lane, size * _COARSE, near)
-    first, last, start, stop, _ = (np.array(column) for column in zip(*coarse, strict=True))
+    first, last, start, stop, fraction = (np.array(column) for column in zip(*coarse, strict=True))
+    origin = track.length[start] + fraction * (track.length[start + 1] - track.length[start])
     count = np.maximum((last - first) // size - 1, 0)
     owner = np.repeat(np.arange(len(coarse)), count)
     target = first[owner] + size * (np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count) + 1)
@@ -147,7 +149,9 @@ def cut_finely(
     fits = (vertex > first[owner]) & (vertex < last[owner])
     fits &= np.diff(vertex, prepend=-1) > 0
     vertex, owner = vertex[fits], owner[fits]
-    segment, at = _find_anchors(six, vertex, first[owner], written_length, track, start[owner], stop[owner], near)
+    gone = written_length[vertex] - written_length[first[owner]]
+    about = origin[owner], gone
+    segment, at = _find_anchors(six, vertex, about, track, start[owner], stop[owner], near)
     # between the coarse anchors, and in order
     place = segment + at
     edge = np.array([lane[-1] + lane[2] for lane in coarse] + [np.inf])
@@ -162,14 +166,14 @@ def cut_finely(
 
 
 def _find_anchors(
-    six: Floats, vertex: Ints, first: Ints, written_length: Floats, track: Track, start: Ints, stop: Ints, near: float
+    six: Floats, vertex: Ints, about: tuple[Floats, Floats], track: Track, start: Ints, stop: Ints, near: float
 ) -> tuple[Ints, Floats]:
     """(k,) places of written vertices on the original, as `find_anchor` does, -1 where they are in doubt.
 
-    Each is looked for between the segments `start` and `stop`, from vertex `first` on which is at `start`.
+    Each is looked for between the segments `start` and `stop`; `about` is where its lane begins on the original, a path
+    length, and how far it is from there.
     """
-    gone = written_length[vertex] - written_length[first]
-    origin = track.length[start]
+    origin, gone = about
     low = np.searchsorted(track.length, origin + _LENGTH_LOW * gone - near) - 1
     high = np.searchsorted(track.length, origin + _LENGTH_HIGH * gone + 2 * near) + 1
     low, high = np.maximum(low, start), np.minimum(high, stop)
@@ -200,6 +204,7 @@ def _find_anchors(
         folded = (d <= 4 * near * near) & _folded(d, np.repeat(least, count), way, near)
         clear = ~np.logical_or.reduceat(folded, begin)
         clear &= least <= near * near
+        clear &= (low[rows] == start[rows]) | (place[best] - track.length[low[rows]] > 2 * near)
         clear[clear] &= (
             track.length[segment[close[np.searchsorted(close, ends[clear]) - 1]]]
             - track.length[segment[close[np.searchsorted(close, begin[clear])]] + 1]

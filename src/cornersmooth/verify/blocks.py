@@ -13,7 +13,7 @@ from cornersmooth.verify.anchors import cut_finely, cut_lane, find_anchor
 from cornersmooth.verify.careful import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.gliding import glide
 from cornersmooth.verify.ncprogram import NcProgram
-from cornersmooth.verify.stops import Stretches
+from cornersmooth.verify.stops import ARITHMETIC, Stretches
 from cornersmooth.verify.trails import CHORD_SHARE, Original, Written, directions, written_motion
 from cornersmooth.verify.walking import Lane, Lanes, Track, Walked, nowhere, walk
 
@@ -213,11 +213,11 @@ class Matcher:
         first, last, start, stop, fraction = piece
         six = ends(self.nc, first, last, self.axis_length)
         length = lengths(six)
-        begin, _, segment, _, _ = cut_lane(
+        begin, _, segment, _, at = cut_lane(
             six, length, self.track, (0, wanted - first, start, stop, fraction), _HOP, self.near
         )[-1]
         for vertex in range(max(wanted - first, begin + 1), len(six), _STRIDE):
-            found = find_anchor(six[vertex], length[vertex] - length[begin], self.track, segment, stop, self.near)
+            found = find_anchor(six[vertex], length[vertex] - length[begin], self.track, segment, at, stop, self.near)
             if found is not None and _INNER <= found[1] <= 1 - _INNER:
                 return first + vertex, *found
         return None
@@ -308,6 +308,14 @@ class Matcher:
         known = np.isfinite(distance)
         for around, most_pairs, most_windows in ROUNDS:
             doubtful = (backward | (known & (distance > self.doubtful))) & (piece >= 0)
+            # both together may be so far, but not one of them alone
+            rows = np.flatnonzero(known & ~doubtful & (distance > self.tolerance + self.margin))
+            row = self.track.row[segment[rows]]
+            away = six[rows] - row[:, :6] - fraction[rows, None] * row[:, 6:12]
+            square = np.maximum(
+                np.einsum("ij,ij->i", away[:, :3], away[:, :3]), np.einsum("ij,ij->i", away[:, 3:], away[:, 3:])
+            )
+            doubtful[rows] = square > (self.tolerance + self.margin) ** 2
             windows = doubtful_windows(doubtful, piece, around, most_windows + 1)
             if around > ROUNDS[0][0] and len(windows) > most_windows:
                 return  # no mishap of the walk: the text is off everywhere
@@ -325,7 +333,7 @@ class Matcher:
                 if around > ROUNDS[0][0]:  # most of so wide a window has its place already
                     begin, end = self._moved(segment[part], fraction[part], found[0], found[1], doubtful[part])
                 new, at = slice(begin, end), slice(first + begin, first + end)
-                if end > begin and off[new].max() <= distance[at].max():
+                if end > begin and off[new].max() <= distance[at].max() + ARITHMETIC:  # no worse, not to the last bit
                     segment[at], fraction[at], distance[at] = found[0][new], found[1][new], off[new]
                     length = self.track.length[found[0] + 1] - self.track.length[found[0]]
                     behind = np.einsum("ij,ij->i", six[part] - row[:, :6], row[:, 6:12]) * row[:, 12]

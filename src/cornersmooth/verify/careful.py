@@ -80,15 +80,22 @@ def assign(
     passing = np.concatenate(
         ([np.zeros(len(way))], np.cumsum(np.minimum(passed / tolerance**2, _FARTHEST) ** _POWER, axis=0))
     ).T
+    # going back on one segment counts like being so far off: else a path that runs to and fro is all on its first line
+    size = np.einsum("ij,ij->i", row[:, 6:12], row[:, 6:12])
+    back = np.maximum(fraction[:-1] - fraction[1:], 0.0) ** 2 * size
+    back = np.minimum(back / tolerance**2, _FARTHEST) ** _POWER
     columns = np.arange(count)
     best = np.where(columns == 0, 0.0, np.inf)
     came = np.zeros((len(six), count), np.int32)
     for k in range(1, len(six)):
         reached = best - passing[k - 1]
-        least = np.minimum.accumulate(reached)
-        is_new = np.append(True, reached[1:] < least[:-1])
-        came[k] = np.maximum.accumulate(np.where(is_new, columns, 0))
-        best = least + passing[k - 1] + cost[k]
+        least = np.append(np.inf, np.minimum.accumulate(reached)[:-1])
+        is_new = np.append(True, reached[1:] < least[1:])
+        before = np.append(0, np.maximum.accumulate(np.where(is_new, columns, 0))[:-1])
+        moved = least + passing[k - 1]
+        stayed = best + back[k - 1]
+        came[k] = np.where(stayed <= moved, columns, before)
+        best = np.minimum(stayed, moved) + cost[k]
     segment = np.zeros(len(six), np.int64)
     segment[-1] = count - 1
     for k in range(len(six) - 1, 0, -1):

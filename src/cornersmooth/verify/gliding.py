@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.nearest import climb, nearest_places
+from cornersmooth.verify.nearest import climb, nearest_places, nearest_segments
 from cornersmooth.verify.stops import ARITHMETIC
 from cornersmooth.verify.walking import Lanes, Track
 
@@ -20,6 +20,9 @@ _STRIDE = 32
 
 #: how much longer one motion may be than the other between neighbouring vertices, in distances that are doubtful
 _SHORTCUT = 2.0
+
+#: segments looked at on either side of a repeated pose
+_BEYOND_REPEATED = 4
 
 
 def glide(
@@ -92,6 +95,16 @@ def _nearest(point: Floats, track: Track, about: Floats, low: Ints, high: Ints) 
     middle = np.clip(np.searchsorted(track.length, about, side="right") - 1, low, high)
     segment, fraction, square = nearest_places(point, track.six, middle, 1, low, high)
     moved = climb(point, track.six, middle, low, high, segment, fraction)
+    ended = np.flatnonzero(((fraction <= 0.0) | (fraction >= 1.0)) & (square > ARITHMETIC))
+    flat = track.row[np.maximum(segment[ended] - 1, 0), 12] == 0
+    flat |= (track.row[segment[ended], 12] == 0) | (track.row[segment[ended] + 1, 12] == 0)
+    stuck = ended[flat]
+    if len(stuck):  # at a repeated pose, beyond which it may be nearer
+        own, part = point[stuck], (low[stuck], high[stuck])
+        there, share = nearest_segments(own, track.six, segment[stuck], _BEYOND_REPEATED, *part)
+        climb(own, track.six, segment[stuck], *part, there, share)
+        segment[stuck], fraction[stuck] = there, share
+        moved = np.union1d(moved, stuck)
     row = track.row[segment[moved]]
     away = point[moved] - row[:, :6] - fraction[moved, None] * row[:, 6:12]
     square[moved] = np.einsum("ij,ij->i", away, away)

@@ -219,12 +219,12 @@ def _match(
                 )
             )
         for k in range(head + i0 + both, head + i1):
-            if not _negligible(program.tip[original.pose], theirs[k], nc.tip_step):
+            if not _negligible(program.tip[original.pose], theirs[k], nc):
                 element = _passing(nc, ours, head + j1, program.tip[original.pose[theirs[k]]])
                 text = "a rapid of the CL file is missing, or is written as a feed move"
                 problems.append(_problem("CS532", original, theirs[k], nc, element, text))
         for k in range(head + j0 + both, head + j1):
-            if not _negligible(nc.tip, ours[k], nc.tip_step):
+            if not _negligible(nc.tip, ours[k], nc):
                 pose = theirs[min(head + i1, len(theirs)) - 1] if len(theirs) else 0
                 text = "a rapid that the CL file does not have, or a feed move written as one"
                 problems.append(_problem("CS533", original, int(pose), nc, ours[k], text))
@@ -248,9 +248,11 @@ def _passing(nc: NcProgram, ours: Ints, stop: int, tip: Floats) -> int:
     return first + int(np.argmin(np.linalg.norm(nc.tip[first : last + 1] - tip, axis=1)))
 
 
-def _negligible(tip: Floats, index: int, step: float) -> bool:
-    """Whether a stop moves the tip by no more than the printed digits show."""
-    return bool(index > 0 and np.abs(tip[index] - tip[index - 1]).max() <= 1.01 * step)
+def _negligible(tip: Floats, index: int, nc: NcProgram) -> bool:
+    """Whether a stop moves the tip by no more than the printed digits show, which may be those of turned axes."""
+    way = np.abs(tip[index] - tip[index - 1])
+    large = np.linalg.norm(way) / np.sqrt(3) if nc.rotary else way.max()
+    return bool(index > 0 and large <= 1.01 * nc.tip_step)
 
 
 def _problem(
