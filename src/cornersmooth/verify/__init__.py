@@ -4,6 +4,17 @@ Shares no code with `smoothing` and `nc`::
 
     found = verify(program, "part.nc", tolerance=0.04, axis_length=10.0)
     found.passed, found.max_tip_deviation_mm, found.problems
+
+Where is what:
+
+- text to `ncprogram`: `source`, `style`, `dialects`, `spelling`, `words`; `runs`, `layouts`, `fixed` for most lines at
+  once; `reader` holds the modal state; `motion` executes: `circles`, `splines`, `polynomials`, `rotary`, `unknown`;
+  `pile` gathers
+- the CL motion and the written one as polylines: `trails`, `arcs`, `curves`
+- what corresponds to what: `stops`, `holes`, `cycles`; then `blocks` with `gliding`, `anchors`, `walking`, `careful`
+- measuring: `comparison`, `deviation`, `gaps`, `nearest`, `farther`, `hulls`, `order`, `joints`, `feeds`, `statements`
+- all of it: `verifying`, `verification`; long texts in `sections`, `sectionwork`, with `processes`, `ring`, `workers`;
+  `along` for pictures
 """
 
 from cornersmooth.verify.along import Distribution, deviation_along
