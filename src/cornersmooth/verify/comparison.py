@@ -8,7 +8,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.blocks import Block, Cut, Matcher
-from cornersmooth.verify.deviation import Largest, Measured, Meter, Poses, Violations, Worst
+from cornersmooth.verify.deviation import Largest, Measured, Meter, Peaks, Poses, Violations, Worst
 from cornersmooth.verify.feeds import check_feeds
 from cornersmooth.verify.joints import joint_jumps
 from cornersmooth.verify.ncprogram import NcProgram, Problem
@@ -22,18 +22,12 @@ BEFORE = -1.0
 
 
 @dataclass
-class Joints:
+class Joints(Peaks):
     """Largest jumps of direction (minus the cosine) and curvature, and the shortest element (minus its length)."""
 
     tangent: Worst = field(default_factory=lambda: Worst(-1.0))
     curvature: Worst = field(default_factory=Worst)
     shortest: Worst = field(default_factory=lambda: Worst(-np.inf))
-
-    def take(self, other: Joints) -> None:
-        """Take over what is larger elsewhere."""
-        for name, worst in vars(other).items():
-            if worst.value > getattr(self, name).value:
-                setattr(self, name, worst)
 
 
 @dataclass

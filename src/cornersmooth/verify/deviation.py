@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
@@ -92,8 +93,18 @@ class Violations:
         return found
 
 
+class Peaks:
+    """Largest values of several kinds: every field is a `Worst`."""
+
+    def take(self, other: Self) -> None:
+        """Take over what is larger elsewhere."""
+        for name, worst in vars(other).items():
+            if worst.value > getattr(self, name).value:
+                setattr(self, name, worst)
+
+
 @dataclass
-class Largest:
+class Largest(Peaks):
     """Largest deviations.
 
     Parameters
@@ -115,12 +126,6 @@ class Largest:
     def copy(self) -> Largest:
         """Return the same values, to go on from."""
         return Largest(*(replace(worst) for worst in vars(self).values()))
-
-    def take(self, other: Largest) -> None:
-        """Take over what is larger elsewhere."""
-        for name, worst in vars(other).items():
-            if worst.value > getattr(self, name).value:
-                setattr(self, name, worst)
 
 
 @dataclass
