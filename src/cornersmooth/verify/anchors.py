@@ -141,7 +141,7 @@ def cut_finely(
     """
     coarse = cut_lane(six, written_length, track, lane, size * _COARSE, near)
     first, last, start, stop, fraction = (np.array(column) for column in zip(*coarse, strict=True))
-    origin = track.length[start] + fraction * (track.length[start + 1] - track.length[start])
+    origin = track.way(start, fraction)
     count = np.maximum((last - first) // size - 1, 0)
     owner = np.repeat(np.arange(len(coarse)), count)
     target = first[owner] + size * (np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count) + 1)
@@ -199,7 +199,7 @@ def _find_anchors(
         best = best[np.searchsorted(best, begin)]
         close = np.flatnonzero(d <= 4 * near * near)
         ends = begin + count
-        place = track.length[segment] + t * (track.length[segment + 1] - track.length[segment])
+        place = track.way(segment, t)
         way = place - np.repeat(place[best], count)
         folded = (d <= 4 * near * near) & _folded(d, np.repeat(least, count), way, near)
         clear = ~np.logical_or.reduceat(folded, begin)

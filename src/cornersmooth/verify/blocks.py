@@ -231,9 +231,12 @@ class Matcher:
         written = written_motion(self.nc, first, last, self.tolerance, self.axis_length)
         six = written.trail.six(self.axis_length)
         length = lengths(six)
-        ends = written.trail.last
-        lanes = [(int(ends[a - first]), int(ends[b - first]), start, stop, at) for a, b, start, stop, at in pieces]
-        (segment, fraction, backward, distance), nearest = self._places(six, length, lanes, ends)
+        last_vertex = written.trail.last
+        lanes = [
+            (int(last_vertex[a - first]), int(last_vertex[b - first]), start, stop, at)
+            for a, b, start, stop, at in pieces
+        ]
+        (segment, fraction, backward, distance), nearest = self._places(six, length, lanes, last_vertex)
         on = fraction >= 0
         number = np.full(len(six), -1, np.int64)
         low, high = np.zeros(len(six), np.int64), np.zeros(len(six), np.int64)
@@ -310,8 +313,7 @@ class Matcher:
             doubtful = (backward | (known & (distance > self.doubtful))) & (piece >= 0)
             # both together may be so far, but not one of them alone
             rows = np.flatnonzero(known & ~doubtful & (distance > self.tolerance + self.margin))
-            row = self.track.row[segment[rows]]
-            away = six[rows] - row[:, :6] - fraction[rows, None] * row[:, 6:12]
+            away = self.track.away(six[rows], segment[rows], fraction[rows])
             square = np.maximum(
                 np.einsum("ij,ij->i", away[:, :3], away[:, :3]), np.einsum("ij,ij->i", away[:, 3:], away[:, 3:])
             )
@@ -327,7 +329,7 @@ class Matcher:
                 if found is None:
                     continue
                 row = self.track.row[found[0]]
-                away = six[part] - row[:, :6] - found[1][:, None] * row[:, 6:12]
+                away = self.track.away(six[part], found[0], found[1])
                 off = np.sqrt(np.einsum("ij,ij->i", away, away))
                 begin, end = 1, len(off)
                 if around > ROUNDS[0][0]:  # most of so wide a window has its place already
@@ -343,9 +345,7 @@ class Matcher:
         self, segment: Ints, fraction: Floats, new_segment: Ints, new_fraction: Floats, doubtful: Bools
     ) -> tuple[int, int]:
         """First vertex of a window, and last plus one, that get another place with the doubtful ones; all in order."""
-        length = self.track.length
-        old = length[segment] + fraction * (length[segment + 1] - length[segment])
-        new = length[new_segment] + new_fraction * (length[new_segment + 1] - length[new_segment])
+        old, new = self.track.way(segment, fraction), self.track.way(new_segment, new_fraction)
         rows = np.flatnonzero(doubtful[1:]) + 1
         if not len(rows):
             return 0, 0

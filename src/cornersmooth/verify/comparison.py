@@ -186,8 +186,7 @@ class Comparison:
         first = block.written.first
         a, b = np.searchsorted(elements, (first, first + len(block.written.trail.last))).tolist()
         vertex = block.written.trail.last[elements[a:b] - first]
-        length, segment = self.matcher.track.length, block.segment[vertex]
-        here = length[segment] + block.fraction[vertex] * (length[segment + 1] - length[segment])
+        here = self.matcher.track.way(block.segment[vertex], block.fraction[vertex])
         return slice(a, b), np.where(block.on[vertex], here, np.nan)
 
     def _joints(self, block: Block) -> Joints:

@@ -93,9 +93,7 @@ class _Around:
     def __init__(self, matcher: Matcher, block: Block) -> None:
         self.length, self.near = matcher.track.length, matcher.near
         self.on = np.flatnonzero(block.on)
-        own = block.segment[self.on]
-        step = self.length[own + 1] - self.length[own]
-        self.place = np.maximum.accumulate(self.length[own] + block.fraction[self.on] * step)
+        self.place = np.maximum.accumulate(matcher.track.way(block.segment[self.on], block.fraction[self.on]))
 
     def vertices(self, vertex: int) -> tuple[int, int]:
         """First and last written vertex that may have to do with an original one."""

@@ -74,7 +74,8 @@ def from_written(matcher: Matcher, block: Block) -> Reached:
         segment[loose[over]], at[loose[over]] = nearest_segments(
             block.six[own], matcher.track.six, segment[loose[over]], _REACH, block.low[own], block.high[own]
         )
-        better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
+        again = _gap_to_original(matcher, block, own, segment[loose[over]], at[loose[over]])
+        better.tip[over], better.axis_point[over], better.angle[over] = again.tip, again.axis_point, again.angle
     gap.tip[loose], gap.axis_point[loose], gap.angle[loose] = better.tip, better.axis_point, better.angle
     return Reached(vertex, gap, segment + at)
 

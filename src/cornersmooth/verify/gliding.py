@@ -54,7 +54,7 @@ def glide(
     owner = np.repeat(np.arange(len(lanes)), count)
     head = np.cumsum(count) - count
     vertex = np.arange(len(owner)) + (first + 1 - head)[owner]
-    begin = track.length[start] + lanes.fraction * (track.length[start + 1] - track.length[start])
+    begin = track.way(start, lanes.fraction)
     end = track.length[lanes.stop]
     joined = np.flatnonzero(first[1:] == lanes.last[:-1])
     end[joined] = begin[joined + 1]
@@ -68,15 +68,14 @@ def glide(
     low, high = start[owner], (lanes.stop - 1)[owner]
     few = np.arange(_STRIDE - 1, len(owner), _STRIDE)
     segment, fraction, _ = _nearest(point[few], track, about[few], low[few], high[few])
-    off = track.length[segment] + fraction * (track.length[segment + 1] - track.length[segment]) - about[few]
+    off = track.way(segment, fraction) - about[few]
     some = np.flatnonzero(count)
     known = np.concatenate((head[some], (head + count)[some] - 1, few))
     order = np.argsort(known, kind="stable")
     about += np.interp(np.arange(len(owner)), known[order], np.append(np.zeros(2 * len(some)), off)[order])
     segment, fraction, square = _nearest(point, track, about, low, high)
     distance = np.sqrt(square)
-    gone = track.length[segment]
-    gone += fraction * (track.length[segment + 1] - gone)
+    gone = track.way(segment, fraction)
     step = gone - np.concatenate(([0.0], gone[:-1]))
     step[head[some]] = gone[head[some]] - begin[some]
     # a rounding is shorter than its corner by no more than twice its deviation: else a part is left out, or run again
@@ -105,7 +104,6 @@ def _nearest(point: Floats, track: Track, about: Floats, low: Ints, high: Ints) 
         climb(own, track.six, segment[stuck], *part, there, share)
         segment[stuck], fraction[stuck] = there, share
         moved = np.union1d(moved, stuck)
-    row = track.row[segment[moved]]
-    away = point[moved] - row[:, :6] - fraction[moved, None] * row[:, 6:12]
+    away = track.away(point[moved], segment[moved], fraction[moved])
     square[moved] = np.einsum("ij,ij->i", away, away)
     return segment, fraction, square

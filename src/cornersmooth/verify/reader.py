@@ -20,7 +20,7 @@ from cornersmooth.verify.motion import Modal, Piece, execute
 from cornersmooth.verify.ncprogram import Element, Event, NcProgram, Problem, Second
 from cornersmooth.verify.pile import Pile
 from cornersmooth.verify.runs import read_lines
-from cornersmooth.verify.source import readable_twice
+from cornersmooth.verify.source import readable_twice, unreadable
 from cornersmooth.verify.stops import moving_rapids
 from cornersmooth.verify.style import DIGITS_SAMPLE, Steps, Style
 from cornersmooth.verify.unknown import settle
@@ -110,7 +110,7 @@ def read_styled(data: bytes | str | os.PathLike[str], style: Style, name: str | 
         with path.open("rb") as file:
             return read(file, label)
     except OSError as error:
-        raise InputError("CS500", f"cannot read: {error.strerror}", "check name and rights", file=label) from error
+        raise unreadable(error, label) from error
 
 
 @dataclass(frozen=True)

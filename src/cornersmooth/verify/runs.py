@@ -41,7 +41,6 @@ def read_lines(
     *,
     layouts: Layouts | None = None,
     number: int = 1,
-    size: int = CHUNK,
 ) -> Iterator[Table | Line]:
     """Give out the text in order, as runs of motion blocks and as other lines.
 
@@ -56,8 +55,6 @@ def read_lines(
         Those met so far in the same text.
     number : int
         Of the first line.
-    size : int
-        Bytes read at a time.
 
     Raises
     ------
@@ -67,16 +64,16 @@ def read_lines(
     spelling = spelling or Spelling()
     if layouts is None:
         layouts = Layouts(spelling.columns, numbered=spelling.numbered)
-    for chunk in _chunks(data, spelling, size):
+    for chunk in _chunks(data, spelling):
         number += yield from _read_chunk(chunk, number, spelling, layouts, name)
 
 
-def _chunks(data: bytes | Readable, spelling: Spelling, size: int) -> Iterator[bytes]:
+def _chunks(data: bytes | Readable, spelling: Spelling) -> Iterator[bytes]:
     """Pieces of the text, cut where no curve is cut in two."""
     file = io.BytesIO(data) if isinstance(data, bytes) else data
     rest = b""
     while True:
-        more = file.read(size)
+        more = file.read(CHUNK)
         chunk = rest + more
         if not chunk:
             return

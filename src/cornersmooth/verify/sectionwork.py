@@ -18,7 +18,7 @@ from cornersmooth.verify.layouts import Layouts
 from cornersmooth.verify.ncprogram import Element, NcProgram
 from cornersmooth.verify.reader import CONTROL_WORDS, Reader, Standing, closed
 from cornersmooth.verify.ring import LeftAlone, Place
-from cornersmooth.verify.runs import CHUNK, read_lines
+from cornersmooth.verify.runs import read_lines
 from cornersmooth.verify.sections import Baton, Irregular, Section, Share, Task
 from cornersmooth.verify.source import GivenUp, Part
 from cornersmooth.verify.stops import Stretches, digit_errors, stops_of_original, stops_of_text
@@ -164,8 +164,8 @@ class _Worker:
     def _reader(self, standing: Standing | None) -> Reader:
         return Reader(self.source.name, self.task.style, self.steps, standing)
 
-    def _lines(self, part: Part, number: int = 1, size: int = CHUNK) -> Iterator[Table | Line]:
-        return read_lines(part, self.source.name, self.spelling, layouts=self.layouts, number=number, size=size)
+    def _lines(self, part: Part, number: int = 1) -> Iterator[Table | Line]:
+        return read_lines(part, self.source.name, self.spelling, layouts=self.layouts, number=number)
 
     def _guess(self, start: int) -> Standing:
         """What may hold where a section begins; its feed is not known."""
@@ -201,10 +201,10 @@ class _Worker:
         """Read some way behind a section, and return the first stop there, or the end of the text."""
         before, farthest = reader.elements, stop + _BEHIND
         end = stop + self.spelling.cut(self.source.read(stop, farthest))
-        ends = self.source.size(farthest + 1) <= farthest
-        reader.take(self._lines(self.source.part(stop, farthest if ends else end), reader.lines + 1))
+        last = self.source.size(farthest + 1) <= farthest
+        reader.take(self._lines(self.source.part(stop, farthest if last else end), reader.lines + 1))
         found = reader.next_stop(before)
-        return reader.elements if found is None and ends else found
+        return reader.elements if found is None and last else found
 
     def _program(self, read: _Read, baton: Baton) -> NcProgram:
         """What a section says, with the lines of the whole text."""

@@ -17,6 +17,11 @@ _PAUSE: Final = 0.003
 _GROWING, _WHOLE, _GIVEN_UP = 0, 1, 2
 
 
+def unreadable(error: OSError, name: str | None) -> InputError:
+    """Say why a text cannot be read."""
+    return InputError("CS500", f"cannot read: {error.strerror}", "check name and rights", file=name)
+
+
 def readable_twice(text: bytes | str | os.PathLike[str]) -> bytes | str | os.PathLike[str]:
     """Return the path of a file as it is, and all that comes out of a pipe or device."""
     if isinstance(text, bytes):
@@ -60,9 +65,7 @@ class Source:
             try:
                 self._files[process] = open(name, "rb", buffering=0)  # noqa: SIM115 - see `close`
             except OSError as error:
-                raise InputError(
-                    "CS500", f"cannot read: {error.strerror}", "check name and rights", file=name
-                ) from error
+                raise unreadable(error, name) from error
         return self._files[process]
 
     def finish(self) -> None:

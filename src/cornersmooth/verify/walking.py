@@ -56,6 +56,18 @@ class Track:
         following = np.append(np.minimum.accumulate(moving[::-1])[::-1][1:], count + 1)
         return cls(six, row, length, following)
 
+    def way(self, segment: Ints, fraction: Floats) -> Floats:
+        """(k,) path length up to places, mm."""
+        start = self.length[segment]
+        way: Floats = start + fraction * (self.length[segment + 1] - start)
+        return way
+
+    def away(self, point: Floats, segment: Ints, fraction: Floats) -> Floats:
+        """(k, 6) from places to points, mm."""
+        row = self.row[segment]
+        away: Floats = point - row[:, :6] - fraction[:, None] * row[:, 6:12]
+        return away
+
 
 @dataclass(frozen=True)
 class Lanes:
