@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.verify import read_nc
+from cornersmooth.verify import block_tables, read_nc
 from cornersmooth.verify.ncprogram import Element
 
 from .writing import simple_text, wavy
@@ -188,12 +188,11 @@ def test_runs_and_single_lines_give_the_same(form, tmp_path):
 
 
 def test_chunks_make_no_difference(monkeypatch):
-    from cornersmooth.verify import runs
 
     tip, axis = wavy(60)
     text = simple_text(tip, axis, 0.02, 10.0, "g6.2")
     whole = read_nc(text)
-    monkeypatch.setattr(runs, "CHUNK", 500)
+    monkeypatch.setattr(block_tables, "CHUNK", 500)
     pieces = read_nc(text)
     assert np.array_equal(whole.tip, pieces.tip)
     assert np.array_equal(whole.curves.knot, pieces.curves.knot)
@@ -207,14 +206,13 @@ def test_digits_before_the_first_word_are_none():
 
 
 def test_block_numbers_make_no_difference(monkeypatch):
-    from cornersmooth.verify import runs
 
     tip, axis = wavy(60)
     text = simple_text(tip, axis, 0.02, 10.0, "g6.2")
     numbered = b"\n".join(
         b"N%d %b" % (i, line) if line[:1] in b"GK" else line for i, line in enumerate(text.split(b"\n"))
     )
-    monkeypatch.setattr(runs, "CHUNK", 500)
+    monkeypatch.setattr(block_tables, "CHUNK", 500)
     plain, other = read_nc(text), read_nc(numbered)
     assert np.array_equal(plain.tip, other.tip)
     assert np.array_equal(plain.curves.point, other.curves.point)

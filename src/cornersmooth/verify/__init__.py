@@ -7,8 +7,8 @@ Shares no code with `smoothing` and `nc`::
 
 Where is what:
 
-- text to `ncprogram`: `source`, `style`, `dialects`, `spelling`, `words`; `runs`, `layouts`, `fixed` for most lines at
-  once; `reader` holds the modal state; `motion` executes: `circles`, `splines`, `polynomials`, `rotary`, `unknown`;
+- text to `ncprogram`: `source`, `style`, `dialects`, `lexer`, `words`; `block_tables`, `line_patterns`, `fixed` for
+  most lines at once; `reader` holds the modal state; `motion` executes: `arcs`, `splines`, `rotary`, `unknown`;
   `pile` gathers
 - the CL motion and the written one as polylines: `trails`, `arcs`, `curves`
 - what corresponds to what: `stops`, `holes`, `cycles`; then `blocks` with `gliding`, `anchors`, `walking`, `careful`

@@ -1,10 +1,73 @@
-"""Points of circular arcs and helices."""
+"""Circular blocks: centre, axis and sweep from what a text says, and points on them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.model import Floats
+from cornersmooth.model import Bools, Floats
+from cornersmooth.verify.ncprogram import Problem
+from cornersmooth.verify.words import Table
+
+_PLANE_NORMAL = {17: (0.0, 0.0, 1.0), 18: (0.0, 1.0, 0.0), 19: (1.0, 0.0, 0.0)}
+_FULL_TURN = 2 * np.pi
+
+
+def circles(
+    table: Table, before: Floats, end: Floats, counterclockwise: Bools, plane: int, problems: list[Problem]
+) -> tuple[Floats, Floats, Floats]:
+    """Circles of G2 and G3 by radius R or by centre I J K, in units of the text.
+
+    Parameters
+    ----------
+    table : Table
+        Of the k circular blocks.
+    before, end : (k, 3) float64
+    counterclockwise : (k,) bool
+    plane : int
+        17, 18 or 19.
+    problems : list of Problem
+        Takes CS520, an arc that does not reach its end.
+
+    Returns
+    -------
+    centre, normal : (k, 3) float64
+    sweep : (k,) float64
+    """
+    upright = np.array(_PLANE_NORMAL[plane])
+    sense = np.where(counterclockwise, 1.0, -1.0)
+    chord = end - before
+    chord -= (chord @ upright)[:, None] * upright
+    length = np.linalg.norm(chord, axis=1)
+    across = np.cross(upright, chord)
+    radius = table.column("R")
+    by_radius = ~np.isnan(radius)
+    half = np.divide(length, 2 * np.abs(radius), out=np.ones_like(length), where=by_radius & (radius != 0))
+    for k in np.flatnonzero(by_radius & ((length == 0) | (half > 1 + _slack(radius, length)))).tolist():
+        text = f"an arc of radius {radius[k]:g} does not reach its end"
+        problems.append(Problem("CS520", 0, int(table.line[k]), text))
+    rise = np.sqrt(np.maximum(1 - half**2, 0)) * np.abs(np.nan_to_num(radius)) * np.sign(np.nan_to_num(radius))
+    towards = np.divide(across, length[:, None], out=np.zeros_like(across), where=length[:, None] > 0)
+    centre = before + chord / 2 + (sense * rise)[:, None] * towards
+    offsets = np.stack([np.nan_to_num(table.column(letter)) for letter in "IJK"], axis=1)
+    offsets -= (offsets @ upright)[:, None] * upright
+    centre = np.where(by_radius[:, None], centre, before + offsets)
+    normals = sense[:, None] * upright
+    return centre, normals, _sweep(before - centre, end - centre, normals, by_radius)
+
+
+def _slack(radius: Floats, length: Floats) -> Floats:
+    """How much, relative to the radius, a half circle may be missed because of printed digits."""
+    return np.maximum(1e-6, np.divide(1e-3, np.abs(radius), out=np.zeros_like(length), where=radius != 0))
+
+
+def _sweep(start: Floats, end: Floats, normal: Floats, by_radius: Bools) -> Floats:
+    """Angle from start to end, right-handed about the normals; a full turn for a centre form that comes back."""
+    sine = np.einsum("ij,ij->i", np.cross(start, end), normal)
+    flat = start - np.einsum("ij,ij->i", start, normal)[:, None] * normal
+    cosine = np.einsum("ij,ij->i", flat, end)
+    angle = np.arctan2(sine, cosine) % _FULL_TURN
+    turned: Floats = np.where(~by_radius & (angle == 0), _FULL_TURN, angle)
+    return turned
 
 
 def arc_points(start: Floats, end: Floats, centre: Floats, normal: Floats, sweep: Floats, fraction: Floats) -> Floats:
@@ -33,27 +96,6 @@ def arc_points(start: Floats, end: Floats, centre: Floats, normal: Floats, sweep
 
     rest = end - turned(sweep)
     return turned(fraction * sweep) + fraction[:, None] * rest
-
-
-def arc_fraction(
-    point: Floats, start: Floats, end: Floats, centre: Floats, normal: Floats, sweep: Floats, guess: Floats
-) -> Floats:
-    """(k,) fraction of the sweep nearest to each point, near a guess, between 0 and 1.
-
-    Two Newton steps on the squared distance; the guess is within a few degrees.
-    """
-    step = 1e-4
-    fraction = guess
-    for _ in range(3):
-        here = arc_points(start, end, centre, normal, sweep, fraction)
-        tangent = (
-            arc_points(start, end, centre, normal, sweep, fraction + step)
-            - arc_points(start, end, centre, normal, sweep, fraction - step)
-        ) / (2 * step)
-        size = _dot(tangent, tangent)
-        move = np.divide(_dot(point - here, tangent), size, out=np.zeros_like(size), where=size > 0)
-        fraction = np.clip(fraction + move, 0.0, 1.0)
-    return fraction
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.circles import circles
+from cornersmooth.verify.arcs import circles
 from cornersmooth.verify.ncprogram import Element, Problem
-from cornersmooth.verify.polynomials import poly_curves, spl_curves
-from cornersmooth.verify.splines import CurveTable, interval_curves, knot_curves
+from cornersmooth.verify.splines import CurveTable, interval_curves, knot_curves, poly_curves, spl_curves
 from cornersmooth.verify.words import BSPLINE, NURBS, POLY, SPL, Table
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"

@@ -14,12 +14,12 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Units
+from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.dialects import CONTROLS
 from cornersmooth.verify.dialects.base import HIGH_SPEED
 from cornersmooth.verify.motion import Modal, Piece, execute
 from cornersmooth.verify.ncprogram import Element, Event, NcProgram, Problem, Second
 from cornersmooth.verify.pile import Pile
-from cornersmooth.verify.runs import read_lines
 from cornersmooth.verify.source import readable_twice, unreadable
 from cornersmooth.verify.stops import moving_rapids
 from cornersmooth.verify.style import DIGITS_SAMPLE, Steps, Style
@@ -98,7 +98,7 @@ def read_styled(data: bytes | str | os.PathLike[str], style: Style, name: str | 
         steps = style.steps(file.read(DIGITS_SAMPLE))
         file.seek(0)
         reader = Reader(label, style, steps)
-        reader.take(read_lines(file, label, style.dialect.spelling))
+        reader.take(read_lines(file, label, style.dialect.lexer))
         return reader.result()
 
     label = name if name is not None or isinstance(data, bytes) else str(data)
@@ -279,7 +279,7 @@ class Reader:
 
     def move(self, line: Line, row: dict[str, float]) -> None:
         """Execute a single motion block; one without words of position only changes what holds."""
-        if set(row) & self.dialect.spelling.places or set(row) & set("XYZIJKUVW"):
+        if set(row) & self.dialect.lexer.places or set(row) & set("XYZIJKUVW"):
             self.waiting.append((line.number, row))
             self.flush()
         elif row:

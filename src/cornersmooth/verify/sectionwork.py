@@ -11,14 +11,14 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Ints, Move
+from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.blocks import Matcher, ends, lengths
 from cornersmooth.verify.comparison import Comparison
 from cornersmooth.verify.deviation import Largest
-from cornersmooth.verify.layouts import Layouts
+from cornersmooth.verify.line_patterns import LinePatterns
 from cornersmooth.verify.ncprogram import Element, NcProgram
 from cornersmooth.verify.reader import CONTROL_WORDS, Reader, Standing, closed
 from cornersmooth.verify.ring import LeftAlone, Place
-from cornersmooth.verify.runs import read_lines
 from cornersmooth.verify.sections import Baton, Irregular, Section, Share, Task
 from cornersmooth.verify.source import GivenUp, Part
 from cornersmooth.verify.stops import Stretches, digit_errors, stops_of_original, stops_of_text
@@ -114,8 +114,8 @@ class _Worker:
     def __init__(self, task: Task, place: Place) -> None:
         self.task, self.place, self.source = task, place, task.source
         self.original, self.exact = task.original, task.exact
-        self.spelling = task.style.dialect.spelling
-        self.layouts = Layouts(self.spelling.columns, numbered=self.spelling.numbered)
+        self.lexer = task.style.dialect.lexer
+        self.patterns = LinePatterns(self.lexer.columns, numbered=self.lexer.numbered)
         self.steps = task.style.steps(self.source.read(0, DIGITS_SAMPLE))
         self._head: Standing | None = None
         self._stops: Ints | None = None
@@ -156,7 +156,7 @@ class _Worker:
             return None if k else 0
         for reach in _REACHES:
             begin = max(place - reach, 0)
-            cut = self.spelling.cut(self.source.read(begin, place))
+            cut = self.lexer.cut(self.source.read(begin, place))
             if cut:
                 return begin + cut
         raise Irregular
@@ -165,17 +165,17 @@ class _Worker:
         return Reader(self.source.name, self.task.style, self.steps, standing)
 
     def _lines(self, part: Part, number: int = 1) -> Iterator[Table | Line]:
-        return read_lines(part, self.source.name, self.spelling, layouts=self.layouts, number=number)
+        return read_lines(part, self.source.name, self.lexer, patterns=self.patterns, number=number)
 
     def _guess(self, start: int) -> Standing:
         """What may hold where a section begins; its feed is not known."""
         if self._head is None:
             reader = self._reader(None)
-            reader.take(self._lines(self.source.part(0, self.spelling.cut(self.source.read(0, _HEAD)))))
+            reader.take(self._lines(self.source.part(0, self.lexer.cut(self.source.read(0, _HEAD)))))
             held = reader.standing
             self._head = replace(held, modal=held.modal.but(feed=float("nan")))
         begin = max(start - _BEFORE, 0)
-        begin += self.spelling.cut(self.source.read(begin, begin + _BEGIN))
+        begin += self.lexer.cut(self.source.read(begin, begin + _BEGIN))
         reader = self._reader(self._head)
         reader.take(self._lines(self.source.part(begin, start)))
         return reader.standing
@@ -200,7 +200,7 @@ class _Worker:
     def _read_on(self, reader: Reader, stop: int) -> int | None:
         """Read some way behind a section, and return the first stop there, or the end of the text."""
         before, farthest = reader.elements, stop + _BEHIND
-        end = stop + self.spelling.cut(self.source.read(stop, farthest))
+        end = stop + self.lexer.cut(self.source.read(stop, farthest))
         last = self.source.size(farthest + 1) <= farthest
         reader.take(self._lines(self.source.part(stop, farthest if last else end), reader.lines + 1))
         found = reader.next_stop(before)

@@ -1,7 +1,7 @@
 """Blocks of an NC text as words: the table that a run of motion blocks becomes, and the single line.
 
 A *motion block* consists of axis, vector, knot, weight and feed words with at most one G word of group 01. Runs of
-them make up nearly all of a file and are read by `runs`; every other line is taken apart here on its own.
+them make up nearly all of a file and are read by `block_tables`; every other line is taken apart here on its own.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cornersmooth.verify.spelling import Spelling
+from cornersmooth.verify.lexer import Lexer
 from cornersmooth.verify.words import Line
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Dialect:
 
     Parameters
     ----------
-    spelling : Spelling
+    lexer : Lexer
     rotary : str
         Addresses of the rotary axes; empty without a machine.
     """
@@ -66,11 +66,11 @@ class Dialect:
     controls: Mapping[str, tuple[str, ...]] = {}
     #: what must be in force for curves; empty for nothing
     curves_need: str = ""
-    #: the first letter, or letters, of tip and second triple in the spelling, with their decimals
+    #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 
-    def __init__(self, spelling: Spelling, rotary: str = "") -> None:
-        self.spelling, self.rotary = spelling, rotary
+    def __init__(self, lexer: Lexer, rotary: str = "") -> None:
+        self.lexer, self.rotary = lexer, rotary
         if rotary:
             self.digits = re.compile(rb"(?:([XYZ])|(?<![A-Z0-9])([%b]))[-+]?\d*\.(\d*)" % rotary.encode())
 
@@ -85,7 +85,7 @@ class Dialect:
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """Decimals of the tip and of the second triple, from a sample of the text; None without any."""
         tip, second = 0, None
-        for _, other, fraction in self.digits.findall(self.spelling.respell(_COMMENT.sub(b"", text))):
+        for _, other, fraction in self.digits.findall(self.lexer.respell(_COMMENT.sub(b"", text))):
             if other:
                 second = max(second or 0, len(fraction))
             else:

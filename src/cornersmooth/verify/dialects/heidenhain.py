@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.verify.dialects.base import AFTER_MOTION, Dialect, State
-from cornersmooth.verify.spelling import Spelling, respelt
+from cornersmooth.verify.lexer import Lexer, respelt
 from cornersmooth.verify.words import SPL, Line, Table
 
 _AXES: Final = "XYZABC"
@@ -66,14 +66,14 @@ class Heidenhain(Dialect):
     digits = re.compile(rb"(?:([XYZ])|([\x81-\x83]))[-+]?\d*\.(\d*)")
 
     def __init__(self, rotary: str = "") -> None:
-        super().__init__(_Spelling(rotary), rotary)
+        super().__init__(_Lexer(rotary), rotary)
 
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""
         row = {name: value for name, value, _ in line.words}
-        if len(row) != len(line.words) or not {*row} <= self.spelling.letters or "PATH" not in row:
+        if len(row) != len(line.words) or not {*row} <= self.lexer.letters or "PATH" not in row:
             return None
-        if not {*row} & self.spelling.places:
+        if not {*row} & self.lexer.places:
             return None
         return _coded(row)
 
@@ -91,7 +91,7 @@ class Heidenhain(Dialect):
                 state.event(line, "G", value, text)
             elif name == "S":
                 state.event(line, "S", value, text)
-            elif name in self.spelling.letters or name in ("circle", "centre", "turn"):
+            elif name in self.lexer.letters or name in ("circle", "centre", "turn"):
                 motion[name] = value
             elif name in "ABC":
                 state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
@@ -158,7 +158,7 @@ class Heidenhain(Dialect):
             state.refuse(line, f"{text} is not understood", "see that the control is the one the text is for")
 
 
-class _Spelling(Spelling):
+class _Lexer(Lexer):
     """Words of several letters as one byte each; blocks begin with their number."""
 
     numbered = True
@@ -184,7 +184,7 @@ class _Spelling(Spelling):
         return _FOLDED.sub(joined, chunk)
 
     def respell(self, chunk: bytes) -> bytes:
-        """Return the text as `runs` is to read it, with the same lines."""
+        """Return the text as `block_tables` is to read it, with the same lines."""
         if b"++" in chunk or b"+-" in chunk or b"-+" in chunk:  # no numbers: read line by line, they are refused
             return respelt(chunk, ())
         return respelt(chunk, _SPELT)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cornersmooth.verify.dialects.base import AFTER_MOTION, HIGH_SPEED, Dialect, State
-from cornersmooth.verify.spelling import Spelling
+from cornersmooth.verify.lexer import Lexer
 from cornersmooth.verify.words import MOTION_CODES, MOTION_LETTERS, PLACE_LETTERS, Line, Table
 
 #: letters whose words are events
@@ -93,7 +93,7 @@ class Iso(Dialect):
         if rotary:  # I J stand on arcs only, and such lines are read one by one; K is a knot
             letters = "".join(letter for letter in letters if letter not in "IJUVW") + rotary
             places = (places - set("IJUVW")) | set(rotary)
-        super().__init__(_IsoSpelling(letters, places, rotary), rotary)
+        super().__init__(_IsoLexer(letters, places, rotary), rotary)
         self.controls, self.unsaid, self.curves_need = self.iso.controls, self.iso.unsaid, self.iso.curves_need
         self.letters = frozenset(letters) | ({"I", "J"} if rotary else set())
 
@@ -101,7 +101,7 @@ class Iso(Dialect):
         """Words of a motion block; None where the line is something else."""
         row = {letter: value for letter, value, _ in line.words}
         letters = set(row)
-        if len(row) != len(line.words) or not letters <= self.spelling.letters or not letters & self.spelling.places:
+        if len(row) != len(line.words) or not letters <= self.lexer.letters or not letters & self.lexer.places:
             return None
         if "G" in row and row["G"] not in MOTION_CODES:
             return None
@@ -157,7 +157,7 @@ class Iso(Dialect):
             state.refuse(line, f"G{code:g} is not understood", hint)
 
 
-class _IsoSpelling(Spelling):
+class _IsoLexer(Lexer):
     """The same, where K is a knot and never a vector beside rotary words."""
 
     def __init__(self, letters: str, places: set[str], rotary: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.verify.dialects.base import AFTER_MOTION, Dialect, State
-from cornersmooth.verify.spelling import Spelling, last_match, respelt
+from cornersmooth.verify.lexer import Lexer, last_match, respelt
 from cornersmooth.verify.words import BSPLINE, POLY, Line, Table
 
 #: names of words of several letters: vectors are I J K, second points U V W, as in `motion`
@@ -80,7 +80,7 @@ class Siemens(Dialect):
     digits = re.compile(rb"(?:([XYZ])|([\x81-\x86]))[-+]?\d*\.(\d*)")
 
     def __init__(self, rotary: str = "") -> None:
-        super().__init__(_Spelling(rotary), rotary)
+        super().__init__(_Lexer(rotary), rotary)
 
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""
@@ -91,7 +91,7 @@ class Siemens(Dialect):
         known = {"N", "G", "X", "Y", "Z", "F", "PL", "PW", "SD", "POLY", "BSPLINE", *self.rotary}
         known |= {f"{axis}{power}" for axis in "XYZUVW" for power in "23"}
         known |= {"R", "centre I", "centre J", "centre K"} if arc else set() if self.rotary else set("IJKUVW")
-        if not set(row) <= known or not set(row) & self.spelling.places:
+        if not set(row) <= known or not set(row) & self.lexer.places:
             return None
         curved = {name for name in row if name[-1] in "23"}
         if (curved and "POLY" not in row) or row.pop("SD", 3.0) != 3.0 or len({"G", "POLY", "BSPLINE"} & set(row)) > 1:
@@ -155,7 +155,7 @@ class Siemens(Dialect):
             state.refuse(line, f"G{code:g} is not understood", "only absolute milling is read")
 
 
-class _Spelling(Spelling):
+class _Lexer(Lexer):
     """Words of several letters as one byte each."""
 
     def __init__(self, rotary: str) -> None:
@@ -163,7 +163,7 @@ class _Spelling(Spelling):
         self._known = self.letters | set(_COLUMNS.values()) if not rotary else self.letters
 
     def respell(self, chunk: bytes) -> bytes:
-        """Return the text as `runs` is to read it, with the same lines."""
+        """Return the text as `block_tables` is to read it, with the same lines."""
         return respelt(chunk, _SPELT)
 
     def cut(self, piece: bytes) -> int:

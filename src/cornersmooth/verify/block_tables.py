@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.text import NumberError, parse_numbers
 from cornersmooth.verify.fixed import MARGIN, read_column, words_of
-from cornersmooth.verify.layouts import Layouts, lines_of
-from cornersmooth.verify.spelling import Spelling
+from cornersmooth.verify.lexer import Lexer
+from cornersmooth.verify.line_patterns import LinePatterns, lines_of
 from cornersmooth.verify.words import Line, Table
 
 #: bytes read at a time
@@ -37,9 +37,9 @@ class Readable(Protocol):
 def read_lines(
     data: bytes | Readable,
     name: str | None,
-    spelling: Spelling | None = None,
+    lexer: Lexer | None = None,
     *,
-    layouts: Layouts | None = None,
+    patterns: LinePatterns | None = None,
     number: int = 1,
 ) -> Iterator[Table | Line]:
     """Give out the text in order, as runs of motion blocks and as other lines.
@@ -49,9 +49,9 @@ def read_lines(
     data : bytes or file, open at its start
     name : str or None
         For messages.
-    spelling : Spelling, optional
+    lexer : Lexer, optional
         Of the control; single letters by default.
-    layouts : Layouts, optional
+    patterns : LinePatterns, optional
         Those met so far in the same text.
     number : int
         Of the first line.
@@ -61,14 +61,14 @@ def read_lines(
     InputError
         CS501 where a line is not made of words.
     """
-    spelling = spelling or Spelling()
-    if layouts is None:
-        layouts = Layouts(spelling.columns, numbered=spelling.numbered)
-    for chunk in _chunks(data, spelling):
-        number += yield from _read_chunk(chunk, number, spelling, layouts, name)
+    lexer = lexer or Lexer()
+    if patterns is None:
+        patterns = LinePatterns(lexer.columns, numbered=lexer.numbered)
+    for chunk in _chunks(data, lexer):
+        number += yield from _read_chunk(chunk, number, lexer, patterns, name)
 
 
-def _chunks(data: bytes | Readable, spelling: Spelling) -> Iterator[bytes]:
+def _chunks(data: bytes | Readable, lexer: Lexer) -> Iterator[bytes]:
     """Pieces of the text, cut where no curve is cut in two."""
     file = io.BytesIO(data) if isinstance(data, bytes) else data
     rest = b""
@@ -77,7 +77,7 @@ def _chunks(data: bytes | Readable, spelling: Spelling) -> Iterator[bytes]:
         chunk = rest + more
         if not chunk:
             return
-        cut = spelling.cut(chunk) if more else len(chunk)
+        cut = lexer.cut(chunk) if more else len(chunk)
         chunk, rest = chunk[:cut], chunk[cut:]
         if not cut:
             continue
@@ -89,8 +89,8 @@ def _chunks(data: bytes | Readable, spelling: Spelling) -> Iterator[bytes]:
 class _Signatures:
     """The letter sequences of lines met so far, and the columns of those that can be read in runs."""
 
-    def __init__(self, spelling: Spelling) -> None:
-        self.spelling = spelling
+    def __init__(self, lexer: Lexer) -> None:
+        self.lexer = lexer
         self.letters: list[bytes] = []
         self.columns: list[tuple[str, ...] | None] = []
 
@@ -126,7 +126,7 @@ class _Signatures:
 
     def _learn(self, signature: bytes) -> None:
         self.letters.append(signature)
-        self.columns.append(self.spelling.columns(signature))
+        self.columns.append(self.lexer.columns(signature))
 
 
 @dataclass(frozen=True)
@@ -158,20 +158,20 @@ class _Chunk:
 
 
 def _read_chunk(
-    chunk: bytes, number: int, spelling: Spelling, layouts: Layouts, name: str | None
+    chunk: bytes, number: int, lexer: Lexer, patterns: LinePatterns, name: str | None
 ) -> Generator[Table | Line, None, int]:
     """Give out the lines of a chunk and return how many there are."""
-    chunk = spelling.unfolded(chunk)
-    text = spelling.respell(chunk)
-    lines = lines_of(text, layouts)
+    chunk = lexer.unfolded(chunk)
+    text = lexer.respell(chunk)
+    lines = lines_of(text, patterns)
     if lines is None:
-        yield from _read_carefully(chunk, text, number, _Signatures(spelling), name)
+        yield from _read_carefully(chunk, text, number, _Signatures(lexer), name)
         return text.count(b"\n")
 
     def table(start: int, stop: int) -> Table | None:
-        return spelling.table(Table(np.arange(number + start, number + stop), lines.columns(start, stop)))
+        return lexer.table(Table(np.arange(number + start, number + stop), lines.columns(start, stop)))
 
-    yield from _in_order(lines.bulk(), table, lines.text, chunk, text, number, spelling, name)
+    yield from _in_order(lines.bulk(), table, lines.text, chunk, text, number, lexer, name)
     return len(lines.start)
 
 
@@ -182,7 +182,7 @@ def _in_order(
     chunk: bytes,
     text: bytes,
     number: int,
-    spelling: Spelling,
+    lexer: Lexer,
     name: str | None,
 ) -> Iterator[Table | Line]:
     """Runs as tables, and one by one the other lines and those of runs that turn out to be none."""
@@ -197,13 +197,13 @@ def _in_order(
         if text is not chunk and not written:
             written = chunk.split(b"\n")
         for row in range(start, stop):
-            yield spelling.line(written[row] if written else text_of(row), number + row, name)
+            yield lexer.line(written[row] if written else text_of(row), number + row, name)
 
 
 def _read_carefully(
     chunk: bytes, text: bytes, number: int, signatures: _Signatures, name: str | None
 ) -> Iterator[Table | Line]:
-    spelling = signatures.spelling
+    lexer = signatures.lexer
     raw = np.frombuffer(b"\n" * MARGIN + text, np.uint8)
     place = np.flatnonzero(np.frombuffer(text.translate(_SPEAKS), np.bool_)) + MARGIN
     letters = raw[place]
@@ -218,18 +218,18 @@ def _read_carefully(
     def line(row: int) -> bytes:
         return found.text(row, row + 1)
 
-    yield from _in_order(bulk, table, line, chunk, text, number, spelling, name)
+    yield from _in_order(bulk, table, line, chunk, text, number, lexer, name)
 
 
 def _read_run(chunk: _Chunk, start: int, stop: int, signatures: _Signatures, number: int) -> Table | None:
     """Run of lines with known letters; None where the numbers are not what the letters promise."""
-    if not _begin_with_letters(chunk, start, stop, numbered=signatures.spelling.numbered):
+    if not _begin_with_letters(chunk, start, stop, numbered=signatures.lexer.numbered):
         return None
     index = chunk.index[start:stop]
     patterns = {k: signatures.columns[k] or () for k in np.flatnonzero(np.bincount(index)).tolist()}
     fields = _fields(chunk, start, stop, index, patterns)
     if fields is None:
-        fields = _irregular_fields(chunk, start, stop, index, patterns, numbered=signatures.spelling.numbered)
+        fields = _irregular_fields(chunk, start, stop, index, patterns, numbered=signatures.lexer.numbered)
     if fields is None:
         return None
     columns: dict[str, Floats] = {}
@@ -240,7 +240,7 @@ def _read_run(chunk: _Chunk, start: int, stop: int, signatures: _Signatures, num
             else:
                 column = columns.setdefault(letter, np.full(stop - start, np.nan))
                 column[rows] = values
-    return signatures.spelling.table(Table(np.arange(number + start, number + stop), columns))
+    return signatures.lexer.table(Table(np.arange(number + start, number + stop), columns))
 
 
 def _begin_with_letters(chunk: _Chunk, start: int, stop: int, *, numbered: bool) -> bool:

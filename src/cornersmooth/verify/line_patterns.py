@@ -1,10 +1,10 @@
-"""Lines of one layout: the same letters, with numbers of the same shape behind them, in the same places of the line.
+"""Lines of one pattern: the same letters, with numbers of the same shape behind them, in the same places of the line.
 
-What posts write is regular: few layouts make up a text, and a line's layout is known from where its digits are and
-from what stands between them. Once a layout is understood, its numbers are read where they must stand, eight digits
+What posts write is regular: few patterns make up a text, and a line's pattern is known from where its digits are and
+from what stands between them. Once a pattern is understood, its numbers are read where they must stand, eight digits
 at a time: without the point they fit one machine word, and the value is that integer over a power of ten: exactly
-what `float` gives. Every byte that is no digit is compared with the layout's; a chunk in which anything is not
-regular is left to the careful reading in `runs`.
+what `float` gives. Every byte that is no digit is compared with the pattern's; a chunk in which anything is not
+regular is left to the careful reading in `block_tables`.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ MARGIN: Final = 24
 _BITS: Final = 57
 _MOST_WORDS: Final = 4
 
-#: lines up to so many bytes are compared with their layouts apart from longer ones
+#: lines up to so many bytes are compared with their patterns apart from longer ones
 _SHORT: Final = 16
 
 #: longest line, its end included, that is read in runs
 LONGEST: Final = 224
 
-#: a chunk with fewer lines for each layout than this is read otherwise, unless it has few layouts at all
+#: a chunk with fewer lines for each pattern than this is read otherwise, unless it has few patterns at all
 _FEWEST_LINES: Final = 8
-_FEW_LAYOUTS: Final = 256
+_FEW_PATTERNS: Final = 256
 
 _LINE_END: Final = 10
 #: bytes that are part of numbers, or blanks between words
@@ -52,7 +52,6 @@ _FEW: Final = 4
 #: digits that one word holds
 _DIGITS: Final = 8
 
-_ONE = np.uint64(1)
 _NIBBLES = 0x0F0F0F0F0F0F0F0F
 #: digits as numbers: the last k bytes of a word
 _KEEP = np.array([(((1 << (8 * k)) - 1) << (64 - 8 * k)) & _NIBBLES for k in range(9)], np.uint64)
@@ -63,8 +62,8 @@ _LOW_BITS = np.array([(1 << k) - 1 for k in range(_BITS + 1)], np.uint64)
 
 
 @dataclass(frozen=True)
-class Layout:
-    """What the lines of one layout have in common.
+class LinePattern:
+    """What the lines of one pattern have in common.
 
     Parameters
     ----------
@@ -83,8 +82,8 @@ class Layout:
     fields: bytes
 
 
-class Layouts:
-    """The layouts of a text met so far.
+class LinePatterns:
+    """The patterns of a text met so far.
 
     Parameters
     ----------
@@ -96,16 +95,16 @@ class Layouts:
 
     def __init__(self, columns: Callable[[bytes], tuple[str, ...] | None], *, numbered: bool) -> None:
         self._columns, self._numbered = columns, numbered
-        self._known: dict[bytes, Layout | None] = {}
+        self._known: dict[bytes, LinePattern | None] = {}
 
-    def of(self, line: bytes) -> Layout | None:
-        """Layout of a line without its end; None where its numbers are not of a kind that is read here."""
+    def of(self, line: bytes) -> LinePattern | None:
+        """LinePattern of a line without its end; None where its numbers are not of a kind that is read here."""
         shape = line.translate(_TO_ZERO)
         if shape not in self._known:
             self._known[shape] = self._make(shape)
         return self._known[shape]
 
-    def _make(self, shape: bytes) -> Layout | None:
+    def _make(self, shape: bytes) -> LinePattern | None:
         names = self._columns(shape.translate(None, SILENT))
         fields: list[tuple[int, int, int, bool]] = []
         if names is not None:
@@ -131,7 +130,7 @@ class Layouts:
                 return None
         literal = shape + b"\n"
         care = bytes(0 if code == ord("0") else 255 for code in literal)
-        return Layout(
+        return LinePattern(
             names,
             literal.ljust(LONGEST, b"\0"),
             care.ljust(LONGEST, b"\0"),
@@ -141,7 +140,7 @@ class Layouts:
 
 @dataclass(frozen=True)
 class Lines:
-    """Lines of a chunk, each with its layout.
+    """Lines of a chunk, each with its pattern.
 
     Parameters
     ----------
@@ -152,8 +151,8 @@ class Lines:
     start, stop : (l,) int64
         First byte of every line, and its end.
     label : (l,) int64
-        Row of `layouts`.
-    layouts : list of Layout
+        Row of `line_patterns`.
+    patterns : list of LinePattern
     """
 
     raw: Bytes
@@ -161,7 +160,7 @@ class Lines:
     start: Ints
     stop: Ints
     label: Ints
-    layouts: list[Layout]
+    patterns: list[LinePattern]
 
     def text(self, row: int) -> bytes:
         """Return a line as written, with its end."""
@@ -169,25 +168,25 @@ class Lines:
 
     def bulk(self) -> NDArray[np.bool_]:
         """(l,) whether each line can be read in a run."""
-        return np.array([layout.names is not None for layout in self.layouts])[self.label]
+        return np.array([pattern.names is not None for pattern in self.patterns])[self.label]
 
     def columns(self, first: int, last: int) -> dict[str, Floats]:
         """Numbers of lines ``first`` to ``last`` (excluded), all of them of a run; NaN where a line has none."""
         label = self.label[first:last]
-        used = np.flatnonzero(np.bincount(label, minlength=len(self.layouts))).tolist()
-        names = list(dict.fromkeys(self.layouts[k].names for k in used))
-        kind = np.zeros(len(self.layouts), np.int64)
-        place = np.zeros(len(self.layouts), np.int64)
+        used = np.flatnonzero(np.bincount(label, minlength=len(self.patterns))).tolist()
+        names = list(dict.fromkeys(self.patterns[k].names for k in used))
+        kind = np.zeros(len(self.patterns), np.int64)
+        place = np.zeros(len(self.patterns), np.int64)
         columns: dict[str, Floats] = {}
         of_name: dict[tuple[str, ...] | None, list[int]] = {name: [] for name in names}
         for k in used:
-            mine = of_name[self.layouts[k].names]
-            kind[k], place[k] = names.index(self.layouts[k].names), len(mine)
+            mine = of_name[self.patterns[k].names]
+            kind[k], place[k] = names.index(self.patterns[k].names), len(mine)
             mine.append(k)
         kinds = kind[label] if len(names) > 1 else None
         for number, (name, mine) in enumerate(of_name.items()):
             assert name is not None
-            table = np.frombuffer(b"".join([self.layouts[k].fields for k in mine]), np.int64).reshape(-1, len(name), 4)
+            table = np.frombuffer(b"".join([self.patterns[k].fields for k in mine]), np.int64).reshape(-1, len(name), 4)
             if kinds is None:
                 numbers = self._numbers(self.start[first:last], place[label], table)
                 columns.update(zip(name, numbers, strict=True))
@@ -202,7 +201,7 @@ class Lines:
         return columns
 
     def _numbers(self, start: Ints, label: Ints, table: Ints) -> list[Floats]:
-        """Numbers of lines with the same letters, one array for each of them; `table` as in `Layout.fields`."""
+        """Numbers of lines with the same letters, one array for each of them; `table` as in `LinePattern.fields`."""
         found: list[Floats] = []
         at = np.empty(len(start), np.int64)
         for column in _columns(table):
@@ -238,7 +237,7 @@ class Lines:
 
 @dataclass(frozen=True)
 class _Column:
-    """How to read one number of lines with the same letters; values of every layout, or the one of all.
+    """How to read one number of lines with the same letters; values of every pattern, or the one of all.
 
     Parameters
     ----------
@@ -248,9 +247,9 @@ class _Column:
         The bytes behind the point, and all digits.
     divisor : float64
     point, long : bool
-        Whether there is a point, and more bytes than a word has, in any layout.
+        Whether there is a point, and more bytes than a word has, in any pattern.
     short : int
-        Bytes of the number, its sign included, where they are few and as many in all layouts; else 0.
+        Bytes of the number, its sign included, where they are few and as many in all patterns; else 0.
     """
 
     begin: Any
@@ -263,7 +262,7 @@ class _Column:
 
 
 def _columns(table: Ints) -> list[_Column]:
-    """Columns of a table as in `Layout.fields`."""
+    """Columns of a table as in `LinePattern.fields`."""
     end, digits, decimals, minus = np.ascontiguousarray(table.transpose(2, 0, 1))
     size = digits + (decimals >= 0)
     divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]
@@ -301,14 +300,14 @@ _STEPS = (
 _LAST_FACTOR, _LAST_SHIFT = np.uint64(10000 * 2**32 + 1), np.uint64(32)
 
 
-def lines_of(text: bytes, layouts: Layouts) -> Lines | None:
+def lines_of(text: bytes, patterns: LinePatterns) -> Lines | None:
     """Lines of a chunk.
 
     Parameters
     ----------
     text : bytes
         Ends with a line end.
-    layouts : Layouts
+    patterns : LinePatterns
 
     Returns
     -------
@@ -329,10 +328,10 @@ def lines_of(text: bytes, layouts: Layouts) -> Lines | None:
         mixed = mixed * np.uint64(0x9E3779B97F4A7C15) ^ key
     head = np.flatnonzero(np.append(True, mixed[1:] != mixed[:-1]))
     _, first, inverse = np.unique(mixed[head], return_index=True, return_inverse=True)
-    if len(first) > max(_FEW_LAYOUTS, len(start) // _FEWEST_LINES):
+    if len(first) > max(_FEW_PATTERNS, len(start) // _FEWEST_LINES):
         return None
     label = np.repeat(inverse, np.diff(np.append(head, len(start))))
-    return _labelled(raw, words, start, stop, label, head[first], keys, layouts)
+    return _labelled(raw, words, start, stop, label, head[first], keys, patterns)
 
 
 def _digit_keys(raw: Bytes, start: Ints, size: Ints, count: int) -> list[Words]:
@@ -358,21 +357,21 @@ def _labelled(
     label: Ints,
     sample: Ints,
     keys: list[Words],
-    layouts: Layouts,
+    patterns: LinePatterns,
 ) -> Lines | None:
-    """Give every line the layout of the line that stands for its label, or a new label where it differs."""
+    """Give every line the pattern of the line that stands for its label, or a new label where it differs."""
     size = stop - start + 1
-    known: list[Layout] = []
+    known: list[LinePattern] = []
     rows = np.arange(len(start))
     stands = sample[:0]
     while len(sample):
         stands = np.append(stands, sample)
         for row in sample.tolist():
-            layout = layouts.of(raw[int(start[row]) : int(stop[row])].tobytes())
-            if layout is None:
+            pattern = patterns.of(raw[int(start[row]) : int(stop[row])].tobytes())
+            if pattern is None:
                 return None
-            known.append(layout)
-        if len(known) > max(_FEW_LAYOUTS, len(start) // _FEWEST_LINES):
+            known.append(pattern)
+        if len(known) > max(_FEW_PATTERNS, len(start) // _FEWEST_LINES):
             return None
         differs = np.zeros(len(rows), np.bool_)
         short = size[rows] <= _SHORT
@@ -388,15 +387,15 @@ def _labelled(
     return Lines(raw, words, start, stop, label, known)
 
 
-def _unlike(raw: Bytes, start: Ints, size: Ints, label: Ints, known: list[Layout]) -> Bools | bool:
-    """Whether lines have other bytes that are no digits than their layouts."""
+def _unlike(raw: Bytes, start: Ints, size: Ints, label: Ints, known: list[LinePattern]) -> Bools | bool:
+    """Whether lines have other bytes that are no digits than their patterns."""
     if not len(start):
         return False
     wide = -(-int(size.max()) // 8)
     windows = np.ndarray((len(raw) - 8 * wide,), f"V{8 * wide}", buffer=raw.data, strides=(1,))
     literal, care = (
         np.frombuffer(b"".join([text[: 8 * wide] for text in texts]), f"V{8 * wide}")
-        for texts in ([layout.literal for layout in known], [layout.care for layout in known])
+        for texts in ([pattern.literal for pattern in known], [pattern.care for pattern in known])
     )
     found = windows[start].view(np.uint64)
     found ^= literal[label].view(np.uint64)

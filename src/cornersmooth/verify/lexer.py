@@ -1,6 +1,6 @@
-"""How the words of a control are spelt: what `runs` asks to read most of a text at once.
+"""How the words of a control are spelt: what `block_tables` asks to read most of a text at once.
 
-A spelling may write words of several characters as single bytes above 127 before a chunk is looked at, line for line.
+A lexer may write words of several characters as single bytes above 127 before a chunk is looked at, line for line.
 Such bytes in the text itself are made question marks first, so that nothing can be mistaken for them.
 """
 
@@ -24,7 +24,7 @@ _NUMBERED: Final = re.compile(rb"\n[ /]*N\d+ *G")
 _TAIL: Final = 1 << 16
 
 
-class Spelling:
+class Lexer:
     """Words of one letter and a number: what FANUC and its like write.
 
     Parameters
@@ -53,7 +53,7 @@ class Spelling:
         return chunk
 
     def respell(self, chunk: bytes) -> bytes:
-        """Return the text as `runs` is to read it, with the same lines."""
+        """Return the text as `block_tables` is to read it, with the same lines."""
         return chunk
 
     def cut(self, piece: bytes) -> int:

@@ -1,4 +1,4 @@
-"""Fast path equals careful path: lines read by their layouts, and the same lines read carefully."""
+"""Fast path equals careful path: lines read by their patterns, and the same lines read carefully."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import re
 import numpy as np
 import pytest
 
-from cornersmooth.verify import runs
-from cornersmooth.verify.layouts import Layouts, lines_of
-from cornersmooth.verify.spelling import Spelling
+from cornersmooth.verify import block_tables
+from cornersmooth.verify.lexer import Lexer
+from cornersmooth.verify.line_patterns import LinePatterns, lines_of
 from cornersmooth.verify.words import Table
 
 NUMBERS = ["0", "-0.", "5.", ".5", "-.25", "12.3456", "-123.4567", "0.3956870", "-1.0000000", "1234.5678", "7", "-42"]
@@ -50,16 +50,16 @@ def read(call):
 @pytest.mark.parametrize("odd", [None, *ODD])
 @pytest.mark.parametrize("seed", range(5))
 def test_fast_path_is_the_careful_path(seed, odd):
-    data, spelling = text(seed, odd), Spelling()
-    layouts = Layouts(spelling.columns, numbered=False)
-    assert (lines_of(data, layouts) is not None) == (odd is None)
-    fast = read(runs._read_chunk(data, 1, spelling, layouts, None))
-    assert fast == read(runs._read_carefully(data, data, 1, runs._Signatures(spelling), None))
+    data, lexer = text(seed, odd), Lexer()
+    patterns = LinePatterns(lexer.columns, numbered=False)
+    assert (lines_of(data, patterns) is not None) == (odd is None)
+    fast = read(block_tables._read_chunk(data, 1, lexer, patterns, None))
+    assert fast == read(block_tables._read_carefully(data, data, 1, block_tables._Signatures(lexer), None))
 
 
 def test_fast_path_is_taken():
-    layouts = Layouts(Spelling().columns, numbered=False)
-    lines = lines_of(b"X1.5 Y-2.25\nX-1.5 Y2.25 Z12345.678\n(A)\n", layouts)
+    patterns = LinePatterns(Lexer().columns, numbered=False)
+    lines = lines_of(b"X1.5 Y-2.25\nX-1.5 Y2.25 Z12345.678\n(A)\n", patterns)
     assert lines is not None
     assert lines.bulk().tolist() == [True, True, False]
     columns = lines.columns(0, 2)
