@@ -16,7 +16,8 @@ from cornersmooth.report.verification import (
     verification_csv,
     verification_json,
 )
-from cornersmooth.verify import deviation_along, verify
+from cornersmooth.verify import deviation_along, read_nc, verify
+from cornersmooth.verify.trails import original_motion, written_at
 
 from .writing import encode, job
 
@@ -108,6 +109,14 @@ def test_distribution_along_the_path():
     worst = int(np.argmax(along.tip))
     pose = int(np.flatnonzero(program.line == along.cl_line[worst])[0])
     assert found.pose_tip[pose] == pytest.approx(along.tip[worst], abs=1e-9)
+    # both poses of every row can be found again
+    nc, motion = read_nc(encode(lines)), original_motion(program, 0.02, 10.0)
+    sampled = np.flatnonzero(along.element >= 0)
+    assert len(sampled) > 16 * program.chains[0, 1]
+    written, _ = written_at(nc, along.element[sampled], along.fraction[sampled])
+    owner = np.searchsorted(motion.pose, along.pose[sampled])
+    reached, _ = motion.at(owner, along.share[sampled])
+    np.testing.assert_allclose(np.linalg.norm(written - reached, axis=1), along.tip[sampled], atol=1e-9)
     table = along_lines(along, 0.02)
     assert f"{along.tip.max():.6f}" in "\n".join(table)
     assert "".join(verification_csv(program, found)).count("\n") == 1 + np.isfinite(found.pose_tip).sum()

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 #: segments on either side in which the common pose is looked for
 _REACH = 2
 
+#: fields of a distribution
+_COLUMNS = 10
+
 
 @dataclass(frozen=True)
 class Distribution:
@@ -36,6 +39,14 @@ class Distribution:
         Length of the original path, rapids included, up to the original pose.
     tip, axis_point : (k,) float64, mm
     angle : (k,) float64, degrees
+    share : (k,) float64
+        Where on the original move, 1 at its end.
+    fraction : (k,) float64
+        Where on the written element, as in `written_at`; 0 for rows of original poses.
+    pose : (k,) int64
+        Original pose that the original move leads to.
+    element : (k,) int64
+        Written element that was sampled, -1 for rows of original poses.
     cl_line, nc_line : (k,) int64
     """
 
@@ -43,6 +54,10 @@ class Distribution:
     tip: Floats
     axis_point: Floats
     angle: Floats
+    share: Floats
+    fraction: Floats
+    pose: Ints
+    element: Ints
     cl_line: Ints
     nc_line: Ints
 
@@ -82,27 +97,29 @@ def deviation_along(
     matcher = Matcher(original, text, Track.of(original.trail.six(axis_length)), tolerance, axis_length)
     holes = divide_at_holes(original, text, axis_length)
     stretches, _ = find_stretches(original, text, axis_length, holes.parts)
-    parts = [np.zeros((0, 6))]
+    parts = [np.zeros((0, _COLUMNS))]
     for block in matcher.blocks(stretches):
         parts += [_of_elements(matcher, block, samples), _of_poses(matcher, block)]
     rows = np.concatenate(parts)
     columns = rows[np.argsort(rows[:, 0], kind="stable")].T
-    return Distribution(*columns[:4], *(column.astype(np.int64) for column in columns[4:]))
+    return Distribution(*columns[:6], *(column.astype(np.int64) for column in columns[6:]))
 
 
 def _of_poses(matcher: Matcher, block: Block) -> Floats:
-    """(k, 6) columns of the distribution at the original poses of one block."""
+    """Columns (k, 10) of the distribution at the original poses of one block."""
     reached = from_original(matcher, block)
     original, trail = matcher.original, block.written.trail
-    cl_line = original.program.line[original.pose[original.trail.owner[reached.vertex]]]
+    pose = original.pose[original.trail.owner[reached.vertex]]
     nc_line = matcher.nc.line[trail.owner[np.minimum(reached.place.astype(np.int64) + 1, len(trail) - 1)]]
-    gap = reached.gap
-    columns = (matcher.track.length[reached.vertex], gap.tip, gap.axis_point, np.degrees(gap.angle), cl_line, nc_line)
+    gap, way = reached.gap, matcher.track.length[reached.vertex]
+    share, none = original.trail.fraction[reached.vertex], np.zeros(len(pose))
+    places = (share, none, pose, none - 1.0, original.program.line[pose], nc_line)
+    columns = (way, gap.tip, gap.axis_point, np.degrees(gap.angle), *places)
     return np.stack([column.astype(np.float64) for column in columns], axis=1)
 
 
 def _of_elements(matcher: Matcher, block: Block, samples: int) -> Floats:
-    """(k, 6) columns of the distribution at written poses of one block."""
+    """Columns (k, 10) of the distribution at written poses of one block."""
     trail, first = block.written.trail, block.written.first
     end = trail.last[1:]
     start = trail.last[:-1]
@@ -122,6 +139,7 @@ def _of_elements(matcher: Matcher, block: Block, samples: int) -> Floats:
     owner, fraction = owner_fraction(original.trail.owner, original.trail.fraction, segment, at)
     gap = gap_between(tip, axis, *original.at(owner, fraction), matcher.axis_length)
     way = length[segment] + at * (length[segment + 1] - length[segment])
-    cl_line = original.program.line[original.pose[owner]]
-    columns = (way, gap.tip, gap.axis_point, np.degrees(gap.angle), cl_line, matcher.nc.line[element])
+    pose = original.pose[owner]
+    places = (fraction, share, pose, element, original.program.line[pose], matcher.nc.line[element])
+    columns = (way, gap.tip, gap.axis_point, np.degrees(gap.angle), *places)
     return np.stack([column.astype(np.float64) for column in columns], axis=1)
