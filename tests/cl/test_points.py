@@ -294,7 +294,7 @@ GOOD_ROW = st.lists(CELLS.filter(lambda cell: cell[:1].isdigit()), min_size=6, m
 @settings(max_examples=300, deadline=None)
 @given(st.lists(st.one_of(GOOD_ROW, GOOD_ROW, ROW, st.just(""), st.just(", ,")), max_size=8))
 def test_fast_way_equals_careful_way(lines: list[str]):
-    layout = points_table.Layout(6, (0, 1, 2), (3, 4, 5), "vectors")
+    columns = points_table.Columns(6, (0, 1, 2), (3, 4, 5), "vectors")
     text = points_table.clean(("x,y,z,i,j,k\n" + "\n".join(lines)).encode(), "path.csv")
     outcomes = []
     for blocks in (True, False):
@@ -302,7 +302,7 @@ def test_fast_way_equals_careful_way(lines: list[str]):
             if not blocks:
                 patch.setattr(points_table, "_fast", lambda *_: None)
             try:
-                table, line = points_table.numbers(text, layout, "path.csv")
+                table, line = points_table.numbers(text, columns, "path.csv")
                 outcomes.append((table.tobytes(), line.tolist()))
             except InputError as error:
                 outcomes.append(str(error))

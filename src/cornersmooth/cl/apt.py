@@ -13,8 +13,8 @@ from cornersmooth.cl.bulk import blocks
 from cornersmooth.cl.dialects import by_name, recognise
 from cornersmooth.cl.grammar import Decode, Record, read_records
 from cornersmooth.cl.interpret import end, obey, plain
-from cornersmooth.cl.machine import Machine
 from cornersmooth.cl.messages import error, finding
+from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.errors import Finding
 from cornersmooth.model import MM_PER_UNIT, Arcs, Keep, Move, Program, Source, Units
 
@@ -73,34 +73,34 @@ def read_apt(
     known = by_name(dialect) if dialect else recognise(data)
     decode = _decoder(data)
     builder = Builder(name, short_axis_up=known.short_axis == "up", lenient=lenient)
-    machine = Machine(name, known, builder, arc_rule, lenient)
-    _run(data, machine, decode, fast)
-    end(machine)
+    state = ReaderState(name, known, builder, arc_rule, lenient)
+    _run(data, state, decode, fast)
+    end(state)
     if not builder.n:
         raise error("CS101", name, 1)
-    return _program(machine, units)
+    return _program(state, units)
 
 
-def _run(data: bytes, machine: Machine, decode: Decode, fast: bool) -> None:
+def _run(data: bytes, state: ReaderState, decode: Decode, fast: bool) -> None:
     remembered: dict[tuple[bytes, ...], list[Record]] = {}
     done = 0
 
     def take(lines: list[bytes], first: int, follows: str) -> None:
         key = tuple(lines) if len(lines) <= LONGEST_GAP else ()
         for record in remembered.get(key, ()) if key else ():
-            obey(machine, record.moved(first - 1))
+            obey(state, record.moved(first - 1))
         if key in remembered:
             return
         records = []
-        for record in read_records(lines, first, decode, machine.file, follows):
-            obey(machine, record)
+        for record in read_records(lines, first, decode, state.file, follows):
+            obey(state, record)
             if key:
                 records.append(record.moved(1 - first))
         if key and len(remembered) < REMEMBERED:
             remembered[key] = records
 
     for block in blocks(data, fast=fast):
-        machine.builder.enter(block)
+        state.builder.enter(block)
         done += block.size
         follows = "GOTO" if done < len(data) else "the end of the file"
         begin = 0
@@ -108,13 +108,13 @@ def _run(data: bytes, machine: Machine, decode: Decode, fast: bool) -> None:
         for run, (start, stop) in enumerate(block.runs.tolist()):
             if begin < start:
                 take(block.lines[begin:start], block.first + begin, "GOTO")
-            if machine.stopped:
+            if state.stopped:
                 return
-            plain(machine, rows[run + 1] - rows[run], block.first + start)
+            plain(state, rows[run + 1] - rows[run], block.first + start)
             begin = stop
         if begin < len(block.lines):
             take(block.lines[begin:], block.first + begin, follows)
-        if machine.stopped:
+        if state.stopped:
             return
 
 
@@ -128,22 +128,22 @@ def _decoder(data: bytes) -> Decode:
     return lambda line: line.decode("utf-8")
 
 
-def _program(machine: Machine, asked: Units | None) -> Program:
-    builder = machine.builder
-    units, said = _units(machine, asked)
+def _program(state: ReaderState, asked: Units | None) -> Program:
+    builder = state.builder
+    units, said = _units(state, asked)
     scale = MM_PER_UNIT[units]
     tip = builder.tips()
     axis, axis_findings = builder.axes()
     kind = builder.kinds()
     line = builder.lines()
-    resolved = arc_geometry.resolve(machine.arcs, tip, kind, machine.file, machine.arc_rule)
+    resolved = arc_geometry.resolve(state.arcs, tip, kind, state.file, state.arc_rule)
     kind[resolved.lines] = Move.LINEAR
     keep = builder.keep.spread(builder.n).astype(np.uint8)
     keep[resolved.kept] = Keep.CONTRADICTION
     keep[resolved.kept - 1] = Keep.CONTRADICTION
     turned = np.abs(axis[resolved.arcs.pose] - axis[resolved.arcs.pose - 1]).max(axis=1, initial=0) > AXIS_NOISE
     along = [finding("CS147", int(line[resolved.arcs.pose[turned]][0]), int(turned.sum()))] if turned.any() else []
-    for index in machine.unitless_feeds:
+    for index in state.unitless_feeds:
         builder.feed.value[index] *= scale
     arcs = Arcs(resolved.arcs.pose, resolved.arcs.centre * scale, resolved.arcs.normal, resolved.arcs.sweep)
     return Program(
@@ -155,21 +155,21 @@ def _program(machine: Machine, asked: Units | None) -> Program:
         feed_mode=builder.feed_mode.spread(builder.n).astype(np.uint8),
         keep=keep,
         arcs=arcs,
-        statements=tuple(machine.statements),
+        statements=tuple(state.statements),
         units=units,
-        source=Source(machine.file, "apt", machine.dialect.name),
-        findings=(*said, *machine.findings, *axis_findings, *resolved.findings, *along),
+        source=Source(state.file, "apt", state.dialect.name),
+        findings=(*said, *state.findings, *axis_findings, *resolved.findings, *along),
     )
 
 
-def _units(machine: Machine, asked: Units | None) -> tuple[Units, list[Finding]]:
+def _units(state: ReaderState, asked: Units | None) -> tuple[Units, list[Finding]]:
     """Units of the file: as asked for, as stated, as the feeds suggest, or as the dialect has them."""
-    stated = machine.stated_units
-    guess, why = _usual_units(machine)
+    stated = state.stated_units
+    guess, why = _usual_units(state)
     before = stated[0][1] if stated and not stated[0][2] else guess
     for line, now, pose in stated:
         if pose and now != before and not asked:
-            raise error("CS116", machine.file, line, word="UNITS", new=now, old=before)
+            raise error("CS116", state.file, line, word="UNITS", new=now, old=before)
         before = now
     if asked:
         other = [line for line, now, _ in stated if now != asked]
@@ -182,7 +182,7 @@ def _units(machine: Machine, asked: Units | None) -> tuple[Units, list[Finding]]
     return guess, [finding("CS132", 0, units=guess, why=why)]
 
 
-def _usual_units(machine: Machine) -> tuple[Units, str]:
-    if machine.feed_units:
-        return machine.feed_units[0], "as in its feeds"
-    return machine.dialect.units, f"as usual for {machine.dialect.name} files"
+def _usual_units(state: ReaderState) -> tuple[Units, str]:
+    if state.feed_units:
+        return state.feed_units[0], "as in its feeds"
+    return state.dialect.units, f"as usual for {state.dialect.name} files"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from cornersmooth.cl import motion, state
+from cornersmooth.cl import motion_statements, state_statements
 from cornersmooth.cl.grammar import Record
-from cornersmooth.cl.machine import Machine
+from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.words import (
     KNOWN_WORDS,
     MOTION_WORDS,
@@ -16,7 +16,7 @@ from cornersmooth.cl.words import (
 )
 from cornersmooth.model import INFORMING_WORDS
 
-HANDLERS: Final = motion.HANDLERS | state.HANDLERS
+HANDLERS: Final = motion_statements.HANDLERS | state_statements.HANDLERS
 
 #: words that may stand between an arc and the GOTO that ends it
 _WITHIN_ARC: Final = INFORMING_WORDS | {"FEDRAT", "GOTO"}
@@ -28,29 +28,29 @@ _WITHIN_CURVE: Final = frozenset({"KNOT", "CNTRL"})
 _STRANGE_PREFIXES: Final = ("TLON,", "TLLFT,", "TLRGT,", "TLOFF,")
 
 
-def plain(machine: Machine, count: int, line: int) -> None:
+def plain(state: ReaderState, count: int, line: int) -> None:
     """Carry out some plain GOTO statements, whose poses the builder already has.
 
     Parameters
     ----------
-    machine : Machine
+    state : ReaderState
     count : int
     line : int
         Line of the first, for messages.
     """
-    if machine.finished:
-        raise machine.fail("CS118", line, word="GOTO")
-    if machine.curve is not None:
-        motion.finish_curve(machine)
-    if machine.rapid or machine.arc is not None:
-        machine.builder.take(1)
-        machine.arrived()
+    if state.finished:
+        raise state.fail("CS118", line, word="GOTO")
+    if state.curve is not None:
+        motion_statements.finish_curve(state)
+    if state.rapid or state.arc is not None:
+        state.builder.take(1)
+        state.arrived()
         count -= 1
     if count:
-        machine.builder.take(count)
+        state.builder.take(count)
 
 
-def obey(machine: Machine, record: Record) -> None:
+def obey(state: ReaderState, record: Record) -> None:
     """Carry out one statement.
 
     Raises
@@ -58,49 +58,49 @@ def obey(machine: Machine, record: Record) -> None:
     InputError
         For everything that is not a statement in its place.
     """
-    word = machine.renamed.get(record.word, record.word)
-    if machine.curve is not None and word not in _WITHIN_CURVE:
-        motion.finish_curve(machine)
-    if machine.finished:
-        _after_end(machine, record, word)
+    word = state.renamed.get(record.word, record.word)
+    if state.curve is not None and word not in _WITHIN_CURVE:
+        motion_statements.finish_curve(state)
+    if state.finished:
+        _after_end(state, record, word)
         return
-    if machine.arc is not None and word not in _WITHIN_ARC:
-        raise machine.fail("CS121", machine.arc.line, word=machine.arc.word)
+    if state.arc is not None and word not in _WITHIN_ARC:
+        raise state.fail("CS121", state.arc.line, word=state.arc.word)
     if record.points and word != "GOTO":
-        raise machine.fail("CS105", record.points[0][0], text=state.joined(record.points[0][1]))
+        raise state.fail("CS105", record.points[0][0], text=state_statements.joined(record.points[0][1]))
     if word in STRANGE_MOTION_WORDS or (word.startswith(_STRANGE_PREFIXES) and word not in HANDLERS):
-        raise machine.fail("CS108", record.line, word=word)
+        raise state.fail("CS108", record.line, word=word)
     handler = HANDLERS.get(word)
     if handler is not None:
         if record.rest:
-            raise machine.fail("CS107", record.line, word=word, text=record.rest)
-        handler(machine, record)
+            raise state.fail("CS107", record.line, word=word, text=record.rest)
+        handler(state, record)
         return
     if word not in KNOWN_WORDS and word != "$$" and not word.startswith(PLAIN_PREFIXES):
-        _unknown(machine, record, word)
-    machine.keep(record)
+        _unknown(state, record, word)
+    state.keep(record)
 
 
-def end(machine: Machine) -> None:
+def end(state: ReaderState) -> None:
     """Check that nothing is left open."""
-    if machine.curve is not None:
-        motion.finish_curve(machine)
-    if machine.arc is not None:
-        raise machine.fail("CS121", machine.arc.line, word=machine.arc.word)
+    if state.curve is not None:
+        motion_statements.finish_curve(state)
+    if state.arc is not None:
+        raise state.fail("CS121", state.arc.line, word=state.arc.word)
 
 
-def _after_end(machine: Machine, record: Record, word: str) -> None:
-    if word in MOTION_WORDS | STRANGE_MOTION_WORDS and not machine.lenient:
-        raise machine.fail("CS118", record.line, word=word)
+def _after_end(state: ReaderState, record: Record, word: str) -> None:
+    if word in MOTION_WORDS | STRANGE_MOTION_WORDS and not state.lenient:
+        raise state.fail("CS118", record.line, word=word)
     if word != "$$":
-        machine.note("CS144", record.line, what="statements after FINI")
+        state.note("CS144", record.line, what="statements after FINI")
 
 
-def _unknown(machine: Machine, record: Record, word: str) -> None:
+def _unknown(state: ReaderState, record: Record, word: str) -> None:
     near = near_motion_word(word)
-    if near is not None and not machine.lenient:
-        raise machine.fail("CS109", record.line, word=word, near=near)
+    if near is not None and not state.lenient:
+        raise state.fail("CS109", record.line, word=word, near=near)
     if word:
-        machine.note("CS130", record.line, word=word)
+        state.note("CS130", record.line, word=word)
     else:
-        machine.note("CS131", record.line)
+        state.note("CS131", record.line)

@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.cl import points_header as columns
+from cornersmooth.cl import points_header
 from cornersmooth.cl import points_table as table
-from cornersmooth.cl.points_header import Layout
+from cornersmooth.cl.points_header import Columns
 from cornersmooth.cl.points_messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Program, Source, Units
@@ -36,7 +36,7 @@ class _Rows:
     file: str
     values: Floats
     line: Ints
-    layout: Layout
+    columns: Columns
 
     def take(self, group: tuple[int, ...]) -> Floats:
         """Columns of the table."""
@@ -58,9 +58,9 @@ def looks_like_points(data: bytes) -> bool:
         The file, or its first kilobytes.
     """
     first = list(islice(table.leading_lines(data), 2))
-    if not first or any("/" in line and not columns.is_header(line) for line in first):  # a CL statement
+    if not first or any("/" in line and not points_header.is_header(line) for line in first):  # a CL statement
         return False
-    return columns.is_header(first[0]) or any(table.is_row(line) for line in first)
+    return points_header.is_header(first[0]) or any(table.is_row(line) for line in first)
 
 
 def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: bool = False) -> Program:
@@ -91,24 +91,24 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
         CS150-CS164, with the line.
     """
     text = table.clean(data, name)
-    layout = _layout(text, name)
-    values, line = table.numbers(text, layout, name)
+    columns = _find_columns(text, name)
+    values, line = table.numbers(text, columns, name)
     if not len(values):
         raise error("CS150", name, 1)
-    rows = _Rows(name, values, line, layout)
-    far = np.flatnonzero(np.abs(rows.take(layout.wanted)).max(axis=1) > FARTHEST)
+    rows = _Rows(name, values, line, columns)
+    far = np.flatnonzero(np.abs(rows.take(columns.wanted)).max(axis=1) > FARTHEST)
     if len(far):
         raise error("CS163", name, int(line[far[0]]), limit=FARTHEST)
-    findings = [] if units or layout.units else [finding("CS176", 0)]
-    units = units or layout.units or "mm"
+    findings = [] if units or columns.units else [finding("CS176", 0)]
+    units = units or columns.units or "mm"
     scale = MM_PER_UNIT[units]
     axis, axis_findings = _axis(rows, scale, lenient)
     feed, feed_findings = _feed(rows, lenient)
     findings += [*axis_findings, *feed_findings]
-    if layout.unused:
-        findings.append(finding("CS173", text.header_line, len(layout.unused), names=", ".join(layout.unused)))
+    if columns.unused:
+        findings.append(finding("CS173", text.header_line, len(columns.unused), names=", ".join(columns.unused)))
     return Program.from_poses(
-        rows.take(layout.tip) * scale,
+        rows.take(columns.tip) * scale,
         axis,
         feed=feed * scale,
         line=line,
@@ -118,24 +118,24 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
     )
 
 
-def _layout(text: table.PointText, name: str) -> Layout:
+def _find_columns(text: table.PointText, name: str) -> Columns:
     if text.header is not None and text.header_certain:
-        return columns.from_header(text.header, name, text.header_line)
+        return points_header.from_header(text.header, name, text.header_line)
     if not text.width:
         raise error("CS150", name, 1)
     if text.header is not None:
-        layout = columns.from_header(text.header, name, text.header_line)
-        if layout.width == text.width:
-            return layout
-    return columns.from_width(text.width, name, text.row_line)
+        columns = points_header.from_header(text.header, name, text.header_line)
+        if columns.width == text.width:
+            return columns
+    return points_header.from_width(text.width, name, text.row_line)
 
 
 def _axis(rows: _Rows, scale: float, lenient: bool) -> tuple[Floats, list[Finding]]:
     """Axis vectors of any length, and what is to be said about them."""
-    if rows.layout.second is None:
+    if rows.columns.second is None:
         return np.tile((0.0, 0.0, 1.0), (len(rows.values), 1)), [finding("CS170", 0)]
-    tip, second = rows.take(rows.layout.tip), rows.take(rows.layout.second)
-    meaning = rows.layout.meaning
+    tip, second = rows.take(rows.columns.tip), rows.take(rows.columns.second)
+    meaning = rows.columns.meaning
     if meaning == "values":
         meaning = "points" if _second_points(rows, tip, second) else "vectors"
     vector = second - tip if meaning == "points" else second
@@ -181,9 +181,9 @@ def _distances(rows: _Rows, distance: Floats) -> list[Finding]:
 
 def _feed(rows: _Rows, lenient: bool) -> tuple[Floats, list[Finding]]:
     """Feed of every move in units of the file; an empty cell keeps the feed before it, as CL files do."""
-    if rows.layout.feed is None:
+    if rows.columns.feed is None:
         return np.full(len(rows.values), np.nan), []
-    feed = rows.values[:, rows.layout.feed].copy()
+    feed = rows.values[:, rows.columns.feed].copy()
     wrong = feed <= 0
     said = []
     if wrong.any():

@@ -34,7 +34,7 @@ _UNIT = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_/](mm|in|inch)$")
 
 
 @dataclass(frozen=True)
-class Layout:
+class Columns:
     """Columns of a point file, counted from 0.
 
     Parameters
@@ -66,8 +66,8 @@ class Layout:
         return (*self.tip, *(self.second or ()))
 
 
-def from_width(width: int, file: str, line: int) -> Layout:
-    """Layout of a file without a header: 3, 6 or 7 columns.
+def from_width(width: int, file: str, line: int) -> Columns:
+    """Columns of a file without a header: 3, 6 or 7 columns.
 
     Raises
     ------
@@ -75,14 +75,14 @@ def from_width(width: int, file: str, line: int) -> Layout:
         CS159 for any other number.
     """
     if width == 3:
-        return Layout(3, (0, 1, 2))
+        return Columns(3, (0, 1, 2))
     if width in (6, 7):
-        return Layout(width, (0, 1, 2), (3, 4, 5), "values", 6 if width == 7 else None)
+        return Columns(width, (0, 1, 2), (3, 4, 5), "values", 6 if width == 7 else None)
     raise error("CS159", file, line, got=width)
 
 
-def from_header(text: str, file: str, line: int) -> Layout:
-    """Layout that a header line names.
+def from_header(text: str, file: str, line: int) -> Columns:
+    """Columns that a header line names.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def from_header(text: str, file: str, line: int) -> Layout:
     if unused and second is None:  # an axis in a spelling we do not know must not become +Z in silence
         raise error("CS156", file, line, why=f"no tool axis in {', '.join(unused)}")
     units = _units(names, (*tip, *(second if second and meaning == "points" else ())), feed, file, line)
-    return Layout(len(names), tip, second, meaning, feed, unused, units)
+    return Columns(len(names), tip, second, meaning, feed, unused, units)
 
 
 def is_header(text: str) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.cl.points_header import Layout, is_header
+from cornersmooth.cl.points_header import Columns, is_header
 from cornersmooth.cl.points_messages import error
 from cornersmooth.model import Floats, Ints
 from cornersmooth.text import parse_numbers
@@ -98,13 +98,13 @@ def clean(data: bytes, file: str) -> PointText:
     return PointText(body, first_line, header, header_line, width, row_line, certain)
 
 
-def numbers(text: PointText, layout: Layout, file: str) -> tuple[Floats, Ints]:
+def numbers(text: PointText, columns: Columns, file: str) -> tuple[Floats, Ints]:
     """Read the rows of a cleaned file.
 
     Parameters
     ----------
     text : PointText
-    layout : Layout
+    columns : Columns
         Says which columns must hold a number, and which may (the feed); whatever stands in the others becomes NaN
         where it is no number.
     file : str
@@ -112,7 +112,7 @@ def numbers(text: PointText, layout: Layout, file: str) -> tuple[Floats, Ints]:
 
     Returns
     -------
-    table : (n, layout.width) float64
+    table : (n, columns.width) float64
     line : (n,) int64
 
     Raises
@@ -125,37 +125,37 @@ def numbers(text: PointText, layout: Layout, file: str) -> tuple[Floats, Ints]:
     while start < len(text.body):
         end = text.body.find(b"\n", start + _BLOCK) + 1 or len(text.body)
         block = text.body[start:end]
-        table, row = _fast(block, layout.width) or careful(block, layout, first, file)
+        table, row = _fast(block, columns.width) or careful(block, columns, first, file)
         tables.append(table)
         lines.append(row + first)
         first, start = first + block.count(b"\n"), end
     if not tables:
-        return np.zeros((0, layout.width)), np.zeros(0, np.int64)
+        return np.zeros((0, columns.width)), np.zeros(0, np.int64)
     return np.concatenate(tables), np.concatenate(lines)
 
 
-def careful(block: bytes, layout: Layout, first_line: int, file: str) -> tuple[Floats, Ints]:
+def careful(block: bytes, columns: Columns, first_line: int, file: str) -> tuple[Floats, Ints]:
     """Table of a block that starts at `first_line`, and the line of each row less that; one line at a time."""
-    used = {*layout.wanted, *(() if layout.feed is None else (layout.feed,))}
+    used = {*columns.wanted, *(() if columns.feed is None else (columns.feed,))}
     table: list[list[float]] = []
     offsets: list[int] = []
     for offset, line in enumerate(_decode(block).split("\n")):
         cells = _cells(line)
-        while len(cells) > layout.width and not cells[-1]:
+        while len(cells) > columns.width and not cells[-1]:
             cells.pop()
         if not any(cells):
             continue
-        if len(cells) != layout.width:
-            raise error("CS151", file, first_line + offset, got=len(cells), want=layout.width)
+        if len(cells) != columns.width:
+            raise error("CS151", file, first_line + offset, got=len(cells), want=columns.width)
         row = [_number(cell) for cell in cells]
         for column in used:
-            if not math.isfinite(row[column]) and (cells[column] or column in layout.wanted):
+            if not math.isfinite(row[column]) and (cells[column] or column in columns.wanted):
                 cell = cells[column]
                 known = _NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell)
                 raise error("CS153" if known else "CS152" if cell else "CS164", file, first_line + offset, cell=cell)
         table.append(row)
         offsets.append(offset)
-    return np.array(table, np.float64).reshape(-1, layout.width), np.array(offsets, np.int64)
+    return np.array(table, np.float64).reshape(-1, columns.width), np.array(offsets, np.int64)
 
 
 def is_row(line: str) -> bool:

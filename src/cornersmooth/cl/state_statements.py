@@ -8,7 +8,7 @@ from typing import Final
 
 from cornersmooth.cl.builder import UNIT_TOLERANCE, UP, Vector
 from cornersmooth.cl.grammar import Argument, Record
-from cornersmooth.cl.machine import Machine
+from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.words import FRAME_WORDS, MOTION_WORDS
 from cornersmooth.model import FeedMode, Keep, Units
 
@@ -33,120 +33,120 @@ UNIT_NAMES: Final[dict[str, Units]] = {
 _ENDS: Final = frozenset({"OFF", "NOMORE"})
 
 
-def _rapid(machine: Machine, record: Record) -> None:
+def _rapid(state: ReaderState, record: Record) -> None:
     option = record.args[0] if record.args else ""
     if option in ("ON", "OFF"):
-        machine.rapid_on = option == "ON"
-        machine.rapid = False
-        machine.set_kind()
+        state.rapid_on = option == "ON"
+        state.rapid = False
+        state.set_kind()
     elif option in ("", "MODIFY"):
-        machine.rapid = True
-        if machine.hole:
-            machine.note("CS144", record.line, what="RAPID inside CYCLE")
+        state.rapid = True
+        if state.hole:
+            state.note("CS144", record.line, what="RAPID inside CYCLE")
     else:  # FEDTO,LENGTH,n: the last part is at feed; all of it at feed is slow but safe
-        machine.note("CS140", record.line, text=joined(record.args))
+        state.note("CS140", record.line, text=joined(record.args))
 
 
-def _feed(machine: Machine, record: Record) -> None:
+def _feed(state: ReaderState, record: Record) -> None:
     values = [value for value in record.args if isinstance(value, float)]
     words = [value for value in record.args if isinstance(value, str)]
     units = [word for word in words if word in FEED_UNITS]
     if len(values) != 1 or len(units) != len(words) or len(units) > 1:
-        machine.note("CS136", record.line, text=joined(record.args))
-        machine.keep(record)
+        state.note("CS136", record.line, text=joined(record.args))
+        state.keep(record)
         return
     if not (math.isfinite(values[0]) and values[0] > 0):
-        if not machine.lenient:
-            raise machine.fail("CS119", record.line, word="FEDRAT", value=values[0])
-        machine.note("CS144", record.line, what=f"feed of {values[0]:g}")
+        if not state.lenient:
+            raise state.fail("CS119", record.line, word="FEDRAT", value=values[0])
+        state.note("CS144", record.line, what=f"feed of {values[0]:g}")
         return
-    if machine.rapid:
-        machine.note("CS135", record.line)
+    if state.rapid:
+        state.note("CS135", record.line)
     if not units:
-        machine.note("CS148", record.line)
-    builder = machine.builder
+        state.note("CS148", record.line)
+    builder = state.builder
     scale, mode = FEED_UNITS[units[0]] if units else (None, FeedMode(int(builder.feed_mode.now)))
     if scale is None:
-        machine.unitless_feeds.add(len(builder.feed.at))
+        state.unitless_feeds.add(len(builder.feed.at))
     else:
-        machine.feed_units.append("mm" if units[0].startswith("MM") else "inch")
+        state.feed_units.append("mm" if units[0].startswith("MM") else "inch")
     builder.feed_mode.set(builder.n, float(mode))
     builder.feed.append(builder.n, values[0] * (scale or 1.0))
 
 
-def _units(machine: Machine, record: Record) -> None:
+def _units(state: ReaderState, record: Record) -> None:
     name = record.args[0] if len(record.args) == 1 else None
     units = UNIT_NAMES.get(name) if isinstance(name, str) else None
     if units is None:
         want = "use UNITS/MM or UNITS/INCHES"
-        raise machine.fail("CS115", record.line, word=record.word, text=joined(record.args), want=want)
-    machine.stated_units.append((record.line, units, machine.builder.n))
-    machine.keep(record)
+        raise state.fail("CS115", record.line, word=record.word, text=joined(record.args), want=want)
+    state.stated_units.append((record.line, units, state.builder.n))
+    state.keep(record)
 
 
-def _multax(machine: Machine, record: Record) -> None:
-    machine.builder.lock_axis(record.args[:1] == ("OFF",))
-    machine.keep(record)
+def _multax(state: ReaderState, record: Record) -> None:
+    state.builder.lock_axis(record.args[:1] == ("OFF",))
+    state.keep(record)
 
 
-def _tlaxis(machine: Machine, record: Record) -> None:
-    _set_axis(machine, record, machine.vector(record))
-    machine.keep(record)
+def _tlaxis(state: ReaderState, record: Record) -> None:
+    _set_axis(state, record, state.vector(record))
+    state.keep(record)
 
 
-def _set_axis(machine: Machine, record: Record, axis: Vector) -> None:
+def _set_axis(state: ReaderState, record: Record, axis: Vector) -> None:
     length = math.hypot(*axis)
     if length == 0:
-        raise machine.fail("CS111", record.line)
+        raise state.fail("CS111", record.line)
     if not abs(length - 1) <= UNIT_TOLERANCE:
-        if not (machine.lenient and math.isfinite(length)):
-            raise machine.fail("CS112", record.line, length=length)
-        machine.note("CS139", record.line, length=length)
-    machine.builder.set_axis((axis[0] / length, axis[1] / length, axis[2] / length))
+        if not (state.lenient and math.isfinite(length)):
+            raise state.fail("CS112", record.line, length=length)
+        state.note("CS139", record.line, length=length)
+    state.builder.set_axis((axis[0] / length, axis[1] / length, axis[2] / length))
 
 
-def _tool_path(machine: Machine, record: Record) -> None:
-    machine.builder.set_axis(UP)  # NX repeats i,j,k on the first point of a path that is tilted
-    machine.keep(record)
+def _tool_path(state: ReaderState, record: Record) -> None:
+    state.builder.set_axis(UP)  # NX repeats i,j,k on the first point of a path that is tilted
+    state.keep(record)
 
 
-def _csys(machine: Machine, record: Record) -> None:
+def _csys(state: ReaderState, record: Record) -> None:
     if len(record.args) == 12:  # SolidWorks CAM: rows of [R|t]; positions stay in the world, R's z is the axis
-        values = machine.numbers(record)
-        _set_axis(machine, record, (values[2], values[6], values[10]))
-    machine.keep(record)
+        values = state.numbers(record)
+        _set_axis(state, record, (values[2], values[6], values[10]))
+    state.keep(record)
 
 
-def _msys(machine: Machine, record: Record) -> None:
-    if machine.system not in (None, record.args):
-        machine.note("CS146", record.line, word="MSYS")
-    machine.system = record.args
-    machine.keep(record)
+def _msys(state: ReaderState, record: Record) -> None:
+    if state.system not in (None, record.args):
+        state.note("CS146", record.line, word="MSYS")
+    state.system = record.args
+    state.keep(record)
 
 
-def _cutcom(machine: Machine, record: Record) -> None:
+def _cutcom(state: ReaderState, record: Record) -> None:
     option = record.args[0] if record.args else ""
     if option in ("LEFT", "RIGHT", "ON") and "LENGTH" not in record.args:
-        if not machine.builder.keep.now:
-            machine.note("CS138", record.line)
-        machine.builder.keep.set(machine.builder.n, float(Keep.CUTTER_COMPENSATION))
+        if not state.builder.keep.now:
+            state.note("CS138", record.line)
+        state.builder.keep.set(state.builder.n, float(Keep.CUTTER_COMPENSATION))
     elif option in _ENDS:
-        machine.builder.keep.set(machine.builder.n, float(Keep.NO))
-    machine.keep(record)
+        state.builder.keep.set(state.builder.n, float(Keep.NO))
+    state.keep(record)
 
 
-def _cycle(machine: Machine, record: Record) -> None:
-    machine.hole = not (record.args and record.args[0] in _ENDS)
-    machine.set_kind()
-    machine.keep(record)
+def _cycle(state: ReaderState, record: Record) -> None:
+    state.hole = not (record.args and record.args[0] in _ENDS)
+    state.set_kind()
+    state.keep(record)
 
 
-def _frame(machine: Machine, record: Record) -> None:
+def _frame(state: ReaderState, record: Record) -> None:
     if record.word == "TRNTYP" or not _changes_nothing(record):
-        if not machine.lenient:
-            raise machine.fail("CS117", record.line, word=record.word)
-        machine.note("CS143", record.line, word=record.word)
-    machine.keep(record)
+        if not state.lenient:
+            raise state.fail("CS117", record.line, word=record.word)
+        state.note("CS143", record.line, word=record.word)
+    state.keep(record)
 
 
 def _changes_nothing(record: Record) -> bool:
@@ -156,33 +156,33 @@ def _changes_nothing(record: Record) -> bool:
     return first in _ENDS or (bool(values) and not any(values))
 
 
-def _set(machine: Machine, record: Record) -> None:
+def _set(state: ReaderState, record: Record) -> None:
     if "INCR" in record.args or "INCREM" in record.args:
         text = joined(record.args)
-        raise machine.fail("CS115", record.line, word="SET", text=text, want="write absolute positions")
-    machine.keep(record)
+        raise state.fail("CS115", record.line, word="SET", text=text, want="write absolute positions")
+    state.keep(record)
 
 
-def _trntyp(machine: Machine, record: Record) -> None:
+def _trntyp(state: ReaderState, record: Record) -> None:
     if record.args[:1] == ("WORLD",):
-        machine.keep(record)
+        state.keep(record)
     else:
-        _frame(machine, record)
+        _frame(state, record)
 
 
-def _syn(machine: Machine, record: Record) -> None:
+def _syn(state: ReaderState, record: Record) -> None:
     words = [value.strip("'").upper() for value in record.args if isinstance(value, str)]
     if words[:1] and words[0] in MOTION_WORDS:
         text, want = joined(record.args), "motion statements keep their names"
-        raise machine.fail("CS115", record.line, word="SYN", text=text, want=want)
+        raise state.fail("CS115", record.line, word="SYN", text=text, want=want)
     if len(words) == 2:  # ICAM: the first word now means the second, also a comment
-        machine.renamed[words[0]] = "$$" if words[1].startswith("$$") else words[1]
-    machine.keep(record)
+        state.renamed[words[0]] = "$$" if words[1].startswith("$$") else words[1]
+    state.keep(record)
 
 
-def _fini(machine: Machine, record: Record) -> None:
-    machine.finished = True
-    machine.keep(record)
+def _fini(state: ReaderState, record: Record) -> None:
+    state.finished = True
+    state.keep(record)
 
 
 def joined(args: tuple[Argument, ...]) -> str:
@@ -190,7 +190,7 @@ def joined(args: tuple[Argument, ...]) -> str:
     return ",".join(f"{value:g}" if isinstance(value, float) else value for value in args)
 
 
-HANDLERS: Final[dict[str, Callable[[Machine, Record], None]]] = {
+HANDLERS: Final[dict[str, Callable[[ReaderState, Record], None]]] = {
     "RAPID": _rapid,
     "FEDRAT": _feed,
     "UNITS": _units,

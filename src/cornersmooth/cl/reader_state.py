@@ -19,7 +19,7 @@ from cornersmooth.model import Move, Statement, Units
 
 
 @dataclass
-class Machine:
+class ReaderState:
     """State of the reading of one file.
 
     Parameters
