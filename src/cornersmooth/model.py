@@ -322,7 +322,7 @@ class Corners:
         Distance of the second control point from the corner over that of the first; 2/3 in the paper.
     tip_error, axis_error : (k,) float64, mm
         Largest distance between both motions at a common parameter: at the tip, and at b = tip + H·axis. The paths
-        themselves are at least as near (`smoothing.separation`).
+        themselves are at least as near (`smoothing.path_distance`).
     orientation_error : (k,) float64, rad
         Largest angle between the axis on the transition and on the original motion at the common parameter.
     sync_residual : (k,) float64, mm

@@ -12,7 +12,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, direct, plan
-from cornersmooth.feedrate.joints import Joints, follow
+from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.timelaw import TimeLaw, places, poses
 from cornersmooth.kinematics import Dynamics, Machine, load_machine, machine_position, solutions, tool_axis
@@ -39,13 +39,13 @@ def offset(machine: Machine) -> Machine:
 
 def observed(law: TimeLaw) -> tuple[Floats, Floats]:
     """Times, and positions (m, 5) by the solution nearest to the one before: nothing of it is the planner's."""
-    assert law.joints is not None
-    machine = law.joints.machine
+    assert law.machine_axes is not None
+    machine = law.machine_axes.machine
     t = np.arange(0.0, law.total, STEP)
     states = law.at(t)
     near = solutions(machine, states.axis).angles
     angles = np.empty((len(t), 2))
-    before = law.joints.angles[law.path.start[0]]
+    before = law.machine_axes.angles[law.path.start[0]]
     for i, both in enumerate(near):
         turned = both + 360.0 * np.round((before - both) / 360.0)
         before = angles[i] = turned[np.abs(turned - before).sum(axis=1).argmin()]
@@ -54,13 +54,13 @@ def observed(law: TimeLaw) -> tuple[Floats, Floats]:
 
 def used(law: TimeLaw, outliers: int = JUMPS) -> Floats:
     """(3, 5) largest differences over time over the limits."""
-    assert law.joints is not None
+    assert law.machine_axes is not None
     _, q = observed(law)
     found = [np.sort(np.abs(np.diff(q, n=k, axis=0)), axis=0) / STEP**k for k in (1, 2, 3)]
-    return np.stack((found[0][-1], found[1][-1], found[2][-1 - outliers])) / law.joints.limits
+    return np.stack((found[0][-1], found[1][-1], found[2][-1 - outliers])) / law.machine_axes.limits
 
 
-def paths(program: Program, machine: Machine, settings: Settings) -> tuple[Path, Joints]:
+def paths(program: Program, machine: Machine, settings: Settings) -> tuple[Path, MachineAxes]:
     smoothed = smooth(program, settings)
     path = build_path(smoothed.program, smoothed.corners, smoothed.settings, Limits())
     return path, follow(machine, path)
@@ -74,14 +74,14 @@ def tilted(program: Program) -> Program:
 @pytest.mark.parametrize("name", MACHINES)
 def test_derivatives_are_those_of_the_kinematics(chain: Callable[[int], Program], name: str) -> None:
     machine = offset(load_machine(name))
-    path, joints = paths(tilted(chain(2)), machine, Settings(tolerance=0.05, weights=(0.8, 1.7)))
+    path, machine_axes = paths(tilted(chain(2)), machine, Settings(tolerance=0.05, weights=(0.8, 1.7)))
     for kind, size in ((0, 0.02), (1, 0.01)):
         for element in np.flatnonzero((path.kind == kind) & ~path.turning)[2:8]:
             h = size * path.length[element]
             way = 0.4 * path.length[element] + h * np.arange(-3, 4)
             same: Ints = np.full(7, element)
             tip, axis, _ = poses(path, same, way)
-            q, one, two, three = joints.orders(same, places(path, same, way))
+            q, one, two, three = machine_axes.orders(same, places(path, same, way))
             assert tool_axis(machine, q[:, 3:]) == pytest.approx(axis, abs=1e-12)
             assert machine_position(machine, tip, q[:, 3:]) == pytest.approx(q[:, :3], abs=1e-9)
             for order, of in ((one, q), (two, one), (three, two)):
@@ -121,9 +121,9 @@ def test_limits_hold_on_the_impeller(name: str) -> None:
     """At every period, from the exact derivatives, which the test above holds against the kinematics."""
     program = read(IMPELLER.read_bytes(), name=IMPELLER.name)
     law = plan(smooth(program, Settings()), machine=load_machine(name))
-    assert law.joints is not None
+    assert law.machine_axes is not None
     _, *orders = law.axes_at(law.every_period())
-    peaks = np.stack([np.abs(order).max(axis=0) for order in orders]) / law.joints.limits
+    peaks = np.stack([np.abs(order).max(axis=0) for order in orders]) / law.machine_axes.limits
     assert peaks[:2].max() <= 1.001
     assert peaks[2].max() <= 1.005
     assert peaks.max() > 0.9
@@ -215,8 +215,8 @@ def test_jumps_at_corners_keep_the_axes(chain: Callable[[int], Program]) -> None
     law = direct(tilted(chain(3)), limits, "velocity_jump", machine=machine)
     corners = law.times_at(law.edge[1:-1])
     before, after = (law.axes_at(corners + shift)[1] for shift in (-1e-9, 1e-9))
-    assert law.joints is not None
-    jumps = np.abs(after - before) / (law.joints.limits[1] * limits.period)
+    assert law.machine_axes is not None
+    jumps = np.abs(after - before) / (law.machine_axes.limits[1] * limits.period)
     assert jumps.max() <= 1.001
     assert jumps.max() > 0.5
     assert law.total > direct(tilted(chain(3)), limits, "velocity_jump").total

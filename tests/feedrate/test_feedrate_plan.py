@@ -45,7 +45,7 @@ def test_acceleration_of_the_positions(chain: Callable[[int], Program], seed: in
     """Second differences of the tip, which know nothing of curvature, against both parts of the acceleration."""
     program, limits = chain(seed), Limits(accel=800.0, centripetal=300.0)
     law = plan(smooth(program, Settings(tolerance=0.05)), limits)
-    if np.isfinite(law.path.joint[1:-1]).any():
+    if np.isfinite(law.path.junction_speed[1:-1]).any():
         pytest.skip("a corner stays sharp")
     fine = 1e-4
     t = np.arange(0.0, law.total - fine, fine)
@@ -156,7 +156,7 @@ def test_pose_is_continuous(chain: Callable[[int], Program], method: str) -> Non
 
 
 def stops_within(law: TimeLaw) -> int:
-    return int((law.path.joint[1:-1] == 0.0).sum())
+    return int((law.path.junction_speed[1:-1] == 0.0).sum())
 
 
 def test_statements_stop_and_comments_do_not() -> None:

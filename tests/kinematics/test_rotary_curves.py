@@ -22,7 +22,7 @@ from cornersmooth.model import Move, Program, SmoothProgram, Status
 from cornersmooth.nc import choose_form, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
-from cornersmooth.smoothing.layout import lay_out
+from cornersmooth.smoothing.segments import segments_of
 
 TOLERANCE = 0.01  # mm
 KNOTS5 = np.array([0, 0, 0, 0, 0.5, 1, 1, 1, 1])
@@ -130,20 +130,20 @@ def assert_curves(smoothed: SmoothProgram, machine: Machine, curves: RotaryCurve
 
 def assert_straight(smoothed: SmoothProgram, machine: Machine, curves: RotaryCurves) -> None:
     """Even angles on the straight remainders, with the inserted points, keep to the ruled motion."""
-    program, corners, layout = smoothed.program, smoothed.corners, lay_out(smoothed, dense=False)
+    program, corners, segments = smoothed.program, smoothed.corners, segments_of(smoothed, dense=False)
     assert len(curves.inserted.unsolved) == 0
     tolerance = np.degrees(smoothed.settings.tolerance / smoothed.settings.axis_length)
     arrival = curves.pose_angles.copy()
     arrival[corners.pose[corners.smoothed]] = curves.start_angles[corners.smoothed]
     share = np.linspace(0, 1, 17)[:, None]
-    for pose in np.flatnonzero((layout.start >= 0) & ~layout.skip & layout.line):
-        start = layout.start[pose]
-        row = layout.row[start]
+    for pose in np.flatnonzero((segments.start >= 0) & ~segments.skip & segments.has_line):
+        start = segments.start[pose]
+        row = segments.row[start]
         leaving = curves.end_angles[row] if row >= 0 else curves.pose_angles[start]
         own = curves.inserted.segment == pose
         if curves.even[pose]:
             assert not own.any()
-        places = np.concatenate(([layout.entry[pose]], curves.inserted.fraction[own], [layout.exit[pose]]))
+        places = np.concatenate(([segments.entry[pose]], curves.inserted.fraction[own], [segments.exit[pose]]))
         assert (np.diff(places) > 0).all()
         words = np.concatenate((leaving[None], curves.inserted.angles[own], arrival[None, pose]))
         for j in range(len(places) - 1):
@@ -290,7 +290,7 @@ def test_joints_of_fitted_curves(tilt: float, step: float):
     program = Program.from_poses(tip, zigzag(tilt, way * step, 60).axis)
     smoothed = smooth(program, reserved())
     curves = rotary(smoothed, machine)
-    layout = lay_out(smoothed, dense=False)
+    segments = segments_of(smoothed, dense=False)
     place = {int(row): (group, i) for group in curves.groups for i, row in enumerate(group.row)}
     assert sum(group.tip.shape[1] > 5 for group, _ in place.values()) > 20
     with_line = without = bent = 0
@@ -301,10 +301,10 @@ def test_joints_of_fitted_curves(tilt: float, step: float):
         value, slope, bend = per_length(*place[row], 1.0)
         next_value, next_slope, next_bend = per_length(*place[row + 1], 0.0)
         scale = np.abs(slope).max() + np.abs(bend).max() + 1
-        if layout.line[pose]:
+        if segments.has_line[pose]:
             own = curves.inserted.segment == pose
             length = np.linalg.norm(program.tip[pose] - program.tip[pose - 1])
-            at = length * np.concatenate(([layout.entry[pose]], curves.inserted.fraction[own], [layout.exit[pose]]))
+            at = length * np.concatenate(([segments.entry[pose]], curves.inserted.fraction[own], [segments.exit[pose]]))
             words = np.concatenate((value[None], curves.inserted.angles[own], next_value[None]))
             rates = np.diff(words, axis=0) / np.diff(at)[:, None]
             for (group, i), ours, curvature, line in (

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from cornersmooth.model import LimitedBy, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.smoothing.layout import lay_out
+from cornersmooth.smoothing.segments import segments_of
 from smoothing.paths import grid_program, random_program, simultaneous_deviation
 
 FAIR = Settings(allocation="fair")
@@ -98,11 +98,11 @@ def test_corners_beside_an_end_take_more_than_half_of_it():
 
 def test_transitions_that_touch_have_no_line_between():
     smoothed = smooth(random_program(5, 500, wobble=0.05), FAIR.but(tolerance=10.0, axis_length=1.0))
-    corners, layout = smoothed.corners, lay_out(smoothed, dense=False)
+    corners, segments = smoothed.corners, segments_of(smoothed, dense=False)
     rows = np.flatnonzero((corners.after[:-1] == corners.pose[1:]) & corners.smoothed[:-1] & corners.smoothed[1:])
     rest = 1.0 - corners.trim_out[rows] - corners.trim_in[rows + 1]
     assert (np.abs(rest) < 1e-12).mean() > 0.5
-    assert not layout.line[corners.pose[rows + 1][np.abs(rest) < 1e-12]].any()
+    assert not segments.has_line[corners.pose[rows + 1][np.abs(rest) < 1e-12]].any()
 
 
 def test_reversing_the_path_commutes():

@@ -12,9 +12,9 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.model import Program, Status
 from cornersmooth.settings import BOUNDS, Settings
 from cornersmooth.smoothing import nurbs, smooth
-from cornersmooth.smoothing.bridging import PAPER_ERROR, shape_factors
-from cornersmooth.smoothing.layout import lines_per_half
+from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
 from cornersmooth.smoothing.sampling import dense_rows
+from cornersmooth.smoothing.segments import lines_per_half
 from smoothing.paths import grid_program, plane_corner, random_program, simultaneous_deviation
 
 AUTO = Settings(shape="auto")

@@ -17,7 +17,7 @@ from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.report import report
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.smoothing.separation import separations
+from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.verify import read_nc, verify
 
 SAMPLES = Path(__file__).parents[2] / "samples"
@@ -85,7 +85,7 @@ def test_unequal_legs_pass_nearer_than_the_construction_says(dense: bool) -> Non
     program = read(("x,y,z,i,j,k\n" + "\n".join(rows) + "\n").encode(), name="chain.csv")
     smoothed = smooth(program, Settings(tolerance=0.1))
     all_rows = np.flatnonzero(smoothed.corners.smoothed)
-    near_tip, near_axis = separations(smoothed, all_rows, dense=dense)
+    near_tip, near_axis = path_distances(smoothed, all_rows, dense=dense)
     assert (near_tip < 0.8 * smoothed.corners.tip_error[all_rows]).sum() > 5
     for k, row in enumerate(all_rows.tolist()):
         tips, tops = _path(smoothed, row, dense)
@@ -99,8 +99,8 @@ def test_unequal_legs_pass_nearer_than_the_construction_says(dense: bool) -> Non
 def _path(smoothed, row: int, dense: bool):  # type: ignore[no-untyped-def]
     """Tips and axis points of one transition, close together."""
     from cornersmooth.smoothing import nurbs
-    from cornersmooth.smoothing.layout import lines_of
     from cornersmooth.smoothing.sampling import nodes
+    from cornersmooth.smoothing.segments import lines_of
 
     corners = smoothed.corners
     tip_curve, axis_curve = nurbs.control_points(smoothed.program, corners, np.array([row]), 10.0)

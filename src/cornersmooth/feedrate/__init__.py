@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from cornersmooth.feedrate.axis_limits import AxisLimits
 from cornersmooth.feedrate.axispeaks import AxisPeaks, axis_peaks
 from cornersmooth.feedrate.compare import Comparison, compare
-from cornersmooth.feedrate.demands import AxisLimits
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.timelaw import States, TimeLaw

@@ -69,7 +69,7 @@ def _turned(normal: Floats, arm: Floats, angle: Floats) -> Floats:
     return turned
 
 
-def jet(program: Program, moves: Ints, fraction: Floats) -> Floats:
+def series(program: Program, moves: Ints, fraction: Floats) -> Floats:
     """Taylor coefficients (4, k, 3) of the tip by the fraction of the way along the arcs into these poses, mm."""
     rows = arc_rows(program, moves)
     sweep, normal = program.arcs.sweep[rows][:, None], program.arcs.normal[rows]

@@ -49,12 +49,12 @@ class AxisPeaks:
 
 def axis_peaks(law: TimeLaw) -> list[AxisPeaks]:
     """Peaks of the five axes of a law's machine; none where it was planned without one."""
-    if law.joints is None:
+    if law.machine_axes is None:
         return []
     times = law.every_period()
-    largest = np.zeros((3, len(law.joints.names)))
+    largest = np.zeros((3, len(law.machine_axes.names)))
     for begin in range(0, len(times), _BLOCK):
         _, *orders = law.axes_at(times[begin : begin + _BLOCK])
         largest = np.maximum(largest, [np.abs(order).max(axis=0) for order in orders])
-    rows = zip(law.joints.names, largest.T.tolist(), law.joints.limits.T.tolist(), strict=True)
+    rows = zip(law.machine_axes.names, largest.T.tolist(), law.machine_axes.limits.T.tolist(), strict=True)
     return [AxisPeaks(name, (v, a, j), (most_v, most_a, most_j)) for name, (v, a, j), (most_v, most_a, most_j) in rows]

@@ -189,7 +189,7 @@ def compare(
 
 def stops(law: TimeLaw) -> int:
     """How often the motion comes to rest between its start and its end."""
-    return int((law.path.joint[1:-1] == 0.0).sum())
+    return int((law.path.junction_speed[1:-1] == 0.0).sum())
 
 
 def turning_seconds(law: TimeLaw) -> float:

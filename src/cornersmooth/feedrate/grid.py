@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.feedrate.caps import Caps
+from cornersmooth.feedrate.speed_limits import SpeedLimits
 from cornersmooth.model import Bools, Floats, Ints
 
 #: smallest size of a cell over the length of the path: smaller ones would be lost in the digits of the coordinate
@@ -66,22 +66,27 @@ class Grid:
 
 
 def make_grid(
-    caps: Caps, runs: Ints, accel: Floats, jerk: Floats, resolution: Resolution | None = None, more: Caps | None = None
+    speed_limits: SpeedLimits,
+    runs: Ints,
+    accel: Floats,
+    jerk: Floats,
+    resolution: Resolution | None = None,
+    more: SpeedLimits | None = None,
 ) -> Grid:
     """Cells for the given runs.
 
     Parameters
     ----------
-    caps : Caps
+    speed_limits : SpeedLimits
     runs : (r,) int64
         Which runs, ascending.
     accel, jerk : (r,) float64
-    more : Caps, optional
+    more : SpeedLimits, optional
         More limits, over other intervals of the same path.
     """
     resolution = Resolution() if resolution is None else resolution
-    begin, end = caps.edge[caps.run[runs]], caps.edge[caps.run[runs + 1]]
-    rows = [_intervals(each, runs) for each in (caps, more) if each is not None]
+    begin, end = speed_limits.edge[speed_limits.run[runs]], speed_limits.edge[speed_limits.run[runs + 1]]
+    rows = [_intervals(each, runs) for each in (speed_limits, more) if each is not None]
     run, low, cap, before = (np.concatenate([part[i] for part in rows]) for i in range(4))
     highest = np.maximum.reduceat(cap[: len(rows[0][0])], np.flatnonzero(np.isnan(rows[0][3])))
     cap, before = np.minimum(cap, highest[run]), np.minimum(before, highest[run])
@@ -106,7 +111,7 @@ def make_grid(
     place, size, run = place[order], size[order], run[order]
 
     g = resolution.growth
-    size = np.maximum(size, SMALLEST * caps.edge[-1])
+    size = np.maximum(size, SMALLEST * speed_limits.edge[-1])
     size = g * place + np.minimum.accumulate(size - g * place)
     size = -g * place + np.minimum.accumulate((size + g * place)[::-1])[::-1]
     left, right = np.flatnonzero(run[1:] == run[:-1]), np.flatnonzero(run[1:] == run[:-1]) + 1
@@ -140,23 +145,23 @@ def make_grid(
     at_start = np.flatnonzero(starts)
     start, stop = edge[at_start], edge[at_start + 1]
     grid = Grid(start, stop - start, np.full(len(start), np.inf), first)
-    for each in (caps, more):
+    for each in (speed_limits, more):
         if each is not None:
             met = np.minimum.reduceat(np.append(each.cap, np.inf), cell_intervals(each, grid, runs))[::2]
             np.minimum(grid.cap, met, out=grid.cap)
     return grid
 
 
-def _intervals(caps: Caps, runs: Ints) -> tuple[Ints, Floats, Floats, Floats]:
+def _intervals(speed_limits: SpeedLimits, runs: Ints) -> tuple[Ints, Floats, Floats, Floats]:
     """Of all intervals of the runs: number of the run, start, bound of v², and that of the interval before or NaN."""
-    counts = caps.run[runs + 1] - caps.run[runs]
+    counts = speed_limits.run[runs + 1] - speed_limits.run[runs]
     of_interval = np.repeat(np.arange(len(runs)), counts)
     begin = np.cumsum(counts) - counts
-    interval = np.arange(len(of_interval)) + np.repeat(caps.run[runs] - begin, counts)
-    cap = caps.cap[interval]
+    interval = np.arange(len(of_interval)) + np.repeat(speed_limits.run[runs] - begin, counts)
+    cap = speed_limits.cap[interval]
     before = np.concatenate((cap[:1], cap[:-1]))
     before[begin] = np.nan
-    return of_interval, caps.edge[interval], cap, before
+    return of_interval, speed_limits.edge[interval], cap, before
 
 
 def _end_cells(
@@ -188,15 +193,15 @@ def _end_cells(
     return np.minimum(cells[0], outermost[0]), np.minimum(cells[1], outermost[1])
 
 
-def cell_intervals(caps: Caps, grid: Grid, runs: Ints) -> Ints:
+def cell_intervals(speed_limits: SpeedLimits, grid: Grid, runs: Ints) -> Ints:
     """(2n,) pairs of the first interval met in each cell and the one after the last, for ``ufunc.reduceat``."""
     cells = np.diff(np.append(grid.first, len(grid.start)))
     owner = np.repeat(runs, cells)
-    return _met(caps, grid.start, grid.start + grid.width, caps.run[owner], caps.run[owner + 1])
+    return _met(speed_limits, grid.start, grid.start + grid.width, speed_limits.run[owner], speed_limits.run[owner + 1])
 
 
-def _met(caps: Caps, start: Floats, stop: Floats, begin: Ints, end: Ints) -> Ints:
-    slack = 1e-9 * (stop - start)  # so that a joint on a border counts for both cells
-    low = np.clip(np.searchsorted(caps.edge, start - slack, side="right") - 1, begin, end - 1)
-    high = np.clip(np.searchsorted(caps.edge, stop + slack, side="left"), low + 1, end)
+def _met(speed_limits: SpeedLimits, start: Floats, stop: Floats, begin: Ints, end: Ints) -> Ints:
+    slack = 1e-9 * (stop - start)  # so that a junction on a border counts for both cells
+    low = np.clip(np.searchsorted(speed_limits.edge, start - slack, side="right") - 1, begin, end - 1)
+    high = np.clip(np.searchsorted(speed_limits.edge, stop + slack, side="left"), low + 1, end)
     return np.stack((low, high), axis=1).ravel()

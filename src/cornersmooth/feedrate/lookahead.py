@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cornersmooth.feedrate.barrier import Batch, solve
 from cornersmooth.feedrate.grid import Grid
+from cornersmooth.feedrate.interior_point import Batch, solve
 from cornersmooth.feedrate.scurve import stopping_distance
 from cornersmooth.model import Floats, Ints
 
@@ -25,7 +25,7 @@ CRAWLING = 3
 FREE = 1e30
 
 
-def batch_of(grid: Grid, accel: Floats, jerk: Floats, demand: Floats | None = None) -> Batch:
+def batch_of(grid: Grid, accel: Floats, jerk: Floats, coefficients: Floats | None = None) -> Batch:
     """The optimisation problem of all runs of a grid.
 
     The cells of a run are its slots: the first and the last, next to the stops, are driven with constant jerk.
@@ -34,8 +34,8 @@ def batch_of(grid: Grid, accel: Floats, jerk: Floats, demand: Floats | None = No
     ----------
     accel, jerk : (n,) float64
         Limits per cell.
-    demand : (5, n) float64, optional
-        Coefficients per cell as in `demands.Demands.rows`, besides those of the path speed.
+    coefficients : (5, n) float64, optional
+        Coefficients per cell as in `axis_limits.LimitCoefficients.rows`, besides those of the path speed.
     """
     n = len(grid.start)
     first, last = grid.first, grid.last
@@ -56,7 +56,7 @@ def batch_of(grid: Grid, accel: Floats, jerk: Floats, demand: Floats | None = No
     slope_after = np.append(slope[1:], 0.0)
     bend = np.where(cell, np.stack((slope, -slope - slope_after, slope_after)) / (2.0 * width), 0.0)
 
-    use = np.zeros((5, n)) if demand is None else demand.copy()
+    use = np.zeros((5, n)) if coefficients is None else coefficients.copy()
     use[0] = np.maximum(use[0], 0.5 / accel)
     use[2] = np.maximum(use[2], 1.0 / jerk)
     at_node = np.maximum(use[:2], np.concatenate((use[:2, 1:], use[:2, -1:]), axis=1))

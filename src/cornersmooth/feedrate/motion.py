@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cornersmooth.feedrate import arcs, halves, jets
+from cornersmooth.feedrate import arcs, bezier_halves, taylor
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.neighbours import norm
@@ -35,26 +35,26 @@ def derivatives(path: Path, element: Ints, share: Floats, position: Callable[[Fl
         Place on each element: the part of its length for lines and arcs, the parameter t of its half for curves. Curves
         of the paper's method are taken at v = u.
     position : callable
-        From the jets of tip and unit tool axis, (4, m, 3) each, to that of the position, (4, m, d).
+        From the Taylor series of tip and unit tool axis, (4, m, 3) each, to that of the position, (4, m, d).
 
     Returns
     -------
     Derivatives
         Per mm, mm², mm³; per rad where the tip stands still; infinite where it comes to a stand.
     """
-    tip, axis, speed = jets_along(path, element, share)
+    tip, axis, speed = taylor_along(path, element, share)
     with np.errstate(over="ignore", invalid="ignore"):  # the tip comes to a stand
-        found = [norm(order) for order in jets.by_way(position(tip, axis), speed)]
+        found = [norm(order) for order in taylor.by_way(position(tip, axis), speed)]
     return Derivatives(*(np.where(np.isfinite(order), order, np.inf) for order in found))
 
 
-def jets_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
-    """Jets of tip and unit tool axis, (4, m, 3) each, and of the speed of the coordinate, (3, m).
+def taylor_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
+    """Taylor series of tip and unit tool axis, (4, m, 3) each, and of the speed of the coordinate, (3, m).
 
     By the place on each element, which is `share` as in `derivatives`.
     """
     count = len(element)
-    tip, lever, speed = np.zeros((jets.ORDERS, count, 3)), np.zeros((jets.ORDERS, count, 3)), np.zeros((3, count))
+    tip, lever, speed = np.zeros((taylor.ORDERS, count, 3)), np.zeros((taylor.ORDERS, count, 3)), np.zeros((3, count))
     kind = path.kind[element]
     rows = np.flatnonzero(kind == Kind.CURVE)
     if len(rows):
@@ -62,33 +62,33 @@ def jets_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats
     rows = np.flatnonzero(kind != Kind.CURVE)
     if len(rows):
         tip[:, rows], lever[:, rows], speed[:, rows] = _lines(path, element[rows], share[rows])
-    return tip, jets.normalised(lever), speed
+    return tip, taylor.normalised(lever), speed
 
 
 def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Floats]:
-    """Jets in t of tip and lever on halves of transitions, and of the speed of the coordinate."""
+    """Taylor series in t of tip and lever on halves of transitions, and of the speed of the coordinate."""
     corners = path.corners
     if corners is None:
         raise ValueError("a direct path has no curves")
     half = (path.span[element, 0] > 0.0).astype(np.int64)
-    powers = halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
-    shifts = np.stack([t**k for k in range(jets.ORDERS)])
+    powers = bezier_halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
+    shifts = np.stack([t**k for k in range(taylor.ORDERS)])
     curves = []
     for curve in powers:
-        around = np.zeros((jets.ORDERS, len(t), 4))
-        for k in range(jets.ORDERS):
-            for power in range(k, jets.ORDERS):
+        around = np.zeros((taylor.ORDERS, len(t), 4))
+        for k in range(taylor.ORDERS):
+            for power in range(k, taylor.ORDERS):
                 around[k] += _BINOMIALS[k, power] * shifts[power - k][:, None] * curve[:, power]
-        curves.append(jets.divide(around[..., :3], around[..., 3:]))
+        curves.append(taylor.divide(around[..., :3], around[..., 3:]))
     tip, axis_point = curves
     lever = axis_point - tip
     tip[0] += path.program.tip[corners.pose[path.corner[element]]]  # halves are relative to the corner
-    gone = jets.derivative(tip)
-    squared = jets.dot(gone, gone)
+    gone = taylor.derivative(tip)
+    squared = taylor.dot(gone, gone)
     turning = path.turning[element]
     moving = squared[0] > 0.0
     squared[0] = np.where(moving, squared[0], 1.0)
-    speed = jets.root(squared)
+    speed = taylor.root(squared)
     speed[:, ~moving] = 0.0
     speed[0, ~moving] = _NO_SPEED
     speed[:, turning] = 0.0
@@ -97,7 +97,7 @@ def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Float
 
 
 def _lines(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
-    """Jets in the share of the length of tip and lever on lines and arcs, and of the speed of the coordinate."""
+    """Taylor series, in the share of the length, of tip and lever on lines and arcs, and of the coordinate's speed."""
     program = path.program
     start, end = path.start[element], path.move[element]
     span, axis_span = path.span[element], path.axis_span[element]
@@ -105,7 +105,7 @@ def _lines(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Fl
     turn = path.settings.axis_length * (program.axis[end] - program.axis[start])
     part, axis_part = (np.diff(limits, axis=1) for limits in (span, axis_span))
     fraction, axis_fraction = span[:, :1] + share[:, None] * part, axis_span[:, :1] + share[:, None] * axis_part
-    tip = np.zeros((jets.ORDERS, len(element), 3))
+    tip = np.zeros((taylor.ORDERS, len(element), 3))
     lever = tip.copy()
     tip[0] = program.tip[start] + fraction * step
     tip[1] = part * step
@@ -115,7 +115,7 @@ def _lines(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Fl
     lever[1] = axis_part * turn + (axis_part - part) * step
     bow = np.flatnonzero(path.kind[element] == Kind.ARC)
     if len(bow):
-        tip[:, bow] = arcs.jet(program, end[bow], share[bow])
+        tip[:, bow] = arcs.series(program, end[bow], share[bow])
     speed = np.zeros((3, len(element)))
     speed[0] = path.length[element]
     return tip, lever, speed

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate import arcs, halves
-from cornersmooth.feedrate.halves import STANDSTILL
+from cornersmooth.feedrate import arcs, bezier_halves
+from cornersmooth.feedrate.bezier_halves import STANDSTILL
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Status
 from cornersmooth.settings import Settings
@@ -63,7 +63,7 @@ class Path:
     speed : (m,) float64, mm/s or rad/s
         Feed, rapid speed or angular speed.
     rapid : (m,) bool
-    joint : (m + 1,) float64
+    junction_speed : (m + 1,) float64
         Largest speed at the start of element i, and at the end of the last: 0 for a stop, inf for none.
     """
 
@@ -80,7 +80,7 @@ class Path:
     length: Floats
     speed: Floats
     rapid: Bools
-    joint: Floats
+    junction_speed: Floats
 
     def __len__(self) -> int:
         return len(self.length)
@@ -131,7 +131,7 @@ def build_path(
     m = 3 * len(moves)
     half_length, half_turn = np.zeros((2, 0)), np.zeros((2, 0))
     if corners is not None:
-        half_length, half_turn = halves.half_lengths(program, corners, settings.axis_length)
+        half_length, half_turn = bezier_halves.half_lengths(program, corners, settings.axis_length)
     tip_length, axis_angle = np.zeros((len(moves), 3)), np.zeros((len(moves), 3))
     tip_length[:, 1], axis_angle[:, 1] = along, turned
     for slot, at, half in ((0, leaving, 1), (2, reaching, 0)):
@@ -160,14 +160,14 @@ def build_path(
     speed[cutting] = _feeds(program, owners[cutting], limits)
     speed[turning] = limits.angular_limits[0]
 
-    joint = np.full((len(moves), 3), np.inf)
-    joint[:, 0] = _joint_speeds(program, corners, moves, start, leaving, tangents, limits, stop_everywhere)
-    joint_before = joint.reshape(m)
+    junction = np.full((len(moves), 3), np.inf)
+    junction[:, 0] = _junction_speeds(program, corners, moves, start, leaving, tangents, limits, stop_everywhere)
+    junction_before = junction.reshape(m)
 
     keep = np.flatnonzero(present)
-    # the joint before an element that is kept is the slowest of those since the element kept before it
+    # the junction before an element that is kept is the slowest of those since the element kept before it
     begin = np.concatenate(([0], keep[:-1] + 1)) if len(keep) else keep
-    slowest = np.minimum.reduceat(joint_before[: keep[-1] + 1], begin) if len(keep) else np.zeros(0)
+    slowest = np.minimum.reduceat(junction_before[: keep[-1] + 1], begin) if len(keep) else np.zeros(0)
     changes = turning[keep]
     slowest[1:][changes[1:] != changes[:-1]] = 0.0
     slowest[:1] = 0.0
@@ -185,7 +185,7 @@ def build_path(
         length=np.where(turning, angles, lengths)[keep],
         speed=speed[keep],
         rapid=np.repeat(rapid, 3)[keep],
-        joint=np.concatenate((slowest, [0.0])),
+        junction_speed=np.concatenate((slowest, [0.0])),
     )
 
 
@@ -239,7 +239,7 @@ def _feeds(program: Program, moves: Ints, limits: Limits) -> Floats:
     return feeds
 
 
-def _joint_speeds(
+def _junction_speeds(
     program: Program,
     corners: Corners | None,
     moves: Ints,

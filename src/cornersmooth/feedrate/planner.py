@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 
 from cornersmooth.feedrate import lookahead, scurve
-from cornersmooth.feedrate.caps import Caps, speed_caps
-from cornersmooth.feedrate.demands import AxisLimits, Demands, find_demands
+from cornersmooth.feedrate.axis_limits import AxisLimits, LimitCoefficients, find_limit_coefficients
 from cornersmooth.feedrate.grid import Grid, Resolution, cell_intervals, make_grid
-from cornersmooth.feedrate.joints import follow
 from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.machine_axes import follow
 from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.speed_limits import SpeedLimits, find_speed_limits
 from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
@@ -112,35 +112,35 @@ def plan_path(
     progress: Progress | None = None,
 ) -> TimeLaw:
     """Plan the motion along any path."""
-    joints = None if machine is None else follow(machine, path)
-    if joints is not None:
-        path = replace(path, joint=np.minimum(path.joint, joints.jump_speeds(limits.period)))
-    caps = speed_caps(path, limits)
-    runs = len(caps.run) - 1
-    lead = caps.element[:-1]  # first element of each run
+    machine_axes = None if machine is None else follow(machine, path)
+    if machine_axes is not None:
+        path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
+    speed_limits = find_speed_limits(path, limits)
+    runs = len(speed_limits.run) - 1
+    lead = speed_limits.element[:-1]  # first element of each run
     accel = np.where(path.rapid[lead], limits.rapid_limits[1], limits.accel)
     jerk = np.where(path.rapid[lead], limits.rapid_limits[2], limits.jerk)
     accel = np.where(path.turning[lead], limits.angular_limits[1], accel)
     jerk = np.where(path.turning[lead], limits.angular_limits[2], jerk)
 
     if runs:
-        lowest = np.minimum.reduceat(caps.cap, caps.run[:-1])
-        highest = np.maximum.reduceat(caps.cap, caps.run[:-1])
+        lowest = np.minimum.reduceat(speed_limits.cap, speed_limits.run[:-1])
+        highest = np.maximum.reduceat(speed_limits.cap, speed_limits.run[:-1])
         level = lowest == highest
     else:
         level = np.zeros(0, np.bool_)
-    demands = find_demands(path, limits, caps, axes, joints)
-    if demands is not None and runs:
-        level &= ~_demanding(demands, accel, jerk, lowest)
-    parts = [_level_runs(caps, np.flatnonzero(level), accel, jerk)]
+    coefficients = find_limit_coefficients(path, limits, speed_limits, axes, machine_axes)
+    if coefficients is not None and runs:
+        level &= ~_exceeding(coefficients, accel, jerk, lowest)
+    parts = [_level_runs(speed_limits, np.flatnonzero(level), accel, jerk)]
     uneven = np.flatnonzero(~level)
     if len(uneven):
-        parts.append(_uneven_runs(caps, demands, uneven, accel, jerk, resolution, progress))
+        parts.append(_uneven_runs(speed_limits, coefficients, uneven, accel, jerk, resolution, progress))
 
     run, duration, way, speed, begin, rate, constant = (np.concatenate([part[i] for part in parts]) for i in range(7))
     order = np.argsort(run, kind="stable")
     order = order[duration[order] > 0.0]
-    end = caps.edge[-1]
+    end = speed_limits.edge[-1]
     return TimeLaw(
         time=np.concatenate(([0.0], np.cumsum(duration[order]))),
         way=np.append(way[order], end),
@@ -151,14 +151,14 @@ def plan_path(
         path=path,
         limits=limits,
         edge=np.concatenate(([0.0], np.cumsum(path.length))),
-        joints=joints,
+        machine_axes=machine_axes,
     )
 
 
-def _level_runs(caps: Caps, runs: Ints, accel: Floats, jerk: Floats) -> tuple[Floats | Ints, ...]:
+def _level_runs(speed_limits: SpeedLimits, runs: Ints, accel: Floats, jerk: Floats) -> tuple[Floats | Ints, ...]:
     """Pieces of runs with one speed limit: S-curves in closed form."""
-    begin, end = caps.edge[caps.run[runs]], caps.edge[caps.run[runs + 1]]
-    limit = np.sqrt(caps.cap[caps.run[runs]])
+    begin, end = speed_limits.edge[speed_limits.run[runs]], speed_limits.edge[speed_limits.run[runs + 1]]
+    limit = np.sqrt(speed_limits.cap[speed_limits.run[runs]])
     duration, signed, _ = scurve.rest_to_rest(end - begin, limit, accel[runs], jerk[runs])
     way, speed, rising = np.empty_like(duration), np.empty_like(duration), np.empty_like(duration)
     x, v, a = begin, np.zeros(len(runs)), np.zeros(len(runs))
@@ -180,17 +180,17 @@ def _level_runs(caps: Caps, runs: Ints, accel: Floats, jerk: Floats) -> tuple[Fl
     )
 
 
-def _demanding(demands: Demands, accel: Floats, jerk: Floats, cap: Floats) -> Bools:
+def _exceeding(coefficients: LimitCoefficients, accel: Floats, jerk: Floats, cap: Floats) -> Bools:
     """(r,) bool: runs in which vectors ask for more than the limits of the path speed."""
-    begin = demands.caps.run[:-1]
-    slope, level, bend, cross, cube = np.maximum.reduceat(demands.rows, begin, axis=1)
+    begin = coefficients.speed_limits.run[:-1]
+    slope, level, bend, cross, cube = np.maximum.reduceat(coefficients.rows, begin, axis=1)
     more: Bools = (slope > 0.5 / accel) | (bend > 1.0 / jerk) | (level > 0.0) | (cross > 0.0) | (cube > 0.0)
-    return more | (np.minimum.reduceat(demands.caps.cap, begin) < cap)
+    return more | (np.minimum.reduceat(coefficients.speed_limits.cap, begin) < cap)
 
 
 def _uneven_runs(
-    caps: Caps,
-    demands: Demands | None,
+    speed_limits: SpeedLimits,
+    coefficients: LimitCoefficients | None,
     runs: Ints,
     accel: Floats,
     jerk: Floats,
@@ -198,14 +198,14 @@ def _uneven_runs(
     progress: Progress | None,
 ) -> tuple[Floats | Ints, ...]:
     """Pieces of runs whose speed limit changes on the way: one per cell."""
-    more = None if demands is None else demands.caps
-    grid: Grid = make_grid(caps, runs, accel[runs], jerk[runs], resolution, more)
+    more = None if coefficients is None else coefficients.speed_limits
+    grid: Grid = make_grid(speed_limits, runs, accel[runs], jerk[runs], resolution, more)
     of_cell = lookahead.run_of_cells(grid)
-    demand = None
-    if demands is not None:
-        rows = np.concatenate((demands.rows, np.zeros((5, 1))), axis=1)
-        demand = np.maximum.reduceat(rows, cell_intervals(demands.caps, grid, runs), axis=1)[:, ::2]
-    batch = lookahead.batch_of(grid, accel[runs][of_cell], jerk[runs][of_cell], demand)
+    coefficients = None
+    if coefficients is not None:
+        rows = np.concatenate((coefficients.rows, np.zeros((5, 1))), axis=1)
+        coefficients = np.maximum.reduceat(rows, cell_intervals(coefficients.speed_limits, grid, runs), axis=1)[:, ::2]
+    batch = lookahead.batch_of(grid, accel[runs][of_cell], jerk[runs][of_cell], coefficients)
     c = lookahead.solve_runs(batch, grid, progress)
     z, slope, bend = batch.forms(c)
     v, a = np.sqrt(z), 0.5 * slope  # at the end of each cell

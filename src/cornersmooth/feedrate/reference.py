@@ -18,10 +18,10 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, vstack
 
 from cornersmooth.feedrate import scurve
-from cornersmooth.feedrate.caps import Caps, speed_caps
 from cornersmooth.feedrate.grid import Resolution, make_grid
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Path
+from cornersmooth.feedrate.speed_limits import SpeedLimits, find_speed_limits
 from cornersmooth.model import Floats
 
 #: change of the time, relative, below which a round brought nothing
@@ -50,28 +50,28 @@ def reference_time(path: Path, limits: Limits, resolution: Resolution = FINE) ->
     resolution : Resolution
         How close the nodes are.
     """
-    caps = speed_caps(path, limits)
+    speed_limits = find_speed_limits(path, limits)
     total = 0.0
-    for run, lead in enumerate(caps.element[:-1]):
+    for run, lead in enumerate(speed_limits.element[:-1]):
         accel, jerk = limits.accel, limits.jerk
         if path.rapid[lead]:
             _, accel, jerk = limits.rapid_limits
         if path.turning[lead]:
             _, accel, jerk = limits.angular_limits
-        begin, end = int(caps.run[run]), int(caps.run[run + 1])
-        bound = caps.cap[begin:end]
+        begin, end = int(speed_limits.run[run]), int(speed_limits.run[run + 1])
+        bound = speed_limits.cap[begin:end]
         if (bound == bound[0]).all():
-            length = caps.edge[end : end + 1] - caps.edge[begin]
+            length = speed_limits.edge[end : end + 1] - speed_limits.edge[begin]
             speed = np.sqrt(bound[:1])
             total += float(scurve.rest_to_rest(length, speed, np.array(accel), np.array(jerk))[0].sum())
         else:
-            x = _nodes(caps, run, accel, jerk, resolution)
-            total += fastest(x, node_caps(x, caps.edge[begin : end + 1], bound), accel, jerk)[0]
+            x = _nodes(speed_limits, run, accel, jerk, resolution)
+            total += fastest(x, node_caps(x, speed_limits.edge[begin : end + 1], bound), accel, jerk)[0]
     return total
 
 
-def _nodes(caps: Caps, run: int, accel: float, jerk: float, resolution: Resolution) -> Floats:
-    grid = make_grid(caps, np.array([run]), np.array([accel]), np.array([jerk]), resolution)
+def _nodes(speed_limits: SpeedLimits, run: int, accel: float, jerk: float, resolution: Resolution) -> Floats:
+    grid = make_grid(speed_limits, np.array([run]), np.array([accel]), np.array([jerk]), resolution)
     return np.append(grid.start, grid.start[-1] + grid.width[-1])
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.feedrate import arcs, halves
-from cornersmooth.feedrate.joints import Joints
+from cornersmooth.feedrate import arcs, bezier_halves
 from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.path import Kind, Path, line_axes
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing import nurbs, synchronise
@@ -69,7 +69,7 @@ class TimeLaw:
     limits : Limits
     edge : (m + 1,) float64
         Path coordinate of the elements' ends.
-    joints : Joints or None
+    machine_axes : MachineAxes or None
         The axes of the machine that it was planned for.
     """
 
@@ -82,7 +82,7 @@ class TimeLaw:
     path: Path
     limits: Limits
     edge: Floats
-    joints: Joints | None = None
+    machine_axes: MachineAxes | None = None
 
     @property
     def total(self) -> float:
@@ -165,7 +165,7 @@ class TimeLaw:
         ValueError
             The law was not planned for a machine.
         """
-        if self.joints is None:
+        if self.machine_axes is None:
             raise ValueError("the law was not planned for a machine")
         x, v, a, j = (order[:, None] for order in self.kinematics(t))
         path = self.path
@@ -173,7 +173,7 @@ class TimeLaw:
             return (np.zeros((len(x), 5)),) * 4
         element = np.clip(np.searchsorted(self.edge, x[:, 0], side="right") - 1, 0, len(path) - 1)
         local = np.clip(x[:, 0] - self.edge[element], 0.0, path.length[element])
-        q, one, two, three = self.joints.orders(element, places(path, element, local))
+        q, one, two, three = self.machine_axes.orders(element, places(path, element, local))
         # a tip that comes to a stand has no derivatives by its way
         one, two, three = (np.where(np.isfinite(order), order, 0.0) for order in (one, two, three))
         return q, one * v, two * v * v + one * a, three * v**3 + 3.0 * two * v * a + one * j
@@ -249,8 +249,8 @@ def places(path: Path, element: Ints, local: Floats) -> Floats:
         distinct, which = np.unique(element[rows], return_inverse=True)
         half = (path.span[distinct, 0] > 0.0).astype(np.int64)
         height = path.settings.axis_length
-        tip_half, _ = halves.corner_halves(path.program, corners, path.corner[distinct], half, height)
-        share[rows] = halves.parameters_at(tip_half, half, which, local[rows])
+        tip_half, _ = bezier_halves.corner_halves(path.program, corners, path.corner[distinct], half, height)
+        share[rows] = bezier_halves.parameters_at(tip_half, half, which, local[rows])
     return share
 
 
@@ -261,13 +261,13 @@ def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tup
     program, height = path.program, path.settings.axis_length
     distinct, which = np.unique(element, return_inverse=True)
     half = (path.span[distinct, 0] > 0.0).astype(np.int64)
-    tip_half, axis_half = halves.corner_halves(program, corners, path.corner[distinct], half, height)
+    tip_half, axis_half = bezier_halves.corner_halves(program, corners, path.corner[distinct], half, height)
     t = np.where(path.turning[element], share, 0.0)
     moving = np.flatnonzero(~path.turning[element])
-    t[moving] = halves.parameters_at(tip_half, half, which[moving], local[moving])
-    tip = halves.evaluate(tip_half[which], t[:, None])[:, 0]
-    axis = halves.axis_vectors(tip_half[which], axis_half[which], t[:, None])[:, 0]
-    kappa = halves.curvature(tip_half[which], t[:, None])[:, 0]
+    t[moving] = bezier_halves.parameters_at(tip_half, half, which[moving], local[moving])
+    tip = bezier_halves.evaluate(tip_half[which], t[:, None])[:, 0]
+    axis = bezier_halves.axis_vectors(tip_half[which], axis_half[which], t[:, None])[:, 0]
+    kappa = bezier_halves.curvature(tip_half[which], t[:, None])[:, 0]
     row, half = path.corner[element], half[which]
     paper = np.flatnonzero(np.isfinite(corners.sync_residual[row]))
     if len(paper):

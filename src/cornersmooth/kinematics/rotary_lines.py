@@ -12,7 +12,7 @@ from cornersmooth.kinematics.orientation import continued, unit
 from cornersmooth.kinematics.rotary_motion import RotaryMotion, lever_points, tip_points
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.layout import lines_of
+from cornersmooth.smoothing.segments import lines_of
 
 
 @dataclass(frozen=True)

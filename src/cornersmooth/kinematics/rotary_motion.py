@@ -19,7 +19,7 @@ from cornersmooth.kinematics.orientation import angle_between, continued, pole_d
 from cornersmooth.kinematics.route import rapid_moves, rotary_angles
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.layout import Layout, lay_out
+from cornersmooth.smoothing.segments import Segments, segments_of
 
 #: Places at which each transition is followed, as a rule and where the first rotary axis may turn fast.
 FEW_PLACES, MANY_PLACES = 3, 17
@@ -92,7 +92,7 @@ class RotaryMotion:
     ----------
     rows : (c,) int64
         Rows of `Corners` of the smoothed corners.
-    layout : Layout
+    segments : Segments
     pose_angles : (n, 2) float64, degrees
         At every pose; at a smoothed corner what the axis there would need. NaN where nothing is written.
     even : (n,) bool
@@ -111,7 +111,7 @@ class RotaryMotion:
     """
 
     rows: Ints
-    layout: Layout
+    segments: Segments
     pose_angles: Floats
     even: Bools
     start: Ends
@@ -143,28 +143,28 @@ def rotary_motion(
     InputError
         As `rotary_angles` and `insertions`.
     """
-    layout = lay_out(smoothed, dense=False)
+    segments = segments_of(smoothed, dense=False)
     corners = smoothed.corners
     rows = np.flatnonzero(corners.smoothed)
     strictest = max(float(allowance[rows].min(initial=tolerance)), STRICTEST_SHARE * tolerance)
-    followed, pose_angles, findings = _follow(smoothed, machine, layout, rows, strictest, file)
+    followed, pose_angles, findings = _follow(smoothed, machine, segments, rows, strictest, file)
     allowed = np.full(len(smoothed.program), tolerance)  # on the segment into each pose
     allowed[corners.pose[rows]] = allowance[rows]
     allowed[corners.after[rows]] = np.minimum(allowed[corners.after[rows]], allowance[rows])
-    even = _even_segments(smoothed, machine, layout, pose_angles, allowed)
-    start, end = _exact_ends(smoothed, layout, rows, followed, pose_angles)
-    _level(layout, pose_angles, even, start, end)
-    inserted = _divide_remainders(smoothed, machine, layout, even, start, end, tolerance, file)
+    even = _even_segments(smoothed, machine, segments, pose_angles, allowed)
+    start, end = _exact_ends(smoothed, segments, rows, followed, pose_angles)
+    _level(segments, pose_angles, even, start, end)
+    inserted = _divide_remainders(smoothed, machine, segments, even, start, end, tolerance, file)
     cone = strictest / 2
-    ruled_start = _ruled(smoothed, machine, layout, even, start, cone)
-    ruled_end = _ruled(smoothed, machine, layout, even, end, cone)
-    joined = np.flatnonzero((layout.start >= 0) & ~layout.line)
+    ruled_start = _ruled(smoothed, machine, segments, even, start, cone)
+    ruled_end = _ruled(smoothed, machine, segments, even, end, cone)
+    joined = np.flatnonzero((segments.start >= 0) & ~segments.has_line)
     for side in (end, ruled_end, start):  # transitions that meet without a line between share one joint
         for name in ("angles", "slope", "bend"):
             getattr(side, name)[joined] = getattr(ruled_start, name)[joined]
     return RotaryMotion(
         rows=rows,
-        layout=layout,
+        segments=segments,
         pose_angles=pose_angles,
         even=even,
         start=start,
@@ -179,7 +179,7 @@ def rotary_motion(
 
 
 def _follow(
-    smoothed: SmoothProgram, machine: Machine, layout: Layout, rows: Ints, tolerance: float, file: str | None
+    smoothed: SmoothProgram, machine: Machine, segments: Segments, rows: Ints, tolerance: float, file: str | None
 ) -> tuple[Followed, Floats, tuple[Finding, ...]]:
     """Rotary angles along the whole smoothed path, a few places on every transition."""
     program, corners = smoothed.program, smoothed.corners
@@ -189,7 +189,7 @@ def _follow(
     )
     near = pole_distance(machine, axis[pose]) < NEAR_POLE * step + NEAR_POLE_DEGREES
     count = np.where(near, MANY_PLACES, FEW_PLACES)
-    counts = np.where(layout.skip, 0, 1)
+    counts = np.where(segments.skip, 0, 1)
     counts[pose] = count
     owner = np.repeat(np.arange(len(program)), counts)
     last = np.cumsum(counts)
@@ -212,7 +212,7 @@ def _follow(
     branch = path.branch.astype(np.int64)
     followed = Followed(first, count, path.angles, branch)
     pose_angles = np.full((len(program), 2), np.nan)
-    written = np.flatnonzero(~layout.skip)
+    written = np.flatnonzero(~segments.skip)
     pose_angles[written] = path.angles[last[written] - 1]
     middle = first + count // 2
     pose_angles[pose], _ = continued(machine, axis[pose], path.angles[middle], branch[middle], tolerance / 2)
@@ -220,13 +220,13 @@ def _follow(
 
 
 def _even_segments(
-    smoothed: SmoothProgram, machine: Machine, layout: Layout, angles: Floats, tolerance: Floats
+    smoothed: SmoothProgram, machine: Machine, segments: Segments, angles: Floats, tolerance: Floats
 ) -> Bools:
     """Segments on which even angles from pose to pose keep their tolerances (n,)."""
     axis = smoothed.program.axis
-    even = (layout.start >= 0) & ~layout.skip
+    even = (segments.start >= 0) & ~segments.skip
     pose = np.flatnonzero(even)
-    start = layout.start[pose]
+    start = segments.start[pose]
     turn = np.abs(angles[pose] - angles[start]).sum(axis=1)
     # Path on the sphere and great circle both leave their chord by less than (turn)²/8; poses at the pole deviate.
     exact = np.maximum(
@@ -246,25 +246,25 @@ def _even_segments(
 
 
 def _exact_ends(
-    smoothed: SmoothProgram, layout: Layout, rows: Ints, followed: Followed, pose_angles: Floats
+    smoothed: SmoothProgram, segments: Segments, rows: Ints, followed: Followed, pose_angles: Floats
 ) -> tuple[Ends, Ends]:
     """Ends of the remainders with the angles of the ruled motion; without slopes."""
     corners = smoothed.corners
     nothing = np.full(pose_angles.shape, np.nan)
-    linear = np.flatnonzero((layout.start >= 0) & ~layout.skip)
-    start = Ends(layout.entry, nothing.copy(), nothing.copy(), np.zeros_like(nothing))
-    end = Ends(layout.exit, nothing.copy(), nothing.copy(), np.zeros_like(nothing))
-    start.angles[linear] = pose_angles[layout.start[linear]]
+    linear = np.flatnonzero((segments.start >= 0) & ~segments.skip)
+    start = Ends(segments.entry, nothing.copy(), nothing.copy(), np.zeros_like(nothing))
+    end = Ends(segments.exit, nothing.copy(), nothing.copy(), np.zeros_like(nothing))
+    start.angles[linear] = pose_angles[segments.start[linear]]
     end.angles[linear] = pose_angles[linear]
     end.angles[corners.pose[rows]] = followed.angles[followed.first]
     start.angles[corners.after[rows]] = followed.angles[followed.first + followed.count - 1]
     return start, end
 
 
-def _level(layout: Layout, pose_angles: Floats, even: Bools, start: Ends, end: Ends) -> None:
+def _level(segments: Segments, pose_angles: Floats, even: Bools, start: Ends, end: Ends) -> None:
     """Put the joints of even segments on their line."""
     pose = np.flatnonzero(even)
-    origin = pose_angles[layout.start[pose]]
+    origin = pose_angles[segments.start[pose]]
     turn = pose_angles[pose] - origin
     for side in (start, end):
         side.angles[pose] = origin + side.place[pose, None] * turn
@@ -274,7 +274,7 @@ def _level(layout: Layout, pose_angles: Floats, even: Bools, start: Ends, end: E
 def _divide_remainders(
     smoothed: SmoothProgram,
     machine: Machine,
-    layout: Layout,
+    segments: Segments,
     even: Bools,
     start: Ends,
     end: Ends,
@@ -283,8 +283,8 @@ def _divide_remainders(
 ) -> Insertions:
     """Points for the remainders that do not run evenly, and the slopes of their first and last parts."""
     program = smoothed.program
-    pose = np.flatnonzero((layout.start >= 0) & ~layout.skip & layout.line & ~even)
-    origin = layout.start[pose]
+    pose = np.flatnonzero((segments.start >= 0) & ~segments.skip & segments.has_line & ~even)
+    origin = segments.start[pose]
     rows, both = np.repeat(pose, 2), np.zeros((2 * len(pose), 2))
     tip, lever = np.zeros((2, 2 * len(pose), 3))
     for offset, side in enumerate((start, end)):
@@ -308,11 +308,11 @@ def _divide_remainders(
     return Insertions(pose[remainder], place, found.angles, pose[found.unsolved // 2])
 
 
-def _ruled(smoothed: SmoothProgram, machine: Machine, layout: Layout, even: Bools, side: Ends, cone: float) -> Ends:
+def _ruled(smoothed: SmoothProgram, machine: Machine, segments: Segments, even: Bools, side: Ends, cone: float) -> Ends:
     """Return the same ends with the derivatives of the ruled motion, but for even segments."""
     program = smoothed.program
-    pose = np.flatnonzero((layout.start >= 0) & ~layout.skip & ~even)
-    origin, place, here = layout.start[pose], side.place[pose], side.angles[pose]
+    pose = np.flatnonzero((segments.start >= 0) & ~segments.skip & ~even)
+    origin, place, here = segments.start[pose], side.place[pose], side.angles[pose]
     beside = []
     for step in (-DIFFERENCE, DIFFERENCE):
         share = (place + step)[:, None]

@@ -14,8 +14,8 @@ from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.nc.control import Form
 from cornersmooth.nc.notes import Notes
 from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
-from cornersmooth.smoothing.layout import Layout, lay_out
 from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.smoothing.segments import Segments, segments_of
 
 #: poses whose rows are handed on at a time
 _BLOCK = 16384
@@ -67,12 +67,12 @@ class _Table:
     def __init__(self, smoothed: SmoothProgram, found: RotaryCurves) -> None:
         program, corners = smoothed.program, smoothed.corners
         self.smoothed, self.found = smoothed, found
-        self.layout: Layout = lay_out(smoothed, dense=False)
+        self.segments: Segments = segments_of(smoothed, dense=False)
         n = len(program)
         more = found.inserted
         self.order = np.lexsort((more.fraction, more.segment))
         self.inserted = np.bincount(more.segment, minlength=n)[:n]
-        self.straight = np.where(self.layout.line & ~self.layout.skip, 1, 0)
+        self.straight = np.where(self.segments.has_line & ~self.segments.skip, 1, 0)
         self.pieces = arc_lines(program, smoothed.settings) if len(program.arcs) else np.zeros(0, np.int64)
         self.straight[program.arcs.pose] = self.pieces
         curve = np.zeros(n, np.int64)
@@ -124,14 +124,14 @@ class _Block:
         own = self.table.order[self._within(more.segment[self.table.order])]
         segment, fraction = more.segment[own], more.fraction[own]
         number = np.arange(len(own)) - np.searchsorted(segment, segment)
-        start = program.tip[self.table.layout.start[segment]]
+        start = program.tip[self.table.segments.start[segment]]
         tip = start + fraction[:, None] * (program.tip[segment] - start)
         self._put(self.first[segment - self.begin] + number, tip, more.angles[own])
 
     def _straight(self) -> None:
         """Ends of straight motion that are no joints."""
         poses = slice(self.begin, self.end)
-        pose = self.begin + np.flatnonzero((self.table.straight[poses] > 0) & (self.table.layout.row[poses] < 0))
+        pose = self.begin + np.flatnonzero((self.table.straight[poses] > 0) & (self.table.segments.row[poses] < 0))
         at = self.after[pose - self.begin] - 1
         self._put(at, self.table.smoothed.program.tip[pose], self.table.found.pose_angles[pose])
 
@@ -163,7 +163,7 @@ class _Block:
         spline[at, 1] = group.weights[own]
         spline[at[:, -1], 2] = group.knots[-1]
         self._join(pose, tip[:, 0], angles[:, 0])
-        self.rows.joined[at[:, 0]] = ~self.table.layout.line[pose]
+        self.rows.joined[at[:, 0]] = ~self.table.segments.has_line[pose]
 
     def _lines(self) -> None:
         lines = self.table.found.lines
@@ -180,5 +180,5 @@ class _Block:
 
     def _join(self, pose: Ints, tip: Floats, angles: Floats) -> None:
         """Let the straight motion before a curve end exactly where the curve begins."""
-        line = self.table.layout.line[pose]
+        line = self.table.segments.has_line[pose]
         self._put(self.after[pose[line] - self.begin] - 1, tip[line], angles[line])

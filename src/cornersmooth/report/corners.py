@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.neighbours import norm
-from cornersmooth.smoothing.separation import separations
+from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.smoothing.synchronise import angle_between
 
 STATUS_NAMES = {
@@ -65,7 +65,7 @@ def corner_table(smoothed: SmoothProgram, rows: Ints, *, dense: bool = True) -> 
     turn_out = settings.axis_length * (program.axis[after] - program.axis[pose])
     turn_out[corners.after[rows] < 0] = 0.0
     axis_in, axis_out = tip_in + turn_in, tip_out + turn_out
-    tip_error, axis_error = separations(smoothed, rows, dense=dense)
+    tip_error, axis_error = path_distances(smoothed, rows, dense=dense)
     columns: dict[str, Column] = {
         "corner": pose.astype(np.int64),
         "line": program.line[pose],
@@ -145,7 +145,7 @@ def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = Tru
         if bound[begin] < least:
             break
         more = rows[begin : begin + _TOGETHER]
-        more_tip, more_axis_point = separations(smoothed, more, dense=dense)
+        more_tip, more_axis_point = path_distances(smoothed, more, dense=dense)
         seen, tip, axis_point = np.append(seen, more), np.append(tip, more_tip), np.append(axis_point, more_axis_point)
         larger = np.maximum(tip, axis_point)
     best = np.lexsort((seen, -larger))[:count]

@@ -47,7 +47,7 @@ def timelaw_csv(law: TimeLaw) -> Iterator[str]:
     for begin in range(0, len(times), _BLOCK):
         block = times[begin : begin + _BLOCK]
         states = law.at(block)
-        axes = np.zeros((len(block), 0)) if law.joints is None else law.axes_at(block)[0]
+        axes = np.zeros((len(block), 0)) if law.machine_axes is None else law.axes_at(block)[0]
         # adding 0.0 turns -0.0 into 0.0
         numbers = np.column_stack(
             (states.t, states.s, states.v, states.a, states.j, states.centripetal, states.tip, states.axis)
@@ -60,9 +60,9 @@ def timelaw_csv(law: TimeLaw) -> Iterator[str]:
 
 def axis_columns(law: TimeLaw) -> tuple[str, ...]:
     """Columns of the machine's axes."""
-    if law.joints is None:
+    if law.machine_axes is None:
         return ()
-    return tuple(f"machine_{name.lower()}_{'mm' if name in LINEAR else 'deg'}" for name in law.joints.names)
+    return tuple(f"machine_{name.lower()}_{'mm' if name in LINEAR else 'deg'}" for name in law.machine_axes.names)
 
 
 def comparison_json(contents: Mapping[str, Any]) -> str:

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
-from cornersmooth.smoothing.layout import Layout, lay_out, lines_per_half
 from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 from cornersmooth.smoothing.synchronise import angle_between, matching_parameters
 
 
@@ -86,18 +86,20 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
         `other` holds unit vectors; every `curve` is 0.
     """
     program, corners = smoothed.program, smoothed.corners
-    layout = lay_out(smoothed, dense=True)
+    segments = segments_of(smoothed, dense=True)
     halves = lines_per_half(smoothed)
-    counts = np.where(layout.skip, 0, layout.pieces)
+    counts = np.where(segments.skip, 0, segments.lines)
     rounded = corners.pose[corners.smoothed]
-    counts[rounded] = np.where(layout.line[rounded], layout.pieces[rounded], 0) + 2 * np.abs(halves[corners.smoothed])
+    counts[rounded] = np.where(segments.has_line[rounded], segments.lines[rounded], 0) + 2 * np.abs(
+        halves[corners.smoothed]
+    )
     pieces = _pieces(smoothed, circles)
     for block in _blocks(smoothed, counts, pieces, poses):
-        sharp = (layout.row[block.poses] < 0) & (block.last > block.first)
+        sharp = (segments.row[block.poses] < 0) & (block.last > block.first)
         at = block.last[sharp] - 1
         block.tip[at], block.other[at] = program.tip[block.poses[sharp]], program.axis[block.poses[sharp]]
-        _fill_divided(smoothed, layout, block)
-        _fill_transitions(smoothed, layout, block, halves)
+        _fill_divided(smoothed, segments, block)
+        _fill_transitions(smoothed, segments, block, halves)
         arc = _fill_arcs(smoothed, block, pieces, circles)
         yield Rows(block.tip, block.other, block.move, *_no_curves(len(block.tip)), arc=arc)
 
@@ -116,14 +118,14 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
         `other` holds axis points; a transition is five rows.
     """
     program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
-    layout = lay_out(smoothed, dense=divide)
-    counts = np.where(layout.line, layout.pieces, 0) + np.where(layout.row >= 0, 5, 0)
-    counts[layout.skip] = 0
+    segments = segments_of(smoothed, dense=divide)
+    counts = np.where(segments.has_line, segments.lines, 0) + np.where(segments.row >= 0, 5, 0)
+    counts[segments.skip] = 0
     pieces = _pieces(smoothed)
     for block in _blocks(smoothed, counts, pieces, poses):
-        row = layout.row[block.poses]
+        row = segments.row[block.poses]
         if divide:
-            _fill_divided(smoothed, layout, block)
+            _fill_divided(smoothed, segments, block)
             block.other[:] = block.tip + height * block.other
         sharp = (row < 0) & (block.last > block.first)
         pose, at = block.poses[sharp], block.last[sharp] - 1
@@ -135,12 +137,12 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
         weights = np.ones((len(block.tip), 2))
         pose, first = block.poses[row >= 0], block.last[row >= 0] - 5
         if len(pose):
-            tip_curve, axis_curve = nurbs.control_points(program, corners, layout.row[pose], height)
+            tip_curve, axis_curve = nurbs.control_points(program, corners, segments.row[pose], height)
             places = first[:, None] + np.arange(5)
             block.tip[places], block.other[places] = tip_curve, axis_curve
             curve[places] = np.arange(1, 6)
-            weights[places] = corners.weights[layout.row[pose]][:, None, :]
-            line = layout.line[pose]
+            weights[places] = corners.weights[segments.row[pose]][:, None, :]
+            line = segments.has_line[pose]
             joined[first] = ~line
             block.tip[first[line] - 1], block.other[first[line] - 1] = tip_curve[line, 0], axis_curve[line, 0]
         yield Rows(block.tip, block.other, block.move, curve, joined, weights)
@@ -200,12 +202,12 @@ def nodes(lines: int) -> Floats:
     return np.concatenate((u, 1.0 - u[-2::-1], [1.0]))
 
 
-def _fill_transitions(smoothed: SmoothProgram, layout: Layout, block: _Block, halves: Ints) -> None:
+def _fill_transitions(smoothed: SmoothProgram, segments: Segments, block: _Block, halves: Ints) -> None:
     """Points of the transitions of the block, first point included; corners of equal count together."""
     points_of = _paper_points if smoothed.settings.method == "zhang2016" else _proportional_points
-    here = layout.row[block.poses] >= 0
+    here = segments.row[block.poses] >= 0
     poses, last = block.poses[here], block.last[here]
-    rows = layout.row[poses]
+    rows = segments.row[poses]
     number = halves[rows]
     for lines in np.unique(number):
         chosen = np.flatnonzero(number == lines)
@@ -213,8 +215,8 @@ def _fill_transitions(smoothed: SmoothProgram, layout: Layout, block: _Block, ha
         points, levers = points_of(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
         block.tip[where], block.other[where] = points[:, 1:], _unit(levers[:, 1:])
-        block.move[where[:, len(u) // 2 :]] = layout.following[poses[chosen]][:, None]
-        first = layout.line[poses[chosen]]
+        block.move[where[:, len(u) // 2 :]] = segments.following[poses[chosen]][:, None]
+        first = segments.has_line[poses[chosen]]
         at = where[first, 0] - 1
         block.tip[at], block.other[at] = points[first, 0], _unit(levers[first, 0])
 
@@ -260,18 +262,18 @@ def _paper_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Float
     return points, tops - points
 
 
-def _fill_divided(smoothed: SmoothProgram, layout: Layout, block: _Block) -> None:
+def _fill_divided(smoothed: SmoothProgram, segments: Segments, block: _Block) -> None:
     """Inner points of the straight remainders that are written as several lines.
 
     They divide the angle of the ruled motion equally, that of the paper's method by equation (24).
     """
     program, settings = smoothed.program, smoothed.settings
-    pieces = np.where(layout.line[block.poses] & (block.last > block.first), layout.pieces[block.poses], 1)
+    pieces = np.where(segments.has_line[block.poses] & (block.last > block.first), segments.lines[block.poses], 1)
     for number in np.unique(pieces):
         if number < 2:
             continue
         pose, first = block.poses[pieces == number], block.first[pieces == number]
-        start, entry, leave = layout.start[pose], layout.entry[pose], layout.exit[pose]
+        start, entry, leave = segments.start[pose], segments.entry[pose], segments.exit[pose]
         step = program.tip[pose] - program.tip[start]
         turn = program.axis[pose] - program.axis[start]
         slope = np.tan(np.arcsin(np.minimum(norm(turn) / 2.0, 1.0)))
@@ -282,7 +284,7 @@ def _fill_divided(smoothed: SmoothProgram, layout: Layout, block: _Block) -> Non
                 + axis_at[pose][:, None] * (step + settings.axis_length * turn)
                 - at[pose][:, None] * step
             )
-            for at, axis_at in ((layout.entry, layout.axis_entry), (layout.exit, layout.axis_exit))
+            for at, axis_at in ((segments.entry, segments.axis_entry), (segments.exit, segments.axis_exit))
         ]
         for j in range(1, int(number)):
             place = first + j - 1

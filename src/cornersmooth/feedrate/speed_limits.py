@@ -1,4 +1,4 @@
-"""How fast each stretch of a path may be driven: feed, curvature and joints as one row of intervals."""
+"""How fast each stretch of a path may be driven: feed, curvature and junctions as one row of intervals."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.feedrate import arcs, halves
+from cornersmooth.feedrate import arcs, bezier_halves
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Floats, Ints
 
 
 @dataclass(frozen=True)
-class Caps:
+class SpeedLimits:
     """Speed limits over the path coordinate x, which runs on over all elements.
 
     Parameters
     ----------
     edge : (k + 1,) float64, mm or rad
-        Interval i lies between ``edge[i]`` and ``edge[i + 1]``; a joint has an interval without width.
+        Interval i lies between ``edge[i]`` and ``edge[i + 1]``; a junction has an interval without width.
     cap : (k,) float64
         Bound of v² in interval i.
     run : (r + 1,) int64
@@ -34,7 +34,7 @@ class Caps:
     element: Ints
 
 
-def speed_caps(path: Path, limits: Limits) -> Caps:
+def find_speed_limits(path: Path, limits: Limits) -> SpeedLimits:
     """Intervals of constant speed limit of a whole path.
 
     The limit of κ·v² is applied over short pieces of each curve with the largest curvature in the piece.
@@ -46,10 +46,14 @@ def speed_caps(path: Path, limits: Limits) -> Caps:
         bound = limits.centripetal_accel / arcs.curvature(path.program, path.move[arc])
         cap[arc] = np.minimum(cap[arc], bound)
     curve = np.flatnonzero((path.kind == Kind.CURVE) & ~path.turning)
-    which, share, piece_cap = np.zeros(0, np.int64), np.zeros((0, halves.PIECES)), np.zeros((0, halves.PIECES))
+    which, share, piece_cap = (
+        np.zeros(0, np.int64),
+        np.zeros((0, bezier_halves.PIECES)),
+        np.zeros((0, bezier_halves.PIECES)),
+    )
     if len(curve) and path.corners is not None:
         half = (path.span[curve, 0] > 0.0).astype(np.int64)
-        which, share, piece_cap = halves.speed_caps(
+        which, share, piece_cap = bezier_halves.curvature_limits(
             path.program,
             path.corners,
             path.corner[curve],
@@ -60,26 +64,26 @@ def speed_caps(path: Path, limits: Limits) -> Caps:
         )
         which = curve[which]
 
-    # one slot for the joint before each element, then its pieces
+    # one slot for the junction before each element, then its pieces
     count = np.ones(m, np.int64)
-    count[which] = halves.PIECES
-    joined = np.isfinite(path.joint[:-1]) & (path.joint[:-1] > 0.0)
+    count[which] = bezier_halves.PIECES
+    joined = np.isfinite(path.junction_speed[:-1]) & (path.junction_speed[:-1] > 0.0)
     begin = np.concatenate(([0], np.cumsum(count + joined)))
     total = int(begin[-1])
-    width, caps = np.zeros(total), np.zeros(total)
+    width, bounds = np.zeros(total), np.zeros(total)
     first = begin[:-1] + joined
     single = count == 1
     width[first[single]] = path.length[single]
-    caps[first[single]] = cap[single]
-    inside = first[which][:, None] + np.arange(halves.PIECES)
+    bounds[first[single]] = cap[single]
+    inside = first[which][:, None] + np.arange(bezier_halves.PIECES)
     width[inside] = share * (path.length[which] / share.sum(axis=1))[:, None]
-    caps[inside] = piece_cap
-    caps[begin[:-1][joined]] = path.joint[:-1][joined] ** 2
+    bounds[inside] = piece_cap
+    bounds[begin[:-1][joined]] = path.junction_speed[:-1][joined] ** 2
 
-    stops = np.flatnonzero(path.joint == 0.0)
-    return Caps(
+    stops = np.flatnonzero(path.junction_speed == 0.0)
+    return SpeedLimits(
         edge=np.concatenate(([0.0], np.cumsum(width))),
-        cap=caps,
+        cap=bounds,
         run=begin[stops] if m else np.zeros(1, np.int64),
         element=stops,
     )

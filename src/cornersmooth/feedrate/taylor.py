@@ -1,7 +1,7 @@
 """Taylor polynomials of functions of one parameter, cut after the third order, as arrays of their coefficients.
 
-A jet has its orders along the first axis: ``a[k]`` is the k-th derivative over k!. Products, quotients and roots follow
-from comparing coefficients (Griewank and Walther, Evaluating Derivatives, ch. 13), so derivatives are exact.
+A series has its orders along the first axis: ``a[k]`` is the k-th derivative over k!. Products, quotients and roots
+follow from comparing coefficients (Griewank and Walther, Evaluating Derivatives, ch. 13), so derivatives are exact.
 """
 
 from __future__ import annotations
@@ -10,18 +10,18 @@ import numpy as np
 
 from cornersmooth.model import Floats
 
-#: coefficients of a jet: value and three derivatives
+#: coefficients of a series: value and three derivatives
 ORDERS = 4
 
 
 def multiply(a: Floats, b: Floats) -> Floats:
-    """Product of two jets; shapes broadcast behind the first axis, and the shorter jet counts."""
+    """Product of two series; shapes broadcast behind the first axis, and the shorter series counts."""
     orders = min(len(a), len(b))
     return np.stack([sum(a[i] * b[k - i] for i in range(k + 1)) for k in range(orders)])
 
 
 def divide(a: Floats, b: Floats) -> Floats:
-    """Quotient of two jets."""
+    """Quotient of two series."""
     found: list[Floats] = []
     for k in range(min(len(a), len(b))):
         rest = a[k] - sum(found[i] * b[k - i] for i in range(k))
@@ -30,7 +30,7 @@ def divide(a: Floats, b: Floats) -> Floats:
 
 
 def root(a: Floats) -> Floats:
-    """Square root of a jet with a positive value."""
+    """Square root of a series with a positive value."""
     found: list[Floats] = [np.sqrt(a[0])]
     for k in range(1, len(a)):
         rest = a[k] - sum(found[i] * found[k - i] for i in range(1, k))
@@ -44,13 +44,13 @@ def derivative(a: Floats) -> Floats:
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """Scalar product of two jets of vectors along the last axis."""
+    """Scalar product of two Taylor series of vectors along the last axis."""
     product: Floats = multiply(a, b).sum(axis=-1)
     return product
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """Vector product of two jets of vectors along the last axis."""
+    """Vector product of two Taylor series of vectors along the last axis."""
     orders = min(len(a), len(b))
     return np.stack([sum(np.cross(a[i], b[k - i]) for i in range(k + 1)) for k in range(orders)])
 
@@ -61,7 +61,7 @@ def normalised(a: Floats) -> Floats:
 
 
 def by_way(a: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
-    """First three derivatives by the way s of a jet in u.
+    """First three derivatives by the way s of a series in u.
 
     Parameters
     ----------

@@ -223,7 +223,7 @@ def axis_vectors(tip: Floats, axis_point: Floats, t: Floats) -> Floats:
     return unit
 
 
-def speed_caps(
+def curvature_limits(
     program: Program, corners: Corners, rows: Ints, half: Ints, speed: Floats, limits: Limits, axis_length: float
 ) -> tuple[Ints, Floats, Floats]:
     """Where curvature asks for less than the feed.
@@ -243,7 +243,7 @@ def speed_caps(
     cap : (b, PIECES) float64, (mm/s)²
         v² at most, per part.
     """
-    which, shares, caps = [], [], []
+    which, shares, bounds = [], [], []
     for block in _blocks(np.arange(len(rows))):
         tip, _ = corner_halves(program, corners, rows[block], half[block], axis_length)
         borders = pieces(half[block])
@@ -262,10 +262,10 @@ def speed_caps(
         kappa = np.clip(kappa, limits.centripetal_accel / fastest, 1.0 / SMALLEST_RADIUS)
         which.append(block[slowed])
         shares.append(share)
-        caps.append(np.minimum(limits.centripetal_accel / kappa, fastest))
+        bounds.append(np.minimum(limits.centripetal_accel / kappa, fastest))
     if not which:
         return np.zeros(0, np.int64), np.zeros((0, PIECES)), np.zeros((0, PIECES))
-    return np.concatenate(which), np.concatenate(shares), np.concatenate(caps)
+    return np.concatenate(which), np.concatenate(shares), np.concatenate(bounds)
 
 
 def _blocks(rows: Ints) -> list[Ints]:

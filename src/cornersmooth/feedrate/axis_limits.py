@@ -1,8 +1,9 @@
 """Limits of what moves along with the tip: its whole jerk, the turning of the tool axis, the axes of a machine.
 
-A vector q(s) on the path moves with q₁·√z, q₂·z + q₁·z′/2 and √z·(q₃·z + 3/2·q₂·z′ + q₁·z″/2) (see `barrier`). The
-lengths of q₁, q₂, q₃ bound these from above whatever their directions, and over a short piece of the path their largest
-values do; with several vectors the largest demand counts term by term. That is on the safe side, and keeps every limit.
+A vector q(s) on the path moves with q₁·√z, q₂·z + q₁·z′/2 and √z·(q₃·z + 3/2·q₂·z′ + q₁·z″/2) (see `interior_point`).
+The lengths of q₁, q₂, q₃ bound these from above whatever their directions, and over a short interval of the path their
+largest values do. With several vectors the largest coefficient counts, term by term. The bounds may be higher than
+needed, never lower: every limit is kept.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.feedrate import halves
-from cornersmooth.feedrate.caps import Caps
-from cornersmooth.feedrate.joints import Joints
+from cornersmooth.feedrate import bezier_halves
 from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.motion import derivatives
 from cornersmooth.feedrate.path import Kind, Path
+from cornersmooth.feedrate.speed_limits import SpeedLimits
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.neighbours import norm
 
@@ -27,7 +28,7 @@ PIECES = 4
 #: pieces on either side of the nearest point to the pole of a machine, and the first of them over the way on which the
 #: pole is felt
 POLE_PIECES, FIRST_PIECE = 40, 0.05
-#: the cone in which demands do without exact derivatives, over that of the machine: its edge lies outside for certain
+#: the cone at the pole in which derivatives are cut off here, over the cone of the machine: smaller, to be safe
 WITHIN = 0.5
 #: places inside every piece at which derivatives are looked at
 _INNER = np.array([0.25, 0.5, 0.75])
@@ -42,8 +43,8 @@ class AxisLimits:
     Parameters
     ----------
     position : callable
-        Position as a function of tip and tool axis: takes their jets, two (4, m, 3) arrays of Taylor coefficients as in
-        `jets`, and returns the jet of the position, (4, m, d). With the operations of `jets` derivatives come by
+        Position as a function of tip and tool axis: takes their Taylor series, two (4, m, 3) arrays as in
+        `taylor`, and returns that of the position, (4, m, d). With the operations of `taylor` derivatives come by
         themselves; for X, Y and Z of a three-axis machine it is ``lambda tip, axis: tip[..., [0]]`` and so on.
     speed, accel, jerk : float
         Limits of its length, per s, s² and s³; inf for none.
@@ -64,17 +65,17 @@ def _tool_axis(tip: Floats, axis: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Demands:
-    """Coefficients over intervals of the path coordinate, in the names of `barrier.Batch`.
+class LimitCoefficients:
+    """Coefficients over intervals of the path coordinate, in the names of `interior_point.Batch`.
 
     Parameters
     ----------
-    caps : Caps
+    speed_limits : SpeedLimits
         The intervals and their bounds of v², which keep the speed limits and, at steady speed, all others.
     accel_slope, accel_level, jerk_bend, jerk_slope, jerk_level : (k,) float64
     """
 
-    caps: Caps
+    speed_limits: SpeedLimits
     accel_slope: Floats
     accel_level: Floats
     jerk_bend: Floats
@@ -91,10 +92,14 @@ class Demands:
 Orders = Callable[[Ints, Floats], tuple[Floats, Floats, Floats]]
 
 
-def find_demands(
-    path: Path, limits: Limits, caps: Caps, axes: Sequence[AxisLimits] = (), joints: Joints | None = None
-) -> Demands | None:
-    """Demands of the limits that go beyond those of the path speed; None where there are none.
+def find_limit_coefficients(
+    path: Path,
+    limits: Limits,
+    speed_limits: SpeedLimits,
+    axes: Sequence[AxisLimits] = (),
+    machine_axes: MachineAxes | None = None,
+) -> LimitCoefficients | None:
+    """Coefficients of the limits that go beyond those of the path speed; None where there are none.
 
     Transitions between a motion of the tip and a turn on the spot are left out but for the jerk of the tip: by the way
     of the tip the derivatives of everything else have no bound there.
@@ -111,16 +116,16 @@ def find_demands(
         (_orders(path, item), np.array([[item.speed], [item.accel], [item.jerk]]), where) for item, where in vectors
     ]
     close = np.zeros(len(path), np.bool_)
-    if joints is not None:
-        joints = replace(joints, cone=WITHIN * joints.cone)
-        given.append((_signed(joints), joints.limits, steady))
-        close = joints.near_pole() & steady
+    if machine_axes is not None:
+        machine_axes = replace(machine_axes, cone=WITHIN * machine_axes.cone)
+        given.append((_signed(machine_axes), machine_axes.limits, steady))
+        close = machine_axes.near_pole() & steady
     given = [(orders, bounds, where) for orders, bounds, where in given if np.isfinite(bounds).any()]
     if not given:
         return None
     curved = (path.kind == Kind.CURVE) & ~path.turning
     asked = np.logical_or.reduce([where for _, _, where in given])
-    count = np.where(asked, np.where(close, 2 * POLE_PIECES, np.where(curved, halves.PIECES, PIECES)), 1)
+    count = np.where(asked, np.where(close, 2 * POLE_PIECES, np.where(curved, bezier_halves.PIECES, PIECES)), 1)
     begin = np.concatenate(([0], np.cumsum(count)))
     total = int(begin[-1])
     width, cap = np.repeat(path.length, count), np.full(total, np.inf)
@@ -130,7 +135,7 @@ def find_demands(
             chosen = np.flatnonzero(asked & (curved == curve) & (close == near))
             for at in range(0, len(chosen), _BLOCK // 8 if near else _BLOCK):
                 element = chosen[at : at + (_BLOCK // 8 if near else _BLOCK)]
-                graded = _around(*joints.closest(element)) if joints is not None and near else None
+                graded = _around(*machine_axes.closest(element)) if machine_axes is not None and near else None
                 borders, share = _borders(path, element, curve, graded)
                 into = begin[element][:, None] + np.arange(borders.shape[1] - 1)
                 width[into] = share * path.length[element][:, None]
@@ -142,7 +147,9 @@ def find_demands(
                     cap[into] = np.minimum(cap[into], np.where(counts, bound, np.inf))
                     rows[:, into] = np.maximum(rows[:, into], np.where(counts, row, 0.0))
     edge = np.concatenate(([0.0], np.cumsum(width)))
-    return Demands(Caps(edge=edge, cap=cap, run=begin[caps.element], element=caps.element), *rows)
+    return LimitCoefficients(
+        SpeedLimits(edge=edge, cap=cap, run=begin[speed_limits.element], element=speed_limits.element), *rows
+    )
 
 
 def _orders(path: Path, item: AxisLimits) -> Orders:
@@ -153,9 +160,9 @@ def _orders(path: Path, item: AxisLimits) -> Orders:
     return orders
 
 
-def _signed(joints: Joints) -> Orders:
+def _signed(machine_axes: MachineAxes) -> Orders:
     def orders(element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
-        return joints.orders(element, share)[1:]
+        return machine_axes.orders(element, share)[1:]
 
     return orders
 
@@ -174,7 +181,7 @@ def _stalling(path: Path) -> Bools:
         (corners.trim_out[row], tip[corners.after[row]] - tip[corners.pose[row]]),
     )
     for trim, step in legs:
-        stalling[curves] |= trim * norm(step) <= halves.STANDSTILL
+        stalling[curves] |= trim * norm(step) <= bezier_halves.STANDSTILL
     return stalling
 
 
@@ -197,9 +204,9 @@ def _borders(path: Path, element: Ints, curve: bool, given: Floats | None) -> tu
     corners = path.corners
     if corners is None:
         raise ValueError("a direct path has no curves")
-    tip, _ = halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
-    borders = halves.pieces(half) if given is None else given
-    lengths = halves.piece_lengths(tip, borders)
+    tip, _ = bezier_halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
+    borders = bezier_halves.pieces(half) if given is None else given
+    lengths = bezier_halves.piece_lengths(tip, borders)
     return borders, lengths / lengths.sum(axis=1, keepdims=True)
 
 

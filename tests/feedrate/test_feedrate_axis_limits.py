@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cornersmooth.feedrate import AxisLimits, Limits, jets, plan
+from cornersmooth.feedrate import AxisLimits, Limits, plan, taylor
 from cornersmooth.feedrate.motion import derivatives
 from cornersmooth.feedrate.path import build_path
 from cornersmooth.feedrate.timelaw import TimeLaw, poses
@@ -34,7 +34,7 @@ def test_jets_against_a_function() -> None:
     u = 0.3
     e = np.exp(2 * u) * np.array([1.0, 2.0, 2.0, 8.0 / 6.0])
     p = np.array([1.0 + u * u, 2.0 * u, 1.0, 0.0])
-    found = jets.divide(e, p)
+    found = taylor.divide(e, p)
     h = 1e-2
 
     def value(x: float) -> float:
@@ -45,9 +45,9 @@ def test_jets_against_a_function() -> None:
     second = (2 * y[0] - 27 * y[1] + 270 * y[2] - 490 * y[3] + 270 * y[4] - 27 * y[5] + 2 * y[6]) / (180 * h * h)
     third = (y[0] - 8 * y[1] + 13 * y[2] - 13 * y[4] + 8 * y[5] - y[6]) / (8 * h**3)
     assert found == pytest.approx([y[3], first, second / 2, third / 6], rel=1e-5)
-    half = jets.root(found)
-    assert jets.multiply(half, half) == pytest.approx(found)
-    assert jets.derivative(found) == pytest.approx([found[1], 2 * found[2], 3 * found[3]])
+    half = taylor.root(found)
+    assert taylor.multiply(half, half) == pytest.approx(found)
+    assert taylor.derivative(found) == pytest.approx([found[1], 2 * found[2], 3 * found[3]])
 
 
 @pytest.mark.parametrize("weights", [(1.0, 1.0), (0.8, 1.7)])
@@ -81,14 +81,16 @@ def test_derivatives_of_a_path(chain: Callable[[int], Program], weights: tuple[f
 
 def halves_way(path: object, element: int, t: Floats, h: float) -> Floats:
     """Way between the parameters t − h and t + h of a half."""
-    from cornersmooth.feedrate import halves
+    from cornersmooth.feedrate import bezier_halves
     from cornersmooth.feedrate.path import Path
 
     assert isinstance(path, Path)
     assert path.corners is not None
     half = np.array([int(path.span[element, 0] > 0)])
-    tip, _ = halves.corner_halves(path.program, path.corners, path.corner[[element]], half, path.settings.axis_length)
-    ends = halves.evaluate(np.repeat(tip, len(t), axis=0), np.stack((t - h, t + h), axis=1))
+    tip, _ = bezier_halves.corner_halves(
+        path.program, path.corners, path.corner[[element]], half, path.settings.axis_length
+    )
+    ends = bezier_halves.evaluate(np.repeat(tip, len(t), axis=0), np.stack((t - h, t + h), axis=1))
     return np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1)
 
 

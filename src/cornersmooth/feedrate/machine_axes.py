@@ -2,8 +2,8 @@
 
 With rotary axes a₁ (nearest to the part) and a₂ the tool axis is k = R₁R₂k₀. At the rates ω₁ and ω₂ it moves with
 k′ = ω₁·a₁×k + ω₂·b×k, where b = R₁a₂. The product with b gives ω₁ = k′·b / ((a₁×k)·b), what is left gives ω₂, and
-b′ = ω₁·a₁×b: coefficient by coefficient these make the jets of the angles on either solution and for any two axes, and
-sines, cosines and turns of them make those of the linear axes.
+b′ = ω₁·a₁×b: coefficient by coefficient these make the Taylor series of the angles on either solution and for any
+two axes; sines, cosines and turns of them make those of the linear axes.
 
 At the pole (a₁×k)·b vanishes. Within the cone in which a control may turn the first axis ahead of time
 (`cornersmooth.kinematics.route`) it is taken as at the edge of the cone: rates stay finite and the plan slows down.
@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate import jets
-from cornersmooth.feedrate.motion import jets_along
+from cornersmooth.feedrate import taylor
+from cornersmooth.feedrate.motion import taylor_along
 from cornersmooth.feedrate.path import NO_TURN, Kind, Path
 from cornersmooth.kinematics import Machine, rapid_moves, rotary_angles, solutions
 from cornersmooth.kinematics.orientation import angle_between, continued
@@ -33,7 +33,7 @@ _CONES = 2.0
 
 
 @dataclass(frozen=True)
-class Joints:
+class MachineAxes:
     """The motion of a machine's axes along a path: X, Y, Z in mm, then the two rotary axes in degrees.
 
     Parameters
@@ -73,15 +73,15 @@ class Joints:
         share : (m,) float64
             Place on each element as in `motion.derivatives`; infinite derivatives where the tip comes to a stand.
         """
-        tip, axis, speed = jets_along(self.path, element, share)
+        tip, axis, speed = taylor_along(self.path, element, share)
         position = self.positions(element, share, tip, axis)
         with np.errstate(over="ignore", invalid="ignore"):
-            one, two, three = jets.by_way(position, speed)
+            one, two, three = taylor.by_way(position, speed)
         one, two, three = (np.where(np.isfinite(order), order, np.inf) for order in (one, two, three))
         return position[0], one, two, three
 
     def positions(self, element: Ints, share: Floats, tip: Floats, axis: Floats) -> Floats:
-        """Jets (4, m, 5) of the axes from those of tip and tool axis, (4, m, 3) each."""
+        """Taylor series (4, m, 5) of the axes from those of tip and tool axis, (4, m, 3) each."""
         path = self.path
         start, end = path.start[element], path.move[element]
         part = _fractions(path, element, share)[:, None]
@@ -90,35 +90,35 @@ class Joints:
         value, _ = continued(self.machine, axis[0], guess, self.branch[end], self.cone)
         rapid = path.rapid[element]
         value[rapid] = guess[rapid]
-        turning = self._angle_jets(axis, np.radians(value))
+        turning = self._angle_series(axis, np.radians(value))
         # in a rapid all axes run evenly, back by whole turns too
         turning[1:, rapid] = 0.0
         turning[1, rapid] = np.radians(whole[rapid])
-        return np.concatenate((_linear_jets(self.machine, tip, turning), np.degrees(turning)), axis=-1)
+        return np.concatenate((_linear_series(self.machine, tip, turning), np.degrees(turning)), axis=-1)
 
-    def _angle_jets(self, axis: Floats, value: Floats) -> Floats:
-        """Jets (4, m, 2) of the rotary angles, rad."""
+    def _angle_series(self, axis: Floats, value: Floats) -> Floats:
+        """Taylor series (4, m, 2) of the rotary angles, rad."""
         first, second = self.machine.axes
         about = first.unit
-        gone = jets.derivative(axis)
+        gone = taylor.derivative(axis)
         b = np.zeros_like(axis)
         b[0] = _turned(first.unit, _waves(first.sign * value[None, :, 0]), second.unit[None, None])[0]
         smallest = math.sin(math.radians(self.cone)) * float(np.linalg.norm(np.cross(about, second.unit)))
         lever = np.cross(about, axis)
-        rate = np.zeros((jets.ORDERS - 1, len(value)))
-        for k in range(jets.ORDERS - 1):
-            size = jets.dot(lever[: k + 1], b[: k + 1])
+        rate = np.zeros((taylor.ORDERS - 1, len(value)))
+        for k in range(taylor.ORDERS - 1):
+            size = taylor.dot(lever[: k + 1], b[: k + 1])
             inside = np.abs(size[0]) < smallest
             size[0] = np.where(inside, np.where(size[0] < 0.0, -smallest, smallest), size[0])
             size[1:, inside] = 0.0
-            rate[k] = jets.divide(jets.dot(gone[: k + 1], b[: k + 1]), size)[k]
-            b[k + 1] = jets.multiply(rate[: k + 1, :, None], np.cross(about, b[: k + 1]))[k] / (k + 1)
-        rest = gone - jets.multiply(rate[..., None], lever[: len(rate)])
-        across = jets.cross(b, axis)[: len(rate)]
-        other = jets.divide(jets.dot(rest, across), jets.dot(across, across))
-        found = np.zeros((jets.ORDERS, len(value), 2))
+            rate[k] = taylor.divide(taylor.dot(gone[: k + 1], b[: k + 1]), size)[k]
+            b[k + 1] = taylor.multiply(rate[: k + 1, :, None], np.cross(about, b[: k + 1]))[k] / (k + 1)
+        rest = gone - taylor.multiply(rate[..., None], lever[: len(rate)])
+        across = taylor.cross(b, axis)[: len(rate)]
+        other = taylor.divide(taylor.dot(rest, across), taylor.dot(across, across))
+        found = np.zeros((taylor.ORDERS, len(value), 2))
         found[0] = value
-        order = np.arange(1, jets.ORDERS)[:, None]
+        order = np.arange(1, taylor.ORDERS)[:, None]
         found[1:, :, 0] = first.sign * rate / order
         found[1:, :, 1] = second.sign * other / order
         return found
@@ -130,7 +130,7 @@ class Joints:
         """
         path = self.path
         found = np.full(len(path) + 1, np.inf)
-        sharp = np.flatnonzero(np.isfinite(path.joint) & (path.joint > 0.0))
+        sharp = np.flatnonzero(np.isfinite(path.junction_speed) & (path.junction_speed > 0.0))
         if len(sharp):
             sides = [
                 self.orders(sharp + shift, np.full(len(sharp), share))[1] for shift, share in ((-1, 1.0), (0, 0.0))
@@ -158,7 +158,7 @@ class Joints:
         rows = np.arange(len(element))
         for _ in range(_ROUNDS):
             share = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _SEARCHED)
-            _, axis, _ = jets_along(self.path, np.repeat(element, _SEARCHED), share.ravel())
+            _, axis, _ = taylor_along(self.path, np.repeat(element, _SEARCHED), share.ravel())
             aside = np.linalg.norm(np.cross(about, axis[0]), axis=-1).reshape(share.shape)
             speed = np.linalg.norm(axis[1], axis=-1).reshape(share.shape)
             at = aside.argmin(axis=1)
@@ -168,7 +168,7 @@ class Joints:
         return share[rows, at], felt
 
 
-def follow(machine: Machine, path: Path) -> Joints:
+def follow(machine: Machine, path: Path) -> MachineAxes:
     """Rotary solutions along a path.
 
     Raises
@@ -202,7 +202,7 @@ def follow(machine: Machine, path: Path) -> Joints:
     start, end = path.start, path.move
     one, other = own[start], own[end]
     branch[end] = np.where(one == other, one, np.where(one < 0, other, np.where(other < 0, one, -1)))
-    return Joints(machine, path, found.angles, branch, cone)
+    return MachineAxes(machine, path, found.angles, branch, cone)
 
 
 def _fractions(path: Path, element: Ints, share: Floats) -> Floats:
@@ -221,28 +221,29 @@ def _fractions(path: Path, element: Ints, share: Floats) -> Floats:
 
 
 def _waves(angle: Floats) -> tuple[Floats, Floats]:
-    """Jets of cosine and sine of a jet: c′ = −s·q′, s′ = c·q′."""
+    """Taylor series of cosine and sine of a series: c′ = −s·q′, s′ = c·q′."""
     cosine, sine = np.zeros_like(angle), np.zeros_like(angle)
     cosine[0], sine[0] = np.cos(angle[0]), np.sin(angle[0])
     for k in range(len(angle) - 1):
-        gone = jets.derivative(angle)[: k + 1]
-        cosine[k + 1] = -jets.multiply(sine[: k + 1], gone)[k] / (k + 1)
-        sine[k + 1] = jets.multiply(cosine[: k + 1], gone)[k] / (k + 1)
+        gone = taylor.derivative(angle)[: k + 1]
+        cosine[k + 1] = -taylor.multiply(sine[: k + 1], gone)[k] / (k + 1)
+        sine[k + 1] = taylor.multiply(cosine[: k + 1], gone)[k] / (k + 1)
     return cosine, sine
 
 
 def _turned(direction: Floats, waves: tuple[Floats, Floats], vectors: Floats) -> Floats:
-    """Jets of vectors turned about a unit direction (Rodrigues) by an angle given by its cosine and sine."""
+    """Taylor series of vectors turned about a unit direction (Rodrigues) by an angle given by its cosine and sine."""
     cosine, sine = waves
     along = (vectors @ direction)[..., None] * direction
     found: Floats = along + (
-        jets.multiply(cosine[..., None], vectors - along) + jets.multiply(sine[..., None], np.cross(direction, vectors))
+        taylor.multiply(cosine[..., None], vectors - along)
+        + taylor.multiply(sine[..., None], np.cross(direction, vectors))
     )
     return found
 
 
-def _linear_jets(machine: Machine, tip: Floats, angles: Floats) -> Floats:
-    """Jets (4, m, 3) of `cornersmooth.kinematics.machine_position`."""
+def _linear_series(machine: Machine, tip: Floats, angles: Floats) -> Floats:
+    """Taylor series (4, m, 3) of `cornersmooth.kinematics.machine_position`."""
     waves = [_waves(axis.sign * angles[..., index]) for index, axis in enumerate(machine.axes)]
     zero = np.array(machine.part_zero)
     position = tip.copy()

@@ -18,10 +18,10 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.layout import lines_of
 from cornersmooth.smoothing.legs import dot, legs_at
 from cornersmooth.smoothing.neighbours import norm
 from cornersmooth.smoothing.sampling import nodes
+from cornersmooth.smoothing.segments import lines_of
 
 #: corners looked at together
 _BLOCK = 4096
@@ -87,7 +87,7 @@ class _Transitions:
         return tip + lever - self.lever[:, None, :]
 
 
-def separations(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple[Floats, Floats]:
+def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple[Floats, Floats]:
     """Distances of the written tip path and axis-point path from the original ones at some corners.
 
     Parameters

@@ -15,7 +15,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.bridging import PAPER_ERROR, shape_factors
+from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
 from cornersmooth.smoothing.neighbours import norm
 
 #: bend (mm) that one line per half may bridge, over the chord tolerance
@@ -29,7 +29,7 @@ _MOST_LINES = 20_000
 
 
 @dataclass(frozen=True)
-class Layout:
+class Segments:
     """What every pose contributes, arrays over the n poses of the program."""
 
     row: Ints  # row of `Corners`, -1 where the pose is no smoothed corner
@@ -40,11 +40,11 @@ class Layout:
     exit: Floats  # and where it ends
     axis_entry: Floats
     axis_exit: Floats
-    line: Bools  # the straight remainder has a length
-    pieces: Ints  # lines it is written in
+    has_line: Bools  # the straight remainder has a length
+    lines: Ints  # lines it is written in
 
 
-def lay_out(smoothed: SmoothProgram, *, dense: bool) -> Layout:
+def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
     """Lay out the smoothed motion; straight remainders are divided into several lines only for `dense` output."""
     program, corners = smoothed.program, smoothed.corners
     n = len(program)
@@ -71,11 +71,11 @@ def lay_out(smoothed: SmoothProgram, *, dense: bool) -> Layout:
     if corners.axis_trim_in is not corners.trim_in:
         axis_entry, axis_leave = _ends(n, corners.pose, corners.axis_trim_in, corners.axis_trim_out, linear, known)
     line, pieces = np.ones(n, np.bool_), np.ones(n, np.int64)
-    layout = Layout(row, skip, start, following, entry, leave, axis_entry, axis_leave, line, pieces)
+    segments = Segments(row, skip, start, following, entry, leave, axis_entry, axis_leave, line, pieces)
     for begin in range(0, n, _BLOCK):
         poses = begin + np.flatnonzero(linear[begin : begin + _BLOCK] & ~skip[begin : begin + _BLOCK])
-        _measure_remainders(smoothed, layout, poses, dense=dense)
-    return layout
+        _measure_remainders(smoothed, segments, poses, dense=dense)
+    return segments
 
 
 def _ends(n: int, pose: Ints, trim_in: Floats, trim_out: Floats, linear: Bools, known: Ints) -> tuple[Floats, Floats]:
@@ -86,23 +86,23 @@ def _ends(n: int, pose: Ints, trim_in: Floats, trim_out: Floats, linear: Bools, 
     return np.where(linear, entry[known], 0.0), leave
 
 
-def _measure_remainders(smoothed: SmoothProgram, layout: Layout, poses: Ints, *, dense: bool) -> None:
-    """Set `line` and `pieces` of the layout for some poses that are reached by linear moves."""
+def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints, *, dense: bool) -> None:
+    """Set `has_line` and `lines` of the segments for some poses that are reached by linear moves."""
     program, settings = smoothed.program, smoothed.settings
-    start = layout.start[poses]
+    start = segments.start[poses]
     step = program.tip[poses] - program.tip[start]
     turn = program.axis[poses] - program.axis[start]
     # a remainder below the shortest line, and short beside the transition it leads to, is no line of its own
-    joins = (layout.row[poses] >= 0) & (layout.row[start] >= 0)
+    joins = (segments.row[poses] >= 0) & (segments.row[start] >= 0)
     for length, entry, leave in (
-        (norm(step), layout.entry, layout.exit),
-        (norm(step + settings.axis_length * turn), layout.axis_entry, layout.axis_exit),
+        (norm(step), segments.entry, segments.exit),
+        (norm(step + settings.axis_length * turn), segments.axis_entry, segments.axis_exit),
     ):
         rest, leg = length * (leave[poses] - entry[poses]), length * (1.0 - leave[poses])
         joins &= (rest <= 1e-9) | ((rest < settings.shortest_line) & (rest < 0.1 * leg))
-    layout.line[poses[joins]] = False
+    segments.has_line[poses[joins]] = False
     if dense:
-        _divide(settings, layout, poses[~joins], norm(turn)[~joins])
+        _divide(settings, segments, poses[~joins], norm(turn)[~joins])
 
 
 def _turn_limit(settings: Settings, half_turn: Floats) -> Floats:
@@ -122,8 +122,8 @@ def _turn_limit(settings: Settings, half_turn: Floats) -> Floats:
     return limit
 
 
-def _divide(settings: Settings, layout: Layout, poses: Ints, chord: Floats) -> None:
-    """Set `pieces`: lines per straight remainder, from the change of axis along it, given as its chord."""
+def _divide(settings: Settings, segments: Segments, poses: Ints, chord: Floats) -> None:
+    """Set `lines`: lines per straight remainder, from the change of axis along it, given as its chord."""
     share = settings.interpolation_tolerance / settings.axis_length
     turning = chord**3 / 54.0 + chord**2 / 4.0 * np.tan(np.minimum(chord, 2.0) / 2.0) > share
     if settings.axis_step is not None:
@@ -134,14 +134,14 @@ def _divide(settings: Settings, layout: Layout, poses: Ints, chord: Floats) -> N
     if not len(pose):
         return
     # angle of the ruled axis from the middle of its segment: tan φ is linear in the fraction
-    low = np.arctan((2.0 * layout.axis_entry[pose] - 1.0) * np.tan(half))
-    high = np.arctan((2.0 * layout.axis_exit[pose] - 1.0) * np.tan(half))
+    low = np.arctan((2.0 * segments.axis_entry[pose] - 1.0) * np.tan(half))
+    high = np.arctan((2.0 * segments.axis_exit[pose] - 1.0) * np.tan(half))
     turn = high - low
     as_one = turn**2 / 4.0 * np.abs(np.tan((low + high) / 2.0)) + turn**3 / 54.0
     pieces = np.ceil(turn / _turn_limit(settings, np.maximum(np.abs(low), np.abs(high))) - 1e-9)
     if settings.axis_step is None:
         pieces[as_one <= share] = 1
-    layout.pieces[pose] = np.clip(pieces, 1, _MOST_LINES).astype(np.int64)
+    segments.lines[pose] = np.clip(pieces, 1, _MOST_LINES).astype(np.int64)
 
 
 def lines_per_half(smoothed: SmoothProgram) -> Ints:
