@@ -8,7 +8,7 @@ and what the NC text will speak.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from typing import Any, Literal
@@ -266,10 +266,6 @@ class Program:
         first = np.flatnonzero(linear & ~np.concatenate(([False], inner[:-1]))) - 1
         last = np.flatnonzero(linear & ~inner)
         return np.stack((first, last), axis=1).astype(np.int64)
-
-    def with_findings(self, *more: Finding) -> Program:
-        """Return the same program with more findings."""
-        return replace(self, findings=(*self.findings, *more))
 
 
 class Status(IntEnum):

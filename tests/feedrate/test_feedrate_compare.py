@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from linear_programmes import reference_time
 
 from cornersmooth.cl import read
 from cornersmooth.feedrate import Limits, compare, direct, plan
 from cornersmooth.feedrate.compare import peaks, slowest
-from cornersmooth.feedrate.reference import reference_time
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth

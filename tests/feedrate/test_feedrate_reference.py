@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from linear_programmes import reference_time
 
 from cornersmooth.feedrate import Limits, direct, plan
-from cornersmooth.feedrate.reference import reference_time
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth

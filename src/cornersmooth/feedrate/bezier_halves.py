@@ -270,10 +270,3 @@ def curvature_limits(
 
 def _blocks(rows: Ints) -> list[Ints]:
     return [rows[at : at + BLOCK] for at in range(0, len(rows), BLOCK)]
-
-
-def _horner(powers: Floats, t: Floats) -> Floats:
-    value = np.broadcast_to(powers[:, None, -1], (*t.shape, powers.shape[-1]))
-    for k in range(powers.shape[1] - 2, -1, -1):
-        value = value * t[..., None] + powers[:, None, k]
-    return value

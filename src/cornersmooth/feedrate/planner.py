@@ -201,11 +201,11 @@ def _uneven_runs(
     more = None if coefficients is None else coefficients.speed_limits
     grid: Grid = make_grid(speed_limits, runs, accel[runs], jerk[runs], resolution, more)
     of_cell = lookahead.run_of_cells(grid)
-    coefficients = None
+    of_cells = None
     if coefficients is not None:
         rows = np.concatenate((coefficients.rows, np.zeros((5, 1))), axis=1)
-        coefficients = np.maximum.reduceat(rows, cell_intervals(coefficients.speed_limits, grid, runs), axis=1)[:, ::2]
-    batch = lookahead.batch_of(grid, accel[runs][of_cell], jerk[runs][of_cell], coefficients)
+        of_cells = np.maximum.reduceat(rows, cell_intervals(coefficients.speed_limits, grid, runs), axis=1)[:, ::2]
+    batch = lookahead.batch_of(grid, accel[runs][of_cell], jerk[runs][of_cell], of_cells)
     c = lookahead.solve_runs(batch, grid, progress)
     z, slope, bend = batch.forms(c)
     v, a = np.sqrt(z), 0.5 * slope  # at the end of each cell

@@ -39,7 +39,7 @@ def root(a: Floats) -> Floats:
 
 
 def derivative(a: Floats) -> Floats:
-    """Jet of the derivative, one order shorter."""
+    """Series of the derivative, one order shorter."""
     return np.stack([(k + 1) * a[k + 1] for k in range(len(a) - 1)])
 
 
@@ -56,7 +56,7 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 
 def normalised(a: Floats) -> Floats:
-    """Jet of vectors over their lengths."""
+    """Series of vectors over their lengths."""
     return divide(a, root(dot(a, a))[..., None])
 
 
@@ -67,7 +67,7 @@ def by_way(a: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
     ----------
     a : (4, m, d) float64
     speed : (3, m) float64
-        Jet of ds/du.
+        Series of ds/du.
     """
     first = divide(derivative(a), speed[..., None])
     second = divide(derivative(first), speed[:, :, None])
