@@ -1,4 +1,7 @@
-"""Tables in TOML, those that come with the program and the user's own: found by name, read, their keys checked."""
+"""Tables in TOML, those that come with the program and the user's own: found by name, read, their keys checked.
+
+A table may say ``like = NAME`` and then only what is different from that one, ``false`` for what it has not.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +26,13 @@ class TableText(NamedTuple):
     name: str
 
 
+class Parsed(NamedTuple):
+    """A table, and the name of the one that comes with the program and that it is like; empty for none."""
+
+    table: Table
+    like: str
+
+
 @dataclass(frozen=True)
 class Shelf:
     """Where the tables of one kind lie.
@@ -33,15 +43,21 @@ class Shelf:
         What they describe, for messages.
     package, folder : str
         Where those lie that come with the program.
-    unknown, unreadable : str
-        Codes of the errors that say that a name is unknown, and that a file or its text cannot be read.
+    keys : tuple of str
+        Those that a table may have, ``like`` aside.
+    unknown, unreadable, unknown_key, wrong_value : str
+        Codes of the errors that say that a name is unknown, that a file or its text cannot be read, that a key is
+        unknown, and that a value is of a wrong kind.
     """
 
     kind: str
     package: str
     folder: str
+    keys: tuple[str, ...]
     unknown: str
     unreadable: str
+    unknown_key: str
+    wrong_value: str
 
     def names(self) -> tuple[str, ...]:
         """Names of the tables that come with the program, sorted."""
@@ -90,27 +106,68 @@ class Shelf:
             raise SettingsError(self.unknown, f"unknown {self.kind} {name!r}", hint)
         return (resources.files(self.package) / self.folder / f"{name}.toml").read_text(encoding="utf-8")
 
-    def parse(self, text: str) -> Table:
-        """Table that a text holds.
+    def parse(self, text: str) -> Parsed:
+        """Table that a text holds, on top of the one that it is like.
 
         Raises
         ------
         SettingsError
-            The text is not TOML.
+            The text is not TOML, has an unknown key, or is like a table that is not known.
         """
         try:
-            return tomllib.loads(text)
+            table = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise SettingsError(self.unreadable, f"not TOML: {error}", "correct the text") from error
+        self.check_keys(table, (*self.keys, "like"), "")
+        like = table.pop("like", "")
+        if not isinstance(like, str):
+            raise self.wrong(f"like is {like!r}", f"name one of the built-in {self.kind}s")
+        if not like:
+            return Parsed(table, "")
+        base = self.parse(self.built_in(like)).table
+        base.pop("name", None)
+        return Parsed(_merged(base, table), like)
+
+    def check_keys(self, table: Iterable[str], known: Sequence[str], where: str) -> None:
+        """Refuse a key that is not known; `where` is what stands before it in the message.
+
+        Raises
+        ------
+        SettingsError
+            With the closest known key.
+        """
+        for key in table:
+            if key not in known:
+                close = closest(key, known)
+                advice = f"did you mean {close}?" if close else f"known keys are {', '.join(known)}"
+                raise SettingsError(self.unknown_key, f"unknown key {where}{key}", advice)
+
+    def wrong(self, what: str, hint: str) -> SettingsError:
+        """Error that says that a value is of a wrong kind."""
+        return SettingsError(self.wrong_value, what, hint)
 
 
-def unknown_key(table: Iterable[str], known: Sequence[str]) -> tuple[str, str] | None:
-    """First key of a table that is not known and what to do about it; None where all are known."""
-    for key in table:
-        if key not in known:
-            close = closest(key, known)
-            return key, f"did you mean {close}?" if close else f"known keys are {', '.join(known)}"
-    return None
+def _merged(base: Table, changes: Table) -> Table:
+    """Return a table with changes: tables and lists of named tables are merged, ``false`` takes a table out."""
+    result = dict(base)
+    for key, value in changes.items():
+        old = result.get(key)
+        if value is False and isinstance(old, dict):
+            del result[key]
+        elif isinstance(old, dict) and isinstance(value, dict):
+            result[key] = _merged(old, value)
+        elif (rows := _by_name(old)) and (changed := _by_name(value)) and changed.keys() <= rows.keys():
+            result[key] = [_merged(row, changed.get(name, {})) for name, row in rows.items()]
+        else:
+            result[key] = value
+    return result
+
+
+def _by_name(rows: Any) -> dict[str, Table]:
+    """Tables of a list by their names; nothing where it is no list of named tables."""
+    if not isinstance(rows, list) or not all(isinstance(row, dict) and "name" in row for row in rows):
+        return {}
+    return {str(row["name"]): row for row in rows}
 
 
 def closest(word: str, known: Sequence[str]) -> str:

@@ -73,9 +73,9 @@ def test_file_without_name_takes_that_of_the_file(tmp_path: Path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("tool_length", "tool_lenght", "m.toml: error: unknown key 'tool_lenght'; did you mean tool_length?"),
-        ("direction = [0, 0, 2]", "dirction = [0, 0, 2]", "axis 1: unknown key 'dirction'; did you mean direction?"),
-        ("part_zero", "zzz", "unknown key 'zzz'; known keys are name, description, preferred"),
+        ("tool_length", "tool_lenght", "m.toml: error: unknown key tool_lenght; did you mean tool_length?"),
+        ("direction = [0, 0, 2]", "dirction = [0, 0, 2]", "unknown key axis 1.dirction; did you mean direction?"),
+        ("part_zero", "zzz", "unknown key zzz; known keys are name, description, preferred"),
         ("[0, 0, 2]", "[0, 0, 0]", "rotary axis C: direction is zero; give a vector along the axis"),
         ("[0, 0, 2]", "[0, 0]", "axis 1: direction is [0, 0]; give three numbers in brackets"),
         ("[0, 0, 2]", "[0, 0, nan]", "rotary axis C: direction is not a point of space"),
@@ -163,11 +163,11 @@ def test_dynamics_are_read_and_told():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[dynamics.B]", "[dynamics.A]", "dynamics: unknown key 'A'; known keys are X, Y, Z, C, B"),
+        ("[dynamics.B]", "[dynamics.A]", "unknown key dynamics.A; known keys are X, Y, Z, C, B"),
         ("jerk = 900", "jerk = 0", "dynamics of B: jerk is 0; give a positive number"),
         ("jerk = 900", "jerk = nan", "dynamics of B: jerk is nan; give a positive number"),
         ("jerk = 900", 'jerk = "soft"', "dynamics of B: jerk is 'soft'; give a number"),
-        ("velocity", "velocty", "dynamics of X: unknown key 'velocty'; did you mean velocity?"),
+        ("velocity", "velocty", "unknown key dynamics.X.velocty; did you mean velocity?"),
         ("[dynamics.B]\njerk", "[dynamics]\njerk", "dynamics is not a table per axis; write [dynamics.X]"),
     ],
 )

@@ -16,7 +16,7 @@ from cornersmooth.kinematics import (
     tip_position,
     tool_axis,
 )
-from cornersmooth.kinematics.orientation import closest_second, passes_pole, wrap
+from cornersmooth.kinematics.poses import closest_second, passes_pole, wrap
 from kinematics.random_machines import random_machine
 
 RNG = np.random.default_rng(20160713)

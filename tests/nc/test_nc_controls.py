@@ -9,7 +9,7 @@ import pytest
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Frame, choose_form, control_names, fit_settings, load_control
-from cornersmooth.nc.tables import parse_control
+from cornersmooth.nc.control_tables import parse_control
 from cornersmooth.settings import Settings
 from nc.writing import lines_of
 

@@ -12,7 +12,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.nc import Frame, choose_form, control_names, control_table, write
-from cornersmooth.nc.tables import parse_control
+from cornersmooth.nc.control_tables import parse_control
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from nc.cases import RUNNABLE, Case

@@ -14,7 +14,7 @@ import pytest
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc import control_names, control_table
-from cornersmooth.nc.tables import parse_control
+from cornersmooth.nc.control_tables import parse_control
 
 WRONG: tuple[Any, ...] = (3, -1, 1.5, True, "x", "{", "{nix}", "\n", [], [3], ["{nix}"], {}, {"x": 1})
 

@@ -11,20 +11,27 @@ import click
     epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]")
-def command(name: str | None) -> int:
+@click.option("--table", is_flag=True, help="Print the table of a machine: what a TOML file of your own starts from.")
+def command(name: str | None, table: bool) -> int:
     """List the machines that come with the program, or check and describe one.
 
     A machine is two rotary axes, each in a table or a head, by direction, point and limits; a TOML file describes your
-    own.
+    own, or is like one of them and says only what is different.
 
     \b
     Examples:
       cornersmooth machines
       cornersmooth machines xyzac-trt
+      cornersmooth machines table-ac --table > mine.toml
       cornersmooth machines mine.toml
     """
-    from cornersmooth.kinematics import load_machine, machine_names
+    from cornersmooth.kinematics import load_machine, machine_names, machine_table
 
+    if table:
+        if name is None:
+            raise click.UsageError("--table needs the name of a machine")
+        click.echo(machine_table(name), nl=False)
+        return 0
     if name:
         click.echo(load_machine(name).describe())
         return 0

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from cornersmooth.errors import SettingsError
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics import Machine
@@ -58,14 +55,8 @@ def _is_file(control: str) -> bool:
 
 def _base(path: str) -> str:
     """Name of the built-in control that a table is like; empty for none."""
-    import tomllib
-
     from cornersmooth.nc import load_control
     from cornersmooth.verify import CONTROLS
 
-    load_control(path)  # says what is wrong with it
-    try:
-        like = tomllib.loads(Path(path).read_text(encoding="utf-8")).get("like", "")
-    except (OSError, ValueError) as error:
-        raise SettingsError("CS212", "control file cannot be read", "check the name", file=path) from error
+    like = load_control(path).like
     return like if like in CONTROLS else ""

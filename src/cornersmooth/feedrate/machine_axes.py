@@ -6,7 +6,7 @@ b′ = ω₁·a₁×b: coefficient by coefficient these make the Taylor series o
 two axes; sines, cosines and turns of them make those of the linear axes.
 
 At the pole (a₁×k)·b vanishes. Within the cone in which a control may turn the first axis ahead of time
-(`cornersmooth.kinematics.route`) it is taken as at the edge of the cone: rates stay finite and the plan slows down.
+(`cornersmooth.rotary.angle_path`) it is taken as at the edge of the cone: rates stay finite and the plan slows down.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import taylor
 from cornersmooth.feedrate.motion import taylor_along
 from cornersmooth.feedrate.path import NO_TURN, Kind, Path
-from cornersmooth.kinematics import Machine, rapid_moves, rotary_angles, solutions
-from cornersmooth.kinematics.orientation import angle_between, continued
+from cornersmooth.kinematics import Machine, solutions
+from cornersmooth.kinematics.poses import angle_between, continued
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.rotary import rapid_moves, rotary_angles
 
 #: an element whose axis comes nearer to the pole than so many times its own turn is looked at closely there
 NEAR_POLE = 5.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.orientation import radians, rotate
+from cornersmooth.kinematics.poses import radians, rotate
 from cornersmooth.model import Floats
 
 

@@ -10,19 +10,19 @@ from typing import Protocol
 
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.model import Ints, Program, SmoothProgram, Units
-from cornersmooth.nc.advice import advise
-from cornersmooth.nc.blocks import BlockWriter
-from cornersmooth.nc.choice import check_program, choose_form
+from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.circles import Circles, plan_circles
-from cornersmooth.nc.control import Form
-from cornersmooth.nc.framing import BLEND_SHARE, Frame, blend_word
-from cornersmooth.nc.motion import MotionWriter
-from cornersmooth.nc.notes import Notes
-from cornersmooth.nc.rotary import rotary_rows
-from cornersmooth.nc.rotary_curves import rotary_curve_rows
-from cornersmooth.nc.statements import StatementWriter
-from cornersmooth.nc.tables import control_names, control_table, load_control
-from cornersmooth.nc.vocabulary import Control
+from cornersmooth.nc.control import Control
+from cornersmooth.nc.control_tables import control_names, control_table, load_control
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.form_choice import check_program, choose_form
+from cornersmooth.nc.motion_writer import MotionWriter
+from cornersmooth.nc.program_frame import BLEND_SHARE, Frame, blend_word
+from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
+from cornersmooth.nc.rotary_rows import rotary_rows
+from cornersmooth.nc.statement_writer import StatementWriter
+from cornersmooth.nc.warnings import add_warnings
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
 from cornersmooth.text import format_number
@@ -132,27 +132,29 @@ def write(
         A number that the form cannot hold.
     """
     chosen = form if isinstance(form, Form) else choose_form(control, form)
-    program, notes = smoothed.program, Notes()
+    program, findings = smoothed.program, Findings()
     check_program(chosen, program, smoothed.settings)
     frame = frame or Frame()
-    statements = StatementWriter(chosen, program, notes, _values(program, smoothed.settings), comments=frame.comments)
+    statements = StatementWriter(
+        chosen, program, findings, _values(program, smoothed.settings), comments=frame.comments
+    )
     circles = plan_circles(program, smoothed.settings, chosen)
-    advise(chosen, smoothed, circles, notes)
-    writer = BlockWriter(chosen, program, statements, notes, circles)
-    motion = MotionWriter(program, writer, statements, notes)
-    with _Behind(stream) as behind:
-        framing = frame.start(behind, chosen, program, smoothed.settings.tolerance)
-        framing.head()
-        blocks = ((rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, notes))
-        for rows, ticks in _one_ahead(blocks):
+    add_warnings(chosen, smoothed, circles, findings)
+    writer = BlockWriter(chosen, program, statements, findings, circles)
+    motion = MotionWriter(program, writer, statements, findings)
+    with _BackgroundWriter(stream) as behind:
+        text_writer = frame.start(behind, chosen, program, smoothed.settings.tolerance)
+        text_writer.head()
+        chunks = ((rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, findings))
+        for rows, ticks in _one_ahead(chunks):
             for text in motion.write(rows, ticks):
-                framing.write(text)
+                text_writer.write(text)
             if progress is not None and len(rows.move):
                 progress(int(rows.move[-1]) + 1, len(program))
         for text in motion.finish():
-            framing.write(text)
-        framing.tail(motion.end())
-    return Written(framing.blocks + motion.blocks + writer.blocks, notes.findings())
+            text_writer.write(text)
+        text_writer.tail(motion.end())
+    return Written(text_writer.blocks + motion.blocks + writer.blocks, findings.all())
 
 
 def _values(program: Program, settings: Settings) -> dict[str, str]:
@@ -164,25 +166,25 @@ def _values(program: Program, settings: Settings) -> dict[str, str]:
     }
 
 
-def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, notes: Notes) -> Iterator[Rows]:
+def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findings) -> Iterator[Rows]:
     if form.curves and form.rotary:
-        return rotary_curve_rows(smoothed, form, notes)
+        return rotary_curve_rows(smoothed, form, findings)
     if form.curves:
         return curve_rows(smoothed, divide=form.curve in _TURNING)
-    rows = dense_rows(smoothed, circles.pieces)
-    return rotary_rows(rows, smoothed.program, smoothed.settings, form, notes) if form.rotary else rows
+    rows = dense_rows(smoothed, circles.blocks)
+    return rotary_rows(rows, smoothed.program, smoothed.settings, form, findings) if form.rotary else rows
 
 
-def _one_ahead(blocks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:
-    """Compute the next block of rows while the last one is written: numpy leaves the interpreter free meanwhile."""
+def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:
+    """Compute the next chunk of rows while the last one is written: numpy leaves the interpreter free meanwhile."""
     with ThreadPoolExecutor(1) as pool:
-        coming = pool.submit(next, blocks, None)
-        while (block := coming.result()) is not None:
-            coming = pool.submit(next, blocks, None)
-            yield block
+        coming = pool.submit(next, chunks, None)
+        while (chunk := coming.result()) is not None:
+            coming = pool.submit(next, chunks, None)
+            yield chunk
 
 
-class _Behind:
+class _BackgroundWriter:
     """A stream that is written to while the next text is made; an error shows with one of the next writes.
 
     Parameters
@@ -191,7 +193,7 @@ class _Behind:
     """
 
     #: bytes gathered before they are handed on
-    _PIECE = 1 << 18
+    _CHUNK = 1 << 18
 
     def __init__(self, stream: Stream) -> None:
         self._stream = stream
@@ -200,7 +202,7 @@ class _Behind:
         self._size = 0
         self._done: Future[object] | None = None
 
-    def __enter__(self) -> _Behind:
+    def __enter__(self) -> _BackgroundWriter:
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
@@ -213,10 +215,10 @@ class _Behind:
             self._pool.shutdown()
 
     def write(self, data: bytes, /) -> None:
-        """Take the bytes; wait for those before the last piece."""
+        """Take the bytes; wait for those handed on before."""
         self._waiting.append(data)
         self._size += len(data)
-        if self._size >= self._PIECE:
+        if self._size >= self._CHUNK:
             self._hand_on()
 
     def _hand_on(self) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Keep, Program
-from cornersmooth.nc.control import Form
+from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.arcs import arc_points, arc_radii, divided
 from cornersmooth.smoothing.neighbours import norm
@@ -46,7 +46,7 @@ class Circles:
 
     Parameters
     ----------
-    pieces : (k,) int64
+    blocks : (k,) int64
         Circular blocks of each arc; 0 where it becomes lines.
     plane : (k,) int64
         17, 18 or 19.
@@ -56,7 +56,7 @@ class Circles:
         In steps of the last written digit.
     """
 
-    pieces: Ints
+    blocks: Ints
     plane: Ints
     clockwise: Bools
     radius: Ints
@@ -88,22 +88,22 @@ def plan_circles(program: Program, settings: Settings, form: Form) -> Circles:
         # the plane of cutter compensation must not change under it, and it is XY
         & ((plane == 0) | (program.keep[arcs.pose] != Keep.CUTTER_COMPENSATION))
     )
-    pieces = np.where(fits, np.ceil(arcs.sweep / _LARGEST_SWEEP - 1e-9), 0.0).astype(np.int64)
+    blocks = np.where(fits, np.ceil(arcs.sweep / _LARGEST_SWEEP - 1e-9), 0.0).astype(np.int64)
     if fits.any():
         step = float(unit * 10.0**-decimals)
         tolerance = min(settings.tip_tolerance, settings.axis_point_tolerance)
         written: Floats = ticks.astype(np.float64) * step
-        deviation = _deviation(program, pieces, PLANES[plane], height > 0.0, written, step)
-        pieces[deviation > tolerance] = 0
-    return Circles(pieces, plane + FIRST_PLANE, height < 0.0, ticks)
+        deviation = _deviation(program, blocks, PLANES[plane], height > 0.0, written, step)
+        blocks[deviation > tolerance] = 0
+    return Circles(blocks, plane + FIRST_PLANE, height < 0.0, ticks)
 
 
 def _deviation(
-    program: Program, pieces: Ints, planes: Ints, counterclockwise: Bools, radius: Floats, step: float
+    program: Program, blocks: Ints, planes: Ints, counterclockwise: Bools, radius: Floats, step: float
 ) -> Floats:
     """(k,) mm from the written circles to the arcs at equal shares; infinite for a block that is too short."""
-    rows, share = divided(pieces)
-    before = share - 1.0 / pieces[rows]
+    rows, share = divided(blocks)
+    before = share - 1.0 / blocks[rows]
     start, end = (step * np.rint(arc_points(program, rows, at)[0] / step) for at in (before, share))
     first, second, third = planes[rows].T
     own = np.arange(len(rows))
@@ -127,6 +127,6 @@ def _deviation(
         arc, _ = arc_points(program, rows, before + probe * (share - before))
         worst = np.maximum(worst, norm(point - arc))
     worst[~proper] = np.inf
-    deviation = np.zeros(len(pieces))
+    deviation = np.zeros(len(blocks))
     np.maximum.at(deviation, rows, worst)
     return deviation

@@ -34,9 +34,9 @@ def comment_lines(text: str, marks: tuple[str, str] = ("(", ")"), orders: tuple[
     rest = plain_text(text)
     lines = []
     while rest:
-        piece = rest[:_LONGEST]
+        part = rest[:_LONGEST]
         rest = rest[_LONGEST:].lstrip()
-        if piece.upper().startswith(orders):
-            piece = f"- {piece}"
-        lines.append(f"{marks[0]}{piece}{marks[1]}".rstrip())
+        if part.upper().startswith(orders):
+            part = f"- {part}"
+        lines.append(f"{marks[0]}{part}{marks[1]}".rstrip())
     return lines

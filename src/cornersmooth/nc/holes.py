@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
-from cornersmooth.nc.revolutions import milliseconds
+from cornersmooth.nc.spindle import milliseconds
 
 #: mm left above the last depth before feeding goes on, and moved up to break a chip
 PECK_GAP = 0.5

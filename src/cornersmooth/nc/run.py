@@ -32,7 +32,7 @@ class Run:
     arc : (r,) int64 or None
     dwell : (r,) bool or None
         Where the tool waits after the block.
-    pieces : (r, 4, c) float64 or None
+    bezier : (r, 4, c) float64 or None
         Bézier points of the knot intervals of curves, in units of the text, for polynomials.
     spline : (r, 3) float64 or None
         As in `Rows`.
@@ -47,7 +47,7 @@ class Run:
     weights: Floats | None = None
     arc: Ints | None = None
     dwell: Bools | None = None
-    pieces: Floats | None = None
+    bezier: Floats | None = None
     spline: Floats | None = None
 
     def __len__(self) -> int:

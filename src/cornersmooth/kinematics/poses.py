@@ -1,0 +1,308 @@
+"""Tool axis from rotary angles, and both pairs of rotary angles from a tool axis, for any two rotary axes.
+
+The axis in part coordinates is k = R₁(q₁) R₂(q₂) k₀ with the rotary axes a₁, a₂ in the order from the part to the tool.
+With u = R₂ k₀ = R₁⁻¹ k the unit vectors a₁, a₂, u form a spherical triangle whose sides are known: σ between a₁ and a₂,
+ρ₁ between a₁ and u (as between a₁ and k), ρ₂ between a₂ and u (as between a₂ and k₀). This is Paden and Kahan's second
+subproblem (Murray, Li, Sastry, "A Mathematical Introduction to Robotic Manipulation", 3.2); the half-angle formula of
+the triangle solves it without the loss of digits near the pole that their square root has.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.model import Bools, Floats, Ints
+
+#: A machine has a pole where k can lie along a₁; sides that differ by less (rad) meet there up to rounding.
+POLE_MATCH = 1e-9
+#: Chords of unit vectors are known to this.
+ROUNDING = 1e-7
+#: Axes that are solved at a time: what is computed on the way stays in the processor's cache.
+CHUNK = 1 << 13
+
+
+@dataclass(frozen=True)
+class Solutions:
+    """Both pairs of rotary angles for each of n axes.
+
+    Parameters
+    ----------
+    angles : (n, 2, 2) float64, degrees
+        ``angles[i, branch, axis]`` in (-180, 180].
+    pole_distance : (n,) float64, degrees
+        Angle between the tool axis and the nearest direction in which the first rotary axis has no effect; infinite
+        on a machine without such a direction. At the pole the first angle is free, and what is given is one choice.
+    beyond : (n,) float64, degrees
+        By how much the axis lies outside of what the machine can reach, else 0; the angles are then the nearest.
+    """
+
+    angles: Floats
+    pole_distance: Floats
+    beyond: Floats
+
+    @property
+    def singular(self) -> Bools:
+        """(n,) bool: the axis is at the pole, to rounding."""
+        singular: Bools = self.pole_distance <= np.degrees(POLE_MATCH)
+        return singular
+
+
+def tool_axis(machine: Machine, angles: Floats) -> Floats:
+    """Axis of the tool in part coordinates that rotary angles give, as unit vectors.
+
+    Parameters
+    ----------
+    angles : (n, 2) float64, degrees
+
+    Returns
+    -------
+    (n, 3) float64
+    """
+    first, second = machine.axes
+    turned = rotate(second.unit, second.sign * radians(angles[:, 1]), machine.tool[None, :])
+    return rotate(first.unit, first.sign * radians(angles[:, 0]), turned)
+
+
+def solutions(machine: Machine, axis: Floats) -> Solutions:
+    """Both pairs of rotary angles for unit tool axis vectors.
+
+    Parameters
+    ----------
+    axis : (n, 3) float64
+        In part coordinates, from the tip to the spindle.
+
+    Notes
+    -----
+    `tool_axis` of either solution gives the axis back to 1e-15, near the pole too.
+    """
+    frame = _Frame.of(machine)
+    n = len(axis)
+    angles, distance, beyond = np.empty((n, 2, 2)), np.empty(n), np.empty(n)
+    for begin in range(0, n, CHUNK):
+        here = slice(begin, begin + CHUNK)
+        rho1 = _solve(frame, axis[here], angles[here])
+        distance[here] = frame.pole_distance(rho1)
+        beyond[here] = frame.beyond(rho1)
+    return Solutions(angles, distance, beyond)
+
+
+def pole_distance(machine: Machine, axis: Floats) -> Floats:
+    """Angle between tool axes and the nearest pole, as in `Solutions`: (n, 3) -> (n,) degrees."""
+    frame = _Frame.of(machine)
+    x, y, z = (axis @ frame.first).T
+    return frame.pole_distance(np.arctan2(np.hypot(x, y), z))
+
+
+def _solve(frame: _Frame, axis: Floats, angles: Floats) -> Floats:
+    """Put both pairs of angles (n, 2, 2) into `angles`; return ρ₁ (n,)."""
+    x, y, z = (axis @ frame.first).T
+    rho1: Floats = np.arctan2(np.hypot(x, y), z)
+    sigma, rho2 = frame.sigma, frame.rho
+    half = (sigma + rho1 + rho2) / 2
+    rising = np.sqrt(np.maximum(np.sin(half - sigma) * np.sin(half - rho2), 0.0))
+    falling = np.sqrt(np.maximum(np.sin(half) * np.sin(half - rho1), 0.0))
+    phi_half = np.arctan2(rising, falling)  # half of the angle of the triangle at a₂
+    sine, cosine = np.sin(phi_half), np.cos(phi_half)
+    # Azimuth of u about a₁, in the frame where a₂ has azimuth 0; for σ = ρ₂ a common factor sin(φ/2) is taken out.
+    if frame.pole_ahead:
+        azimuth = np.arctan2(cosine, np.cos(sigma) * sine)
+    else:
+        azimuth = np.arctan2(
+            2 * np.sin(rho2) * sine * cosine, np.sin(sigma - rho2) + 2 * np.sin(rho2) * np.cos(sigma) * sine**2
+        )
+    target = np.arctan2(y, x)
+    for branch, side in enumerate((1.0, -1.0)):
+        angles[:, branch, 0] = wrap(frame.signs[0] * np.degrees(target + side * azimuth))
+        angles[:, branch, 1] = wrap(frame.signs[1] * np.degrees(side * 2 * phi_half - frame.zero))
+    return rho1
+
+
+def closest_second(machine: Machine, axis: Floats, first_angle: Floats) -> Floats:
+    """Second angle that brings the tool closest to `axis` while the first angle is given.
+
+    Parameters
+    ----------
+    axis : (n, 3) float64
+    first_angle : (n,) float64, degrees
+
+    Returns
+    -------
+    (n,) float64, degrees in (-180, 180]
+    """
+    frame = _Frame.of(machine)
+    first, _ = machine.axes
+    turned = rotate(first.unit, -first.sign * radians(first_angle), axis)
+    x, y, _z = (turned @ frame.second).T
+    return wrap(frame.signs[1] * np.degrees(np.arctan2(y, x) - frame.zero))
+
+
+def continued(machine: Machine, axis: Floats, guess: Floats, branch: Ints, cone: float) -> tuple[Floats, Ints]:
+    """Angles on a known branch, in the turn that lies nearest to a guess.
+
+    Parameters
+    ----------
+    axis : (n, 3) float64
+    guess : (n, 2) float64, degrees
+    branch : (n,) int64
+        As in `Solutions.angles`; -1 for the one nearer to the guess.
+    cone : float, degrees
+        Within this angle of the pole the first angle is the guess, and the second comes closest to the axis.
+
+    Returns
+    -------
+    angles : (n, 2) float64, degrees
+    branch : (n,) int64
+        -1 within the cone.
+    """
+    found = solutions(machine, axis)
+    near = found.angles + 360 * np.round((guess[:, None, :] - found.angles) / 360)
+    nearer = np.argmin(np.abs(near - guess[:, None, :]).sum(axis=2), axis=1)
+    branch = np.where(branch < 0, nearer, branch)
+    angles: Floats = near[np.arange(len(axis)), branch]
+    free = found.pole_distance <= cone
+    if free.any():
+        second = closest_second(machine, axis[free], guess[free, 0])
+        angles[free, 0] = guess[free, 0]
+        angles[free, 1] = second + 360 * np.round((guess[free, 1] - second) / 360)
+        branch = np.where(free, -1, branch)
+    return angles, branch
+
+
+def passes_pole(machine: Machine, start: Floats, end: Floats, cone: float) -> Bools:
+    """Whether the shortest turn from one axis to the other comes within `cone` degrees of a pole on its way.
+
+    Parameters
+    ----------
+    start, end : (n, 3) float64
+
+    Returns
+    -------
+    (n,) bool
+        False where the nearest point is one of the ends.
+    """
+    passes = np.zeros(len(start), np.bool_)
+    step = end - start
+    step = np.sqrt(np.einsum("ij,ij->i", step, step)) + np.radians(cone) + ROUNDING
+    for pole in _Frame.of(machine).poles(machine):
+        # On a way that is shorter than the distance of its start nothing comes near: chords obey the triangle too.
+        near = np.flatnonzero(2.0 - 2.0 * (start @ pole) <= step * step)
+        if len(near):
+            one, two = start[near], end[near]
+            normal = np.cross(one, two)
+            length = np.linalg.norm(normal, axis=1)
+            ahead = np.einsum("ij,ij->i", np.cross(one, pole[None, :]), normal) > 0
+            behind = np.einsum("ij,ij->i", np.cross(pole[None, :], two), normal) > 0
+            close = np.abs(normal @ pole) <= np.sin(np.radians(cone)) * length
+            passes[near] |= (length > 0) & ahead & behind & close
+    return passes
+
+
+def angle_between(one: Floats, other: Floats) -> Floats:
+    """Angle between unit vectors, degrees, exact for small angles too: (n, 3), (n, 3) -> (n,)."""
+    apart = np.linalg.norm(one - other, axis=-1)
+    angle: Floats = np.degrees(2 * np.arcsin(np.minimum(apart / 2, 1.0)))
+    return angle
+
+
+def pole_angle(machine: Machine, axis: Floats) -> Floats:
+    """Second angle that the machine has at the pole nearest to each axis: (n, 3) -> (n,) degrees in (-180, 180]."""
+    poles = np.array(_Frame.of(machine).poles(machine))
+    angles = closest_second(machine, poles, np.zeros(len(poles)))
+    nearest: Floats = angles[np.argmax(axis @ poles.T, axis=1)]
+    return nearest
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors along the last axis brought to unit length; none becomes a vector of no length, 60 degrees off all."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    units: Floats = vectors / np.where(length > 0, length, 1.0)
+    return units
+
+
+def wrap(angles: Floats) -> Floats:
+    """Angles in degrees brought to (-180, 180]."""
+    wrapped = angles - 360 * np.round(angles / 360)
+    return np.where(wrapped <= -180, wrapped + 360, wrapped)
+
+
+def radians(angles: Floats) -> Floats:
+    """Radians of angles in degrees, whole turns taken off first so that they cost no digits."""
+    turned: Floats = np.radians(np.fmod(angles, 360.0))
+    return turned
+
+
+def rotate(direction: Floats, angle: Floats, vectors: Floats) -> Floats:
+    """Vectors turned about a unit direction by angles in radians (Rodrigues): (3,), (n,), (n or 1, 3) -> (n, 3)."""
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y, z = direction
+    across = np.array(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)))  # v @ across = direction × v, faster than np.cross
+    along = (vectors @ direction)[:, None] * direction
+    turned: Floats = along + (vectors - along) * cosine + (vectors @ across) * sine
+    return turned
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """What the triangle needs of a machine: its constant sides, and a frame about each rotary axis."""
+
+    first: Floats  # columns: towards a₂, across, a₁
+    second: Floats  # columns: towards a₁, across, a₂
+    sigma: float
+    rho: float
+    zero: float  # azimuth of k₀ about a₂, rad
+    signs: tuple[float, float]
+
+    @classmethod
+    def of(cls, machine: Machine) -> _Frame:
+        one, two = (axis.unit for axis in machine.axes)
+        first, second = _columns(one, two), _columns(two, one)
+        x, y, _ = machine.tool @ second
+        signs = machine.axes[0].sign, machine.axes[1].sign
+        return cls(first, second, _angle(one, two), _angle(machine.tool, two), float(np.arctan2(y, x)), signs)
+
+    @property
+    def pole_ahead(self) -> bool:
+        """The tool can point along a₁."""
+        return abs(self.sigma - self.rho) < POLE_MATCH
+
+    @property
+    def pole_behind(self) -> bool:
+        """The tool can point against a₁."""
+        return abs(self.sigma + self.rho - np.pi) < POLE_MATCH
+
+    def poles(self, machine: Machine) -> list[Floats]:
+        """Directions of the tool axis in which the first rotary axis has no effect."""
+        direction = machine.axes[0].unit
+        return [direction] * self.pole_ahead + [-direction] * self.pole_behind
+
+    def pole_distance(self, rho1: Floats) -> Floats:
+        """Degrees to the nearest pole; infinite without one."""
+        distance = np.full(rho1.shape, np.inf)
+        if self.pole_ahead:
+            distance = np.minimum(distance, rho1)
+        if self.pole_behind:
+            distance = np.minimum(distance, np.pi - rho1)
+        degrees: Floats = np.degrees(distance)
+        return degrees
+
+    def beyond(self, rho1: Floats) -> Floats:
+        """Degrees outside of the reach of the machine."""
+        nearest = abs(self.sigma - self.rho)
+        farthest = np.pi - abs(np.pi - self.sigma - self.rho)
+        degrees: Floats = np.degrees(np.maximum(np.maximum(nearest - rho1, rho1 - farthest), 0.0))
+        return degrees
+
+
+def _columns(about: Floats, towards: Floats) -> Floats:
+    """Right-handed frame as columns: the part of `towards` across `about`, the third direction, `about`."""
+    third = np.cross(about, towards)
+    third /= np.linalg.norm(third)
+    frame: Floats = np.stack((np.cross(third, about), third, about), axis=1)
+    return frame
+
+
+def _angle(one: Floats, other: Floats) -> float:
+    return float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))

@@ -1,0 +1,247 @@
+"""Runs of rows as text: the words of every block, many rows at a time.
+
+Ticks are the one rounding; words come from tables. Python runs per change of state and per run of circular blocks,
+never per row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.kinematics import machine_position
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
+from cornersmooth.nc.circles import FIRST_PLANE, Circles
+from cornersmooth.nc.control import INVERSE_TIME
+from cornersmooth.nc.curve_blocks import Curves, RowWriter
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.polynomial_blocks import bezier_points, curves_for
+from cornersmooth.nc.run import Run
+from cornersmooth.nc.statement_writer import StatementWriter
+from cornersmooth.text import RowFormat, format_number, to_ticks
+
+
+@dataclass
+class BlockWriter:
+    """Writes runs and remembers what a control remembers: feed, feed mode, plane.
+
+    Parameters
+    ----------
+    form : Form
+    program : Program
+    statements : StatementWriter
+        Knows the plane, which statements change too, and the words of the control.
+    findings : Findings
+    circles : Circles
+        How arcs are written.
+    """
+
+    form: Form
+    program: Program
+    statements: StatementWriter
+    findings: Findings
+    circles: Circles
+    blocks: int = 0
+    _feed: int = -1  # ticks and feed mode of the last F, as one number
+    _mode: int = FeedMode.PER_MINUTE
+    _format: RowFormat = field(init=False)
+    _arc_format: RowFormat = field(init=False)
+    _curves: Curves = field(init=False)
+    _blank: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        motion = self.form.mode.motion
+        self._blank = " " if motion.spaces else ""
+        words = [word.encode() for word in (*motion.coordinates, *self.form.other_words)]
+        decimals = self.form.decimals(self.program.units)
+        spaced = (words[0], *(self._blank.encode() + word for word in words[1:]))
+        self._format = self._row_format(spaced, decimals)
+        radius = f"{self._blank}{motion.radius}".encode()
+        self._arc_format = self._row_format((*spaced[:3], radius), decimals[:3] + decimals[:1])
+        self._curves = curves_for(self.form, self.program.units)
+
+    def _row_format(self, words: tuple[bytes, ...], decimals: tuple[int, ...]) -> RowFormat:
+        motion = self.form.mode.motion
+        return RowFormat(
+            words, decimals, plus=motion.signs, trim=not motion.trailing_zeros, leading_zero=motion.leading_zeros
+        )
+
+    def end(self) -> list[str]:
+        """Blocks that bring feed mode and plane back to where they were at the start."""
+        words, blocks = self.statements.words, []
+        if self._mode != FeedMode.PER_MINUTE:
+            blocks += [words.feed_mode[key] for key in (int(FeedMode.PER_MINUTE),) if key in words.feed_mode]
+            self._mode = FeedMode.PER_MINUTE
+        if self.statements.plane != FIRST_PLANE:
+            blocks += [words.plane[key] for key in (FIRST_PLANE,) if key in words.plane]
+            self.statements.plane = FIRST_PLANE
+        return blocks
+
+    def ticks(self, tip: Floats, other: Floats) -> Ints:
+        """Numbers of rows in steps of their last digit, (r, c), from `Rows.tip` and `Rows.other`."""
+        ticks: Ints = to_ticks(self._numbers(tip, other), self._format.decimals)
+        return ticks
+
+    def bezier(self, tip: Floats, other: Floats, curve: NDArray[np.int8]) -> Floats | None:
+        """`Run.bezier` where the form writes polynomials."""
+        if self._curves.format is None or not (curve > 0).any():
+            return None
+        return bezier_points(self._numbers(tip, other), curve)
+
+    def _numbers(self, tip: Floats, other: Floats) -> Floats:
+        """Numbers of rows in units of the text, (r, c)."""
+        form = self.form
+        if form.orientation == "machine" and form.machine is not None:
+            # for the angles as they are written: far from the axes their rounding would move the tip
+            decimals = form.table.digits.angle
+            other = to_ticks(other, (decimals,) * 2) / 10.0**decimals
+            tip = machine_position(form.machine, tip, other)
+        if form.rotary and form.machine is not None and form.machine.names != form.other_words:
+            other = other[:, ::-1]
+        numbers = np.concatenate((tip, other[:, : len(form.other_words)]), axis=1)
+        unit = self.program.mm_per_unit
+        if unit != 1.0:
+            numbers[:, : 6 if form.orientation == "point" else 3] /= unit
+        return numbers
+
+    def text(self, run: Run, dwell: int = 0) -> bytes:
+        """Text of a run that is not empty; `dwell` in milliseconds."""
+        run = self._curves.prepare(run)
+        prefix, prefix_id, extra = self._prefixes(run)
+        suffix, suffix_id = self._suffixes(run, dwell)
+        self.blocks += len(run) + extra
+        apart: list[tuple[Bools, RowWriter, Ints]] = []  # rows with words of their own
+        if run.arc is not None and (circular := run.arc >= 0).any():
+            numbers = np.column_stack((run.ticks[circular, :3], self.circles.radius[run.arc[circular]]))
+            apart.append((circular, self._arc_format, numbers))
+        if self._curves.format is not None and (curved := run.curve > 0).any():
+            apart.append((curved, self._curves.format, self._curves.numbers(run, curved)))
+        if not apart:
+            return self._format.rows(run.ticks, prefix, prefix_id, suffix, suffix_id)[0]
+        which = np.zeros(len(run), np.int64)
+        for number, (rows, _, _) in enumerate(apart, start=1):
+            which[rows] = number
+        plain = which == 0
+        texts = [
+            layout.rows(numbers, prefix, prefix_id[rows], suffix, suffix_id[rows])
+            for rows, layout, numbers in ((plain, self._format, run.ticks[plain]), *apart)
+        ]
+        return _interleave(which, texts)
+
+    def _prefixes(self, run: Run) -> tuple[list[bytes], Ints, int]:
+        """Table of what stands before the numbers, an entry for each row, and the blocks hidden in the prefixes."""
+        motion = self.form.mode.motion
+        starts = (motion.line, motion.rapid, motion.clockwise, motion.counterclockwise)
+        table = [f"{word}{self._blank}".encode() for word in starts]
+        chosen = run.rapid.astype(np.int64)
+        before: dict[int, bytes] = {}  # blocks before some rows
+        feeding = np.flatnonzero(~run.rapid)
+        modes = run.mode[feeding]
+        for place in np.flatnonzero(np.diff(modes, prepend=self._mode)).tolist():
+            self._mode = int(modes[place])
+            if self._mode == FeedMode.PER_REVOLUTION and not self.statements.speed:
+                text = "feed per revolution while no spindle speed is given; controls stop there or stand still"
+                self.findings.add("CS324", "warning", int(self.program.line[run.move[feeding[place]]]), text)
+            before[int(feeding[place])] = self._block(self.statements.words.feed_mode, self._mode)
+        if run.arc is not None:
+            rows = np.flatnonzero(run.arc >= 0)
+            arcs = run.arc[rows]
+            chosen[rows] = np.where(self.circles.clockwise[arcs], 2, 3)
+            planes = self.circles.plane[arcs]
+            for place in np.flatnonzero(np.diff(planes, prepend=self.statements.plane)).tolist():
+                block = self._block(self.statements.words.plane, int(planes[place]))
+                before[int(rows[place])] = before.get(int(rows[place]), b"") + block
+            if len(planes):
+                self.statements.plane = int(planes[-1])
+        extra = sum(blocks.count(b"\n") for blocks in before.values())
+        if (run.curve > 0).any():
+            extra += self._curves.add_prefixes(run, table, chosen)
+        entries: dict[bytes, int] = {}
+        for row, blocks in before.items():
+            text = blocks + table[chosen[row]]
+            entry = entries.setdefault(text, len(table))
+            if entry == len(table):
+                table.append(text)
+            chosen[row] = entry
+        return table, chosen, extra
+
+    def _block(self, table: Mapping[int, str], key: int) -> bytes:
+        return table[key].encode() + b"\n" if key in table else b""
+
+    def _suffixes(self, run: Run, dwell: int) -> tuple[list[bytes], Ints]:
+        """Table of what stands behind the numbers, feed or weight, and an entry for each row."""
+        motion, digits = self.form.mode.motion, self.form.table.digits
+        table = [b"\n", f"{motion.rapid_end}\n".encode()]
+        chosen = run.rapid.astype(np.int64)
+        curved = run.curve > 0
+        within = curved.copy()
+        within[:1] = False
+        within[1:] &= curved[:-1] & (run.move[1:] == run.move[:-1])
+        feeding = np.flatnonzero(~run.rapid & ~within)
+        on_curves: list[tuple[int, bytes]] = []
+        if len(feeding):
+            feed = run.feed[feeding]
+            missing = np.isnan(feed)
+            uncounted = missing & ~curved[feeding]
+            if uncounted.any():
+                self._count_missing(run.move[feeding[uncounted]])
+            inverse = run.mode[feeding] == INVERSE_TIME
+            unit = np.where(missing, 0.0, feed) / np.where(inverse, 1.0, self.program.mm_per_unit)
+            if motion.inch_feed != 1 and self.program.units == "inch":
+                unit[run.mode[feeding] == FeedMode.PER_MINUTE] *= motion.inch_feed
+            ticks = to_ticks(unit, digits.feed)[~missing]
+            given = feeding[~missing]
+            # F is given again with its unit: the same number per minute and per revolution is not the same feed
+            keys = 4 * ticks + run.mode[given]
+            fresh = np.diff(keys, prepend=self._feed) != 0
+            fresh |= run.mode[given] == INVERSE_TIME  # which every block wants
+            changed = np.flatnonzero(fresh)
+            if len(changed):
+                values, which = np.unique(ticks[changed], return_inverse=True)
+                chosen[given[changed]] = len(table) + which.reshape(-1)
+                word = f"{self._blank}{motion.feed}"
+                table += [f"{word}{self._feed_digits(value)}\n".encode() for value in values.tolist()]
+                self._feed = int(keys[-1])
+                rows = given[changed]
+                on_curves = [(row, table[chosen[row]]) for row in rows[curved[rows]].tolist()]
+        if curved.any():
+            self._curves.add_suffixes(run, table, chosen)
+        # the line before a curve brings the feed; where it is nothing in the written digits the curve must
+        for row, given_feed in on_curves:
+            end, others = table[chosen[row]].split(b"\n", 1)
+            chosen[row] = len(table)
+            table.append(end + given_feed + others)
+        if run.dwell is not None and run.dwell.any():
+            blocks = self.statements.dwell(dwell)
+            chosen[run.dwell] += len(table)
+            table += [end + "".join(block + "\n" for block in blocks).encode() for end in table]
+            self.blocks += int(np.count_nonzero(run.dwell)) * len(blocks)
+        return table, chosen
+
+    def _feed_digits(self, ticks: int) -> str:
+        decimals = self.form.table.digits.feed
+        text = format_number(ticks / 10.0**decimals, decimals, trim=True)
+        return text if self.form.mode.motion.feed_point else text.rstrip(".")
+
+    def _count_missing(self, moves: Ints) -> None:
+        text = "feed move without a feed in the CL file; most controls stop with an alarm, give one with --feed"
+        self.findings.add("CS311", "warning", int(self.program.line[moves[0]]), text, len(moves))
+
+
+def _interleave(which: Ints, texts: Sequence[tuple[bytes, Ints]]) -> bytes:
+    """Put texts of rows together; `which` says for each row in which of them it is."""
+    edges = [0, *(1 + np.flatnonzero(which[1:] != which[:-1])).tolist(), len(which)]
+    at = [0] * len(texts)
+    parts = []
+    for first, last in pairwise(edges):
+        own = int(which[first])
+        text, offsets = texts[own]
+        stop = at[own] + last - first
+        parts.append(text[offsets[at[own]] : offsets[stop]])
+        at[own] = stop
+    return b"".join(parts)

@@ -1,0 +1,290 @@
+"""Controls as TOML tables: those that come with the program, and the user's own.
+
+A table may say ``like = "fanuc"`` and then only what is different, ``false`` for a form or mode that it has not; the
+keys are those of the tables in the folder ``controls``.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.model import FeedMode
+from cornersmooth.nc.control import (
+    INVERSE_TIME,
+    Control,
+    CurveStyle,
+    Digits,
+    Extra,
+    FormTable,
+    Mode,
+    Motion,
+    Orientation,
+    TextStyle,
+    Words,
+)
+from cornersmooth.tables import Shelf, Table
+
+Record = TypeVar("Record", Digits, TextStyle, Words, Motion, Extra)
+
+_SHELF = Shelf(
+    "control",
+    __package__,
+    "controls",
+    keys=("name", "description", "digits", "layout", "words", "motion", "forms", "extras"),
+    unknown="CS210",
+    unreadable="CS212",
+    unknown_key="CS214",
+    wrong_value="CS213",
+)
+
+_FORM_KEYS = ("description", "curve", *get_args(Orientation))
+_MODE_KEYS = ("words", "on", "off", "circles", "timed_turns", *(item.name for item in fields(Motion)))
+_PLANES = {"xy": 17, "zx": 18, "yz": 19}
+_FEED_MODES = {
+    "per_minute": int(FeedMode.PER_MINUTE),
+    "per_revolution": int(FeedMode.PER_REVOLUTION),
+    "inverse_time": INVERSE_TIME,
+}
+#: keys whose values are tables
+_TABLES = ("digits", "layout", "layout.units", "words", "words.coolant", "words.plane", "words.feed_mode", "motion")
+_MOST_DIGITS = 9
+#: what stands in braces in blocks
+_BRACES: dict[str, Table] = {
+    "tool_change": {"tool": 1},
+    "tool_select": {"tool": 1},
+    "spindle_speed": {"speed": "1", "direction": "M3"},
+    "dwell": {"milliseconds": 1, "seconds": "1."},
+    "compensation_left": {"register": 1},
+    "compensation_right": {"register": 1},
+    "on": {"offset": 1},
+    "head": {"program": "O1", "units": "G21", "blend": "0.001"},
+    "tail": {"program": "O1", "units": "G21"},
+    "block_number": {"number": 10},
+}
+#: the same in blocks of extras
+_EXTRA_BRACES: Table = {"blend": "0.001", "turn": "0.01"}
+
+
+def control_names() -> tuple[str, ...]:
+    """Names of the controls that come with the program, sorted."""
+    return _SHELF.names()
+
+
+def load_control(name_or_path: str | Path) -> Control:
+    """Control of that name, or described by that TOML file.
+
+    A text that ends in ``.toml`` or holds a path separator is a file; anything else is a name.
+
+    Raises
+    ------
+    SettingsError
+        The name is unknown (with the closest known one), the file cannot be read, or it does not describe a control.
+    """
+    text, file, name = _SHELF.choose(name_or_path)
+    return parse_control(text, file=file, name=name)
+
+
+def parse_control(text: str, *, file: str = "<control>", name: str = "control") -> Control:
+    """Control that a TOML text describes.
+
+    Parameters
+    ----------
+    file : str
+        For messages.
+    name : str
+        Where the text has none.
+
+    Raises
+    ------
+    SettingsError
+        The text is not TOML, has an unknown key (with the closest known one), or does not describe a control.
+    """
+    try:
+        table, like = _SHELF.parse(text)
+        _check_tables(table)
+        return Control(
+            name=_text(table, "name", name),
+            description=_text(table, "description", ""),
+            like=like,
+            digits=_record(Digits, table.get("digits", {}), "digits"),
+            layout=_layout(table.get("layout", {})),
+            words=_words(table.get("words", {})),
+            forms=_forms(table),
+            extras=_extras(table.get("extras", {})),
+        )
+    except SettingsError as error:
+        raise SettingsError(error.code, error.what, error.hint, file=file) from error
+
+
+def control_table(name: str) -> str:
+    """Text of the table of a control that comes with the program.
+
+    Raises
+    ------
+    SettingsError
+        The name is unknown.
+    """
+    return _SHELF.built_in(name)
+
+
+def _check_tables(table: Table) -> None:
+    """Refuse what is no table where one is wanted."""
+    for path in _TABLES:
+        value: Any = table
+        for key in path.split("."):
+            value = value.get(key, {})
+        _check_table(value, path)
+    _check_table(table.get("forms", {}), "forms")
+    for name, form in table.get("forms", {}).items():
+        _check_table(form, f"forms.{name}")
+        for orientation in get_args(Orientation):
+            _check_table(form.get(orientation, {}), f"forms.{name}.{orientation}")
+
+
+def _check_table(value: object, where: str) -> None:
+    if not isinstance(value, dict):
+        raise _SHELF.wrong(f"{where} is {value!r}", f"write a table [{where}]")
+
+
+def _layout(table: Table) -> TextStyle:
+    units = {"mm": "", "inch": ""} | _strings(table.get("units", {}), "layout.units", ("mm", "inch"))
+    plain = {key: value for key, value in table.items() if key != "units"}
+    _SHELF.check_keys(table, tuple(item.name for item in fields(TextStyle)), "layout.")
+    layout = _record(TextStyle, plain, "layout")
+    if len(layout.comment) != 2:
+        raise _SHELF.wrong(f"layout.comment is {plain['comment']!r}", "give what stands before and behind")
+    try:
+        re.compile(layout.program_pattern)
+    except re.error as error:
+        what = f"layout.program_pattern is {layout.program_pattern!r}: {error}"
+        raise _SHELF.wrong(what, "give a regular expression") from error
+    return TextStyle(**{**vars(layout), "units": units})
+
+
+def _words(table: Table) -> Words:
+    _SHELF.check_keys(table, tuple(item.name for item in fields(Words)), "words.")
+    special = {"coolant", "plane", "feed_mode"}
+    words = _record(Words, {key: value for key, value in table.items() if key not in special}, "words")
+    coolant = {
+        word.upper(): _blocks(blocks, f"words.coolant.{word}") for word, blocks in table.get("coolant", {}).items()
+    }
+    planes = _strings(table.get("plane", {}), "words.plane", tuple(_PLANES))
+    modes = _strings(table.get("feed_mode", {}), "words.feed_mode", tuple(_FEED_MODES))
+    return Words(
+        **{
+            **vars(words),
+            "coolant": coolant,
+            "plane": {_PLANES[key]: block for key, block in planes.items()},
+            "feed_mode": {_FEED_MODES[key]: block for key, block in modes.items()},
+        }
+    )
+
+
+def _forms(table: Table) -> dict[str, FormTable]:
+    entries = table.get("forms", {})
+    if not isinstance(entries, dict) or not entries:
+        raise _SHELF.wrong("there are no forms", "write a table [forms.g1]")
+    motion = table.get("motion", {})
+    _SHELF.check_keys(motion, tuple(item.name for item in fields(Motion)), "motion.")
+    return {name: _form(name, entry, motion) for name, entry in entries.items()}
+
+
+def _form(name: str, entry: Table, motion: Table) -> FormTable:
+    where = f"forms.{name}"
+    _SHELF.check_keys(entry, _FORM_KEYS, f"{where}.")
+    curve = entry.get("curve", "")
+    if curve not in get_args(CurveStyle):
+        raise _SHELF.wrong(f"{where}.curve is {curve!r}", f"use one of {', '.join(get_args(CurveStyle)[1:])}")
+    modes: dict[Orientation, Mode] = {}
+    for orientation in get_args(Orientation):
+        if orientation in entry:
+            modes[orientation] = _mode(entry[orientation], motion, f"{where}.{orientation}")
+            wanted = {"vector": 3, "point": 3}.get(orientation, 0)
+            if len(modes[orientation].words) != wanted:
+                raise _SHELF.wrong(f"{where}.{orientation} has {len(modes[orientation].words)} words", f"give {wanted}")
+    if not modes:
+        raise _SHELF.wrong(f"{where} says no orientation", f"use one of {', '.join(get_args(Orientation))}")
+    return FormTable(name, _text(entry, "description", ""), curve, modes)
+
+
+def _extras(table: Table) -> dict[str, Extra]:
+    _check_table(table, "extras")
+    extras = {}
+    for name, entry in table.items():
+        _check_table(entry, f"extras.{name}")
+        extras[name] = _record(Extra, {**entry, "name": name}, f"extras.{name}")
+    return extras
+
+
+def _mode(entry: Table, motion: Table, where: str) -> Mode:
+    _SHELF.check_keys(entry, _MODE_KEYS, f"{where}.")
+    own = {item.name for item in fields(Motion)}
+    return Mode(
+        words=_blocks(entry.get("words", []), f"{where}.words"),
+        on=_blocks(entry.get("on", []), f"{where}.on"),
+        off=_blocks(entry.get("off", []), f"{where}.off"),
+        motion=_record(Motion, {**motion, **{key: value for key, value in entry.items() if key in own}}, where),
+        circles=_flag(entry.get("circles", False), f"{where}.circles"),
+        timed_turns=_flag(entry.get("timed_turns", False), f"{where}.timed_turns"),
+    )
+
+
+def _record(kind: type[Record], table: Table, where: str) -> Record:
+    """Dataclass of plain fields from a table, each checked against the type of its default."""
+    values: Table = {}
+    _SHELF.check_keys(table, tuple(item.name for item in fields(kind)), f"{where}.")
+    plain = kind()
+    for key, value in table.items():
+        default = getattr(plain, key)
+        if isinstance(default, tuple):
+            values[key] = _blocks(value, f"{where}.{key}")
+        elif isinstance(default, bool):
+            values[key] = _flag(value, f"{where}.{key}")
+        elif isinstance(default, int):
+            most = _MOST_DIGITS if kind is Digits else 1_000_000
+            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
+                raise _SHELF.wrong(f"{where}.{key} is {value!r}", f"give a whole number up to {most}")
+            values[key] = value
+        else:
+            values[key] = _string(value, f"{where}.{key}")
+    return kind(**values)
+
+
+def _blocks(value: object, where: str) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(block, str) for block in value):
+        raise _SHELF.wrong(f"{where} is {value!r}", 'give a list of texts, as in ["M8"]')
+    return tuple(_string(block, where) for block in value)
+
+
+def _strings(table: Any, where: str, keys: tuple[str, ...]) -> dict[str, str]:
+    if not isinstance(table, dict):
+        raise _SHELF.wrong(f"{where} is {table!r}", "give a table of texts")
+    _SHELF.check_keys(table, keys, f"{where}.")
+    return {key: _string(value, f"{where}.{key}") for key, value in table.items()}
+
+
+def _string(value: object, where: str) -> str:
+    if not isinstance(value, str) or not value.isascii() or not (value.isprintable()):
+        raise _SHELF.wrong(f"{where} is {value!r}", "give ASCII text without line ends")
+    places = _EXTRA_BRACES if where.startswith("extras.") else _BRACES.get(where.rpartition(".")[2], {})
+    if "{" in value or "}" in value:
+        try:
+            value.format(**places)
+        except (KeyError, IndexError, ValueError) as error:
+            known = ", ".join(f"{{{place}}}" for place in places) or "no braces"
+            raise _SHELF.wrong(f"{where}: {value!r} has unknown braces", f"use {known}") from error
+    return value
+
+
+def _text(table: Table, key: str, default: str) -> str:
+    return _string(table.get(key, default), key)
+
+
+def _flag(value: object, where: str) -> bool:
+    if not isinstance(value, bool):
+        raise _SHELF.wrong(f"{where} is {value!r}", "give true or false")
+    return value

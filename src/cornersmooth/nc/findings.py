@@ -1,0 +1,24 @@
+"""What the writers notice, counted: one finding for each code and text, at the line where it was first met."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from cornersmooth.errors import Finding, Severity
+
+
+@dataclass
+class Findings:
+    """Findings of one output, in the order in which they were first met."""
+
+    _found: dict[tuple[str, str], Finding] = field(default_factory=dict)
+
+    def add(self, code: str, severity: Severity, line: int, text: str, count: int = 1) -> None:
+        """Count something that was noticed."""
+        old = self._found.get((code, text))
+        new = Finding(code, severity, line, text, count) if old is None else replace(old, count=old.count + count)
+        self._found[code, text] = new
+
+    def all(self) -> tuple[Finding, ...]:
+        """Everything that was noticed."""
+        return tuple(self._found.values())

@@ -1,0 +1,111 @@
+"""A form of a control in one of its modes: everything that the writers go by."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cornersmooth.kinematics import Machine
+from cornersmooth.model import MM_PER_UNIT, Units
+from cornersmooth.nc.control import Control, CurveStyle, Extra, Mode, Orientation
+
+#: share of ε, at the axis point, that rotary axes may take between and at the written words
+ROTARY_SHARE = 0.1
+
+#: share of ε that the tip may leave its line where the control knows nothing of the tip
+TIP_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of a control in one of its modes: everything the writers go by.
+
+    Parameters
+    ----------
+    table : Control
+    name : str
+        As on the command line.
+    curve : CurveStyle
+    orientation : Orientation
+    mode : Mode
+    machine : Machine or None
+        For rotary words.
+    extras : tuple of Extra
+        Functions of the control that were asked for.
+    """
+
+    table: Control
+    name: str
+    curve: CurveStyle
+    orientation: Orientation
+    mode: Mode
+    machine: Machine | None = None
+    extras: tuple[Extra, ...] = ()
+
+    @property
+    def control(self) -> str:
+        """Name of the control."""
+        return self.table.name
+
+    @property
+    def curves(self) -> bool:
+        """Whether transitions are written as curves instead of lines."""
+        return bool(self.curve)
+
+    @property
+    def vectors(self) -> bool:
+        """Whether the words behind the tip are a unit vector."""
+        return self.orientation == "vector"
+
+    @property
+    def rotary(self) -> bool:
+        """Whether the words behind the tip are angles."""
+        return self.orientation in ("angles", "machine")
+
+    @property
+    def other_words(self) -> tuple[str, ...]:
+        """Addresses behind those of the tip; rotary ones in the order of the alphabet."""
+        return tuple(sorted(self.machine.names)) if self.machine is not None and self.rotary else self.mode.words
+
+    def tip_decimals(self, units: Units) -> int:
+        """Decimals of lengths."""
+        return self.table.digits.mm if units == "mm" else self.table.digits.inch
+
+    def decimals(self, units: Units) -> tuple[int, ...]:
+        """Decimals of the numbers of a motion block."""
+        tip, digits = self.tip_decimals(units), self.table.digits
+        other = {"vector": digits.vector, "point": tip, "angles": digits.angle, "machine": digits.angle, "fixed": 0}
+        return (tip,) * 3 + (other[self.orientation],) * len(self.other_words)
+
+    def rounding(self, units: Units) -> float:
+        """Step of the written coordinates, mm."""
+        return float(MM_PER_UNIT[units] * 10.0 ** -self.tip_decimals(units))
+
+    def tip_resolution(self, units: Units, tolerance: float) -> float:
+        """What is to be taken off ε at the tip, as a step of its coordinates: half of it per axis, mm."""
+        step = self.rounding(units)
+        return step + 2.0 / math.sqrt(3.0) * TIP_SHARE * tolerance if self.orientation == "machine" else step
+
+    def axis_point_resolution(self, units: Units, tolerance: float, axis_length: float) -> float:
+        """What the orientation is worth at the axis point, as a step in mm.
+
+        A rounded axis point moves b = tip + H·dir by at most its own rounding and, across the tool, that of the tip;
+        the latter is in `tip_resolution` already. Rotary words have besides what `rotary_tolerance` leaves to them.
+        """
+        if self.orientation == "point":
+            return self.rounding(units)
+        if self.orientation == "fixed":
+            return 2.0 / math.sqrt(3.0) * ROTARY_SHARE * tolerance
+        if self.rotary:
+            reserve = axis_length * math.radians(self.rotary_tolerance(tolerance, axis_length) + self._angle_rounding)
+            return 2.0 / math.sqrt(3.0) * reserve
+        return axis_length * float(10.0**-self.table.digits.vector)
+
+    def rotary_tolerance(self, tolerance: float, axis_length: float) -> float:
+        """Degrees by which rotary axes may leave the axis asked for, rounding of the words not counted."""
+        return math.degrees(ROTARY_SHARE * tolerance / axis_length)
+
+    @property
+    def _angle_rounding(self) -> float:
+        """Degrees by which the rounding of both rotary words may turn the axis."""
+        return float(10.0**-self.table.digits.angle)

@@ -1,0 +1,123 @@
+"""Which form, in which mode; combinations that a control cannot run are refused with what works instead."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics import Machine
+from cornersmooth.model import Floats, Move, Program
+from cornersmooth.nc.control import Control, Extra, FormTable, Orientation
+from cornersmooth.nc.control_tables import load_control
+from cornersmooth.nc.form import ROTARY_SHARE, Form
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.neighbours import norm
+
+
+def choose_form(
+    control: str | Path | Control = "fanuc",
+    form: str | None = None,
+    *,
+    machine: Machine | None = None,
+    tcp: bool = True,
+    extras: Iterable[str] = (),
+) -> Form:
+    """Return the form of a control by name; the control's default where `form` is None.
+
+    Parameters
+    ----------
+    control : str, Path or Control
+        A name, or a TOML file.
+    machine : Machine, optional
+        For rotary words instead of tool vectors.
+    tcp : bool
+        Whether the control keeps the tool tip itself; without, the words are positions of the machine's axes.
+    extras : iterable of str
+        Names of functions of the control to be switched on.
+
+    Raises
+    ------
+    SettingsError
+        Unknown control or form, or a combination that the control cannot run.
+    """
+    table = control if isinstance(control, Control) else load_control(control)
+    name = next(iter(table.forms)) if form is None else form
+    if name not in table.forms:
+        raise SettingsError("CS211", f"{table.name} has no form {name!r}", f"choose one of {', '.join(table.forms)}")
+    chosen = table.forms[name]
+    if machine is None and not tcp and "machine" in chosen.modes:
+        raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
+    wanted: tuple[Orientation, ...] = ("vector", "point", "fixed")
+    if not tcp:
+        wanted = ("machine",)
+    elif machine is not None:
+        wanted = ("angles",)
+    for orientation in wanted:
+        if orientation in chosen.modes:
+            asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
+            return Form(table, name, chosen.curve, orientation, chosen.modes[orientation], machine, asked)
+    raise _refusal(table, chosen, wanted, machine)
+
+
+def _extra(table: Control, form: str, name: str) -> Extra:
+    if name not in table.extras:
+        known = f"choose one of {', '.join(table.extras)}" if table.extras else "leave it out"
+        raise SettingsError("CS218", f"{table.name} has no function {name!r}", known)
+    extra = table.extras[name]
+    if extra.forms and form not in extra.forms:
+        raise SettingsError("CS218", f"{name} is not for {table.name} form {form}", f"use -f {extra.forms[0]}")
+    return extra
+
+
+def check_program(form: Form, program: Program, settings: Settings) -> None:
+    """Refuse a program that the form cannot hold.
+
+    Raises
+    ------
+    SettingsError
+        The tool is not parallel to Z, or turns on an arc, and the form has no words for that.
+    """
+    if form.orientation == "fixed":
+        tilt = norm(program.axis - (0.0, 0.0, 1.0))
+        tilt[program.kind == Move.FROM] = 0.0
+        text = "the tool is not parallel to Z, and {} has no words for its axis"
+        vectors = [name for name, other in form.table.forms.items() if "vector" in other.modes]
+        hint = f"use -f {vectors[0]}" if vectors else "name your machine with --machine"
+        _refuse_tilt(form, program, settings, tilt, text, hint)
+    if form.rotary and form.curves and len(program.arcs):
+        turn = np.zeros(len(program))
+        pose = program.arcs.pose
+        turn[pose] = norm(program.axis[pose] - program.axis[pose - 1])
+        text = "the tool turns on an arc, which {} cannot follow within the tolerance"
+        _refuse_tilt(form, program, settings, turn, text, f"use -f {next(iter(form.table.forms))}")
+
+
+def _refuse_tilt(form: Form, program: Program, settings: Settings, tilt: Floats, text: str, hint: str) -> None:
+    """Refuse the first pose whose tilt (n,), rad, is worth more than a rounding error at the axis point."""
+    tilted = np.flatnonzero(settings.axis_length * tilt > ROTARY_SHARE * settings.tolerance)
+    if len(tilted):
+        what = text.format(f"{form.control} form {form.name}")
+        raise SettingsError("CS219", what, hint, file=program.source.name, line=int(program.line[tilted[0]]))
+
+
+def _refusal(
+    table: Control, form: FormTable, wanted: tuple[Orientation, ...], machine: Machine | None
+) -> SettingsError:
+    here = f"{table.name} form {form.name}"
+    others = [name for name, other in table.forms.items() if any(mode in other.modes for mode in wanted)]
+    instead = f"use -f {others[0]}" if others else ""
+    if "machine" in wanted:
+        what = f"{here} cannot run without tool tip control"
+        if form.curve:
+            what += ": its curves are refused at inverse time feed (G93)"
+        if instead and machine is None:
+            instead += " and name your machine with --machine"
+        return SettingsError("CS215", what, instead or "leave out --no-tcp")
+    if "angles" in wanted:
+        return SettingsError("CS215", f"{here} has no rotary words", instead or "leave out --machine")
+    return SettingsError(
+        "CS215", f"{here} has no tool vectors, only rotary words", instead or "name your machine with --machine"
+    )

@@ -1,0 +1,257 @@
+"""Rows of the smoothed motion in order, with the statements in their places, holes drilled and positions remembered.
+
+Python runs per statement, per run of holes and per block of rows, never per row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.model import Bools, Floats, Ints, Move, Program, Statement
+from cornersmooth.nc.block_writer import BlockWriter
+from cornersmooth.nc.control import INVERSE_TIME
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.holes import approaches, hole_moves, travel_height
+from cornersmooth.nc.run import Run
+from cornersmooth.nc.statement_writer import StatementWriter
+from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.text import format_number
+
+#: a pose that no program has
+_NOWHERE = 1 << 62
+
+
+@dataclass
+class MotionWriter:
+    """Writes rows in order and remembers where the tool is.
+
+    Parameters
+    ----------
+    program : Program
+    writer : BlockWriter
+    statements : StatementWriter
+    findings : Findings
+    """
+
+    program: Program
+    writer: BlockWriter
+    statements: StatementWriter
+    findings: Findings
+    blocks: int = 0  #: those that are not `writer`'s
+    _repeated: int = 0
+    _position: NDArray[np.int64] | None = None
+    _last: NDArray[np.int64] | None = None  #: what was written last, a tool change or not
+    _return_to: int = _NOWHERE  #: first pose behind a tool change, until it is reached
+    _next_statement: int = 0
+    _arc_begun: int = -1  #: arc behind a FROM whose start has been gone to
+    _ticks: Ints = field(init=False)  #: of the block that is written
+    _said: tuple[Statement, ...] = field(init=False)
+    _approach: Ints | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._said = _with_starts(self.program)
+        self._approach = approaches(self.program) if (self.program.kind == Move.HOLE).any() else None
+
+    def write(self, rows: Rows, ticks: Ints) -> Iterator[bytes]:
+        """Text of a block of rows, with their numbers in ticks, and of the statements before and between them."""
+        self._ticks = ticks
+        moves = rows.move
+        waiting = self._statements_until(int(moves[-1])) if len(moves) else []
+        start = 0
+        for statement in waiting:
+            if self.statements.only_counted(statement):  # thousands of them must not cut the rows to pieces
+                continue
+            stop = int(np.searchsorted(moves, statement.pose))
+            if stop > start:
+                yield from self._between(rows, start, stop)
+                start = stop
+            yield from self._say(statement)
+        yield from self._between(rows, start, len(moves))
+
+    def finish(self) -> Iterator[bytes]:
+        """Text of the statements behind the last row."""
+        for statement in self._said[self._next_statement :]:
+            yield from self._say(statement)
+        self._next_statement = len(self._said)
+        if self._repeated:
+            text = "move of zero length in the written digits left out"
+            self.findings.add("CS312", "note", 0, text, self._repeated)
+
+    def end(self) -> list[str]:
+        """Blocks that cancel what is still on when the program ends."""
+        return [*self.statements.end_compensation(), *self.writer.end(), *self.statements.end_motion()]
+
+    def _statements_until(self, pose: int) -> Sequence[Statement]:
+        begin = self._next_statement
+        said = self._said
+        while self._next_statement < len(said) and said[self._next_statement].pose <= pose:
+            self._next_statement += 1
+        return said[begin : self._next_statement]
+
+    def _say(self, statement: Statement) -> Iterator[bytes]:
+        text = self.statements.blocks(statement)
+        if self.statements.changed:  # a tool change leaves the machine elsewhere
+            self._position, self._return_to, self.statements.changed = None, statement.pose, False
+        yield from self._blocks(text)
+
+    def _blocks(self, text: Sequence[str]) -> Iterator[bytes]:
+        self.blocks += len(text)
+        if text:
+            yield ("\n".join(text) + "\n").encode("ascii")
+
+    def _between(self, rows: Rows, start: int, stop: int) -> Iterator[bytes]:
+        """Rows between statements, holes apart from the others."""
+        if start >= stop:
+            return
+        yield from self._blocks(self.statements.begin_motion())
+        if self._approach is None:
+            yield from self._lines(rows, start, stop)
+            return
+        hole = self.program.kind[rows.move[start:stop]] == Move.HOLE
+        edges = [start, *(start + 1 + np.flatnonzero(hole[1:] != hole[:-1])).tolist(), stop]
+        for first, last in pairwise(edges):
+            if hole[first - start]:
+                yield from self._holes(rows, slice(first, last), self._approach)
+            else:
+                yield from self._lines(rows, first, last)
+
+    def _lines(self, rows: Rows, start: int, stop: int) -> Iterator[bytes]:
+        part = slice(start, stop)
+        move, program = rows.move[part], self.program
+        ticks = self._ticks[part]
+        arc = rows.arc[part] if rows.arc is not None else None
+        yield from self._go_back(int(move[0]))
+        if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
+            yield from self._go_to(self.writer.ticks(program.tip[move[:1] - 1], rows.other[part][:1]), move[:1])
+        elif self._begins_at_stated(int(move[0])):  # an arc in lines wants its start, too
+            start_of_arc = self._shifted(rows, part, program.tip[move[:1] - 1], np.zeros(1, np.int64))
+            yield from self._go_to(start_of_arc, move[:1])
+        self._join(ticks, rows.joined[part])
+        feed, mode = program.feed[move], program.feed_mode[move].astype(np.int64)
+        if rows.rate is not None:
+            rate = rows.rate[part]
+            timed = ~np.isnan(rate)
+            feed, mode = np.where(timed, rate, feed), np.where(timed, INVERSE_TIME, mode)
+        run = Run(
+            ticks=ticks,
+            move=move,
+            rapid=program.kind[move] == Move.RAPID,
+            feed=feed,
+            mode=mode,
+            curve=rows.curve[part],
+            weights=rows.weights[part] if rows.weights is not None else None,
+            arc=arc,
+            bezier=self.writer.bezier(rows.tip[part], rows.other[part], rows.curve[part]),
+            spline=rows.spline[part] if rows.spline is not None else None,
+        )
+        before = len(run)
+        run = self._moving(run)
+        self._repeated += before - len(run)
+        yield from self._emit(run)
+
+    def _begins_at_stated(self, move: int) -> bool:
+        """Whether a move is an arc from a stated position, met for the first time."""
+        kind = self.program.kind
+        if move in (0, self._arc_begun) or kind[move] != Move.ARC or kind[move - 1] != Move.FROM:
+            return False
+        self._arc_begun = move
+        return True
+
+    def _go_back(self, move: int) -> Iterator[bytes]:
+        """Go to the pose behind a tool change even if it repeats the last one before, and so is no row."""
+        begin, self._return_to = self._return_to, _NOWHERE
+        if self._last is not None and (self.program.kind[begin:move] != Move.FROM).any():
+            yield from self._emit(self._run(self._last[None], np.array([move])))
+
+    def _go_to(self, ticks: Ints, move: Ints) -> Iterator[bytes]:
+        """Go to a place at the feed of a move, if the tool is elsewhere."""
+        yield from self._emit(self._moving(self._run(ticks, move)))
+
+    def _holes(self, rows: Rows, part: slice, approach: Ints) -> Iterator[bytes]:
+        """Holes of one cycle as plain moves; those not understood are only approached."""
+        cycle, program, poses = self.statements.cycle, self.program, rows.move[part]
+        line = int(program.line[poses[0]])
+        if cycle is None:
+            text = "hole of a cycle that is not understood; it is not drilled, the tool only goes over it"
+            self.findings.add("CS315", "warning", line, text, len(poses))
+            yield from self._over_holes(rows, part, travel_height(program, poses, approach[poses]))
+            return
+        self.findings.add("CS316", "note", line, "hole of a cycle written as plain moves", len(poses))
+        moves = hole_moves(cycle, program, poses, approach[poses])
+        move = poses[moves.hole]
+        ticks = self._shifted(rows, part, moves.tip, moves.hole)
+        run = replace(self._run(ticks, move), rapid=moves.rapid, dwell=moves.dwell)
+        if not np.isnan(cycle.feed):
+            run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
+        yield from self._emit(self._moving(run), cycle.dwell)
+
+    def _over_holes(self, rows: Rows, part: slice, height: Floats) -> Iterator[bytes]:
+        program = self.program
+        decimals = self.writer.form.tip_decimals(program.units)
+        poses = rows.move[part]
+        tips = program.tip[poses] + height[:, None] * program.axis[poses]
+        ticks = self._shifted(rows, part, tips, np.arange(len(poses)))
+        for index, pose in enumerate(poses.tolist()):
+            tip = (program.tip[pose] / program.mm_per_unit).tolist()
+            place = " ".join(
+                f"{letter}{format_number(value, decimals)}" for letter, value in zip("XYZ", tip, strict=True)
+            )
+            yield from self._blocks(self.statements.comment(f"NOT DRILLED: HOLE AT {place}"))
+            run = replace(self._run(ticks[index : index + 1], poses[index : index + 1]), rapid=np.ones(1, np.bool_))
+            yield from self._emit(self._moving(run))
+
+    def _shifted(self, rows: Rows, part: slice, tips: Floats, own: Ints) -> Ints:
+        """Ticks of tips reached with the orientation of rows, which `own` names for each of them."""
+        other = rows.other[part][own]
+        if self.writer.form.orientation == "point":
+            other = other + (tips - rows.tip[part][own])
+        return self.writer.ticks(tips, other)
+
+    def _run(self, ticks: Ints, move: Ints) -> Run:
+        """Straight moves at the feeds of moves of the program."""
+        program, count = self.program, len(ticks)
+        mode = program.feed_mode[move].astype(np.int64)
+        return Run(ticks, move, np.zeros(count, np.bool_), program.feed[move], mode, np.zeros(count, np.int8))
+
+    def _join(self, ticks: Ints, joined: Bools) -> None:
+        """Give first control points that follow without a line the digits of the row before."""
+        places = np.flatnonzero(joined)
+        if not len(places):
+            return
+        if places[0] == 0:
+            if self._position is not None:
+                ticks[0] = self._position
+            places = places[1:]
+        ticks[places] = ticks[places - 1]
+
+    def _moving(self, run: Run) -> Run:
+        """Leave out the rows that do not move the tool in the written digits."""
+        ticks = run.ticks
+        new = np.ones(len(ticks), np.bool_)
+        new[1:] = (ticks[1:] != ticks[:-1]).any(axis=1)
+        if self._position is not None:
+            new[0] = bool((ticks[0] != self._position).any())
+        kept = new | (run.curve > 0)
+        return run if kept.all() else run.only(kept)
+
+    def _emit(self, run: Run, dwell: int = 0) -> Iterator[bytes]:
+        if len(run):
+            self._position = self._last = run.ticks[-1]
+            yield self.writer.text(run, dwell)
+
+
+def _with_starts(program: Program) -> tuple[Statement, ...]:
+    """Statements of the program, and one for every FROM, which is a pose there, behind what stands before it."""
+    starts = np.flatnonzero(program.kind == Move.FROM).tolist()
+    if not starts:
+        return program.statements
+    said = [
+        Statement(pose, int(program.line[pose]), "FROM", tuple((program.tip[pose] / program.mm_per_unit).tolist()))
+        for pose in starts
+    ]
+    return tuple(sorted((*program.statements, *said), key=lambda statement: (statement.pose, statement.word == "FROM")))

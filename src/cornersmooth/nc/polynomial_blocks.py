@@ -1,0 +1,200 @@
+"""How transitions are written as polynomials: a cubic for every knot interval, where all weights are 1."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.model import Bools, Floats, Ints, Units
+from cornersmooth.nc.curve_blocks import Curves, KnotBlocks, NoCurves, RotaryKnotBlocks, SplineBlocks
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.run import Run
+from cornersmooth.text import RowFormat, format_number, to_ticks
+
+#: control points that a curve has more than knot intervals
+_DEGREE = 3
+
+
+def curves_for(form: Form, units: Units) -> Curves:
+    """Way to write curves of a form."""
+    decimals = form.table.digits.weight
+    if form.curve == "g6.2":
+        blank = b" " if form.mode.motion.spaces else b""
+        return RotaryKnotBlocks(decimals, blank) if form.rotary else KnotBlocks(decimals, blank)
+    if form.curve == "bspline":
+        return SplineBlocks(decimals)
+    if form.curve == "poly":
+        return PolyBlocks(form, units)
+    if form.curve == "spl":
+        return SplBlocks(form, units)
+    return NoCurves()
+
+
+class _Polynomials(NoCurves):
+    """One block for each knot interval, in the last rows of a curve.
+
+    Parameters
+    ----------
+    decimals : tuple of int
+        Of the words of lines.
+    """
+
+    def __init__(self, decimals: tuple[int, ...]) -> None:
+        self._line_decimals = decimals
+
+    def prepare(self, run: Run) -> Run:
+        """Leave the rows that carry an interval; curves begin where the block before ended, digit for digit."""
+        first = np.flatnonzero(run.curve == 1)
+        if len(first):
+            assert run.bezier is not None
+            run.bezier[first + _DEGREE, 0] = run.ticks[first] / 10.0 ** np.array(self._line_decimals)
+        return run.only((run.curve == 0) | (run.curve > _DEGREE))
+
+    def _intervals(self, run: Run, curved: Bools) -> NDArray[np.float64]:
+        """Bézier points (4, r, c) of the rows on curves."""
+        assert run.bezier is not None
+        return np.moveaxis(run.bezier[curved], 1, 0)
+
+
+class PolyBlocks(_Polynomials):
+    """Siemens' POLY: ``PO[X]=(end, a2, a3)`` of a parameter from 0 to 1.
+
+    The control takes a0 from where the block before ended and a1 = end − a0 − a2 − a3. Only for weights 1: the
+    denominator of POLY acts on the geometry axes alone.
+    """
+
+    def __init__(self, form: Form, units: Units) -> None:
+        super().__init__(form.decimals(units))
+        digits, tip = form.table.digits, form.tip_decimals(units)
+        letters = [word.rstrip("=") for word in (*form.mode.motion.coordinates, *form.other_words)]
+        words = []
+        for index, letter in enumerate(letters):
+            words += [f"{') ' if index else ''}PO[{letter}]=(".encode(), b",", b","]
+        self._decimals = (tip, digits.coefficient, digits.coefficient) * len(letters)
+        self.format = RowFormat(words=tuple(words), decimals=self._decimals)
+
+    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """``POLY``."""
+        chosen[run.curve > 0] = len(table)
+        table.append(b"POLY ")
+        return 0
+
+    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
+        """Length of the parameter interval."""
+        chosen[run.curve > 0] = len(table)
+        table.append(b") PL=1\n")
+
+    def numbers(self, run: Run, curved: Bools) -> Ints:
+        """End point and coefficients of each interval, axis by axis."""
+        start, first, second, end = self._intervals(run, curved)
+        square, cube = 3.0 * (start - 2.0 * first + second), end - 3.0 * second + 3.0 * first - start
+        numbers = np.stack((end, square, cube), axis=2).reshape(len(end), -1)
+        return to_ticks(numbers, self._decimals)
+
+
+class SplBlocks(_Polynomials):
+    """Heidenhain's SPL (iTNC 530): end point, then ``K3X K2X K1X K3Y ...`` of a parameter that runs from 1 to 0.
+
+    X(t) = K3·t³ + K2·t² + K1·t + X; where the block starts is said again by the sum and may differ by a micrometre.
+    """
+
+    def __init__(self, form: Form, units: Units) -> None:
+        super().__init__(form.decimals(units))
+        letters = (*form.mode.motion.coordinates, *form.other_words)
+        self._decimals, self._coefficient = form.decimals(units), form.table.digits.coefficient
+        self.format = _SplFormat(letters, self._decimals, self._coefficient)
+
+    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """``SPL``."""
+        chosen[run.curve > 0] = len(table)
+        table.append(b"SPL ")
+        return 0
+
+    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
+        """Line ends."""
+        chosen[run.curve > 0] = 0
+
+    def numbers(self, run: Run, curved: Bools) -> Ints:
+        """End point, then K3, K2 and K1 of each axis."""
+        end, second, first, start = self._intervals(run, curved)[::-1]
+        slope, square = 3.0 * (second - end), 3.0 * (end - 2.0 * second + first)
+        cube = start - 3.0 * first + 3.0 * second - end
+        factors = np.stack((cube, square, slope), axis=2).reshape(len(end), -1)
+        return np.concatenate((to_ticks(end, self._decimals), to_ticks(factors, self._coefficient)), axis=1)
+
+
+class _SplFormat:
+    """Rows of SPL: coefficients of ten and more have an exponent, so rows are put together one by one."""
+
+    def __init__(self, letters: Sequence[str], decimals: Sequence[int], coefficient: int) -> None:
+        self._letters, self._decimals, self._digits = letters, decimals, coefficient
+
+    def rows(
+        self, ticks: Ints, prefix: Sequence[bytes], prefix_id: Ints, suffix: Sequence[bytes], suffix_id: Ints
+    ) -> tuple[bytes, Ints]:
+        """Text, and where each row starts in it."""
+        axes = len(self._letters)
+        texts = []
+        for row, numbers in enumerate(ticks.tolist()):
+            words = [
+                letter + format_number(number / 10.0**decimals, decimals, plus=True)
+                for letter, number, decimals in zip(self._letters, numbers[:axes], self._decimals, strict=True)
+            ]
+            words += [
+                f"K{3 - place % 3}{self._letters[place // 3]}{self._coefficient(number)}"
+                for place, number in enumerate(numbers[axes:])
+            ]
+            texts.append(prefix[int(prefix_id[row])] + " ".join(words).encode() + suffix[int(suffix_id[row])])
+        offsets = np.concatenate(([0], np.cumsum([len(text) for text in texts]))).astype(np.int64)
+        return b"".join(texts), offsets
+
+    def _coefficient(self, ticks: int) -> str:
+        value = ticks / 10.0**self._digits
+        if abs(value) < 10.0:
+            return format_number(value, self._digits, plus=True)
+        mantissa, exponent = f"{value:+.8E}".split("E")
+        return f"{mantissa}E{exponent[0]}{int(exponent[1:]):03d}"
+
+
+def bezier_points(points: Floats, curve: NDArray[np.int8]) -> Floats:
+    """Bézier points of the knot intervals of curves, in the last rows of each; zero elsewhere.
+
+    Parameters
+    ----------
+    points : (r, c) float64
+        Control points; p rows for a curve of p − 3 equal knot intervals, all weights 1.
+    curve : (r,) int8
+        As in `Rows`.
+
+    Returns
+    -------
+    (r, 4, c) float64
+    """
+    intervals = np.zeros((len(points), 4, points.shape[1]))
+    first = np.flatnonzero(curve == 1)
+    ends = np.append(np.flatnonzero((curve[1:] <= 1) & (curve[:-1] > 0)) + 1, len(curve) if curve[-1] > 0 else [])
+    counts = (ends - first).astype(np.int64)
+    for count in np.unique(counts).tolist():
+        begin = first[counts == count]
+        own = points[begin[:, None] + np.arange(count)]
+        bezier = (_bezier_matrix(count) @ own).reshape(len(begin), count - _DEGREE, 4, -1)
+        intervals[begin[:, None] + np.arange(_DEGREE, count)] = bezier
+    return intervals
+
+
+@cache
+def _bezier_matrix(points: int) -> Floats:
+    """Matrix from control points to the Bézier points of all knot intervals, four rows each."""
+    from scipy.interpolate import BSpline
+
+    spans = points - _DEGREE
+    knots = np.concatenate(([0.0] * _DEGREE, np.arange(spans + 1.0), [float(spans)] * _DEGREE))
+    share = np.array([0.0, 1.0, 2.0, 3.0]) / 3.0
+    bernstein = np.stack(((1 - share) ** 3, 3 * share * (1 - share) ** 2, 3 * share**2 * (1 - share), share**3), axis=1)
+    places = (np.arange(spans)[:, None] + share).ravel()
+    basis = BSpline(knots, np.eye(points), _DEGREE)(places).reshape(spans, 4, points)
+    matrix: Floats = (np.linalg.inv(bernstein) @ basis).reshape(-1, points)
+    return matrix

@@ -1,0 +1,182 @@
+"""What stands around the motion: head and tail, program name, block numbers, the user's own texts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from cornersmooth.errors import OutputError, SettingsError
+from cornersmooth.model import Program
+from cornersmooth.nc.control import TextStyle
+from cornersmooth.nc.form import Form
+from cornersmooth.text import format_number
+
+#: share of the tolerance that a control may blend lines with, where it is told so
+BLEND_SHARE = 0.1
+
+#: decimals of that
+_BLEND_DECIMALS = 5
+
+
+class Stream(Protocol):
+    """What text is written to."""
+
+    def write(self, data: bytes, /) -> object:
+        """Write the bytes."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a user wants around the motion.
+
+    Parameters
+    ----------
+    program : str or None
+        Name or number of the program; None for that of the control's table.
+    block_numbers : bool
+        Whether blocks are numbered where the control does not ask for it.
+    header, footer : tuple of str
+        Lines behind the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``.
+    comments : bool
+        Whether what the CL file says in words is written.
+    """
+
+    program: str | None = None
+    block_numbers: bool = False
+    header: tuple[str, ...] = ()
+    footer: tuple[str, ...] = ()
+    comments: bool = True
+
+    def start(self, stream: Stream, form: Form, program: Program, tolerance: float) -> FramedText:
+        """Frame for one text.
+
+        Raises
+        ------
+        SettingsError
+            A line of header or footer has unknown braces or characters that NC text cannot hold.
+        """
+        layout = form.table.layout
+        if self.program is not None and not re.fullmatch(layout.program_pattern or ".*", self.program):
+            raise SettingsError(
+                "CS216", f"{form.control} takes no program name {self.program!r}", f"use one like {layout.program}"
+            )
+        values = {
+            "program": self.program or layout.program,
+            "units": layout.units[program.units],
+            "blend": blend_word(tolerance / program.mm_per_unit),
+        }
+        number = layout.block_number or ("N{number} " if self.block_numbers else "")
+        return FramedText(
+            stream,
+            before=[*_filled(layout.head, values), *_filled(self.header, values)],
+            after=[*_filled(self.footer, values), *_filled(layout.tail, values)],
+            number=number,
+            layout=layout,
+            next_number=layout.number_start,
+        )
+
+
+def blend_word(tolerance: float) -> str:
+    """A tenth of ε; never zero, which would lift all limits."""
+    return format_number(max(BLEND_SHARE * tolerance, 10.0**-_BLEND_DECIMALS), _BLEND_DECIMALS)
+
+
+@dataclass
+class FramedText:
+    """Writes one text; numbers its blocks where asked for.
+
+    Parameters
+    ----------
+    stream : binary stream
+    before, after : list of str
+    number : str
+        With ``{number}``; empty for none.
+    """
+
+    stream: Stream
+    before: list[str]
+    after: list[str]
+    number: str
+    layout: TextStyle
+    next_number: int
+    blocks: int = 0  #: in head and tail
+
+    def head(self) -> None:
+        """Write what stands before the motion."""
+        self._write_lines(self.before)
+
+    def tail(self, last: Sequence[str]) -> None:
+        """Write what stands behind the motion, its own last blocks first."""
+        self._write_lines([*last, *self.after])
+
+    def write(self, text: bytes) -> None:
+        """Write whole lines."""
+        if self.number:
+            text = self._numbered(text)
+        longest = self.layout.longest_block
+        if longest and _longest_line(text) > longest:
+            text = b"".join(self._folded(line) for line in text.splitlines(keepends=True))
+        self.stream.write(text)
+
+    def _write_lines(self, lines: list[str]) -> None:
+        self.blocks += len(lines)
+        if lines:
+            self.write("".join(line + "\n" for line in lines).encode("ascii"))
+
+    def _numbered(self, text: bytes) -> bytes:
+        before, _, behind = self.number.partition("{number}")
+        head, tail = before.encode(), behind.encode()
+        lines = text.splitlines(keepends=True)
+        parts = []
+        number, step, last = self.next_number, self.layout.number_step, self.layout.number_last
+        for line in lines:
+            if line in (b"%\n", b"\n"):
+                parts.append(line)
+            else:
+                parts.append(b"%b%d%b%b" % (head, number, tail, line))
+                number += step
+                if last and number > last:
+                    number = self.layout.number_start
+        self.next_number = number
+        return b"".join(parts)
+
+    def _folded(self, line: bytes) -> bytes:
+        """Line in parts that are short enough, where the control knows such."""
+        longest, end = self.layout.longest_block, self.layout.continuation.encode()
+        parts = []
+        rest = line[:-1]
+        while len(rest) > longest:
+            at = rest.rfind(b" ", 0, longest - len(end) + 1) if end else -1
+            if at <= 0:
+                raise OutputError(
+                    "CS302",
+                    f"a block of {len(rest)} characters is too long for the control, which takes {longest}",
+                    "shorten it: " + rest[:40].decode("ascii") + " ...",
+                )
+            parts.append(rest[:at] + end)
+            rest = rest[at + 1 :]
+        return b"\n".join([*parts, rest]) + b"\n"
+
+
+def _longest_line(text: bytes) -> int:
+    """Characters of the longest line, without its end."""
+    ends = np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n"))
+    return int(np.diff(ends, prepend=-1).max()) - 1 if len(ends) else 0
+
+
+def _filled(lines: Sequence[str], values: dict[str, str]) -> list[str]:
+    filled = []
+    for line in lines:
+        try:
+            text = line.format(**values) if "{" in line or "}" in line else line
+        except (KeyError, IndexError, ValueError) as error:
+            known = ", ".join(f"{{{name}}}" for name in values)
+            raise SettingsError("CS216", f"{line!r} has unknown braces", f"use {known}") from error
+        if not (text.isascii() and text.isprintable()):
+            raise SettingsError("CS216", f"{line!r} has characters that NC text cannot hold", "use ASCII")
+        filled.append(text)
+    return filled

@@ -1,0 +1,167 @@
+"""Rows in rotary words of a machine: angles for tool vectors, points where angles need them, inverse time.
+
+Solution and turn of the rotary axes are chosen with a look ahead over the whole path, so all of its rows are held at
+once here.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+
+import numpy as np
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics import inverse_time
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import TIP_SHARE, Form
+from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves, rotary_angles
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.smoothing.sampling import Rows
+
+#: rows handed on at a time
+_CHUNK = 32768
+
+#: deg/min that no rotary axis exceeds where we time its blocks ourselves
+_FASTEST_TURN = 36_000.0
+
+#: degrees that a rotary axis turns in one block of a cut at most: far from the half turn where some controls go the
+#: other way round
+LARGEST_TURN = 60.0
+
+#: turns below this many degrees are none
+_NO_TURN = 1e-9
+
+
+def rotary_rows(
+    rows: Iterator[Rows], program: Program, settings: Settings, form: Form, findings: Findings
+) -> Iterator[Rows]:
+    """Rows of lines with the words of the form's machine in `Rows.other`, in the order of its axes.
+
+    Parameters
+    ----------
+    rows : iterator of Rows
+        From `dense_rows`, with tool vectors.
+    findings : Findings
+        Takes what the kinematics notice.
+
+    Raises
+    ------
+    InputError
+        The machine cannot follow the path.
+    """
+    machine = form.machine
+    if machine is None:
+        raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
+    tip, axis, move = _whole(rows)
+    if not len(move):
+        return
+    rapid, line, file = rapid_moves(program.kind)[move], program.line[move], program.source.name
+    tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_length)
+    path = rotary_angles(machine, tip, axis, tolerance=tolerance, rapid=rapid, line=line, file=file)
+    for finding in path.findings:
+        findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
+    timed = _timed_cuts(path.angles, move, program) if form.orientation == "machine" else None
+    inserted, first_inserted, unsolved = 0, 0, []
+    for begin in range(0, max(len(move) - 1, 1), _CHUNK):
+        here = slice(begin, begin + _CHUNK + 1)  # the last row of a chunk is the start of the next
+        more = insertions(
+            machine,
+            tip[here],
+            axis[here],
+            path.angles[here],
+            tolerance=tolerance,
+            rapid=rapid[here],
+            tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
+            max_step=min(settings.axis_step or LARGEST_TURN, LARGEST_TURN),
+            line=line[here],
+            file=file,
+        )
+        if len(more) and not inserted:
+            first_inserted = int(line[here][more.segment[0] + 1])
+        inserted += len(more)
+        unsolved += line[here][more.unsolved + 1].tolist()
+        filled = fill(tip[here], axis[here], path.angles[here], more)
+        rate = _rates(filled, move[here], None if timed is None else timed[here], program, settings, form)
+        own = slice(1 if begin else 0, None)
+        count = len(filled.pose[own])
+        yield Rows(
+            tip=filled.tip[own],
+            other=filled.angles[own],
+            move=move[here][filled.pose[own]],
+            curve=np.zeros(count, np.int8),
+            joined=np.zeros(count, np.bool_),
+            rate=None if rate is None else rate[own],
+        )
+    if unsolved:
+        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
+        findings.add("CS369", "warning", unsolved[0], text, len(unsolved))
+    if inserted:
+        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
+        findings.add("CS367", "note", first_inserted, text, inserted)
+
+
+def _whole(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:
+    """Tip, axis and move of all rows; what they were gathered in is given back part by part."""
+    tips: deque[Floats] = deque()
+    axes: deque[Floats] = deque()
+    moves: deque[Ints] = deque()
+    for chunk in rows:
+        tips.append(chunk.tip)
+        axes.append(chunk.other)
+        moves.append(chunk.move)
+    total = sum(map(len, moves))
+    tip, axis, move = np.empty((total, 3)), np.empty((total, 3)), np.empty(total, np.int64)
+    for whole, parts in ((tip, tips), (axis, axes), (move, moves)):
+        begin = 0
+        while parts:
+            part = parts.popleft()
+            whole[begin : begin + len(part)] = part
+            begin += len(part)
+    return tip, axis, move
+
+
+def _cuts(move: Ints, program: Program) -> Bools:
+    """(n,) rows of cuts with a feed per minute."""
+    cuts: Bools = ~rapid_moves(program.kind)[move] & (program.feed_mode[move] == FeedMode.PER_MINUTE)
+    return cuts
+
+
+def _timed_cuts(angles: Floats, move: Ints, program: Program) -> Bools:
+    """(n,) rows of cuts in which a rotary axis turns: a whole cut is timed in one way."""
+    cut = _cuts(move, program)
+    begins = cut & ~np.concatenate(([False], cut[:-1]))
+    run = np.cumsum(begins) - 1
+    turning = np.zeros(max(int(begins.sum()), 1), np.bool_)
+    turns = cut & (np.abs(np.diff(angles, axis=0, prepend=angles[:1])).max(axis=1) > _NO_TURN)
+    turning[run[turns]] = True
+    timed: Bools = cut & turning[np.maximum(run, 0)]
+    return timed
+
+
+def _rates(
+    path: FilledPath, move: Ints, timed: Bools | None, program: Program, settings: Settings, form: Form
+) -> Floats | None:
+    """(m,) moves per minute where blocks are timed by us, NaN elsewhere; None where none is.
+
+    `timed` says which rows without inserted ones; else it is every block in which only rotary axes turn, for controls
+    that want it. Where the tip stands still, the axis point runs with the feed.
+    """
+    if timed is None and not form.mode.timed_turns:
+        return None
+    own = move[path.pose]
+    step = np.diff(path.tip, axis=0, prepend=path.tip[:1])
+    swing = step + settings.axis_length * np.diff(path.axis, axis=0, prepend=path.axis[:1])
+    length = norm(step)
+    still = length < form.rounding(program.units)
+    turn = np.abs(np.diff(path.angles, axis=0, prepend=path.angles[:1])).max(axis=1)
+    chosen = _cuts(own, program) & still & (turn > _NO_TURN) if timed is None else timed[path.pose]
+    if not chosen.any():
+        return None
+    way = np.where(still, norm(swing), length)
+    rate = np.full(len(own), np.nan)
+    rate[chosen] = inverse_time(way[chosen], program.feed[own[chosen]], turn[chosen], _FASTEST_TURN)
+    rate[~np.isfinite(rate)] = np.nan
+    return rate

@@ -1,0 +1,359 @@
+"""CL statements as NC words: what the program says between its moves.
+
+What a machinist reads becomes a comment without its CL word (PPRINT, REMARK, TPRINT and the like); what describes the
+file or the tool becomes a comment as it stands; PAINT only tells the CAM screen what to draw and is left out. Whatever
+is not understood becomes a comment and a counted warning, never an NC word by guess.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from cornersmooth.model import Move, Program, Statement
+from cornersmooth.nc.comments import comment_lines
+from cornersmooth.nc.control import Words
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.holes import Cycle, read_cycle
+from cornersmooth.nc.spindle import milliseconds, revolutions
+from cornersmooth.nc.statement_args import number_after, numbers_of, spoken_text, whole_number, words_of
+from cornersmooth.text import format_number
+
+#: words whose text is for the machinist: comments without the word
+_TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
+
+#: words that describe the file or the tool: comments, nothing to warn of
+_DESCRIBING = frozenset(
+    "PARTNO TLDATA MSYS CSYS CUTTER INTOL OUTTOL TOLER MULTAX UNITS UNIT MACHIN TLAXIS TRNTYP SYN PPFUN ISN TOOLNO "
+    "CSI_SET_FLUTE_LENGTH CSI_SET_EXTENSION_LENGTH".split()
+) | {"TOOL PATH"}
+
+#: words that say nothing beside what the NC text shows anyway
+_SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})
+
+_TOOL_WORDS = frozenset({"LOADTL", "LOAD", "TURRET"})
+
+_NC_WORDS = re.compile(r"\s*(?:[A-Z][+-]?(?:\d+\.?\d*|\.\d+)\s*)+[$%]?\s*", re.IGNORECASE)
+
+
+@dataclass
+class StatementWriter:
+    """Turns statements into NC blocks, remembering what the machine would.
+
+    Parameters
+    ----------
+    form : Form
+    program : Program
+    findings : Findings
+        Takes what is noticed.
+    values : mapping
+        What stands for braces in the blocks of extras.
+    comments : bool
+        Whether comments are written.
+    """
+
+    form: Form
+    program: Program
+    findings: Findings
+    values: Mapping[str, str] = field(default_factory=dict)
+    comments: bool = True
+    plane: int = 17  #: the plane selected, kept by who writes the motion
+    changed: bool = False  #: a tool change left the machine elsewhere
+    cycle: Cycle | None = None  #: the hole cycle in force, None where it is not understood
+    speed: float | None = None  #: of the spindle, revolutions per minute
+    _compensated: bool = False
+    _tool: int | None = None
+    _offset: int = 1
+    _tip_control: bool = False
+    _direction: str = "clockwise"
+    _diameter: float = 0.0
+    _last_cycle: Cycle | None = None
+    words: Words = field(init=False)
+    _toolno_loads: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.words = self.form.table.words
+        said = {statement.word for statement in self.program.statements}
+        self._toolno_loads = not _TOOL_WORDS & said
+
+    def blocks(self, statement: Statement) -> list[str]:
+        """NC blocks of one statement, without line ends."""
+        word = statement.word
+        handler = _HANDLERS.get(word)
+        if handler is not None:
+            written = handler(self, statement)
+            if written is not None:
+                return written
+            self._not_understood(statement)
+        elif word in _TEXT_WORDS:
+            return self.comment(spoken_text(statement))
+        elif word in _SILENT:
+            return []
+        elif word not in _DESCRIBING:
+            self._not_understood(statement)
+        return self.comment(statement.text or word)
+
+    def only_counted(self, statement: Statement) -> bool:
+        """Whether a statement says nothing to the control; it has been counted then."""
+        if statement.word != "PAINT":
+            return False
+        self.paint(statement)
+        return True
+
+    def begin_motion(self) -> list[str]:
+        """Blocks needed before the next motion: tool tip control, where it is off."""
+        if self._tip_control:
+            return []
+        self._tip_control = True
+        return [
+            *self._extras("on", outside=True),
+            *(block.format(offset=self._offset) for block in self.form.mode.on),
+            *self._extras("on", outside=False),
+        ]
+
+    def end_motion(self) -> list[str]:
+        """Blocks that switch tool tip control off, where it is on."""
+        if not self._tip_control:
+            return []
+        self._tip_control = False
+        return [*self._extras("off", outside=False), *self.form.mode.off, *self._extras("off", outside=True)]
+
+    def _extras(self, side: str, *, outside: bool) -> list[str]:
+        extras = self.form.extras if side == "on" else self.form.extras[::-1]
+        return [
+            block.format(**self.values)
+            for extra in extras
+            if extra.outside is outside
+            for block in getattr(extra, side)
+        ]
+
+    def end_compensation(self) -> list[str]:
+        """Blocks that switch cutter compensation off, where it is on."""
+        blocks = list(self.words.compensation_off) if self._compensated else []
+        self._compensated = False
+        return blocks
+
+    def comment(self, text: str) -> list[str]:
+        """Comments that hold a text."""
+        if not self.comments:
+            return []
+        layout = self.form.table.layout
+        return comment_lines(text, layout.comment, layout.comment_orders)
+
+    def _not_understood(self, statement: Statement) -> None:
+        text = f"{statement.word} is not translated; written as a comment"
+        self.findings.add("CS310", "warning", statement.line, text)
+
+    def load(self, statement: Statement) -> list[str] | None:
+        """LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]."""
+        words, numbers = words_of(statement), numbers_of(statement)
+        if statement.word == "LOAD" and words[:1] != ["TOOL"]:
+            return None
+        if not numbers and statement.word == "LOADTL" and words and re.fullmatch(r"T\d+", words[0]):
+            numbers = [float(words[0][1:])]
+        number = whole_number(numbers[:1])
+        if number is None:
+            return None
+        offset = whole_number(number_after(statement, "ADJUST") or number_after(statement, "OSETNO"))
+        offset = number if offset is None else offset
+        if (number, offset) == (self._tool, self._offset):  # CATIA loads a tool twice: at the change, in the operation
+            return self.comment(statement.text)
+        blocks = self.end_motion()
+        if number != self._tool:
+            blocks += [block.format(tool=number) for block in self.words.tool_change]
+            self.changed = True
+        self._tool, self._offset = number, offset
+        return blocks
+
+    def toolno(self, statement: Statement) -> list[str] | None:
+        """TOOLNO/n,...: describes the tool that LOADTL loads; without any such statement it loads itself."""
+        return self.load(statement) if self._toolno_loads else self.comment(statement.text)
+
+    def select(self, statement: Statement) -> list[str] | None:
+        """SELECT/TOOL,n: brings the next tool near."""
+        number = whole_number(numbers_of(statement))
+        if number is None or words_of(statement) != ["TOOL"]:
+            return None
+        if number == self._tool:
+            return self.comment(statement.text)
+        blocks = [block.format(tool=number) for block in self.words.tool_select]
+        return blocks or self.comment(statement.text)
+
+    def cutter(self, statement: Statement) -> list[str]:
+        """CUTTER/d,r,e,... and TLDATA/MILL,d,...: the diameter is kept; CUTTER/d alone is the nose of a lathe tool."""
+        numbers = numbers_of(statement)
+        mill = {"MILL", "DRILL"} & set(words_of(statement)) if statement.word == "TLDATA" else len(numbers) > 2
+        self._diameter = numbers[0] * self.program.mm_per_unit if mill and numbers else 0.0
+        return self.comment(statement.text)
+
+    def spindle(self, statement: Statement) -> list[str] | None:
+        """SPINDL in every order of its words."""
+        words, numbers = words_of(statement), numbers_of(statement)
+        for word in ("RANGE", "MAXRPM"):  # gears and limits are the control's own affair
+            if word in words:
+                following = number_after(statement, word)
+                words = [other for other in words if other not in (word, "HIGH", "LOW", "MEDIUM")]
+                for number in following:
+                    numbers.remove(number)
+        if not set(words) <= {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}:
+            return None
+        if "LOCK" in words or "ORIENT" in words:
+            return None if numbers else list(self.words.spindle_orient) or None
+        if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
+            return list(self.words.spindle_off) or None
+        if len(numbers) > 1 or any(number < 0.0 for number in numbers):
+            return None
+        cutting = next((unit for unit in ("SFM", "SMM") if unit in words), None)
+        speed = numbers[0] if numbers else None
+        if cutting is not None and speed is not None:
+            speed = revolutions(speed, cutting, self._diameter)
+            if speed is None:
+                return None
+            speed = float(round(speed))
+            text = f"SPINDL in {cutting} is written as revolutions at the cutter's diameter"
+            self.findings.add("CS322", "note", statement.line, text)
+        if "CLW" in words or "CCLW" in words:
+            self._direction = "counterclockwise" if "CCLW" in words else "clockwise"
+        direction = getattr(self.words, self._direction)
+        if speed is None:
+            return [direction]
+        self.speed = speed
+        digits = format_number(speed, self.form.table.digits.speed, trim=True).rstrip(".")
+        return [block.format(speed=digits, direction=direction) for block in self.words.spindle_speed]
+
+    def coolant(self, statement: Statement) -> list[str] | None:
+        """COOLNT/ON, OFF, FLOOD, MIST and what else the control has; a bare COOLNT means ON."""
+        words = words_of(statement)
+        if not words and "/" not in statement.text:
+            words = ["ON"]
+        kinds = [word for word in words if word not in ("ON", "OFF")] or words[:1]
+        if numbers_of(statement) or len(kinds) != 1:
+            return None
+        if "OFF" in words or kinds == ["NOMORE"]:
+            return list(self.words.coolant.get("OFF", ())) or None
+        blocks = self.words.coolant.get(kinds[0])
+        return None if blocks is None else list(blocks)
+
+    def delay(self, statement: Statement) -> list[str] | None:
+        """DELAY/seconds and DELAY/n,REV."""
+        numbers, words = numbers_of(statement), words_of(statement)
+        if len(numbers) != 1 or words not in ([], ["REV"]):
+            return None
+        time = milliseconds(numbers[0], "REV" in words, self.speed)
+        if time is None:
+            return None
+        return self.dwell(time) if self.words.dwell else None
+
+    def dwell(self, time: int) -> list[str]:
+        """Blocks that wait for so many milliseconds."""
+        seconds = format_number(time / 1000.0, 3, trim=True)
+        return [block.format(milliseconds=time, seconds=seconds) for block in self.words.dwell] if time else []
+
+    def compensation(self, statement: Statement) -> list[str] | None:
+        """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF."""
+        words, numbers = words_of(statement), numbers_of(statement)
+        if words[:1] in (["OFF"], ["NOMORE"]):
+            self._compensated = False
+            return list(self.words.compensation_off) or None
+        planes = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
+        side = {"LEFT": self.words.compensation_left, "RIGHT": self.words.compensation_right}.get((words or [""])[0])
+        register = whole_number(numbers or [float(self._offset)])
+        if not side or len(words) > 2 or not set(words[1:]) <= planes.keys() or register is None:
+            return None
+        self.findings.add(
+            "CS319",
+            "warning",
+            statement.line,
+            "cutter compensation is left to the control, which offsets the path in the plane and not along the tool; "
+            "see that it may be used with tool tip control, and that the register holds what the CAM system meant",
+        )
+        self._compensated = True
+        blocks = []
+        plane = planes[words[1]] if len(words) > 1 else 17
+        if plane != self.plane:
+            self.plane = plane
+            blocks += [self.words.plane[plane]] if plane in self.words.plane else []
+        return [*blocks, *(block.format(register=register) for block in side)]
+
+    def hole_cycle(self, statement: Statement) -> list[str]:
+        """CYCLE: kept for the holes that follow."""
+        words = words_of(statement)
+        if words[:1] in (["OFF"], ["NOMORE"]):
+            self.cycle = None
+            return []
+        if words == ["ON"]:
+            self.cycle = self._last_cycle
+        elif words != ["INIT"]:  # SolidWorks announces a cycle by it
+            self.cycle = self._last_cycle = read_cycle(statement.args, self.program, self.speed)
+        if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
+            text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
+            self.findings.add("CS321", "warning", statement.line, text)
+        return self.comment(statement.text)
+
+    def end(self, statement: Statement) -> list[str]:
+        """END: the end of the text; in the middle of the path a stop."""
+        if not (self.program.kind[statement.pose :] != Move.FROM).any():
+            return []
+        text = "END stands before the last motion; written as a program stop"
+        self.findings.add("CS318", "warning", statement.line, text)
+        return [*self.comment(statement.text), *self.words.stop]
+
+    def insert(self, statement: Statement) -> list[str]:
+        """INSERT: text for the NC file; as a comment, since nobody has looked at what it does."""
+        text = spoken_text(statement)
+        if _NC_WORDS.fullmatch(text):
+            what = "INSERT with NC words is written as a comment; where the machine needs them, put them in by hand"
+            self.findings.add("CS320", "warning", statement.line, what)
+        return self.comment(text)
+
+    def auxiliary(self, statement: Statement) -> list[str] | None:
+        """AUXFUN/n: M code n, unless it ends the program or calls another."""
+        number = whole_number(numbers_of(statement))
+        if number is None or words_of(statement) or number in (2, 6, 30, 98, 99):
+            return None
+        return [f"M{number}"]
+
+    def paint(self, statement: Statement) -> list[str]:
+        """PAINT: colours and speeds of the CAM system's screen."""
+        text = "PAINT is left out: it only says what the CAM screen shows"
+        self.findings.add("CS317", "note", statement.line, text)
+        return []
+
+    def mode(self, statement: Statement) -> list[str] | None:
+        """SET/MODE,ABSOL: positions are absolute, as ours always are."""
+        return self.comment(statement.text) if words_of(statement) == ["MODE", "ABSOL"] else None
+
+    def start(self, statement: Statement) -> list[str]:
+        """FROM: a position that is stated; the tool is not sent there."""
+        decimals = self.form.tip_decimals(self.program.units)
+        numbers = (format_number(value, decimals, trim=True) for value in numbers_of(statement))
+        place = " ".join(letter + number for letter, number in zip("XYZ", numbers, strict=True))
+        return self.comment(f"FROM {place}")
+
+
+Handler = Callable[[StatementWriter, Statement], list[str] | None]
+
+_HANDLERS: dict[str, Handler] = {
+    "LOADTL": StatementWriter.load,
+    "LOAD": StatementWriter.load,
+    "TURRET": StatementWriter.load,
+    "TOOLNO": StatementWriter.toolno,
+    "SELECT": StatementWriter.select,
+    "CUTTER": StatementWriter.cutter,
+    "TLDATA": StatementWriter.cutter,
+    "SPINDL": StatementWriter.spindle,
+    "COOLNT": StatementWriter.coolant,
+    "DELAY": StatementWriter.delay,
+    "CUTCOM": StatementWriter.compensation,
+    "CYCLE": StatementWriter.hole_cycle,
+    "STOP": lambda writer, statement: list(writer.words.stop) or None,
+    "OPSTOP": lambda writer, statement: list(writer.words.optional_stop) or None,
+    "END": StatementWriter.end,
+    "INSERT": StatementWriter.insert,
+    "AUXFUN": StatementWriter.auxiliary,
+    "PAINT": StatementWriter.paint,
+    "SET": StatementWriter.mode,
+    "FROM": StatementWriter.start,
+}

@@ -1,0 +1,50 @@
+"""What is said of a text before it is written: what the control does with arcs, feeds and single splines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import FeedMode, Program, SmoothProgram
+from cornersmooth.nc.circles import Circles
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+from cornersmooth.rotary import rapid_moves
+
+
+def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings: Findings) -> None:
+    """Note what a user of the form should know of the program."""
+    _arcs(circles, smoothed.program, findings)
+    if form.orientation == "machine":
+        _feeds(smoothed.program, findings)
+    if form.curve == "bspline":
+        _single_splines(smoothed, findings)
+
+
+def _arcs(circles: Circles, program: Program, findings: Findings) -> None:
+    for chosen, code, text in (
+        (circles.blocks > 0, "CS313", "arc written as G2 or G3"),
+        (circles.blocks == 0, "CS314", "arc written as lines"),
+    ):
+        rows = np.flatnonzero(chosen)
+        if len(rows):
+            findings.add(code, "note", int(program.line[program.arcs.pose[rows[0]]]), text, len(rows))
+
+
+def _feeds(program: Program, findings: Findings) -> None:
+    cuts = ~rapid_moves(program.kind) & (program.feed_mode == FeedMode.PER_REVOLUTION)
+    rows = np.flatnonzero(cuts)
+    if len(rows):
+        text = "feed per revolution without tool tip control counts along the machine's axes; give feeds per minute"
+        findings.add("CS323", "warning", int(program.line[rows[0]]), text, len(rows))
+
+
+def _single_splines(smoothed: SmoothProgram, findings: Findings) -> None:
+    """Corners without a rounded one beside them: their four blocks are less than the six among ten that are wanted."""
+    corners, program = smoothed.corners, smoothed.program
+    rounded = np.zeros(len(program), np.bool_)
+    rounded[corners.pose[corners.smoothed]] = True
+    single = corners.smoothed & ~rounded[corners.before] & ~rounded[corners.after]
+    rows = np.flatnonzero(single)
+    if len(rows):
+        text = "BSPLINE of a single corner: SINUMERIK wants six spline blocks among ten; -f poly has no such rule"
+        findings.add("CS325", "warning", int(program.line[corners.pose[rows[0]]]), text, len(rows))

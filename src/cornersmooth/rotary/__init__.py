@@ -1,0 +1,16 @@
+"""Rotary angles along a path: one solution for every pose, points where angles need them, curves of angles."""
+
+from cornersmooth.rotary.angle_path import RotaryPath, rapid_moves, rotary_angles
+from cornersmooth.rotary.axis_findings import axis_rates
+from cornersmooth.rotary.insertion import FilledPath, Insertions, fill, insertions
+
+__all__ = [
+    "FilledPath",
+    "Insertions",
+    "RotaryPath",
+    "axis_rates",
+    "fill",
+    "insertions",
+    "rapid_moves",
+    "rotary_angles",
+]

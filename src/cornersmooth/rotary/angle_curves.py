@@ -1,0 +1,304 @@
+"""Smoothed orientation as NURBS in rotary axes: the angles as further axes of the tip curve.
+
+A control such as FANUC's G6.2 runs every axis of a curve on the same knots and weights, rotary axes among them, but
+knows no second curve for the tool axis. So both rotary angles get control points of their own, such that the tool axis
+they give follows the direction of Q(u) − P(u).
+
+Where the angles run evenly on both segments of a corner, the five angle control points follow from the corner as those
+of the tip do, and the angles are as smooth over the tip as the tip curve is: they join the straight motion with their
+curvature. Elsewhere, with large axis steps and near the pole, knots are inserted (which leaves the tip curve as it is),
+value and first two derivatives are kept at both joints, and the points between them are fitted. The derivatives are
+those of the straight lines beside, or, where that would take many knots, those of the ruled motion, which the lines
+follow by steps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.errors import Finding, SettingsError
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.poses import continued
+from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
+from cornersmooth.rotary.angle_fit import (
+    MEASURE_SAMPLES,
+    Targets,
+    end_points,
+    fit,
+    fit_samples,
+    leg_derivatives,
+    measured,
+)
+from cornersmooth.rotary.corner_lines import CornerLines, corner_lines
+from cornersmooth.rotary.insertion import Insertions
+from cornersmooth.rotary.nurbs_knots import SPANS, CurveGroup, refinement, weight_factors
+from cornersmooth.rotary.straight_motion import RotaryMotion, lever_points, rotary_motion
+from cornersmooth.settings import WEIGHT_DECIMALS
+from cornersmooth.smoothing import nurbs
+
+#: Numbers of knot intervals in the order of trial, and whether the rates of the ruled motion hold at the joints.
+TRIALS = tuple((spans, False) for spans in SPANS[:3]) + tuple((spans, True) for spans in SPANS[1:])
+#: Share of the allowance that a curve may take where it is measured; the rest is for what lies between.
+SHARE = 0.95
+#: An allowance below this share of the tolerance is nothing.
+LEAST_ALLOWANCE = 1e-3
+#: Samples on curves that are worked on at a time: their intermediate arrays fit the processor's cache.
+CHUNK = 1 << 15
+#: A curve on even segments whose angles vary by D (rad, both axes and both legs) errs by less than this times D² away
+#: from the pole. Where that is within the allowance the error has one hump on either half, and needs few samples.
+GENTLE, GENTLE_SAMPLES = 0.8, 4
+
+
+@dataclass(frozen=True)
+class RotaryCurves:
+    """Smoothed corners in rotary angles, and the straight motion between them.
+
+    Parameters
+    ----------
+    groups : tuple of CurveGroup
+        By the number of control points: 5, 7, 11, 19, 35; every smoothed corner is in one of them or in `lines`.
+    lines : CornerLines
+        Corners that no curve meets, as points of dense lines.
+    points : (k,) int64
+        Control points of each row of `Corners`; 0 where it is not smoothed or belongs to `lines`.
+    orientation_error : (k,) float64, degrees
+        As in the groups; NaN where `points` is 0.
+    start_angles, end_angles : (k, 2) float64, degrees
+        Angles at both joints of smoothed corners, NaN elsewhere.
+    pose_angles : (n, 2) float64, degrees
+        Angles at the poses that are passed; NaN where nothing is written (`Status.DUPLICATE`, `Move.FROM`). At a
+        rounded pose what its axis would need.
+    inserted : Insertions
+        Points that the straight remainders need so that even angles keep the tolerance: `segment` is the pose that the
+        straight motion leads to, `fraction` counts on the whole segment from the pose before (`Corners.before`) to it.
+        `unsolved` are poses into which no division helps.
+    even : (n,) bool
+        The segment into the pose runs evenly in its angles, joints included: no points inserted.
+    findings : tuple of Finding
+        Those of `rotary_angles`, and what became of corners that no curve meets.
+    """
+
+    groups: tuple[CurveGroup, ...]
+    lines: CornerLines
+    points: Ints
+    orientation_error: Floats
+    start_angles: Floats
+    end_angles: Floats
+    pose_angles: Floats
+    inserted: Insertions
+    even: Bools
+    findings: tuple[Finding, ...]
+
+
+def angle_allowance(smoothed: SmoothProgram, angle_resolution: float) -> Floats:
+    """What ε leaves for the fit of the orientation at each corner: (k,) degrees, 0 or more.
+
+    An axis that is off by δ moves the axis point by 2H sin(δ/2). Settings whose tolerance for the axis point is reduced
+    (`Settings.axis_point_resolution`) leave something to corners too that are limited by the tolerance.
+
+    Parameters
+    ----------
+    angle_resolution : float, degrees
+        Step of the written angles, half of which is taken off for each of the two.
+    """
+    settings = smoothed.settings
+    height = settings.axis_length
+    left = settings.tolerance - math.sqrt(3) / 2 * settings.tip_resolution - smoothed.corners.axis_error
+    left -= height * math.radians(angle_resolution)
+    allowance: Floats = np.degrees(2 * np.arcsin(np.clip(left / (2 * height), 0.0, 1.0)))
+    return allowance
+
+
+def rotary_curves(
+    smoothed: SmoothProgram,
+    machine: Machine,
+    *,
+    tolerance: float,
+    allowance: Floats | None = None,
+    file: str | None = None,
+) -> RotaryCurves:
+    """Control points of the rotary angles for all smoothed corners, on the knots and weights of their tip curves.
+
+    Parameters
+    ----------
+    smoothed : SmoothProgram
+        Made with the proportional method: only there P and Q run with one parameter.
+    machine : Machine
+    tolerance : float, degrees
+        Largest angle between the tool axis and that of the ruled motion on straight motion: ε at H where nothing else
+        deviates, less the rounding of the words.
+    allowance : (k,) float64, degrees, optional
+        Largest angle between the tool axis and the direction of Q(u) − P(u) for each row of `Corners`, joints included
+        (`angle_allowance`); `tolerance` for all by default. Smoothed corners with nothing left become `lines`.
+    file : str, optional
+        For messages.
+
+    Raises
+    ------
+    SettingsError
+        Another method (CS254), or a tolerance that is not positive (CS255).
+    InputError
+        The machine cannot follow the path (`rotary_angles`).
+    """
+    if smoothed.settings.method != "proportional":
+        raise SettingsError(
+            "CS254",
+            f"method {smoothed.settings.method} has no curves in rotary axes",
+            "use the method proportional, or write lines",
+        )
+    corners = smoothed.corners
+    allowed = np.full(len(corners), tolerance) if allowance is None else np.minimum(allowance, tolerance)
+    if not tolerance > 0:
+        raise SettingsError("CS255", f"orientation tolerance is {tolerance:g} deg", "give a positive angle")
+    allowed = np.where(allowed < LEAST_ALLOWANCE * tolerance, 0.0, allowed)
+    motion = rotary_motion(smoothed, machine, tolerance, allowed, file)
+    work = _Work(smoothed, machine, motion, allowed)
+    found, pending = [], np.arange(len(motion.rows))
+    for spans, ruled in TRIALS:
+        more, pending = work.trial(spans, ruled, pending)
+        found += more
+    start, end = np.full((2, len(corners), 2), np.nan)
+    pose, after = corners.pose[motion.rows], corners.after[motion.rows]
+    start[motion.rows], end[motion.rows] = motion.end.angles[pose], motion.start.angles[after]
+    lines = corner_lines(smoothed, machine, motion, pending, file)
+    findings = motion.findings + _lines_finding(smoothed, machine, motion.rows[pending])
+    rows, pose_angles, inserted, even = motion.rows, motion.pose_angles, motion.inserted, motion.even
+    del work, motion  # as large as what is made of it
+    groups = [
+        _group(smoothed, rows, spans, same)
+        for spans in SPANS
+        if (same := [part for part in found if part.spans == spans])
+    ]
+    points, error = np.zeros(len(corners), np.int64), np.full(len(corners), np.nan)
+    for group in groups:
+        points[group.row], error[group.row] = group.points, group.orientation_error
+    return RotaryCurves(tuple(groups), lines, points, error, start, end, pose_angles, inserted, even, findings)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Curves that keep their tolerance: numbers of corners in `RotaryMotion.rows`, and `CurveGroup.angles` and more."""
+
+    spans: int
+    numbers: Ints
+    angles: Floats
+    error: Floats
+    ruled: bool
+
+
+@dataclass(frozen=True)
+class _Work:
+    """All smoothed corners; methods take their numbers in `RotaryMotion.rows`."""
+
+    smoothed: SmoothProgram
+    machine: Machine
+    motion: RotaryMotion
+    allowed: Floats
+
+    def trial(self, spans: int, ruled: bool, chosen: Ints) -> tuple[list[_Found], Ints]:
+        """Curves on so many knot intervals, and the corners that are left over."""
+        found, open_ = [], [chosen[:0]]
+        if spans == SPANS[0]:
+            corners, rows = self.smoothed.corners, self.motion.rows[chosen]
+            even = self.motion.even[corners.pose[rows]] & self.motion.even[corners.after[rows]]
+            open_.append(chosen[~even])
+            chosen = chosen[even]
+        gentle = self.gentle(chosen)
+        for some, samples in ((chosen[gentle], GENTLE_SAMPLES), (chosen[~gentle], MEASURE_SAMPLES)):
+            size = max(1, CHUNK // (samples * spans))
+            for begin in range(0, len(some), size):
+                part = some[begin : begin + size]
+                points, error = self.curves(spans, ruled, part, samples)
+                met = error <= SHARE * self.allowed[self.motion.rows[part]]
+                if met.any():
+                    found.append(_Found(spans, part[met], points[met], error[met], ruled))
+                open_.append(part[~met])
+        return found, np.sort(np.concatenate(open_))
+
+    def gentle(self, chosen: Ints) -> Bools:
+        """Corners on even segments whose angles vary so little that few samples tell their error."""
+        corners, motion = self.smoothed.corners, self.motion
+        rows = motion.rows[chosen]
+        pose, after = corners.pose[rows], corners.after[rows]
+        here = motion.pose_angles[pose]
+        turn = np.abs(motion.end.angles[pose] - here).sum(axis=1) + np.abs(motion.start.angles[after] - here).sum(
+            axis=1
+        )
+        small = GENTLE * np.radians(turn) ** 2 <= SHARE * np.radians(self.allowed[rows])
+        gentle: Bools = small & motion.even[pose] & motion.even[after]
+        return gentle
+
+    def curves(self, spans: int, ruled: bool, chosen: Ints, samples: int) -> tuple[Floats, Floats]:
+        """Angle control points (g, p, 2) of some corners, and their errors (g,); infinite outside of the limits.
+
+        These are measured in so many `samples` in each knot interval.
+        """
+        refined, targets = refinement(spans), self.targets(chosen, ruled)
+        if spans == SPANS[0]:
+            start, end = end_points(refined, targets)
+            middle = (start[:, 2:] + end[:, :1]) / 2  # the same, but for where two transitions are joined
+            points = np.concatenate((start[:, :2], middle, end[:, 1:]), axis=1)
+        else:
+            fitted = fit_samples(refined)
+            points = fit(self.machine, refined, targets, self.exact(targets, chosen, fitted), fitted)
+        error, extremes = measured(self.machine, refined, targets, points, samples)
+        limits = self.machine.limits
+        slack = self.allowed[self.motion.rows[chosen], None]
+        inside = (extremes[:, :, 0] >= limits[:, 0] - slack) & (extremes[:, :, 1] <= limits[:, 1] + slack)
+        return points, np.where(inside.all(axis=1), error, np.inf)
+
+    def targets(self, chosen: Ints, ruled: bool) -> Targets:
+        """What the curves of some corners have to follow."""
+        corners, motion = self.smoothed.corners, self.motion
+        rows = motion.rows[chosen]
+        weights = nurbs.full_weights(corners.weights[rows])
+        slope, bend = (part[:, None] for part in leg_derivatives(weights, corners.ratio[rows]))
+        conditions = []
+        for side, pose, trim in (
+            (motion.ruled_end if ruled else motion.end, corners.pose[rows], corners.trim_in[rows, None]),
+            (motion.ruled_start if ruled else motion.start, corners.after[rows], -corners.trim_out[rows, None]),
+        ):
+            along, across = trim * side.slope[pose], trim**2 * side.bend[pose]
+            conditions.append((side.angles[pose], along * slope, along * bend + across * slope**2))
+        return Targets(lever_points(self.smoothed, rows), weights, conditions[0], conditions[1])
+
+    def exact(self, targets: Targets, chosen: Ints, samples: Floats) -> Floats:
+        """Angles that give the wanted axes of some corners at common parameters: (g, m, 2) degrees."""
+        guess, branch = self.motion.followed.interpolated(chosen, samples)
+        axis = targets.axis(samples).reshape(-1, 3)
+        angles, _ = continued(self.machine, axis, guess.reshape(-1, 2), branch.ravel(), self.motion.cone)
+        return angles.reshape(guess.shape)
+
+
+def _group(smoothed: SmoothProgram, smooth_rows: Ints, spans: int, found: list[_Found]) -> CurveGroup:
+    """All curves on so many knot intervals, as they are to be written; `smooth_rows` as in `RotaryMotion.rows`."""
+    refined = refinement(spans)
+    numbers = np.sort(np.concatenate([part.numbers for part in found]))
+    rows = smooth_rows[numbers]
+    angles, error = np.empty((len(rows), refined.points, 2)), np.empty(len(rows))
+    ruled = np.empty(len(rows), np.bool_)
+    for part in found:
+        at = np.searchsorted(numbers, part.numbers)
+        angles[at], error[at], ruled[at] = part.angles, part.error, part.ruled
+    own = refined.homogeneous(nurbs.full_weights(smoothed.corners.weights[rows]))
+    return CurveGroup(
+        smoothed=smoothed,
+        row=rows,
+        knots=refined.knots * refined.end,
+        weights=np.round(own * weight_factors(own)[:, None], WEIGHT_DECIMALS),
+        angles=angles,
+        orientation_error=error,
+        ruled=ruled,
+    )
+
+
+def _lines_finding(smoothed: SmoothProgram, machine: Machine, lines: Ints) -> tuple[Finding, ...]:
+    """Corners that have to be written as lines."""
+    if not len(lines):
+        return ()
+    first = int(smoothed.program.line[smoothed.corners.pose[lines[0]]])
+    text = f"no curve in {' and '.join(machine.names)} keeps the tolerance at this corner: it is written as lines"
+    return (Finding("CS366", "note", first, text, len(lines)),)

@@ -1,0 +1,311 @@
+"""Rotary angles along a whole path: continuous, inside the limits, calm at the pole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.errors import Finding, InputError
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.poses import (
+    angle_between,
+    closest_second,
+    passes_pole,
+    solutions,
+    tool_axis,
+)
+from cornersmooth.model import Bools, Floats, Ints, Move
+from cornersmooth.rotary.axis_findings import limit_error, pole_finding, reach_error, rewind_finding, swap_finding
+from cornersmooth.rotary.branch_choice import LIMIT_SLACK, PREFERENCE_COST, NoChoiceError, Stretches, choose
+from cornersmooth.rotary.unwrapping import WideSteps, meet_at_pole, unwrap
+
+#: Poses worked on at a time, so that memory is needed for their angles and little else.
+CHUNK = 1 << 15
+
+
+@dataclass(frozen=True)
+class RotaryPath:
+    """Rotary words of n poses.
+
+    Parameters
+    ----------
+    angles : (n, 2) float64, degrees
+        In the order of `Machine.axes`, unwrapped: no step by a whole turn but for rewinds in rapids.
+    deviation : (n,) float64, degrees
+        Angle between the axis that the angles give and the one asked for: 0 but for poses at the pole, where it stays
+        within the tolerance given.
+    branch : (n,) int8
+        Which of `Solutions.angles` they are, -1 at the pole.
+    findings : tuple of Finding
+        Passages near the pole, rewinds, changes of solution.
+    """
+
+    angles: Floats
+    deviation: Floats
+    branch: NDArray[np.int8]
+    findings: tuple[Finding, ...]
+
+
+def rotary_angles(
+    machine: Machine,
+    tip: Floats,
+    axis: Floats,
+    *,
+    tolerance: float,
+    rapid: Bools | None = None,
+    line: Ints | None = None,
+    file: str | None = None,
+) -> RotaryPath:
+    """Rotary angles of a path: one solution and one turn per pose, chosen with a look ahead over the whole path.
+
+    Parameters
+    ----------
+    machine : Machine
+    tip : (n, 3) float64, mm
+    axis : (n, 3) float64
+        Unit vectors in part coordinates.
+    tolerance : float, degrees
+        By how much the axis may deviate near the pole, where the first angle is then free to turn ahead of time.
+        Also how far outside the reach of the machine an axis may lie (digits of the file) and be taken as on its edge.
+    rapid : (n,) bool
+        The move into the pose does not cut, so that solution and turn may change in it; only the first by default.
+    line : (n,) int64
+        Source lines for messages.
+    file : str, optional
+        For messages.
+
+    Raises
+    ------
+    InputError
+        The machine cannot reach an axis (CS361), or not within the limits of its rotary axes (CS362).
+    """
+    n = len(axis)
+    line = np.zeros(n, np.int64) if line is None else line
+    rapid = np.zeros(n, np.bool_) if rapid is None else rapid
+    if n == 0:
+        return RotaryPath(np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int8), ())
+    poses = _sorted_poses(machine, axis, tolerance, line, file)
+    run: Ints = np.cumsum(rapid, dtype=np.int64)
+    branch, swaps = np.full(n, -1, np.int8), np.zeros(0, np.int64)
+    if len(poses.steady):
+        angles, branch[poses.steady], swaps = _steady_angles(machine, axis, poses, run, tolerance, line, file)
+        if len(poses.cone):
+            steady, angles = angles, np.full((n, 2), np.nan)
+            angles[poses.steady] = steady
+            length = _lengths(tip)
+            for here in _chunks(len(poses.cone)):
+                _fill_cone(machine, length, axis, angles, poses.cone[here], poses.steady, run)
+    else:
+        angles = np.zeros((n, 2))
+        angles[:, 0] = np.clip(0.0, *machine.limits[0])
+        for here in _chunks(n):
+            angles[here, 1] = closest_second(machine, axis[here], angles[here, 0])
+    angles[poses.cone] = _into_limits(angles[poses.cone], machine.limits)
+    deviation = np.zeros(n)
+    for off in (poses.cone, poses.beyond):
+        for here in _chunks(len(off)):
+            deviation[off[here]] = angle_between(tool_axis(machine, angles[off[here]]), axis[off[here]])
+            if (over := deviation[off[here]] > tolerance).any():
+                pose = int(off[here][np.argmax(over)])
+                both = solutions(machine, axis[pose : pose + 1]).angles[0]
+                raise limit_error(machine, both, machine.limits, None, int(line[pose]), 0, file)
+    findings = pole_finding(machine, tip, axis, angles, rapid, line)
+    findings += rewind_finding(machine, angles, rapid, line) + swap_finding(machine, swaps, line)
+    return RotaryPath(angles, deviation, branch, findings)
+
+
+def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
+    """Poses of a program whose move does not cut, so that solution and turn may change in it: (n,) bool.
+
+    Everything but linear feed moves and arcs, and what follows a start position that is stated, not moved to.
+    """
+    rapid: Bools = (kind != Move.LINEAR) & (kind != Move.ARC)
+    rapid[1:] |= kind[:-1] == Move.FROM
+    rapid[:1] = True
+    return rapid
+
+
+@dataclass(frozen=True)
+class _Poses:
+    """Poses by what their axes are.
+
+    Parameters
+    ----------
+    cone, steady : (c,) and (s,) int64
+        In the cone of the pole, and outside of it.
+    angles : (s, 2, 2) float64, degrees
+        ``[pose, branch, axis]`` of the steady ones, in (-180, 180] until they are unwrapped.
+    beyond : (b,) int64
+        Just out of reach of the machine.
+    """
+
+    cone: Ints
+    steady: Ints
+    angles: Floats
+    beyond: Ints
+
+
+def _sorted_poses(machine: Machine, axis: Floats, tolerance: float, line: Ints, file: str | None) -> _Poses:
+    """Both solutions of all poses outside of the cone.
+
+    Half of the tolerance is the cone: two axes inside it are within the tolerance of each other.
+    """
+    n, count = len(axis), 0
+    angles, steady = np.empty((n, 2, 2)), np.empty(n, np.int64)
+    cone, beyond = [], []
+    for here in _chunks(n):
+        found = solutions(machine, axis[here])
+        if (outside := found.beyond > tolerance).any():
+            pose = here.start + int(np.argmax(outside))
+            raise reach_error(machine, axis[pose], float(found.beyond[pose - here.start]), int(line[pose]), file)
+        inside = found.pole_distance <= tolerance / 2
+        own = np.flatnonzero(~inside)
+        angles[count : count + len(own)] = found.angles[own] if len(own) < len(inside) else found.angles
+        steady[count : count + len(own)] = here.start + own
+        count += len(own)
+        cone.append(here.start + np.flatnonzero(inside))
+        beyond.append(here.start + np.flatnonzero(found.beyond > 0))
+    return _Poses(np.concatenate(cone), steady[:count], angles[:count], np.concatenate(beyond))
+
+
+def _steady_angles(
+    machine: Machine, axis: Floats, poses: _Poses, run: Ints, tolerance: float, line: Ints, file: str | None
+) -> tuple[Floats, NDArray[np.int8], Ints]:
+    """Angles (s, 2) and branches (s,) of the poses outside the cone, and poses before which a rapid changes branch."""
+    steady, unwrapped = poses.steady, poses.angles
+    dislike = _dislike(machine, unwrapped[0])
+    free, first = [np.ones(1, np.bool_)], [np.zeros(1, np.int64)]
+    wide = [WideSteps(np.zeros(0, np.int64), *np.zeros((2, 0, 2, 2)))]
+    for here in _chunks(len(steady)):
+        rows = slice(max(here.start, 1), here.stop)
+        start, end = steady[rows.start - 1 : rows.stop - 1], steady[rows]
+        rests = run[start] != run[end]
+        broken = rests | (end - start > 1) | passes_pole(machine, axis[start], axis[end], tolerance / 2)
+        found = unwrap(machine, axis, start, end, unwrapped[rows.start - 1 : rows.stop], broken)
+        wide.append(WideSteps(found.row + rows.start, found.low, found.high))
+        breaks = np.flatnonzero(broken)
+        first.append(rows.start + breaks)
+        free.append(rests[breaks])
+    begins = np.concatenate(first)
+    enter, leave = unwrapped[begins], unwrapped[np.append(begins[1:], len(steady)) - 1]
+    meet_at_pole(machine, axis, steady, begins, ~np.concatenate(free), enter, leave)
+    low, high = np.minimum.reduceat(unwrapped, begins, axis=0), np.maximum.reduceat(unwrapped, begins, axis=0)
+    way = WideSteps(*(np.concatenate([getattr(part, name) for part in wide]) for name in ("row", "low", "high")))
+    owner = np.searchsorted(begins, way.row, side="right") - 1
+    np.minimum.at(low, owner, way.low)
+    np.maximum.at(high, owner, way.high)
+    stretches = Stretches(
+        first=enter,
+        last=leave,
+        low=low,
+        high=high,
+        free=np.concatenate(free),
+        dislike=dislike,
+    )
+    stretch = np.repeat(np.arange(len(begins)), np.diff(begins, append=len(steady)))
+    try:
+        branch, turns = choose(stretches, machine.limits)
+    except NoChoiceError as stuck:
+        raise _stuck_error(machine, stuck, stretch, axis, unwrapped, way, steady, run, line, file) from stuck
+    angles = np.empty((len(steady), 2))
+    for here in _chunks(len(steady)):
+        own = stretch[here]
+        angles[here] = unwrapped[here][np.arange(len(own)), branch[own]] + 360 * turns[own]
+    swaps = begins[1:][stretches.free[1:] & (branch[1:] != branch[:-1])]
+    return angles, branch.astype(np.int8)[stretch], steady[swaps]
+
+
+def _dislike(machine: Machine, start: Floats) -> Floats:
+    """Cost that the preference of the machine puts on either branch at the start of the path, degrees."""
+    if machine.preferred is None:
+        return np.zeros(2)
+    name, sign = machine.preferred
+    wrong = sign * start[:, machine.names.index(name)] < 0
+    return np.where(wrong, PREFERENCE_COST, 0.0)
+
+
+def _fill_cone(
+    machine: Machine, length: Floats, axis: Floats, angles: Floats, poses: Ints, steady: Ints, run: Ints
+) -> None:
+    """Angles of poses inside the cone, in place; `length` is that of the path up to each pose.
+
+    Between two poses outside, the first angle goes evenly with the length of the path from the one's to the other's;
+    towards the end of a cut it stays, and before the start of one it waits already. The second follows the axis.
+    """
+    after = np.searchsorted(steady, poses)
+    before = np.maximum(after - 1, 0)
+    left, right = steady[before], steady[np.minimum(after, len(steady) - 1)]
+    from_left = (left < poses) & (run[left] == run[poses])
+    to_right = (right > poses) & (run[right] == run[poses])
+    # Waiting angle of a cut without any pose outside: where the axis stands after the last one, or will stand first.
+    left_angles = angles[np.where(left < poses, left, right)]
+    right_angles = angles[right]
+    start, end = np.minimum(left + 1, len(length) - 1), np.maximum(right - 1, 0)
+    span, gone = length[end] - length[start], length[poses] - length[start]
+    count = end - start
+    even = np.where(count > 0, (poses - start) / np.maximum(count, 1), 0.5)
+    share = np.where(span > 0, gone / np.where(span > 0, span, 1.0), even)
+    share = np.where(from_left & to_right, share, np.where(to_right, 1.0, 0.0))
+    first = left_angles[:, 0] + share * (right_angles[:, 0] - left_angles[:, 0])
+    # Which turn of the second angle: both sides say the same, but where the axis goes over from pole to pole.
+    pole = machine.axes[0].unit
+    follows = to_right & (~from_left | ((axis[poses] @ pole > 0) == (axis[end] @ pole > 0)))
+    guess = np.where(follows, right_angles[:, 1], left_angles[:, 1])
+    second = closest_second(machine, axis[poses], first)
+    angles[poses, 0] = first
+    angles[poses, 1] = second + 360 * np.round((guess - second) / 360)
+
+
+def _into_limits(angles: Floats, limits: Floats) -> Floats:
+    """Angles clipped to the limits: at the pole only, where the axis hardly notices."""
+    clipped: Floats = np.clip(angles, limits[:, 0], limits[:, 1])
+    return clipped
+
+
+def _stuck_error(
+    machine: Machine,
+    stuck: NoChoiceError,
+    stretch: Ints,
+    axis: Floats,
+    unwrapped: Floats,
+    way: WideSteps,
+    steady: Ints,
+    run: Ints,
+    line: Ints,
+    file: str | None,
+) -> InputError:
+    """Message for the pose that no choice gets beyond."""
+    limits = machine.limits
+    members = np.flatnonzero(stretch == stuck.stretch)
+    low, high = unwrapped[members], unwrapped[members]
+    own = (way.row >= members[0]) & (way.row <= members[-1])
+    row = way.row[own] - members[0]
+    low[row], high[row] = np.minimum(low[row], way.low[own]), np.maximum(high[row], way.high[own])
+    furthest, words = 0, unwrapped[members[0], 0]
+    for branch, *turns in stuck.states:
+        least, most = low[:, branch] + 360 * np.array(turns), high[:, branch] + 360 * np.array(turns)
+        below, above = least < limits[:, 0] - LIMIT_SLACK, most > limits[:, 1] + LIMIT_SLACK
+        first = int(np.argmax((below | above).any(axis=1)))
+        if first >= furthest:
+            furthest, words = first, np.where(below[first], least[first], most[first])
+    pose = int(steady[members[furthest]])
+    start = int(np.searchsorted(run, run[pose]))
+    both = solutions(machine, axis[pose : pose + 1]).angles[0]
+    return limit_error(machine, both, limits, words, int(line[pose]), int(line[start]), file)
+
+
+def _lengths(tip: Floats) -> Floats:
+    """Length of the path up to each pose: (n, 3) -> (n,) mm."""
+    step = np.zeros(len(tip))
+    for here in _chunks(len(tip) - 1):
+        step[here.start + 1 : here.stop + 1] = np.linalg.norm(np.diff(tip[here.start : here.stop + 1], axis=0), axis=1)
+    length: Floats = np.cumsum(step)
+    return length
+
+
+def _chunks(n: int) -> Iterator[slice]:
+    """Rows 0 to n - 1, some at a time."""
+    return (slice(begin, min(begin + CHUNK, n)) for begin in range(0, n, CHUNK))

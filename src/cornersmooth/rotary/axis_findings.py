@@ -1,0 +1,128 @@
+"""What is said about rotary axes: poses out of reach, limits, the pole, rewinds, changes of solution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.errors import Finding, InputError
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.poses import pole_distance
+from cornersmooth.model import Bools, Floats, Ints
+
+#: A cut counts as near the pole where the first rotary axis turns by so many times what the tool axis turns by.
+NEAR_POLE = 20.0
+#: Turns of a rotary axis below this (degrees) are rounding.
+NO_TURN = 1e-6
+#: Poses looked at at a time.
+CHUNK = 1 << 15
+
+
+def axis_rates(angles: Floats, tip: Floats) -> Floats:
+    """How fast rotary axes turn along a path: (n, 2) degrees, (n, 3) mm -> (n-1, 2) degrees per mm.
+
+    Infinite where the tip stands still while the axis turns.
+    """
+    turn = np.abs(np.diff(angles, axis=0))
+    length = np.linalg.norm(np.diff(tip, axis=0), axis=1)[:, None]
+    moving = length > 0
+    return np.where(moving, turn / np.where(moving, length, 1.0), np.where(turn > NO_TURN, np.inf, 0.0))
+
+
+def reach_error(machine: Machine, axis: Floats, beyond: float, line: int, file: str | None) -> InputError:
+    """Say that no rotary angles give this axis."""
+    vector = ", ".join(f"{number:.6f}" for number in axis)
+    return InputError(
+        "CS361",
+        f"tool axis ({vector}) is {beyond:.3f} deg beyond the reach of {' and '.join(machine.names)} of {machine.name}",
+        "turn the part or use a machine that reaches it",
+        file=file,
+        line=line or None,
+    )
+
+
+def limit_error(
+    machine: Machine,
+    both: Floats,
+    limits: Floats,
+    words: Floats | None,
+    line: int,
+    since: int,
+    file: str | None,
+) -> InputError:
+    """Say that a rotary word leaves its limits: with either solution alone, or because the cut began on the other one.
+
+    Parameters
+    ----------
+    both : (2, 2) float64, degrees
+        Both solutions of the pose.
+    words : (2,) float64, degrees, or None
+        The words at which the furthest choice leaves the limits.
+    since : int
+        Line at which the cut starts, 0 where unknown.
+    """
+    turned = both + 360 * np.round((limits.clip(-1e6, 1e6).mean(axis=1) - both) / 360)
+    excess = np.maximum(np.maximum(limits[:, 0] - turned, turned - limits[:, 1]), 0.0)
+    alone = bool((excess.max(axis=1) > NO_TURN).all())
+    shown = turned[int(np.argmin(excess.max(axis=1)))] if alone or words is None else words
+    over = np.maximum(limits[:, 0] - shown, shown - limits[:, 1])
+    axis = int(np.argmax(over))
+    name = machine.names[axis]
+    limit = limits[axis, 0] if shown[axis] < limits[axis, 0] else limits[axis, 1]
+    text = f"{name} would have to go to {shown[axis]:.3f} deg, its limit is {limit:g} deg"
+    if alone or words is None:
+        hint = "turn the part or use a machine with more travel"
+    else:
+        text += f", in a cut from line {since} on" if since else ", in one cut"
+        hint = "interrupt the cut with a retract in rapid before, so that the axis can turn back"
+    return InputError("CS362", text, hint, file=file, line=line or None)
+
+
+def pole_finding(
+    machine: Machine, tip: Floats, axis: Floats, angles: Floats, rapid: Bools, line: Ints
+) -> tuple[Finding, ...]:
+    """Cuts near the pole, where the first rotary axis turns fast: where, how close, how fast."""
+    found = []
+    for begin in range(0, len(axis) - 1, CHUNK):
+        here = slice(begin, begin + CHUNK + 1)
+        turn = np.abs(np.diff(angles[here, 0]))
+        tilt = np.linalg.norm(np.diff(axis[here], axis=0), axis=1)
+        fast = (turn > NO_TURN) & (turn > NEAR_POLE * np.degrees(tilt)) & ~rapid[here][1:]
+        found.append(begin + np.flatnonzero(fast))
+    edges = np.concatenate(found) if found else np.zeros(0, np.int64)
+    if not len(edges):
+        return ()
+    turns = np.abs(angles[edges + 1, 0] - angles[edges, 0])
+    lengths = np.linalg.norm(tip[edges + 1] - tip[edges], axis=1)
+    rates = np.where(lengths > 0, turns / np.where(lengths > 0, lengths, 1.0), np.inf)
+    worst = int(np.argmax(rates))
+    closest = float(min(pole_distance(machine, axis[edges]).min(), pole_distance(machine, axis[edges + 1]).min()))
+    name = machine.names[0]
+    speed = f"{rates[worst]:.4g} deg/mm" if np.isfinite(rates[worst]) else "with the tip standing still"
+    text = (
+        f"the tool axis comes within {closest:.3g} deg of the pole of {name}, which turns fast there: "
+        f"{turns[worst]:.4g} deg in one move, {speed}"
+    )
+    passages = 1 + int(np.count_nonzero(np.diff(edges) > 1))
+    return (Finding("CS363", "warning", int(line[edges[worst] + 1]), text, passages),)
+
+
+def rewind_finding(machine: Machine, angles: Floats, rapid: Bools, line: Ints) -> tuple[Finding, ...]:
+    """Rapids in which an axis turns back by whole turns to stay inside its limits."""
+    rapids = np.flatnonzero(rapid[1:])
+    step = angles[rapids + 1] - angles[rapids]
+    turned = np.abs(step) > 180 + NO_TURN
+    findings = []
+    for axis, name in enumerate(machine.names):
+        moves = np.flatnonzero(turned[:, axis])
+        if len(moves):
+            text = f"{name} turns back by {abs(step[moves[0], axis]):.4g} deg in a rapid, to stay inside its limits"
+            findings.append(Finding("CS364", "warning", int(line[rapids[moves[0]] + 1]), text, len(moves)))
+    return tuple(findings)
+
+
+def swap_finding(machine: Machine, swaps: Ints, line: Ints) -> tuple[Finding, ...]:
+    """Rapids in which the rotary axes go over to their other solution."""
+    if not len(swaps):
+        return ()
+    text = f"{' and '.join(machine.names)} go over to their other solution in a rapid: keep clear of the part there"
+    return (Finding("CS365", "note", int(line[swaps[0]]), text, len(swaps)),)

@@ -1,0 +1,230 @@
+"""Which of the two solutions, and in which turn, for every stretch of a path: the cheapest choice inside the limits.
+
+On a stretch the solution cannot change without a jump. Between two of them is either a rapid, where everything may
+change, or a passage through the pole, where the two solutions meet. The search looks ahead over the
+whole path (dynamic programming): the start of a stretch is chosen so that its end still lies inside the limits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+
+#: What a full turn back of an axis in a rapid costs, in degrees of rotation: so much that rotation never outweighs it.
+REWIND_COST = 1e9
+#: What a start on the solution that is not preferred costs, in degrees of rotation: more than any start turn.
+PREFERENCE_COST = 1e3
+#: What each turn costs by which a path starts away from zero: it only breaks ties.
+START_TURN_COST = 1e-3
+#: What a stretch costs that leaves the limits in every turn.
+OUTSIDE_COST = 1e12
+#: Words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
+LIMIT_SLACK = 1e-9
+#: An axis with room for more turns than this is taken as endless first; only where that fails its turns are searched.
+MANY_TURNS = 8
+#: More states than these are not searched: axes with many turns are then kept within `MANY_TURNS` of zero.
+MOST_STATES = 1000
+#: Numbers that the costs of the steps between states may take up at a time.
+CHUNK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """Angles of p stretches on both branches, unwrapped from the first pose of each stretch; degrees.
+
+    Parameters
+    ----------
+    first, last : (p, 2, 2) float64
+        ``[stretch, branch, axis]`` at the first pose and at the last, or at the pole where stretches meet there.
+    low, high : (p, 2, 2) float64
+        Extremes over the stretch.
+    free : (p,) bool
+        A rapid leads into the stretch; false for a passage through the pole. True for the first stretch.
+    dislike : (2,) float64
+        What a start of the path on either branch costs.
+    """
+
+    first: Floats
+    last: Floats
+    low: Floats
+    high: Floats
+    free: Bools
+    dislike: Floats
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+class NoChoiceError(Exception):
+    """No choice keeps the path inside the limits.
+
+    Parameters
+    ----------
+    stretch : int
+        The first stretch that cannot be reached inside the limits.
+    states : (s, 3) int64
+        Branch and turns of both axes in which that stretch can be entered, all of which leave the limits inside it.
+    """
+
+    def __init__(self, stretch: int, states: Ints) -> None:
+        super().__init__(stretch, states)
+        self.stretch = stretch
+        self.states = states
+
+
+def choose(stretches: Stretches, limits: Floats) -> tuple[Ints, Floats]:
+    """Branch and turns of every stretch.
+
+    Parameters
+    ----------
+    stretches : Stretches
+    limits : (2, 2) float64, degrees
+        Lowest and highest word of each axis, infinite where there is none.
+
+    Returns
+    -------
+    branch : (p,) int64
+    turns : (p, 2) float64
+        Whole turns to add to the angles of the stretch.
+
+    Raises
+    ------
+    NoChoiceError
+    """
+    branch = _cheapest_branches(stretches, limits)
+    turns = _nearest_turns(stretches, branch)
+    if _start_inside(stretches, branch, turns, limits):
+        return branch, turns
+    finite = np.isfinite(limits[:, 0]) & np.isfinite(limits[:, 1])
+    narrow = finite & (limits[:, 1] - limits[:, 0] <= 360 * MANY_TURNS)
+    if narrow.any() and (narrow != finite).any():
+        branch, fixed = search(stretches, np.where(narrow[:, None], limits, [[-np.inf, np.inf]]))
+        turns = _nearest_turns(stretches, branch, fixed, narrow)
+        if _start_inside(stretches, branch, turns, limits):
+            return branch, turns
+    branch, fixed = search(stretches, limits)
+    return branch, _nearest_turns(stretches, branch, fixed, finite)
+
+
+def _cheapest_branches(stretches: Stretches, limits: Floats) -> Ints:
+    """Branches with the least rotation between stretches that fit into the limits, each in some turn."""
+    lowest = np.ceil((limits[:, 0] - LIMIT_SLACK - stretches.low) / 360)  # turns that bring the stretch inside
+    highest = np.floor((limits[:, 1] + LIMIT_SLACK - stretches.high) / 360)
+    outside = np.where((lowest > highest).any(axis=2), OUTSIDE_COST, 0.0)
+    step = stretches.first[1:, None, :, :] - stretches.last[:-1, :, None, :]  # [edge, from, to, axis]
+    cost = np.abs(step - 360 * np.round(step / 360)).sum(axis=3) + outside[1:, None, :]
+    start = (stretches.dislike + np.abs(stretches.first[0]).sum(axis=1) + outside[0]).tolist()
+    best, origins = [start[0], start[1]], []
+    for (stay0, swap01), (swap10, stay1) in cost.tolist():
+        into0, into1 = (best[0] + stay0, best[1] + swap10), (best[0] + swap01, best[1] + stay1)
+        origins.append((int(into0[1] < into0[0]), int(into1[0] >= into1[1])))
+        best = [min(into0), min(into1)]
+    branch = [int(best[1] < best[0])]
+    for origin in reversed(origins):
+        branch.append(origin[branch[-1]])
+    return np.array(branch[::-1], dtype=np.int64)
+
+
+def _nearest_turns(
+    stretches: Stretches, branch: Ints, fixed: Floats | None = None, known: Bools | None = None
+) -> Floats:
+    """Count the turns without a rewind; those of axes that are `known` are taken as they are."""
+    index = np.arange(len(stretches))
+    first, last = stretches.first[index, branch], stretches.last[index, branch]
+    turns = np.zeros((len(stretches), 2))
+    turns[1:] = -np.cumsum(np.round((first[1:] - last[:-1]) / 360), axis=0)
+    return turns if fixed is None or known is None else np.where(known, fixed, turns)
+
+
+def _start_inside(stretches: Stretches, branch: Ints, turns: Floats, limits: Floats) -> bool:
+    """Shift the whole path by the fewest turns that bring it inside the limits, in place; false if none do."""
+    index = np.arange(len(stretches))
+    low = (stretches.low[index, branch] + 360 * turns).min(axis=0)
+    high = (stretches.high[index, branch] + 360 * turns).max(axis=0)
+    fewest = np.ceil((limits[:, 0] - LIMIT_SLACK - low) / 360)
+    most = np.floor((limits[:, 1] + LIMIT_SLACK - high) / 360)
+    if (fewest > most).any():
+        return False
+    turns += np.clip(0, fewest, most)
+    return True
+
+
+def search(stretches: Stretches, limits: Floats) -> tuple[Ints, Floats]:
+    """Search the careful way: every branch and every turn that the limits allow; axes without limits carry no turns.
+
+    Returns and raises as `choose`, with turns 0 for axes without limits.
+    """
+    finite = np.isfinite(limits[:, 0]) & np.isfinite(limits[:, 1])
+    ranges = _turn_ranges(limits, finite)
+    start = (
+        (stretches.dislike + np.abs(stretches.first[0]).sum(axis=1))[:, None, None]
+        + START_TURN_COST * np.abs(ranges[0])[:, None]
+        + START_TURN_COST * np.abs(ranges[1])
+    )
+    shape = start.shape
+    size = max(1, CHUNK // start.size**2)
+    origins: list[Ints] = []
+    best = entered = start.ravel()
+    for begin in range(0, len(stretches), size):
+        end = min(begin + size, len(stretches))
+        allowed = _allowed(stretches, begin, end, ranges, limits)
+        steps = _steps(stretches, begin, end, ranges, finite)
+        for p in range(begin, end):
+            if p:
+                total = best[:, None] + steps[p - begin]
+                origin = total.argmin(axis=0)
+                entered = total[origin, np.arange(len(origin))]
+                origins.append(origin)
+            best = np.where(allowed[p - begin], entered, np.inf)
+            if best.min() == np.inf:
+                branch, turn0, turn1 = np.unravel_index(np.flatnonzero(np.isfinite(entered)), shape)
+                raise NoChoiceError(p, np.stack((branch, ranges[0][turn0], ranges[1][turn1]), axis=1).astype(np.int64))
+    path = [int(best.argmin())]
+    for origin in reversed(origins):
+        path.append(int(origin[path[-1]]))
+    branch, turn0, turn1 = np.unravel_index(np.array(path[::-1]), shape)
+    return branch.astype(np.int64), np.stack((ranges[0][turn0], ranges[1][turn1]), axis=1)
+
+
+def _turn_ranges(limits: Floats, finite: Bools) -> tuple[Floats, Floats]:
+    """Whole turns that bring an angle in (-180, 180] inside the limits, for either axis; 0 for one without."""
+    low = np.where(finite, np.ceil((np.where(finite, limits[:, 0], 0) - 180) / 360), 0)
+    high = np.where(finite, np.floor((np.where(finite, limits[:, 1], 0) + 180) / 360), 0)
+    if 2 * np.prod(high - low + 1) > MOST_STATES:
+        low, high = np.maximum(low, -MANY_TURNS), np.minimum(high, MANY_TURNS)
+    return np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1)
+
+
+def _allowed(stretches: Stretches, begin: int, end: int, ranges: tuple[Floats, Floats], limits: Floats) -> Bools:
+    """Whether stretches stay inside the limits in each state: (stretches, states)."""
+    fits = []
+    for axis in (0, 1):
+        turned = 360 * ranges[axis]
+        low = stretches.low[begin:end, :, axis, None] + turned >= limits[axis, 0] - LIMIT_SLACK
+        fits.append(low & (stretches.high[begin:end, :, axis, None] + turned <= limits[axis, 1] + LIMIT_SLACK))
+    both: Bools = fits[0][:, :, :, None] & fits[1][:, :, None, :]
+    return both.reshape(end - begin, -1)
+
+
+def _steps(stretches: Stretches, begin: int, end: int, ranges: tuple[Floats, Floats], finite: Bools) -> Floats:
+    """Costs of the steps into stretches from all states before to all states: (stretches, states, states)."""
+    before = np.maximum(np.arange(begin, end) - 1, 0)  # the first stretch has none: its row is not used
+    step = stretches.first[begin:end, None, :, :] - stretches.last[before][:, :, None, :]  # [stretch, from, to, axis]
+    free = stretches.free[begin:end, None, None, None, None]
+    costs = []
+    for axis in (0, 1):
+        off = step[..., axis, None, None]
+        nearest = -np.round(off / 360)
+        if finite[axis]:
+            change = ranges[axis] - ranges[axis][:, None]
+            other = np.where(free, REWIND_COST, np.inf)
+            costs.append(np.abs(off + 360 * change) + np.where(change == nearest, 0.0, other))
+        else:
+            costs.append(np.abs(off + 360 * nearest))
+    # [stretch, from, to, old turn 0, new turn 0, old turn 1, new turn 1], then all of the old before all of the new
+    total: Floats = costs[0][..., None, None] + costs[1][:, :, :, None, None]
+    states = 2 * len(ranges[0]) * len(ranges[1])
+    return total.transpose(0, 1, 3, 5, 2, 4, 6).reshape(end - begin, states, states)

@@ -1,0 +1,86 @@
+"""Corners as lines in rotary angles: for those few that no curve meets, where the first rotary axis turns too fast."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.poses import continued, unit
+from cornersmooth.model import Floats, Ints, SmoothProgram
+from cornersmooth.rotary.insertion import fill, insertions
+from cornersmooth.rotary.straight_motion import RotaryMotion, lever_points, tip_points
+from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.segments import lines_of
+
+
+@dataclass(frozen=True)
+class CornerLines:
+    """Points of some corners, q rows in path order, from the joint where a corner starts to the one where it ends.
+
+    Parameters
+    ----------
+    row : (q,) int64
+        Row of `Corners`, ascending.
+    tip : (q, 3) float64, mm
+    angles : (q, 2) float64, degrees
+        Those of the joints in the first and the last point of a corner. Even angles from point to point keep the
+        tolerance.
+    unsolved : (v,) int64
+        Rows of `Corners` in which no division helps: the axis jumps there.
+    """
+
+    row: Ints
+    tip: Floats
+    angles: Floats
+    unsolved: Ints
+
+
+def corner_lines(
+    smoothed: SmoothProgram, machine: Machine, motion: RotaryMotion, chosen: Ints, file: str | None
+) -> CornerLines:
+    """Points of corners with the numbers `chosen` in `RotaryMotion.rows`, ascending.
+
+    The samples are those of dense output (`lines_of`), and what the rotary angles need between them.
+
+    Raises
+    ------
+    InputError
+        A rotary axis would leave its limits (CS362).
+    """
+    program, corners = smoothed.program, smoothed.corners
+    rows = motion.rows[chosen]
+    halves = lines_of(smoothed, rows)
+    counts = 2 * np.abs(halves) + 1
+    first = np.cumsum(counts) - counts
+    total = int(counts.sum())
+    tip, lever, angles = np.zeros((total, 3)), np.zeros((total, 3)), np.zeros((total, 2))
+    for number in np.unique(halves):
+        group = np.flatnonzero(halves == number)
+        u = _nodes(int(number))
+        where = first[group, None] + np.arange(len(u))
+        weights = corners.weights[rows[group]]
+        tip[where] = nurbs.evaluate(tip_points(smoothed, rows[group]), weights, u)
+        lever[where] = nurbs.evaluate(lever_points(smoothed, rows[group]), weights, u)
+        guess, branch = motion.followed.interpolated(chosen[group], u)
+        words, _ = continued(
+            machine, unit(lever[where].reshape(-1, 3)), guess.reshape(-1, 2), branch.ravel(), motion.cone
+        )
+        angles[where] = words.reshape(guess.shape)
+    angles[first] = motion.end.angles[corners.pose[rows]]
+    angles[first + counts - 1] = motion.start.angles[corners.after[rows]]
+    owner = np.repeat(rows, counts)
+    between = np.zeros(total, np.bool_)
+    between[first] = True
+    line = program.line[corners.pose[owner]]
+    more = insertions(machine, tip, lever, angles, tolerance=2 * motion.cone, rapid=between, line=line, file=file)
+    filled = fill(tip, lever, angles, more)
+    return CornerLines(owner[filled.pose], filled.tip, filled.angles, np.unique(owner[more.unsolved]))
+
+
+def _nodes(lines: int) -> Floats:
+    """Parameters of the ends of the lines, as `lines_per_half` counts them: graded, or even where it is negative."""
+    number = abs(lines)
+    s = (np.arange(number + 1) / number) ** (2.0 / 3.0 if lines > 0 else 1.0)
+    return np.concatenate((s / 2, 1 - s[-2::-1] / 2))
