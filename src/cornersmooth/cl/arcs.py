@@ -20,6 +20,7 @@ from cornersmooth.cl.grammar import Record
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import Arcs, Bools, Floats, Ints, Move
+from cornersmooth.vectors import dot, norm
 
 ArcRule = Literal["left", "right", "tangent"]
 RULES: Final[tuple[ArcRule, ...]] = ("left", "right", "tangent")
@@ -186,11 +187,11 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
     full_turns = table.column(lambda arc: arc.turns) - 1
     stated = table.column(lambda arc: arc.sweep)
     start, end = tip[pose - 1] - centre, tip[pose] - centre
-    start_height, end_height = _dot(start, normal), _dot(end, normal)
+    start_height, end_height = dot(start, normal), dot(end, normal)
     start = start - start_height[:, None] * normal
     end = end - end_height[:, None] * normal
 
-    start_radius, end_radius = _length(start), _length(end)
+    start_radius, end_radius = norm(start), norm(end)
     radius = np.where(np.isnan(radius), start_radius, radius)
     allowed = np.maximum(RADIUS_DIGITS * resolution, RADIUS_SHARE * radius)
     for which, distance in (("start", start_radius), ("end", end_radius)):
@@ -202,10 +203,10 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
             values = {"which": which, "distance": distance[first], "radius": radius[first]}
             raise error("CS123", file, table.arc[first].line, **values)
 
-    chord = _length(end - start)
+    chord = norm(end - start)
     rise = np.abs(end_height - start_height)
     closed = chord < resolution / 2
-    turn = np.arctan2(_dot(np.cross(start, end), normal), _dot(start, end)) % (2 * np.pi)
+    turn = np.arctan2(dot(np.cross(start, end), normal), dot(start, end)) % (2 * np.pi)
     turn = np.where(closed, 2 * np.pi, turn)
     short = (chord < SHORTEST_DIGITS * resolution) & ~closed & (full_turns == 0)
     short &= np.isnan(stated) | (stated < np.pi)
@@ -216,13 +217,13 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
     if table.inner:
         row = np.array([row for row, _ in table.inner], np.int64)
         spoke = np.array([point for _, point in table.inner]) - centre[row]
-        spoke = spoke - _dot(spoke, normal[row])[:, None] * normal[row]
-        off = ~(np.abs(_length(spoke) - radius[row]) <= allowed[row])
+        spoke = spoke - dot(spoke, normal[row])[:, None] * normal[row]
+        off = ~(np.abs(norm(spoke) - radius[row]) <= allowed[row])
         if off.any():
             first = int(off.argmax())
-            values = {"which": "point", "distance": _length(spoke)[first], "radius": radius[row[first]]}
+            values = {"which": "point", "distance": norm(spoke)[first], "radius": radius[row[first]]}
             raise error("CS123", file, table.arc[row[first]].line, **values)
-        passed = np.arctan2(_dot(np.cross(start[row], spoke), normal[row]), _dot(start[row], spoke)) % (2 * np.pi)
+        passed = np.arctan2(dot(np.cross(start[row], spoke), normal[row]), dot(start[row], spoke)) % (2 * np.pi)
         clear = np.minimum(passed, 2 * np.pi - passed) * radius[row] > VOTING_DIGITS * resolution[row]
         beyond = passed > turn[row] + allowed[row] / radius[row]
         np.add.at(agree, row, clear & ~beyond)
@@ -278,19 +279,10 @@ def _votes(
     )
     for line, spoke, there in sides:
         tangent = np.cross(normal, spoke)
-        line = line - _dot(line, normal)[:, None] * normal
-        length, reach = _length(line), _length(tangent)
+        line = line - dot(line, normal)[:, None] * normal
+        length, reach = norm(line), norm(tangent)
         there = there & (length > VOTING_DIGITS * resolution) & (reach > 0)
-        cosine = _dot(line, tangent) / np.where(there, length * reach, 1.0)
+        cosine = dot(line, tangent) / np.where(there, length * reach, 1.0)
         agree += there & (cosine > math.cos(TANGENT))
         against += there & (cosine < -math.cos(TANGENT))
     return agree, against
-
-
-def _dot(left: Floats, right: Floats) -> Floats:
-    product: Floats = np.einsum("ij,ij->i", left, right)
-    return product
-
-
-def _length(vectors: Floats) -> Floats:
-    return np.sqrt(_dot(vectors, vectors))

@@ -17,6 +17,7 @@ from cornersmooth.cl.bulk import FARTHEST, Block
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import Bools, Floats, Ints, Keep, Move
+from cornersmooth.vectors import norm
 
 Vector = tuple[float, float, float]
 T = TypeVar("T", np.float64, np.int64, np.bool_)
@@ -210,7 +211,7 @@ class Builder:
 
     def _normalise(self, vector: Floats, pose: Ints, findings: list[Finding]) -> Floats:
         with np.errstate(over="ignore", invalid="ignore"):
-            length = np.sqrt(np.einsum("ij,ij->i", vector, vector))
+            length = norm(vector)
             wrong = ~(np.abs(length - 1) <= UNIT_TOLERANCE)
         if wrong.any():
             first = int(wrong.argmax())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Floats, Ints, Program
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import dot, norm
 
 
 def shape(program: Program, moves: Ints) -> tuple[Floats, Floats, Floats]:
@@ -52,13 +52,13 @@ def _radii(program: Program, moves: Ints) -> Floats:
     rows = arc_rows(program, moves)
     arm = program.tip[moves - 1] - program.arcs.centre[rows]
     normal = program.arcs.normal[rows]
-    across: Floats = arm - np.einsum("ij,ij->i", arm, normal)[:, None] * normal
+    across: Floats = arm - dot(arm, normal)[:, None] * normal
     return across
 
 
 def _pitches(program: Program, moves: Ints) -> Floats:
     rows = arc_rows(program, moves)
-    rise = np.einsum("ij,ij->i", program.tip[moves] - program.tip[moves - 1], program.arcs.normal[rows])
+    rise = dot(program.tip[moves] - program.tip[moves - 1], program.arcs.normal[rows])
     pitch: Floats = rise / program.arcs.sweep[rows]
     return pitch
 

@@ -21,7 +21,7 @@ from cornersmooth.feedrate.motion import derivatives
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.feedrate.speed_limits import SpeedLimits
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import norm
 
 #: pieces of a line or arc
 PIECES = 4

@@ -12,7 +12,7 @@ import numpy as np
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import norm
 
 #: tip lengths up to this are no motion of the tip, mm
 STANDSTILL = 1e-7

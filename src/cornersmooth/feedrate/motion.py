@@ -10,7 +10,7 @@ import numpy as np
 from cornersmooth.feedrate import arcs, bezier_halves, taylor
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Floats, Ints
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import norm
 
 _BINOMIALS = np.array([[1, 1, 1, 1], [0, 1, 2, 3], [0, 0, 1, 3], [0, 0, 0, 1]], np.float64)
 _NO_SPEED = np.finfo(np.float64).tiny

@@ -20,8 +20,8 @@ from cornersmooth.feedrate.bezier_halves import STANDSTILL
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.neighbours import find_neighbours, norm
-from cornersmooth.smoothing.synchronise import angle_between
+from cornersmooth.smoothing.neighbours import find_neighbours
+from cornersmooth.vectors import angle_between, norm
 
 #: angles below this are no motion of the axis, rad
 NO_TURN = 1e-9

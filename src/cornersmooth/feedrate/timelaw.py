@@ -12,7 +12,7 @@ from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.path import Kind, Path, line_axes
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing import nurbs, synchronise
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import norm
 
 _HALVINGS = 60
 

@@ -12,6 +12,7 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics.dynamics import LINEAR, Dynamics
 from cornersmooth.model import Floats
+from cornersmooth.vectors import unit as unit_vector
 
 Vector = tuple[float, float, float]
 
@@ -76,7 +77,7 @@ class RotaryAxis:
     @cached_property
     def unit(self) -> Floats:
         """(3,) unit vector along the axis."""
-        return _unit(self.direction)
+        return unit_vector(np.array(self.direction))
 
     @property
     def low(self) -> float:
@@ -166,7 +167,7 @@ class Machine:
     @cached_property
     def tool(self) -> Floats:
         """(3,) unit vector from the tip to the spindle with both rotary axes at zero."""
-        return _unit(self.tool_direction)
+        return unit_vector(np.array(self.tool_direction))
 
     @property
     def names(self) -> tuple[str, str]:
@@ -200,12 +201,6 @@ class Machine:
             lines.append(f"  tool length {self.tool_length:g} mm")
         lines += [f"  {item.describe()}" for item in self.dynamics]
         return "\n".join(lines)
-
-
-def _unit(vector: Vector) -> Floats:
-    array = np.array(vector, dtype=np.float64)
-    unit: Floats = array / np.linalg.norm(array)
-    return unit
 
 
 def _parallel(one: Floats, other: Floats) -> bool:

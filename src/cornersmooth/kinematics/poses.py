@@ -15,6 +15,7 @@ import numpy as np
 
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.vectors import dot, norm
 
 #: A machine has a pole where k can lie along a₁; sides that differ by less (rad) meet there up to rounding.
 POLE_MATCH = 1e-9
@@ -185,7 +186,7 @@ def passes_pole(machine: Machine, start: Floats, end: Floats, cone: float) -> Bo
     """
     passes = np.zeros(len(start), np.bool_)
     step = end - start
-    step = np.sqrt(np.einsum("ij,ij->i", step, step)) + np.radians(cone) + ROUNDING
+    step = norm(step) + np.radians(cone) + ROUNDING
     for pole in _Frame.of(machine).poles(machine):
         # On a way that is shorter than the distance of its start nothing comes near: chords obey the triangle too.
         near = np.flatnonzero(2.0 - 2.0 * (start @ pole) <= step * step)
@@ -193,8 +194,8 @@ def passes_pole(machine: Machine, start: Floats, end: Floats, cone: float) -> Bo
             one, two = start[near], end[near]
             normal = np.cross(one, two)
             length = np.linalg.norm(normal, axis=1)
-            ahead = np.einsum("ij,ij->i", np.cross(one, pole[None, :]), normal) > 0
-            behind = np.einsum("ij,ij->i", np.cross(pole[None, :], two), normal) > 0
+            ahead = dot(np.cross(one, pole[None, :]), normal) > 0
+            behind = dot(np.cross(pole[None, :], two), normal) > 0
             close = np.abs(normal @ pole) <= np.sin(np.radians(cone)) * length
             passes[near] |= (length > 0) & ahead & behind & close
     return passes
@@ -213,13 +214,6 @@ def pole_angle(machine: Machine, axis: Floats) -> Floats:
     angles = closest_second(machine, poles, np.zeros(len(poles)))
     nearest: Floats = angles[np.argmax(axis @ poles.T, axis=1)]
     return nearest
-
-
-def unit(vectors: Floats) -> Floats:
-    """Vectors along the last axis brought to unit length; none becomes a vector of no length, 60 degrees off all."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    units: Floats = vectors / np.where(length > 0, length, 1.0)
-    return units
 
 
 def wrap(angles: Floats) -> Floats:

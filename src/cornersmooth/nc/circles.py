@@ -16,8 +16,8 @@ from cornersmooth.model import Bools, Floats, Ints, Keep, Program
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.arcs import arc_points, arc_radii, divided
-from cornersmooth.smoothing.neighbours import norm
 from cornersmooth.text import to_ticks
+from cornersmooth.vectors import norm
 
 #: largest turn of one circular block: in R form a control cannot tell which way to go near 180 degrees
 _LARGEST_SWEEP = math.radians(120.0)

@@ -14,7 +14,7 @@ from cornersmooth.nc.control import Control, Extra, FormTable, Orientation
 from cornersmooth.nc.control_tables import load_control
 from cornersmooth.nc.form import ROTARY_SHARE, Form
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import norm
 
 
 def choose_form(

@@ -26,6 +26,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.spindle import milliseconds
+from cornersmooth.vectors import dot
 
 #: mm left above the last depth before feeding goes on, and moved up to break a chip
 PECK_GAP = 0.5
@@ -239,8 +240,8 @@ def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:
     """
     known = np.maximum(approach, 0)
     axis = program.axis[poses]
-    same = (approach >= 0) & (np.einsum("ij,ij->i", axis, program.axis[known]) > 1.0 - _SAME_AXIS)
-    height = np.einsum("ij,ij->i", program.tip[known] - program.tip[poses], axis)
+    same = (approach >= 0) & (dot(axis, program.axis[known]) > 1.0 - _SAME_AXIS)
+    height = dot(program.tip[known] - program.tip[poses], axis)
     return np.where(same, np.maximum(height, 0.0), 0.0)
 
 

@@ -18,8 +18,8 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves, rotary_angles
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.neighbours import norm
 from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.vectors import norm
 
 #: rows handed on at a time
 _CHUNK = 32768

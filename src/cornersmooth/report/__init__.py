@@ -11,7 +11,7 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status
 from cornersmooth.report.corners import STATUS_NAMES, corner_table, worst_corners
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import dot, norm
 
 __all__ = ["SCHEMA", "corners_csv", "report", "report_json"]
 
@@ -145,8 +145,8 @@ def _feed_length(smoothed: SmoothProgram) -> float:
         return straight
     start, end = program.tip[arcs.pose - 1], program.tip[arcs.pose]
     spoke = start - arcs.centre
-    rise = np.einsum("ij,ij->i", end - start, arcs.normal)
-    spoke = spoke - np.einsum("ij,ij->i", spoke, arcs.normal)[:, None] * arcs.normal
+    rise = dot(end - start, arcs.normal)
+    spoke = spoke - dot(spoke, arcs.normal)[:, None] * arcs.normal
     return straight + float(np.hypot(norm(spoke) * arcs.sweep, rise).sum())
 
 

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.neighbours import norm
 from cornersmooth.smoothing.path_distance import path_distances
-from cornersmooth.smoothing.synchronise import angle_between
+from cornersmooth.vectors import angle_between, norm
 
 STATUS_NAMES = {
     Status.SMOOTHED: "smoothed",

@@ -14,8 +14,7 @@ from cornersmooth.model import Bools, Corners, FeedMode, Floats, LimitedBy, Move
 from cornersmooth.report.corners import STATUS_NAMES
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.smoothing.neighbours import norm
-from cornersmooth.smoothing.synchronise import angle_between
+from cornersmooth.vectors import angle_between, dot, norm
 
 SCHEMA: Final = "cornersmooth-info/1"
 
@@ -270,8 +269,8 @@ def _axis(program: Program, segments: _Segments) -> AxisMotion:
 def _arcs(program: Program) -> ArcSummary:
     arcs = program.arcs
     spoke = program.tip[arcs.pose] - arcs.centre
-    spoke = spoke - np.einsum("ij,ij->i", spoke, arcs.normal)[:, None] * arcs.normal
-    rise = np.einsum("ij,ij->i", program.tip[arcs.pose] - program.tip[arcs.pose - 1], arcs.normal)
+    spoke = spoke - dot(spoke, arcs.normal)[:, None] * arcs.normal
+    rise = dot(program.tip[arcs.pose] - program.tip[arcs.pose - 1], arcs.normal)
     return ArcSummary(
         count=len(arcs),
         helices=int(np.count_nonzero(np.abs(rise) > PRINT_STEP * program.mm_per_unit)),

@@ -11,6 +11,7 @@ import numpy as np
 
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.model import Floats
+from cornersmooth.vectors import dot, norm
 
 
 def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack: float) -> Floats:
@@ -50,8 +51,8 @@ def ruled_bend(start: Floats, end: Floats) -> Floats:
         Infinite where the point comes to the origin: the direction jumps there.
     """
     way = end - start
-    square = np.einsum("ij,ij->i", way, way)
-    nearest = np.clip(-np.einsum("ij,ij->i", start, way) / np.where(square > 0, square, 1.0), 0.0, 1.0)
+    square = dot(way, way)
+    nearest = np.clip(-dot(start, way) / np.where(square > 0, square, 1.0), 0.0, 1.0)
     shortest = np.linalg.norm(start + nearest[:, None] * way, axis=1)
     moving = shortest > np.sqrt(square) * JUMP
     shortest = np.where(moving, shortest, 1.0)
@@ -113,12 +114,12 @@ def _sine(machine: Machine, axis: Floats) -> Floats:
     x, y, z = machine.axes[0].unit
     across = np.array(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)))
     vectors = axis @ across
-    sine: Floats = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+    sine: Floats = norm(vectors)
     return sine
 
 
 def _along(point: Floats, way: Floats) -> Floats:
     """Speed with which a point that runs along `way` leaves the origin."""
     length = np.linalg.norm(point, axis=1)
-    share: Floats = np.abs(np.einsum("ij,ij->i", point, way)) / np.where(length > 0, length, 1.0)
+    share: Floats = np.abs(dot(point, way)) / np.where(length > 0, length, 1.0)
     return share

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.poses import angle_between, continued, tool_axis, unit
+from cornersmooth.kinematics.poses import angle_between, continued, tool_axis
 from cornersmooth.kinematics.position import machine_position, tip_position
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.rotary.chord_bounds import axis_bend, ruled_bend, tip_bend
+from cornersmooth.vectors import dot, unit
 
 #: Shares of an interval at which its error is looked at first: an error that vanishes at all three is none.
 SAMPLES = (0.25, 0.5, 0.75)
@@ -139,7 +140,7 @@ class InterpolationError:
         obvious: Bools = (turn <= small) & (part.end - part.start == 1.0)
         if self.tip_tolerance is not None or not obvious.any():
             return np.zeros(len(turn), np.bool_)
-        units = np.abs(np.einsum("ij,ij->i", self.axis, self.axis) - 1) < UNIT
+        units = np.abs(dot(self.axis, self.axis) - 1) < UNIT
         obvious &= units[part.segment] & units[part.segment + 1]
         return obvious
 
@@ -231,8 +232,8 @@ class InterpolationError:
         start, end, from_, to = ends
         real = tip_position(self.machine, from_ * (1 - share) + to * share, words)
         way = end - start
-        square = np.einsum("ij,ij->i", way, way)
-        along = np.einsum("ij,ij->i", real - start, way) / np.where(square > 0, square, 1.0)
+        square = dot(way, way)
+        along = dot(real - start, way) / np.where(square > 0, square, 1.0)
         along = np.where(square > 0, np.clip(along, 0, 1), fraction)
         _, wanted = ruled(self.tip, self.axis, part.segment, part.start + along * (part.end - part.start))
         return _Look(

@@ -14,12 +14,13 @@ import numpy as np
 
 from cornersmooth.errors import Finding
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.poses import angle_between, continued, pole_distance, tool_axis, unit
+from cornersmooth.kinematics.poses import angle_between, continued, pole_distance, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.rotary.angle_path import rapid_moves, rotary_angles
 from cornersmooth.rotary.insertion import Insertions, insertions
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.segments import Segments, segments_of
+from cornersmooth.vectors import unit
 
 #: Samples at which each transition is followed, as a rule and where the first rotary axis may turn fast.
 FEW_SAMPLES, MANY_SAMPLES = 3, 17

@@ -13,7 +13,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import dot, norm
 
 #: share of the tolerance that a chord may take where `Settings.chord` would allow more: the rest is for arithmetic
 _MOST_OF_TOLERANCE = 0.9
@@ -69,7 +69,7 @@ def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Flo
     pose = arcs.pose[rows]
     start, end, normal = program.tip[pose - 1], program.tip[pose], arcs.normal[rows]
     radius = start - arcs.centre[rows]
-    radius -= np.einsum("ij,ij->i", radius, normal)[:, None] * normal
+    radius -= dot(radius, normal)[:, None] * normal
     side = np.cross(normal, radius)
 
     def swung(angle: Floats) -> Floats:
@@ -102,5 +102,5 @@ def _radius_vectors(program: Program) -> tuple[Floats, Floats]:
     vectors = []
     for point in (program.tip[arcs.pose - 1], program.tip[arcs.pose]):
         offset = point - arcs.centre
-        vectors.append(offset - np.einsum("ij,ij->i", offset, arcs.normal)[:, None] * arcs.normal)
+        vectors.append(offset - dot(offset, arcs.normal)[:, None] * arcs.normal)
     return vectors[0], vectors[1]

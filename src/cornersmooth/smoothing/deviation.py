@@ -13,8 +13,8 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.legs import Legs, dot, square
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.smoothing.legs import Legs
+from cornersmooth.vectors import dot, norm, square
 
 #: parameters u at which the deviation at constant H is evaluated; it is largest near u = ½
 _PROBES = 0.5 * np.array([0.5, 0.7, 0.8, 0.87, 0.92, 0.96, 0.98, 1.0])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, Program
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import norm
 
 
 class Legs(NamedTuple):
@@ -73,14 +73,3 @@ def divide(numerator: Floats | float, denominator: Floats) -> Floats:
     """Quotient; infinity where the denominator is zero."""
     quotient: Floats = np.divide(numerator, denominator, out=np.full_like(denominator, np.inf), where=denominator > 0.0)
     return quotient
-
-
-def square(vectors: Floats) -> Floats:
-    """Squared length of the vectors along the last axis."""
-    return dot(vectors, vectors)
-
-
-def dot(one: Floats, other: Floats) -> Floats:
-    """Scalar products along the last axis."""
-    product: Floats = np.einsum("...i,...i->...", one, other)
-    return product

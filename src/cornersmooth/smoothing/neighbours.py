@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints, Program
+from cornersmooth.model import Bools, Ints, Program
+from cornersmooth.vectors import norm
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,3 @@ def _ranges(start: Ints, length: Ints) -> Ints:
     begin = np.cumsum(length) - length
     places: Ints = np.arange(total) + np.repeat(start - begin, length)
     return places
-
-
-def norm(vectors: Floats) -> Floats:
-    """Length of the vectors along the last axis."""
-    lengths: Floats = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
-    return lengths

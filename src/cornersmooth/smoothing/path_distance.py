@@ -18,10 +18,10 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.legs import dot, legs_at
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.smoothing.legs import legs_at
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import lines_of
+from cornersmooth.vectors import dot, norm
 
 #: corners looked at together
 _BLOCK = 4096

@@ -11,8 +11,8 @@ from cornersmooth.model import Floats, LimitedBy, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.deviation import BETWEEN_PROBES, EXACT, Bends, keep
-from cornersmooth.smoothing.legs import Legs, Placed, divide, dot, half_angle_cosine, square
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.smoothing.legs import Legs, Placed, divide, half_angle_cosine
+from cornersmooth.vectors import dot, norm, square
 
 #: while the lever turns by less than this many times the deviation, relative to it, the deviation is largest at u = ½:
 #: half of what is proven, for all weights 1 at the paper's ratio and for every other shape

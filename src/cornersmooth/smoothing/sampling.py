@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
-from cornersmooth.smoothing.neighbours import norm
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
-from cornersmooth.smoothing.synchronise import angle_between, matching_parameters
+from cornersmooth.smoothing.synchronise import matching_parameters
+from cornersmooth.vectors import angle_between, norm, unit
 
 
 @dataclass(frozen=True)
@@ -214,11 +214,11 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, block: _Block
         u = nodes(int(lines))
         points, levers = points_of(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
-        block.tip[where], block.other[where] = points[:, 1:], _unit(levers[:, 1:])
+        block.tip[where], block.other[where] = points[:, 1:], unit(levers[:, 1:])
         block.move[where[:, len(u) // 2 :]] = segments.following[poses[chosen]][:, None]
         first = segments.has_line[poses[chosen]]
         at = where[first, 0] - 1
-        block.tip[at], block.other[at] = points[first, 0], _unit(levers[first, 0])
+        block.tip[at], block.other[at] = points[first, 0], unit(levers[first, 0])
 
 
 def _proportional_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
@@ -279,7 +279,7 @@ def _fill_divided(smoothed: SmoothProgram, segments: Segments, block: _Block) ->
         slope = np.tan(np.arcsin(np.minimum(norm(turn) / 2.0, 1.0)))
         low, high = np.arctan((2.0 * entry - 1.0) * slope), np.arctan((2.0 * leave - 1.0) * slope)
         ends = [
-            _unit(
+            unit(
                 settings.axis_length * program.axis[start]
                 + axis_at[pose][:, None] * (step + settings.axis_length * turn)
                 - at[pose][:, None] * step
@@ -293,7 +293,7 @@ def _fill_divided(smoothed: SmoothProgram, segments: Segments, block: _Block) ->
                 block.other[place] = _great_circle(ends[0], ends[1], j / number)
             else:
                 at = (np.tan(low + (high - low) * j / number) / slope + 1.0) / 2.0
-                block.other[place] = _unit(program.axis[start] + at[:, None] * turn)
+                block.other[place] = unit(program.axis[start] + at[:, None] * turn)
             block.tip[place] = program.tip[start] + at[:, None] * step
 
 
@@ -303,9 +303,4 @@ def _great_circle(one: Floats, other: Floats, share: float) -> Floats:
     sine = np.sin(angle)
     flat = sine < 1e-12
     turned = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * other
-    return _unit(np.where(flat, (1.0 - share) * one + share * other, turned))
-
-
-def _unit(vectors: Floats) -> Floats:
-    units: Floats = vectors / norm(vectors)[..., None]
-    return units
+    return unit(np.where(flat, (1.0 - share) * one + share * other, turned))

@@ -16,7 +16,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import norm, square
 
 #: bend (mm) that one line per half may bridge, over the chord tolerance
 _BEND_PER_CHORD = 1.0 / PAPER_ERROR
@@ -166,7 +166,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
         - (tip_in + turn_in) * corners.axis_trim_in[rows][:, None],
     )
     more_bend, more_turn = shape_factors(corners.weights[rows], corners.ratio[rows])
-    bend = np.sqrt(np.maximum(_square(bends[0]), _square(bends[1]))) * more_bend
+    bend = np.sqrt(np.maximum(square(bends[0]), square(bends[1]))) * more_bend
     by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
     number = np.ceil(by_chord - 1e-9)
 
@@ -175,7 +175,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
         (turn_in, np.maximum(corners.axis_trim_in[rows], corners.trim_in[rows])),
         (turn_out, np.maximum(corners.axis_trim_out[rows], corners.trim_out[rows])),
     ):
-        half = np.arcsin(np.minimum(np.sqrt(_square(turn)) / (2.0 * settings.axis_length), 1.0))
+        half = np.arcsin(np.minimum(np.sqrt(square(turn)) / (2.0 * settings.axis_length), 1.0))
         turned = 2.0 * half * reach + corners.orientation_error[rows]  # on this side of the middle
         by_turn = np.maximum(by_turn, turned * more_turn / _turn_limit(settings, half))
     graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
@@ -183,8 +183,3 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))
     number_of_lines: Ints = np.clip(chosen, -_MOST_LINES, _MOST_LINES).astype(np.int64)
     return number_of_lines
-
-
-def _square(vectors: Floats) -> Floats:
-    square: Floats = np.einsum("...i,...i->...", vectors, vectors)
-    return square

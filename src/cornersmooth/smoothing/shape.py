@@ -13,7 +13,8 @@ import numpy as np
 
 from cornersmooth.model import Floats
 from cornersmooth.settings import WEIGHT_DECIMALS
-from cornersmooth.smoothing.legs import Legs, dot, square
+from cornersmooth.smoothing.legs import Legs
+from cornersmooth.vectors import dot, square
 
 _POWER = 2.5
 

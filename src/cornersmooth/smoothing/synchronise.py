@@ -15,7 +15,7 @@ import numpy as np
 
 from cornersmooth.model import Floats
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.vectors import angle_between, norm
 
 #: parameters of the tip curve at which residual and jumps are reported
 REPORT_PARAMETERS = np.linspace(0.0, 1.0, 9)
@@ -160,10 +160,3 @@ def synchronisation_report(
         - nurbs.evaluate(tip_curve, weights, REPORT_PARAMETERS[[half]])[:, 0]
     )
     return residual.max(axis=1), ends[0], ends[1], angle_between(middle, lever)
-
-
-def angle_between(one: Floats, other: Floats) -> Floats:
-    """Angle between vectors along the last axis, rad; accurate for small angles too."""
-    cross = np.cross(one, other)
-    angle: Floats = np.arctan2(norm(cross), np.einsum("...i,...i->...", one, other))
-    return angle

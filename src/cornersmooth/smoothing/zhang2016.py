@@ -7,9 +7,9 @@ import numpy as np
 from cornersmooth.model import Floats, LimitedBy, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.legs import Legs, Placed, divide, dot, half_angle_cosine
-from cornersmooth.smoothing.neighbours import norm
+from cornersmooth.smoothing.legs import Legs, Placed, divide, half_angle_cosine
 from cornersmooth.smoothing.synchronise import synchronisation_report
+from cornersmooth.vectors import dot, norm
 
 
 def place_zhang2016(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Placed:

@@ -1,0 +1,36 @@
+"""Arithmetic of arrays of vectors: the vectors lie along the last axis, whatever stands before it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Floats
+
+
+def dot(one: Floats, other: Floats) -> Floats:
+    """Scalar products."""
+    product: Floats = np.einsum("...i,...i->...", one, other)
+    return product
+
+
+def square(vectors: Floats) -> Floats:
+    """Squared lengths."""
+    return dot(vectors, vectors)
+
+
+def norm(vectors: Floats) -> Floats:
+    """Lengths."""
+    return np.sqrt(dot(vectors, vectors))
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors of length one with the same directions; a vector of no length stays as it is."""
+    length = norm(vectors)[..., None]
+    units: Floats = vectors / np.where(length > 0.0, length, 1.0)
+    return units
+
+
+def angle_between(one: Floats, other: Floats) -> Floats:
+    """Angles between vectors, rad; accurate for small angles too."""
+    angle: Floats = np.arctan2(norm(np.cross(one, other)), dot(one, other))
+    return angle
