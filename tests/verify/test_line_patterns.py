@@ -54,7 +54,7 @@ def test_fast_path_is_the_careful_path(seed, odd):
     patterns = LinePatterns(lexer.columns, numbered=False)
     assert (lines_of(data, patterns) is not None) == (odd is None)
     fast = read(block_tables._read_chunk(data, 1, lexer, patterns, None))
-    assert fast == read(block_tables._read_carefully(data, data, 1, block_tables._Signatures(lexer), None))
+    assert fast == read(block_tables._in_order(block_tables.LetteredLines(data, lexer), data, 1, lexer, None))
 
 
 def test_fast_path_is_taken():

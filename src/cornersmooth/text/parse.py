@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
-Words = NDArray[np.uint64]
 Bools = NDArray[np.bool_]
 
 #: bytes taken at a time: the block and the arrays made from it stay in the second-level cache
@@ -45,9 +45,6 @@ _POWER: Final = np.array([float(f"1e{n}") for n in range(23)])
 
 #: mantissas below are exact in float64
 _EXACT: Final = 2.0**53
-
-#: digits that one word holds, and that two hold
-_WORD, _TWO_WORDS = 8, 16
 
 
 class NumberError(ValueError):
@@ -144,7 +141,7 @@ def _parse_block(block: Bytes, offset: int, commas: int) -> tuple[Floats, int]:
     point, careful = _find_points(special.compress(kind == _POINT), start, end)
     whole = point - start - signed  # digits before the point
     part = np.maximum(end - point - 1, 0)  # digits after it
-    careful |= (whole > _WORD) | (part > _TWO_WORDS) | (whole + part == 0)
+    careful |= (whole > DIGITS) | (part > 2 * DIGITS) | (whole + part == 0)
     if len(special) != np.count_nonzero(kind <= _POINT) + np.count_nonzero(signed):
         strange = special.compress(kind >= _SIGN)
         strange = strange[~np.isin(strange, start[signed])]
@@ -153,9 +150,9 @@ def _parse_block(block: Bytes, offset: int, commas: int) -> tuple[Floats, int]:
 
     scale = _POWER.take(part)
     mantissa = _digits(area, point, whole) * scale
-    mantissa += _digits(area, end, np.minimum(part, _WORD))
-    if part.max() > _WORD:
-        mantissa += _digits(area, end - _WORD, np.maximum(part - _WORD, 0)) * _POWER[_WORD]
+    mantissa += _digits(area, end, np.minimum(part, DIGITS))
+    if part.max() > DIGITS:
+        mantissa += _digits(area, end - DIGITS, np.maximum(part - DIGITS, 0)) * _POWER[DIGITS]
     careful |= mantissa >= _EXACT  # below it every term and the sum are exact
     numbers = mantissa / scale
     numbers *= 1.0 - 2.0 * minus
@@ -194,29 +191,9 @@ def _find_points(points: Ints, start: Ints, end: Ints) -> tuple[Ints, Bools]:
 
 def _digits(area: Bytes, stop: Ints, count: Ints) -> Words:
     """Read the integers whose `count` (0 to 8) digits end before `stop`."""
-    # a byte string read as a little-endian word has its last character on top; shift counts past 63 give zero
-    windows = np.ndarray((len(area) - _WORD + 1,), "<u8", area, strides=(1,))
-    word = windows[stop + (_MARGIN - _WORD)]
-    word &= _NIBBLES << (_WORD * (_WORD - count)).astype(np.uint64)
-    for mask, factor, shift in _PAIRING:
-        word &= mask
-        word *= factor
-        word >>= shift
-    return word
-
-
-#: the values of eight ASCII digits
-_NIBBLES: Final = np.uint64(0x0F0F0F0F0F0F0F0F)
-
-#: join neighbours to two, four and eight digits: what to keep, 10^k·2^shift + 1, and where the result ends up
-_PAIRING: Final = tuple(
-    (np.uint64(mask), np.uint64((10**digits << shift) + 1), np.uint64(shift))
-    for mask, digits, shift in (
-        (0x0F0F0F0F0F0F0F0F, 1, 8),
-        (0x00FF00FF00FF00FF, 2, 16),
-        (0x0000FFFF0000FFFF, 4, 32),
-    )
-)
+    word = words_of(area)[stop + (_MARGIN - DIGITS)].view("<u8")
+    word &= LAST_DIGITS.take(count, mode="clip")  # other counts are read with care afterwards
+    return join_digits(word)
 
 
 def _careful(field: bytes, offset: int) -> float:

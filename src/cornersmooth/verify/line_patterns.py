@@ -1,4 +1,4 @@
-"""Lines of one pattern: the same letters, with numbers of the same shape behind them, in the same places of the line.
+"""Lines of one digit pattern: the same letters, with numbers of the same shape behind them, in the same places.
 
 What posts write is regular: few patterns make up a text, and a line's pattern is known from where its digits are and
 from what stands between them. Once a pattern is understood, its numbers are read where they must stand, eight digits
@@ -10,7 +10,7 @@ regular is left to the careful reading in `block_tables`.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -18,9 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints
-
-Bytes = NDArray[np.uint8]
-Words = NDArray[np.uint64]
+from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
 
 #: line ends that must stand before and behind a chunk, so that words beyond its ends can be fetched
 MARGIN: Final = 24
@@ -49,16 +47,28 @@ _NUMBER: Final = re.compile(rb"0{1,8} ")
 #: numbers of so few bytes are compared before they are read: they may all be the same
 _FEW: Final = 4
 
-#: digits that one word holds
-_DIGITS: Final = 8
-
-_NIBBLES = 0x0F0F0F0F0F0F0F0F
-#: digits as numbers: the last k bytes of a word
-_KEEP = np.array([(((1 << (8 * k)) - 1) << (64 - 8 * k)) & _NIBBLES for k in range(9)], np.uint64)
 #: the bytes behind the point, for so many decimals; all where there is no point
 _BEHIND = np.array([((1 << (8 * k)) - 1) << (64 - 8 * k) for k in range(9)] + [(1 << 64) - 1], np.uint64)
 #: the first bits of a word
 _LOW_BITS = np.array([(1 << k) - 1 for k in range(_BITS + 1)], np.uint64)
+
+
+#: rows of a run, the names of their columns, and an array of numbers for each name
+Group = tuple[Any, tuple[str, ...], Sequence[Floats]]
+
+
+def merged(groups: Iterable[Group], count: int) -> dict[str, Floats]:
+    """Columns of a run of `count` lines from those of groups with the same letters; NaN where a line has none."""
+    columns: dict[str, Floats] = {}
+    for rows, names, numbers in groups:
+        for name, values in zip(names, numbers, strict=True):
+            if len(values) == count:
+                columns[name] = values
+                continue
+            if name not in columns:
+                columns[name] = np.full(count, np.nan)
+            columns[name][rows] = values
+    return columns
 
 
 @dataclass(frozen=True)
@@ -122,7 +132,7 @@ class LinePatterns:
                     return None
                 decimals = len(part) - (part[:1] == b".") if point else -1
                 digits = whole + max(decimals, 0)
-                if not 1 <= digits <= _DIGITS:
+                if not 1 <= digits <= DIGITS:
                     return None
                 fields.append((found.end("part"), digits, decimals, bool(found["minus"])))
                 place = found.end()
@@ -148,8 +158,8 @@ class Lines:
         The text between line ends, `MARGIN` before it.
     words : (n - 7,) of 8 bytes
         What stands from every place of it on.
-    start, stop : (l,) int64
-        First byte of every line, and its end.
+    start : (l,) int64
+        First byte of every line.
     label : (l,) int64
         Row of `line_patterns`.
     patterns : list of LinePattern
@@ -158,13 +168,8 @@ class Lines:
     raw: Bytes
     words: NDArray[np.void]
     start: Ints
-    stop: Ints
     label: Ints
     patterns: list[LinePattern]
-
-    def text(self, row: int) -> bytes:
-        """Return a line as written, with its end."""
-        return self.raw[int(self.start[row]) : int(self.stop[row]) + 1].tobytes()
 
     def bulk(self) -> NDArray[np.bool_]:
         """(l,) whether each line can be read in a run."""
@@ -172,33 +177,24 @@ class Lines:
 
     def columns(self, first: int, last: int) -> dict[str, Floats]:
         """Numbers of lines ``first`` to ``last`` (excluded), all of them of a run; NaN where a line has none."""
+        return merged(self._groups(first, last), last - first)
+
+    def _groups(self, first: int, last: int) -> Iterator[Group]:
+        """Lines of a run by the letters that they have."""
         label = self.label[first:last]
         used = np.flatnonzero(np.bincount(label, minlength=len(self.patterns))).tolist()
-        names = list(dict.fromkeys(self.patterns[k].names for k in used))
-        kind = np.zeros(len(self.patterns), np.int64)
-        place = np.zeros(len(self.patterns), np.int64)
-        columns: dict[str, Floats] = {}
-        of_name: dict[tuple[str, ...] | None, list[int]] = {name: [] for name in names}
+        of_names: dict[tuple[str, ...], list[int]] = {}
         for k in used:
-            mine = of_name[self.patterns[k].names]
-            kind[k], place[k] = names.index(self.patterns[k].names), len(mine)
-            mine.append(k)
-        kinds = kind[label] if len(names) > 1 else None
-        for number, (name, mine) in enumerate(of_name.items()):
-            assert name is not None
-            table = np.frombuffer(b"".join([self.patterns[k].fields for k in mine]), np.int64).reshape(-1, len(name), 4)
-            if kinds is None:
-                numbers = self._numbers(self.start[first:last], place[label], table)
-                columns.update(zip(name, numbers, strict=True))
-                continue
-            rows = np.flatnonzero(kinds == number)
-            numbers = self._numbers(self.start[first + rows], place[label[rows]], table)
-            for letter, values in zip(name, numbers, strict=True):
-                column = columns.get(letter)
-                if column is None:
-                    column = columns[letter] = np.full(last - first, np.nan)
-                column[rows] = values
-        return columns
+            of_names.setdefault(self.patterns[k].names or (), []).append(k)
+        kind, place = np.zeros((2, len(self.patterns)), np.int64)
+        for number, mine in enumerate(of_names.values()):
+            kind[mine], place[mine] = number, np.arange(len(mine))
+        kinds = kind[label] if len(of_names) > 1 else None
+        for number, (names, mine) in enumerate(of_names.items()):
+            fields = np.frombuffer(b"".join([self.patterns[k].fields for k in mine]), np.int64)
+            rows = slice(None) if kinds is None else np.flatnonzero(kinds == number)
+            start = self.start[first:last][rows]
+            yield rows, names, self._numbers(start, place[label[rows]], fields.reshape(-1, len(names), 4))
 
     def _numbers(self, start: Ints, label: Ints, table: Ints) -> list[Floats]:
         """Numbers of lines with the same letters, one array for each of them; `table` as in `LinePattern.fields`."""
@@ -210,13 +206,13 @@ class Lines:
             if column.short:
                 same = word >> np.uint64(64 - 8 * column.short)
                 if (same == same[0]).all():
-                    last = int(at[0]) + _DIGITS
+                    last = int(at[0]) + DIGITS
                     found.append(np.full(len(at), float(self.raw[last - column.short : last].tobytes())))
                     continue
             if column.point:  # close the gap that it leaves
                 closed = word << _EIGHT
                 if column.long:
-                    at -= _DIGITS
+                    at -= DIGITS
                     before = self.words[at].view(np.uint64)
                     before >>= _REST
                     closed |= before
@@ -224,14 +220,7 @@ class Lines:
                 word &= _each(column.behind, label)
                 word ^= closed
             word &= _each(column.keep, label)
-            # eight decimal digits to an integer: pairs, then fours, then all (first digit in the lowest byte)
-            for factor, shift, mask in _STEPS:
-                word *= factor
-                word >>= shift
-                word &= mask
-            word *= _LAST_FACTOR
-            word >>= _LAST_SHIFT
-            found.append(np.divide(word.view(np.int64), _each(column.divisor, label)))
+            found.append(np.divide(join_digits(word).view(np.int64), _each(column.divisor, label)))
         return found
 
 
@@ -270,9 +259,9 @@ def _columns(table: Ints) -> list[_Column]:
     return [
         _Column(*column)
         for column in zip(
-            *(_alike(values) for values in (end - _DIGITS, _BEHIND[decimals], _KEEP[digits], divisor)),
+            *(_alike(values) for values in (end - DIGITS, _BEHIND[decimals], LAST_DIGITS[digits], divisor)),
             (decimals >= 0).any(axis=0).tolist(),
-            (size > _DIGITS).any(axis=0).tolist(),
+            (size > DIGITS).any(axis=0).tolist(),
             np.where(short.all(axis=0), size[0] + minus[0], 0).tolist(),
             strict=True,
         )
@@ -292,12 +281,6 @@ def _each(values: Any, label: Ints) -> Any:
 
 _TENS = np.array([10.0**k for k in range(9)])
 _EIGHT, _REST = np.uint64(8), np.uint64(56)
-#: a digit and the one behind it make a pair: ten times the one plus the other, and so on
-_STEPS = (
-    (np.uint64(10 * 2**8 + 1), np.uint64(8), np.uint64(0x00FF00FF00FF00FF)),
-    (np.uint64(100 * 2**16 + 1), np.uint64(16), np.uint64(0x0000FFFF0000FFFF)),
-)
-_LAST_FACTOR, _LAST_SHIFT = np.uint64(10000 * 2**32 + 1), np.uint64(32)
 
 
 def lines_of(text: bytes, patterns: LinePatterns) -> Lines | None:
@@ -321,7 +304,6 @@ def lines_of(text: bytes, patterns: LinePatterns) -> Lines | None:
     width = int(size.max())
     if width > LONGEST:
         return None
-    words = np.ndarray((len(raw) - 7,), "V8", buffer=raw.data, strides=(1,))
     keys = _digit_keys(raw, start, size, -(-width // _BITS))
     mixed = keys[0]
     for key in keys[1:]:
@@ -331,18 +313,18 @@ def lines_of(text: bytes, patterns: LinePatterns) -> Lines | None:
     if len(first) > max(_FEW_PATTERNS, len(start) // _FEWEST_LINES):
         return None
     label = np.repeat(inverse, np.diff(np.append(head, len(start))))
-    return _labelled(raw, words, start, stop, label, head[first], keys, patterns)
+    return _labelled(raw, start, stop, label, head[first], keys, patterns)
 
 
 def _digit_keys(raw: Bytes, start: Ints, size: Ints, count: int) -> list[Words]:
     """Bits of every line that say which of its bytes are no digits, `_BITS` in a word."""
     other = raw - np.uint8(ord("0")) > np.uint8(9)
     packed = np.append(np.packbits(other, bitorder="little"), np.zeros(8 * _MOST_WORDS, np.uint8))
-    words = np.ndarray((len(packed) - 7,), np.dtype("<u8"), buffer=packed.data, strides=(1,))
+    words = words_of(packed)
     keys = []
     for k in range(count):
         bit = start + k * _BITS if k else start
-        key = words[bit >> 3]
+        key = words[bit >> 3].view(np.uint64)
         key >>= (bit & 7).view(np.uint64)
         key &= _LOW_BITS[np.clip(size - k * _BITS, 0, _BITS)]
         keys.append(key)
@@ -351,7 +333,6 @@ def _digit_keys(raw: Bytes, start: Ints, size: Ints, count: int) -> list[Words]:
 
 def _labelled(
     raw: Bytes,
-    words: NDArray[np.void],
     start: Ints,
     stop: Ints,
     label: Ints,
@@ -384,7 +365,7 @@ def _labelled(
         _, first, inverse = np.unique(label[rows], return_index=True, return_inverse=True)
         label[rows] = len(known) + inverse
         sample = rows[first]
-    return Lines(raw, words, start, stop, label, known)
+    return Lines(raw, words_of(raw), start, label, known)
 
 
 def _unlike(raw: Bytes, start: Ints, size: Ints, label: Ints, known: list[LinePattern]) -> Bools | bool:
