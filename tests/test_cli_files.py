@@ -9,7 +9,7 @@ import resource
 import signal
 import stat
 import subprocess
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -28,7 +28,8 @@ from oracle.command import (
     only,
     quiet,
     run,
-    start,
+    run_process,
+    started,
     wait_for,
 )
 from oracle.nc_text import parse
@@ -93,7 +94,7 @@ def test_names_that_are_no_text(small: Path, tmp_path: Path) -> None:
 def test_closed_streams(small: Path, tmp_path: Path, closed: int) -> None:
     """Without standard error the work is done in silence; without standard output there is nowhere to write to."""
     options = ["-o", str(tmp_path / "o.nc")] if closed == 2 else []
-    result = run("smooth", small, *options, prepare=lambda: os.close(closed))
+    result = run_process("smooth", small, *options, prepare=lambda: os.close(closed))
     assert result.returncode == (BAD_OUTPUT if closed == 1 else DONE)
     assert quiet(result.stderr)
 
@@ -165,7 +166,7 @@ def test_full_disk_leaves_the_old_file_or_none(large: Path, tmp_path: Path, old:
     def small_files() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536))
 
-    result = run("smooth", large, "-o", out, "--force", prepare=small_files)
+    result = run_process("smooth", large, "-o", out, "--force", prepare=small_files)
     assert result.returncode == BAD_OUTPUT
     assert quiet(result.stderr)
     assert "out.nc" in message(result.stderr)
@@ -175,61 +176,92 @@ def test_full_disk_leaves_the_old_file_or_none(large: Path, tmp_path: Path, old:
 
 
 def test_closed_pipe(large: Path) -> None:
-    process = start("smooth", large)
-    assert process.stdout is not None
-    assert process.stderr is not None
-    process.stdout.read(10)
-    process.stdout.close()
-    complaint = process.stderr.read()
-    process.stderr.close()
-    assert process.wait(PATIENCE) == BAD_OUTPUT
+    with started("smooth", large) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.read(10)
+        process.stdout.close()
+        complaint = process.stderr.read()
+        assert process.wait(PATIENCE) == BAD_OUTPUT
     assert quiet(complaint)
     assert b"BrokenPipe" not in complaint
     assert b"Exception ignored" not in complaint
 
 
-def _ended(process: subprocess.Popen[bytes], beside: Path | None = None) -> bool:
-    """Whether the process has ended, or has made a file beside the given one."""
-    return process.poll() is not None or (beside is not None and not only(beside.parent, beside.name))
+def _reads(process: subprocess.Popen[bytes], data: bytes, out: Path) -> None:
+    """It has taken in more than a pipe holds, and waits for the rest."""
+    assert process.stdin is not None
+    assert len(data) > 1 << 20
+    process.stdin.write(data[: 1 << 20])
 
 
-def _interrupt(process: subprocess.Popen[bytes], number: signal.Signals, out: Path) -> bool:
-    """Send the signal; whether it came in time. The old file is there then, alone, and nothing was complained of."""
-    process.send_signal(number)
-    _, complaint = process.communicate(timeout=PATIENCE)
-    assert only(out.parent, "out.nc")
-    if process.returncode == DONE:
-        parse(out.read_bytes(), "g1")
+def _has_read(process: subprocess.Popen[bytes], data: bytes, out: Path) -> None:
+    """It has everything and is alone with it."""
+    assert process.stdin is not None
+    process.stdin.write(data)
+    process.stdin.close()
+    process.stdin = None
+
+
+def _begins_to_write(process: subprocess.Popen[bytes], data: bytes, out: Path) -> None:
+    _has_read(process, data, out)
+    wait_for(lambda: _part(out) is not None or process.poll() is not None)
+
+
+def _writes(process: subprocess.Popen[bytes], data: bytes, out: Path) -> None:
+    _has_read(process, data, out)
+    wait_for(lambda: _size(out) > 0 or process.poll() is not None)
+
+
+def _verifies(process: subprocess.Popen[bytes], data: bytes, out: Path) -> None:
+    """The text is whole, and has not taken its place yet."""
+    _has_read(process, data, out)
+    wait_for(lambda: _ends(out) or process.poll() is not None)
+
+
+def _part(out: Path) -> Path | None:
+    """The file beside the output that is being written."""
+    return next((path for path in out.parent.iterdir() if path != out), None)
+
+
+def _size(out: Path) -> int:
+    part = _part(out)
+    try:
+        return part.stat().st_size if part else 0
+    except FileNotFoundError:
+        return 0
+
+
+def _ends(out: Path) -> bool:
+    part = _part(out)
+    try:
+        return part is not None and part.read_bytes()[-2:] == b"%\n"
+    except FileNotFoundError:
         return False
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("moment", [_reads, _has_read, _begins_to_write, _writes, _verifies])
+def test_interruption_leaves_the_old_file(
+    large: Path,
+    tmp_path: Path,
+    number: signal.Signals,
+    moment: Callable[[subprocess.Popen[bytes], bytes, Path], None],
+) -> None:
+    """What a run may be about when the signal comes; the last moments are short, and it may have ended by itself."""
+    out, data = tmp_path / "out.nc", large.read_bytes()
+    out.write_bytes(OLD)
+    with started("smooth", "-", "-o", out, "--force") as process:
+        moment(process, data, out)
+        process.send_signal(number)
+        _, complaint = process.communicate(timeout=PATIENCE)
+    assert only(tmp_path, "out.nc")
+    if process.returncode == DONE and moment is not _reads:
+        parse(out.read_bytes(), "g1")
+        return
     assert process.returncode in (128 + number, -number)
     assert quiet(complaint), complaint.decode()
     assert out.read_bytes() == OLD
-    return True
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interruption_leaves_the_old_file(large: Path, tmp_path: Path, number: signal.Signals) -> None:
-    """At several moments of the run; before that Python itself is starting."""
-    out = tmp_path / "out.nc"
-    interrupted = 0
-    for moment in (0.3, 0.5, 0.7, *20 * [0.3]):
-        if interrupted and moment < 0.5:
-            break  # the rest is for a busy computer, which may look too late each time
-        out.write_bytes(OLD)
-        process = start("smooth", large, "-o", out, "--force")
-        wait_for(partial(_ended, process), moment)
-        interrupted += _interrupt(process, number, out)
-    assert interrupted >= 1
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interruption_as_the_temporary_file_appears(large: Path, tmp_path: Path, number: signal.Signals) -> None:
-    out = tmp_path / "out.nc"
-    for _ in range(6):
-        out.write_bytes(OLD)
-        process = start("smooth", large, "-o", out, "--force")
-        wait_for(partial(_ended, process, beside=out), PATIENCE)
-        _interrupt(process, number, out)
 
 
 # ---------------------------------------------------------------- many inputs
@@ -254,13 +286,13 @@ def _contents(folder: Path) -> dict[str, bytes]:
 def test_any_number_of_processes_gives_the_same_bytes(several: list[Path], tmp_path: Path) -> None:
     for name, jobs in (("one", ["-j", "1"]), ("two", ["-j", "2"]), ("all", ["-j"]), ("none", [])):
         (tmp_path / name).mkdir()
-        result = run("smooth", *several, "-d", tmp_path / name, *jobs)
+        result = run_process("smooth", *several, "-d", tmp_path / name, *jobs)
         assert result.returncode == DONE, result.stderr.decode()
         assert result.stdout == b""
     contents = _contents(tmp_path / "one")
     assert len(contents) == len(several)
     assert contents == _contents(tmp_path / "two") == _contents(tmp_path / "all") == _contents(tmp_path / "none")
-    alone = run("smooth", several[0]).stdout
+    alone = run_process("smooth", several[0]).stdout
     assert alone in contents.values()
 
 
@@ -270,7 +302,7 @@ def test_goes_on_after_a_file_that_failed(several: list[Path], tmp_path: Path, j
     bad.write_bytes(SMALL.replace(b"GOTO/10,10,0,0,0.1,1", b"GOTO/10,nan,0,0,0.1,1"))
     out = tmp_path / "out"
     out.mkdir()
-    result = run("smooth", several[0], bad, *several[1:], "-d", out, "-j", jobs)
+    result = run_process("smooth", several[0], bad, *several[1:], "-d", out, "-j", jobs)
     assert result.returncode == BAD_INPUT
     assert quiet(result.stderr)
     assert "bad.cls:9" in message(result.stderr)
@@ -305,15 +337,11 @@ def test_interruption_of_several_processes_leaves_whole_files(large: Path, tmp_p
         path.write_bytes(large.read_bytes())
     out = tmp_path / "out"
     out.mkdir()
-    process = subprocess.Popen(
-        command("smooth", *paths, "-d", out, "-j", "2"),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    wait_for(lambda: bool(list(out.glob("*.nc"))) or process.poll() is not None, PATIENCE)
-    os.killpg(process.pid, signal.SIGINT)
-    assert process.wait(PATIENCE) == 128 + signal.SIGINT
+    with started("smooth", *paths, "-d", out, "-j", "2", session=True) as process:
+        wait_for(lambda: bool(list(out.glob("*.nc"))) or process.poll() is not None)
+        os.killpg(process.pid, signal.SIGINT)
+        process.communicate(timeout=PATIENCE)
+    assert process.returncode == 128 + signal.SIGINT
     left = _contents(out)
     assert 1 <= len(left) < len(paths)
     for name, text in left.items():

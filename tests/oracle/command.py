@@ -1,13 +1,17 @@
-"""Runs the installed command as users do: a process of its own, its streams, its exit code, its CPU time."""
+"""Runs the command line: in this process, or where a test is about processes, signals or streams, as users do."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
@@ -40,56 +44,88 @@ def command(*args: str | Path) -> list[str]:
     return [str(SCRIPT), *map(str, args)]
 
 
+#: what changes looks
+LOOKS = ("NO_COLOR", "FORCE_COLOR", "COLUMNS")
+
+
 def environment(**changes: str) -> dict[str, str]:
     """Environment of the tests without what changes looks, plus `changes`."""
-    kept = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR", "COLUMNS")}
-    return kept | changes
+    return {name: value for name, value in os.environ.items() if name not in LOOKS} | changes
 
 
-def run(
-    *args: str | Path,
-    data: bytes = b"",
-    cwd: Path | None = None,
-    env: Mapping[str, str] | None = None,
-    prepare: Callable[[], None] | None = None,
+def run(*args: str | Path, data: bytes = b"", cwd: Path | None = None) -> subprocess.CompletedProcess[bytes]:
+    """Run the command line to its end in this process, with streams of its own.
+
+    Warnings are errors here, as everywhere in the tests.
+    """
+    from cornersmooth import cli
+
+    words = [str(word) for word in args]
+    streams = [
+        io.TextIOWrapper(io.BytesIO(given), encoding="utf-8", errors="backslashreplace") for given in (data, b"", b"")
+    ]
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.chdir(cwd or os.getcwd()))
+        stack.enter_context(patch.dict(os.environ, environment(), clear=True))
+        stack.enter_context(patch.object(sys, "argv", ["cornersmooth", *words]))
+        for name, stream in zip(("stdin", "stdout", "stderr"), streams, strict=True):
+            stack.enter_context(patch.object(sys, name, stream))
+        code = cli.run(words)
+    out, said = (_written(stream) for stream in streams[1:])
+    return subprocess.CompletedProcess(words, code, out, said)
+
+
+def _written(stream: io.TextIOWrapper) -> bytes:
+    stream.flush()
+    buffer = stream.buffer
+    assert isinstance(buffer, io.BytesIO)
+    return buffer.getvalue()
+
+
+def run_process(
+    *args: str | Path, data: bytes = b"", prepare: Callable[[], None] | None = None
 ) -> subprocess.CompletedProcess[bytes]:
-    """Run the command to its end."""
+    """Run the installed command to its end in a process of its own."""
     return subprocess.run(
         command(*args),
         input=data,
         capture_output=True,
-        cwd=cwd,
-        env=dict(env) if env is not None else environment(),
+        env=environment(),
         timeout=PATIENCE,
         preexec_fn=prepare,
         check=False,
     )
 
 
-def start(*args: str | Path, cwd: Path | None = None) -> subprocess.Popen[bytes]:
-    """Start the command with its output in pipes."""
-    return subprocess.Popen(
-        command(*args), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=cwd
-    )
+def _interruptible() -> None:
+    """Ctrl-C interrupts: what a shell starts in the background inherits that it does not."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def cpu_seconds(args: Sequence[str]) -> float:
-    """User and system time of one run, seconds."""
-    process = subprocess.Popen(command(*args), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    assert process.returncode == 0
-    return usage.ru_utime + usage.ru_stime
+@contextlib.contextmanager
+def started(*args: str | Path, session: bool = False) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of the command with its streams in pipes; it is gone when the block ends."""
+    with subprocess.Popen(
+        command(*args),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=environment(),
+        start_new_session=session,
+        preexec_fn=_interruptible,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
-def wait_for(condition: Callable[[], bool], seconds: float) -> bool:
-    """Whether the condition came true in time; looked at every millisecond."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return True
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Wait until the condition is true; looked at every millisecond."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, "it never came"
         time.sleep(0.001)
-    return False
 
 
 def quiet(stderr: bytes) -> bool:
@@ -117,7 +153,7 @@ def small(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Some ten thousand corners: enough text to be interrupted while it is written."""
     path = tmp_path_factory.mktemp("large") / "large.cls"
