@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from cornersmooth.errors import InputError
-from cornersmooth.kinematics import Machine, findings, load_machine, machine_names, orientation, route, tool_axis
+from cornersmooth.kinematics import Machine, load_machine, machine_names, poses, tool_axis
 from cornersmooth.kinematics.poses import angle_between
-from cornersmooth.rotary import fill, insertions, rotary_angles
+from cornersmooth.rotary import angle_path, axis_findings, fill, insertions, rotary_angles
 
 TOLERANCE = 0.02  # degrees
 
@@ -337,7 +337,7 @@ def test_blocks_change_nothing(size: int, seed: int, monkeypatch: pytest.MonkeyP
     rapid = rng.random(n) < 0.03
     machine = limited("table-ac", (-720, 720), (-100, 100)) if seed % 2 else load_machine("table-ac")
     whole = rotary_angles(machine, tip, axis, tolerance=TOLERANCE, rapid=rapid, line=np.arange(n))
-    for module in (route, findings, orientation):
+    for module in (angle_path, axis_findings, poses):
         monkeypatch.setattr(module, "CHUNK", size)
     parts = rotary_angles(machine, tip, axis, tolerance=TOLERANCE, rapid=rapid, line=np.arange(n))
     np.testing.assert_array_equal(parts.angles, whole.angles)
