@@ -1,0 +1,156 @@
+"""The machined surface, original against written."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.model import Bools, Floats, Program
+from cornersmooth.surface.distance import distance_to_motion
+from cornersmooth.surface.envelope import EnvelopePoints, envelope_points
+from cornersmooth.surface.motion import original_cuts, written_cuts
+from cornersmooth.surface.tool import Tool
+from cornersmooth.verify import NcProgram, read_nc
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
+
+#: a point deeper than this inside the original volume, mm, is cut away by another part of the path
+BURIED = 1e-3
+
+#: classes of the histogram
+_CLASSES = 40
+
+SCHEMA = "cornersmooth-surface/1"
+
+
+@dataclass(frozen=True)
+class SurfaceMap:
+    """Points of the original surface and how far the written motion is off there, k rows.
+
+    Parameters
+    ----------
+    points : EnvelopePoints
+    off : (k,) float64, mm
+        Distance to the written volume less that to the original volume: negative where the written motion cuts below
+        the original surface (overcut), positive where it leaves material (undercut); NaN beyond `reach`.
+    tool : Tool
+    edge, tolerance, reach : float, mm
+    buried : int
+        Points of the envelope that another part of the original path cuts away; they are not among the rows.
+    """
+
+    points: EnvelopePoints
+    off: Floats
+    tool: Tool
+    edge: float
+    tolerance: float
+    reach: float
+    buried: int
+
+    def __len__(self) -> int:
+        return len(self.off)
+
+    @property
+    def known(self) -> Bools:
+        """(k,) bool: rows with a distance."""
+        found: Bools = np.isfinite(self.off)
+        return found
+
+    def histogram(self) -> tuple[Floats, Floats]:
+        """Edges of equal classes, mm, and how many points are in each."""
+        off = self.off[self.known]
+        span = float(np.abs(off).max(initial=0.0)) or self.tolerance
+        counts, edges = np.histogram(off, bins=_CLASSES, range=(-span, span))
+        return edges, counts.astype(np.float64)
+
+    def worst(self, sign: int) -> int | None:
+        """Row of the largest overcut (sign −1) or undercut (+1); None without any."""
+        rows = np.flatnonzero(self.known & (sign * self.off > 0.0))
+        return int(rows[np.argmax(np.abs(self.off[rows]))]) if len(rows) else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything but the points, plain; keys carry their unit."""
+        off = self.off[self.known]
+        edges, counts = self.histogram()
+        contents: dict[str, Any] = {
+            "schema": SCHEMA,
+            "tool": {"description": self.tool.describe(), **vars(self.tool)},
+            "edge_mm": self.edge,
+            "tolerance_mm": self.tolerance,
+            "points": len(self),
+            "points_cut_away_elsewhere": self.buried,
+            "points_beyond_reach": int(np.count_nonzero(~self.known)),
+            "mean_mm": float(off.mean()) if len(off) else None,
+            "rms_mm": float(np.sqrt((off * off).mean())) if len(off) else None,
+            "within_tolerance_percent": float(100.0 * (np.abs(off) <= self.tolerance).mean()) if len(off) else None,
+            "histogram": {"edges_mm": edges.tolist(), "counts": counts.astype(int).tolist()},
+        }
+        for name, sign in (("overcut", -1), ("undercut", 1)):
+            own = np.abs(off[sign * off > 0.0])
+            row = self.worst(sign)
+            contents[name] = {
+                "points": len(own),
+                "max_mm": float(own.max(initial=0.0)),
+                "mean_mm": float(own.mean()) if len(own) else 0.0,
+                "percentile_95_mm": float(np.percentile(own, 95.0)) if len(own) else 0.0,
+                "cl_line": 0 if row is None else int(self.points.line[row]),
+                "at_mm": None if row is None else self.points.point[row].tolist(),
+            }
+        return contents
+
+
+def measure_surface(
+    program: Program,
+    nc: NcProgram | bytes | str | os.PathLike[str],
+    tool: Tool,
+    *,
+    tolerance: float,
+    edge: float = 10.0,
+    levels: int = 7,
+    stations: int = 2000,
+    control: str = "fanuc",
+    machine: Machine | None = None,
+    tcp: bool = True,
+) -> SurfaceMap:
+    """Measure what the written motion leaves of the surface that the original one makes.
+
+    Parameters
+    ----------
+    program : Program
+    nc : NcProgram, bytes or path
+    tool : Tool
+    tolerance : float, mm
+        ε.
+    edge : float, mm
+        Length of the cutting edge.
+    levels, stations
+        As in `envelope_points`.
+    control, machine, tcp
+        As in `read_nc`.
+
+    Raises
+    ------
+    InputError
+        The text cannot be read.
+    SettingsError
+        CS271: nothing is cut.
+    """
+    text = nc
+    if not isinstance(text, NcProgram):
+        text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=edge)
+    original, written = original_cuts(program), written_cuts(text)
+    if not len(original):
+        raise SettingsError("CS271", "there is no feed move, so no surface", "give a program that cuts")
+    points = envelope_points(original, tool, edge, levels=levels, stations=stations)
+    reach = max(10.0 * tolerance, 0.02 * tool.diameter)
+    own = distance_to_motion(points.point, original, tool, edge, reach=reach)
+    on = own > -BURIED  # never NaN: the point is on the tool somewhere
+    rows = np.flatnonzero(on)
+    points, own = points.chosen(rows), own[rows]
+    off = distance_to_motion(points.point, written, tool, edge, reach=reach) - own
+    return SurfaceMap(points, off, tool, edge, tolerance, reach, int(np.count_nonzero(~on)))

@@ -1,0 +1,154 @@
+"""The cutting motion as segments: tip and axis point move evenly, the axis is the direction between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Move, Program
+from cornersmooth.smoothing.arcs import arc_points
+from cornersmooth.verify import NcProgram
+from cornersmooth.verify.ncprogram import Element
+from cornersmooth.verify.trails import directions, written_at
+
+#: largest turn of an arc within one segment, rad: off the arc by its radius times 3e-7
+_ARC_STEP = 1.5e-3
+
+#: segments of one written curve
+_CURVE_PARTS = 64
+
+
+@dataclass(frozen=True)
+class RuledMotion:
+    """Segments of a cutting motion, m rows in order.
+
+    Parameters
+    ----------
+    tip, axis : (m, 2, 3) float64
+        mm and unit vectors at start and end.
+    line : (m,) int64
+        CL or NC line.
+    joined : (m,) bool
+        Whether the segment goes on where the one before ends.
+    """
+
+    tip: Floats
+    axis: Floats
+    line: Ints
+    joined: Bools
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    @classmethod
+    def through(cls, tip: Floats, axis: Floats, line: Ints | None = None) -> RuledMotion:
+        """Motion through poses (n, 3) one after another; those that repeat are left out."""
+        tip, axis = np.asarray(tip, np.float64), np.asarray(axis, np.float64)
+        axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+        lines = np.arange(1, len(tip) + 1) if line is None else line
+        return _segments(tip, axis, lines, np.ones(len(tip), np.bool_))
+
+    def at(self, segment: Ints, share: Floats) -> tuple[Floats, Floats]:
+        """Tip and unit axis (k, 3) at shares (k,) of segments (k,)."""
+        tip, axis = self.tip[segment], self.axis[segment]
+        place = tip[:, 0] + share[:, None] * (tip[:, 1] - tip[:, 0])
+        leaning = axis[:, 0] + share[:, None] * (axis[:, 1] - axis[:, 0])
+        return place, leaning / np.linalg.norm(leaning, axis=1, keepdims=True)
+
+    def parts(self, longest: float, height: float, aside: float) -> Parts:
+        """Cut into parts in which the tip and the point at `height` move about `longest` mm at most.
+
+        `aside` is the distance from the axis up to which points are of interest.
+        """
+        step = self.tip[:, 1] - self.tip[:, 0]
+        top = step + height * (self.axis[:, 1] - self.axis[:, 0])
+        size = np.maximum(np.linalg.norm(step, axis=1), np.linalg.norm(top, axis=1))
+        count = np.maximum(np.ceil(size / longest), 1.0).astype(np.int64)
+        segment = np.repeat(np.arange(len(self)), count)
+        number = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
+        low, high = number / count[segment], (number + 1) / count[segment]
+        ends = [self.at(segment, share) for share in (low, high)]
+        turn = ends[1][1] - ends[0][1]
+        ways = [np.linalg.norm(ends[1][0] - ends[0][0] + up * turn, axis=1) for up in (0.0, height)]
+        return Parts(self, segment, low, high, np.maximum(*ways) + aside * np.linalg.norm(turn, axis=1))
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Parts of the segments of a motion, p of them.
+
+    Parameters
+    ----------
+    motion : RuledMotion
+    segment : (p,) int64
+    low, high : (p,) float64
+        Shares of the segment where the part begins and ends.
+    way : (p,) float64, mm
+        How far any point of interest moves at most.
+    """
+
+    motion: RuledMotion
+    segment: Ints
+    low: Floats
+    high: Floats
+    way: Floats
+
+    def __len__(self) -> int:
+        return len(self.segment)
+
+    def at(self, part: Ints, share: Floats) -> tuple[Floats, Floats]:
+        """Tip and unit axis (k, 3) at shares (k,) of parts (k,)."""
+        low = self.low[part]
+        return self.motion.at(self.segment[part], low + share * (self.high[part] - low))
+
+
+def original_cuts(program: Program) -> RuledMotion:
+    """Feed moves of a CL program; arcs in short chords."""
+    cutting = (program.kind == Move.LINEAR) | (program.kind == Move.ARC)
+    cutting[:1] = False
+    cutting[1:] &= (program.kind[:-1] != Move.FROM) | (program.kind[1:] == Move.ARC)
+    arcs = program.arcs
+    pieces = np.ones(len(program), np.int64)
+    pieces[arcs.pose] = np.maximum(np.ceil(arcs.sweep / _ARC_STEP), 1.0).astype(np.int64)
+    pose = np.repeat(np.arange(len(program)), pieces)
+    last = np.cumsum(pieces)
+    share = (np.arange(len(pose)) - np.repeat(last - pieces, pieces) + 1) / pieces[pose]
+    tip, axis = program.tip[pose].copy(), program.axis[pose].copy()
+    if len(arcs):
+        row = np.full(len(program), -1, np.int64)
+        row[arcs.pose] = np.arange(len(arcs))
+        bow = np.flatnonzero(row[pose] >= 0)
+        tip[bow], axis[bow] = arc_points(program, row[pose[bow]], share[bow])
+    return _segments(tip, axis, program.line[pose], cutting[pose])
+
+
+def written_cuts(nc: NcProgram) -> RuledMotion:
+    """Feed elements of an NC text; arcs and curves in short chords."""
+    pieces = np.ones(len(nc), np.int64)
+    pieces[nc.arcs.element] = np.maximum(np.ceil(nc.arcs.sweep / _ARC_STEP), 1.0).astype(np.int64)
+    pieces[nc.curves.element] = _CURVE_PARTS
+    if pieces.max(initial=1) == 1:
+        tip, axis, element = nc.tip, directions(nc, nc.tip, nc.second), np.arange(len(nc))
+    else:
+        element = np.repeat(np.arange(len(nc)), pieces)
+        share = (np.arange(len(element)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1) / pieces[element]
+        tip, axis = written_at(nc, element, share)
+    cutting = nc.kind != Element.RAPID
+    cutting[:1] = False
+    return _segments(tip, axis, nc.line[element], cutting[element])
+
+
+def _segments(tip: Floats, axis: Floats, line: Ints, cutting: Bools) -> RuledMotion:
+    """Segments into those poses (n, 3) that are reached cutting; without those that do not move."""
+    moved = np.ones(len(tip), np.bool_)
+    moved[1:] = (tip[1:] != tip[:-1]).any(axis=1) | (axis[1:] != axis[:-1]).any(axis=1)
+    end = np.flatnonzero(cutting & moved)
+    end = end[end > 0]
+    joined = np.zeros(len(end), np.bool_)
+    # nothing between two segments but poses that repeat
+    travelled = np.cumsum(moved & ~cutting)
+    joined[1:] = travelled[end[1:]] == travelled[end[:-1]]
+    return RuledMotion(
+        np.stack((tip[end - 1], tip[end]), axis=1), np.stack((axis[end - 1], axis[end]), axis=1), line[end], joined
+    )
