@@ -1,0 +1,111 @@
+"""Symmetric banded systems of whole programs: gathered from samples and spans by sparse products, solved by LAPACK."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import LinAlgError, solveh_banded
+from scipy.sparse import csc_array, csr_array
+
+from cornersmooth.model import Bools, Floats, Ints
+
+#: control points that a span, and so a sample, belongs to
+TAPS = 4
+
+#: what is added to the main diagonal, relative to it, where the factors do not exist without
+_RIDGES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
+
+_PAIRS = [(a, a + o) for o in range(TAPS) for a in range(TAPS - o)]
+
+
+class Gather:
+    """Sums over rows (samples or spans) that belong to four neighbouring control points each.
+
+    Parameters
+    ----------
+    first : (m,) int64
+        First of the four control points of each row.
+    tap : (m, 4) float64
+        Coefficient of each row at its control points.
+    size : int
+        Number of control points c.
+    """
+
+    def __init__(self, first: Ints, tap: Floats, size: int) -> None:
+        m = len(first)
+        self.size = size
+        row = (first[:, None] + np.arange(TAPS)).astype(np.int32).reshape(-1)
+        begin = np.arange(0, TAPS * m + 1, TAPS, dtype=np.int32)
+        self._sum = csc_array((tap.reshape(-1), row, begin), shape=(size, m))
+        self._apply = csr_array((tap.reshape(-1), row, begin), shape=(m, size))
+        pair_row = np.stack([(b - a) * size + first + a for a, b in _PAIRS], axis=1).astype(np.int32)
+        pair_value = np.stack([tap[:, a] * tap[:, b] for a, b in _PAIRS], axis=1)
+        pair_begin = np.arange(0, len(_PAIRS) * m + 1, len(_PAIRS), dtype=np.int32)
+        self._pairs = csc_array((pair_value.reshape(-1), pair_row.reshape(-1), pair_begin), shape=(TAPS * size, m))
+
+    def apply(self, points: Floats) -> Floats:
+        """(m, d) points (c, d), times the coefficients, summed over the four of each row."""
+        return np.asarray(self._apply @ points)
+
+    def sums(self, values: Floats) -> Floats:
+        """(c, d) sums of values (m, d), times the coefficients, at the control points."""
+        return np.asarray(self._sum @ values)
+
+    def bands(self, weights: Floats) -> Floats:
+        """(4, c, d) diagonals of the sums of weights (m, d) times products of two coefficients.
+
+        Row o holds the products of control points j and j + o.
+        """
+        weights = weights[:, None] if weights.ndim == 1 else weights
+        return np.asarray(self._pairs @ weights).reshape(TAPS, self.size, -1)
+
+
+def hold(bands: Floats, free: Bools) -> None:
+    """Take control points that are not free out of diagonals (4, c, ...): nothing but ones on the main diagonal."""
+    bands[0][~free] = 0.0
+    for offset in range(1, TAPS):
+        both = free.copy()
+        both[: len(free) - offset] &= free[offset:]
+        both[len(free) - offset :] = False
+        bands[offset][~both] = 0.0
+
+
+def solve_scalar(bands: Floats, right: Floats, free: Bools) -> Floats:
+    """Solve with diagonals (4, c) for right sides (c, d); what is not free gets 0."""
+    hold(bands, free)
+    bands[0][~free] = 1.0
+    return _cholesky(bands, np.where(free[:, None], right, 0.0))
+
+
+def solve_blocks(bands: Floats, right: Floats, free: Bools) -> Floats:
+    """Solve with 3 by 3 blocks for a right side (c, 3); what is not free gets 0.
+
+    Parameters
+    ----------
+    bands : (4, c, 6) float64
+        Symmetric blocks xx, yy, zz, xy, xz, yz; row o couples control points j and j + o.
+    """
+    size = len(free)
+    hold(bands, free)
+    bands[0][~free, :3] = 1.0
+    lower = np.zeros((size, 3, 3 * TAPS))  # [j, d, k]: element (3j + d + k, 3j + d)
+    which = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
+    for offset in range(TAPS):
+        for d in range(3):
+            for e in range(d if offset == 0 else 0, 3):
+                lower[:, d, 3 * offset + e - d] = bands[offset, :, which[d][e]]
+    held = np.where(free[:, None], right, 0.0).reshape(-1)
+    return _cholesky(lower.reshape(3 * size, 3 * TAPS).T, held).reshape(size, 3)
+
+
+def _cholesky(lower: Floats, right: Floats) -> Floats:
+    """Solve with diagonals (k, n) from the main one down; where rounding leaves no positive pivot it is stiffened."""
+    for ridge in _RIDGES:
+        matrix = lower.copy()
+        matrix[0] *= 1.0 + ridge
+        try:
+            solution: Floats = solveh_banded(matrix, right, lower=True, overwrite_ab=True, check_finite=False)
+        except LinAlgError:
+            continue
+        if np.isfinite(solution).all():
+            return solution
+    return np.zeros_like(right)  # no step is a step that keeps all bounds

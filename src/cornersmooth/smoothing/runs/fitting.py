@@ -1,0 +1,233 @@
+"""Knots of a run, as few as ε asks for: a spline is fitted by least squares and refined where it is too far off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.smoothing.runs.banded import Gather, solve_scalar
+from cornersmooth.smoothing.runs.polylines import Polylines
+from cornersmooth.smoothing.runs.ranges import ranges, spread
+from cornersmooth.smoothing.runs.samples import Pieces, Samples
+from cornersmooth.smoothing.runs.splines import Splines
+from cornersmooth.smoothing.runs.windows import Windows
+
+#: share of the tolerances that the fit may use: the rest is for smoothness
+CLOSE = 0.5
+
+#: poses between the first knots
+STRIDE = 8
+
+#: control points beside a new knot that are fitted anew
+REACH = 10
+
+#: rounds of refining, and the shortest span over the tolerance
+ROUNDS, SHORTEST = 30, 0.02
+
+#: reach of a sharp corner over ε and its turn: with 6 the corner alone would be ε off (docs/method.md, c = 1/6)
+_CORNER = 3.5
+
+#: weight of the third derivative, which settles what samples leave open
+_RIDGE = 1e-6
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Splines near the runs: knots, control points, and the largest deviation in every span over the tolerances.
+
+    Parameters
+    ----------
+    splines : Splines
+    control : (c, 6) float64, mm
+    off : (spans,) float64
+    """
+
+    splines: Splines
+    control: Floats
+    off: Floats
+
+
+def fit(lines: Polylines, tolerances: tuple[float, float]) -> Fit:
+    """Fit splines to runs that keep position, tangent and curvature zero at their ends.
+
+    Parameters
+    ----------
+    lines : Polylines
+        Every run has 3 poses or more.
+    tolerances : (float, float), mm
+        Of tip and axis point; spans are refined until `CLOSE` of them is kept, or they are too short.
+    """
+    splines = first_knots(lines)
+    control = lines_to_control(lines, splines)
+    active = np.ones(len(splines.span_run), np.bool_)
+    off = np.zeros(len(active))
+    corner = _corner_reach(lines, tolerances)
+    for _ in range(ROUNDS):
+        windows = Windows.where(splines, active)
+        pieces = Pieces.of(splines, lines)
+        rows = np.flatnonzero(active[pieces.span])
+        pieces = Pieces(pieces.span[rows], pieces.segment[rows], pieces.low[rows], pieces.high[rows])
+        samples = Samples.of(splines, lines, pieces)
+        control = _least_squares(splines, windows, samples, control)
+        off[active] = _largest(splines, samples, control, tolerances)[active]
+        bad = active & (off > CLOSE) & (splines.width > SHORTEST * min(tolerances))
+        if not bad.any():
+            break
+        splines, control, active, off = _refine(lines, splines, control, off, np.flatnonzero(bad), corner)
+    return Fit(splines, control, off)
+
+
+def first_knots(lines: Polylines) -> Splines:
+    """Both ends of every run, the middles and inner ends of its first and last segment, and some poses between."""
+    row, place = spread(lines.count)
+    last = lines.count[row] - 1
+    chosen = (place == 0) | (place == last) | (place == 1) | (place == last - 1)
+    chosen |= (place % STRIDE == 1) & (place < last - STRIDE // 2)
+    first, end = lines.first[:-1], lines.first[1:] - 1
+    middles = np.stack(((lines.s[first] + lines.s[first + 1]) / 2.0, (lines.s[end] + lines.s[end - 1]) / 2.0), axis=1)
+    run = np.concatenate((row[chosen], np.repeat(np.arange(len(first)), 2)))
+    knot = np.concatenate((lines.s[chosen], middles.reshape(-1)))
+    order = np.lexsort((knot, run))
+    return Splines(knot[order], np.bincount(run, minlength=len(first)))
+
+
+def lines_to_control(lines: Polylines, splines: Splines) -> Floats:
+    """Control points on the runs at their Greville points, the outer three of each end on its first or last segment."""
+    greville, run = splines.greville, splines.control_run
+    control = lines.at(run, greville)
+    begin, end = splines.control_first[:-1], splines.control_first[1:]
+    for outer, pose in (
+        (begin[:, None] + np.arange(3), lines.first[:-1]),
+        (end[:, None] - 1 - np.arange(3), lines.first[1:] - 2),
+    ):
+        start, step = lines.point[pose], lines.point[pose + 1] - lines.point[pose]
+        share = (greville[outer] - lines.s[pose][:, None]) / (lines.s[pose + 1] - lines.s[pose])[:, None]
+        control[outer] = start[:, None] + share[:, :, None] * step[:, None]
+    return control
+
+
+def deviations(samples: Samples, splines: Splines, control: Floats) -> Floats:
+    """(m, 6) curve less original motion at the samples."""
+    taps = splines.span_control[samples.span]
+    off = -samples.target
+    for k in range(4):
+        off += samples.basis[:, k, None] * control[taps + k]
+    return off
+
+
+def over(off: Floats, tolerances: tuple[float, float]) -> Floats:
+    """(m,) deviations (m, 6) of tip or axis point over their tolerances, the larger."""
+    square = off * off
+    tip = square[:, 0] + square[:, 1] + square[:, 2]
+    axis = square[:, 3] + square[:, 4] + square[:, 5]
+    worst: Floats = np.sqrt(np.maximum(tip / tolerances[0] ** 2, axis / tolerances[1] ** 2))
+    return worst
+
+
+def _least_squares(splines: Splines, windows: Windows, samples: Samples, control: Floats) -> Floats:
+    """Move the free control points of the windows so that the squares at the samples are least."""
+    size = len(windows.control)
+    if not size:
+        return control
+    local = np.full(len(splines.span_run), -1, np.int64)
+    local[windows.span] = windows.local
+    rows = np.flatnonzero(local[samples.span] >= 0)
+    chosen = samples.only(rows)
+    near = Gather(local[chosen.span], chosen.basis, size)
+    width = splines.width[windows.span]
+    smooth = Gather(windows.local, splines.third[windows.span], size)
+    bands = near.bands(np.ones(len(rows)))[..., 0] + smooth.bands(_RIDGE * width**6)[..., 0]
+    off = deviations(chosen, splines, control)
+    jerk = smooth.apply(control[windows.control])
+    right = -near.sums(off) - smooth.sums((_RIDGE * width**6)[:, None] * jerk)
+    moved = control.copy()
+    step = solve_scalar(bands, right, windows.free)
+    moved[windows.control[windows.free]] += step[windows.free]
+    return moved
+
+
+def _largest(splines: Splines, samples: Samples, control: Floats, tolerances: tuple[float, float]) -> Floats:
+    """(spans,) largest deviation at the samples of each span over the tolerances; both ends count for both sides."""
+    off = over(deviations(samples, splines, control), tolerances)
+    largest = np.zeros(len(splines.span_run))
+    first = np.flatnonzero(np.concatenate(([True], samples.span[1:] != samples.span[:-1])))
+    largest[samples.span[first]] = np.maximum.reduceat(off, first)
+    before = samples.span[first[1:]] - 1
+    touching = (before == samples.span[first[:-1]]) & (splines.span_run[before] == splines.span_run[before + 1])
+    here = before[touching]
+    largest[here] = np.maximum(largest[here], off[first[1:][touching]])
+    return largest
+
+
+def _corner_reach(lines: Polylines, tolerances: tuple[float, float]) -> Floats:
+    """(n,) how far from each pose a knot should stand where its corner is sharp, mm."""
+    reach = np.full(len(lines.s), np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        unit = np.diff(lines.point, axis=0) / np.diff(lines.s)[:, None]
+        turn = np.abs(over(unit[1:] - unit[:-1], tolerances))
+        reach[1:-1] = _CORNER / turn
+    reach[lines.first[:-1]] = np.inf
+    reach[lines.first[1:] - 1] = np.inf
+    return np.where(np.isnan(reach), np.inf, reach)
+
+
+def _refine(
+    lines: Polylines, splines: Splines, control: Floats, off: Floats, bad: Ints, corner: Floats
+) -> tuple[Splines, Floats, Bools, Floats]:
+    """Split the bad spans; return what is known of all others, and which spans have to be fitted anew."""
+    run, low, high = (
+        splines.span_run[bad],
+        splines.knot[splines.span_knot[bad]],
+        splines.knot[splines.span_knot[bad] + 1],
+    )
+    before = lines.segment_at(run, low)  # pose at or before the start
+    after = lines.segment_at(run, high)
+    after += high > lines.s[after]  # pose at or behind the end
+    inner = after - before - 1
+    split = inner > 0
+    new_run, new_knot = [run[split]], [lines.s[(before[split] + after[split] + 1) // 2]]
+    # inside one segment: beside a sharp corner, else in the middle
+    run, before, after, low, high = run[~split], before[~split], after[~split], low[~split], high[~split]
+    width = high - low
+    at_low = np.where(lines.s[before] == low, corner[before], np.inf)
+    at_high = np.where(lines.s[after] == high, corner[after], np.inf)
+    near_low, near_high = at_low < 0.35 * width, at_high < 0.35 * width
+    middle = ~(near_low | near_high)
+    new_run += [run[near_low], run[near_high], run[middle]]
+    new_knot += [(low + at_low)[near_low], (high - at_high)[near_high], ((low + high) / 2.0)[middle]]
+    return _insert(lines, splines, control, off, np.concatenate(new_run), np.concatenate(new_knot))
+
+
+def _insert(
+    lines: Polylines, splines: Splines, control: Floats, off: Floats, run: Ints, knot: Floats
+) -> tuple[Splines, Floats, Bools, Floats]:
+    """Add knots; control points far from them stay, the others stand on the run until they are fitted."""
+    all_run = np.concatenate((np.repeat(np.arange(len(splines.count)), splines.count), run))
+    all_knot = np.concatenate((splines.knot, knot))
+    order = np.lexsort((all_knot, all_run))
+    new = order >= len(splines.knot)
+    finer = Splines(all_knot[order], splines.count + np.bincount(run, minlength=len(splines.count)))
+    # spans near new knots
+    changed = np.zeros(len(finer.span_run) + 1, np.int64)
+    at = np.flatnonzero(new) - all_run[order][new]  # span that starts at the new knot
+    begin = np.maximum(at - REACH, finer.span_first[all_run[order][new]])
+    end = np.minimum(at + REACH, finer.span_first[all_run[order][new] + 1])
+    np.add.at(changed, begin, 1)
+    np.add.at(changed, end, -1)
+    active = np.cumsum(changed[:-1]) > 0
+    # number of new knots up to each: old spans and control points by their distance from the start of the run
+    added = np.cumsum(new)
+    old_span = np.clip(np.arange(len(finer.span_run)) - added[finer.span_knot], 0, len(off) - 1)
+    fresh = lines_to_control(lines, finer)
+    knot_of = np.clip(ranges(finer.first[:-1] - 1, finer.count + 2), 0, len(new) - 1)
+    knot_of = np.clip(knot_of, finer.first[finer.control_run], finer.first[finer.control_run + 1] - 1)
+    old_control = np.arange(len(finer.control_run)) - added[knot_of]
+    known = np.ones(len(finer.control_run), np.bool_)
+    windows = Windows.where(finer, active)
+    known[windows.control[windows.free]] = False
+    outer = np.arange(3)  # which follow from the knots alone
+    known[finer.control_first[:-1, None] + outer] = known[finer.control_first[1:, None] - 1 - outer] = False
+    fresh[known] = control[np.clip(old_control[known], 0, len(control) - 1)]
+    return finer, fresh, active, np.where(active, 0.0, off[old_span])

@@ -1,0 +1,135 @@
+"""Cubic B-splines of runs on clamped knots, flat: knots, Greville points, basis, third derivative.
+
+Run r with m spans has m + 1 distinct knots, the first and the last four-fold, and m + 3 control points. Span i lies
+between knots i and i + 1 and belongs to the control points i to i + 3 (de Boor, A Practical Guide to Splines, IX).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.smoothing.runs.ranges import ranges, spread, starts
+
+
+@dataclass(frozen=True)
+class Splines:
+    """Knot vectors of r runs.
+
+    Parameters
+    ----------
+    knot : (k,) float64, mm
+        Distinct knots of all runs, ascending in each.
+    count : (r,) int64
+        Knots of each run, at least 2.
+    """
+
+    knot: Floats
+    count: Ints
+
+    @cached_property
+    def first(self) -> Ints:
+        """(r + 1,) where the knots of each run begin."""
+        return starts(self.count)
+
+    @cached_property
+    def span_run(self) -> Ints:
+        """(spans,) run of every span."""
+        return spread(self.count - 1)[0]
+
+    @cached_property
+    def span_knot(self) -> Ints:
+        """(spans,) index of the knot that each span starts at."""
+        return ranges(self.first[:-1], self.count - 1)
+
+    @cached_property
+    def span_control(self) -> Ints:
+        """(spans,) index of the first of the four control points of each span."""
+        return ranges(self.control_first[:-1], self.count - 1)
+
+    @cached_property
+    def control_first(self) -> Ints:
+        """(r + 1,) where the control points of each run begin."""
+        return starts(self.count + 2)
+
+    @cached_property
+    def span_first(self) -> Ints:
+        """(r + 1,) where the spans of each run begin."""
+        return starts(self.count - 1)
+
+    @cached_property
+    def control_run(self) -> Ints:
+        """(controls,) run of every control point."""
+        return spread(self.count + 2)[0]
+
+    @cached_property
+    def width(self) -> Floats:
+        """(spans,) mm."""
+        widths: Floats = self.knot[self.span_knot + 1] - self.knot[self.span_knot]
+        return widths
+
+    @cached_property
+    def _extended(self) -> Floats:
+        """Knots with the ends repeated: control point j of run r has the knots j to j + 4 from 4 r places on."""
+        run, place = spread(self.count + 6)
+        inner = np.clip(place - 3, 0, self.count[run] - 1)
+        extended: Floats = self.knot[self.first[run] + inner]
+        return extended
+
+    def around(self, span: Ints) -> Floats:
+        """(m, 6) the three knots up to the start of each span and the three from its end on."""
+        begin = self.span_control[span] + 4 * self.span_run[span]
+        knots: Floats = self._extended[begin[:, None] + np.arange(1, 7)]
+        return knots
+
+    @cached_property
+    def greville(self) -> Floats:
+        """(controls,) mm: mean of the three inner knots of each control point; a line has its control points there."""
+        begin = np.arange(len(self.control_run)) + 4 * self.control_run
+        means: Floats = (self._extended[begin + 1] + self._extended[begin + 2] + self._extended[begin + 3]) / 3.0
+        return means
+
+    def basis(self, span: Ints, s: Floats) -> Floats:
+        """(m, 4) basis functions of the spans at the places s."""
+        k = self.around(span)
+        left, right = s[:, None] - k[:, 2::-1], k[:, 3:] - s[:, None]  # to the knots behind, nearest first, and ahead
+        values = np.ones((len(s), 1))
+        for degree in range(1, 4):
+            sums = right[:, :degree] + left[:, degree - 1 :: -1] if degree > 1 else right[:, :1] + left[:, :1]
+            share = values / sums
+            grown = np.zeros((len(s), degree + 1))
+            grown[:, :-1] += share * right[:, :degree]
+            grown[:, 1:] += share * left[:, degree - 1 :: -1] if degree > 1 else share * left[:, :1]
+            values = grown
+        return values
+
+    @cached_property
+    def third(self) -> Floats:
+        """(spans, 4) coefficients of the third derivative, which is constant in each span."""
+        k = self.around(np.arange(len(self.span_run)))
+        taps = np.broadcast_to(np.eye(4), (len(k), 4, 4))  # control points, then their divided differences
+        for degree, low, high in ((3, (0, 1, 2), (3, 4, 5)), (2, (1, 2), (3, 4)), (1, (2,), (3,))):
+            gap = k[:, list(high)] - k[:, list(low)]
+            taps = degree * np.diff(taps, axis=1) / gap[:, :, None]
+        return np.ascontiguousarray(taps[:, 0])
+
+    def bernstein(self, span: Ints, low: Floats, high: Floats) -> Floats:
+        """(m, 4, 4) matrices from the four control points of a span to the Bernstein points of its part low..high.
+
+        Each is the blossom at (low, low, low), (low, low, high), (low, high, high), (high, high, high).
+        """
+        k = self.around(span)
+        ends = np.stack((low, high), axis=1)
+        rows = []
+        for row in range(4):
+            values = np.broadcast_to(np.eye(4), (len(k), 4, 4))
+            for level in range(3):
+                at = ends[:, 1 if level < row else 0]
+                begin, end = k[:, level:3], k[:, 3 : 6 - level]
+                share = ((at[:, None] - begin) / (end - begin))[:, :, None]
+                values = (1.0 - share) * values[:, :-1] + share * values[:, 1:]
+            rows.append(values[:, 0])
+        return np.stack(rows, axis=1)

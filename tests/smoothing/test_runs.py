@@ -1,0 +1,238 @@
+"""One pair of splines for a run: proved within ε, smooth, and what it is asked to be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import BSpline
+from scipy.optimize import NonlinearConstraint, minimize
+
+from cornersmooth.smoothing.runs.banded import Gather, solve_blocks
+from cornersmooth.smoothing.runs.fitting import deviations, fit, over
+from cornersmooth.smoothing.runs.interior import smoothest
+from cornersmooth.smoothing.runs.polylines import Polylines
+from cornersmooth.smoothing.runs.samples import Pieces, Samples
+from cornersmooth.smoothing.runs.solving import RunCurves, solve_runs
+from cornersmooth.smoothing.runs.splines import Splines
+from cornersmooth.smoothing.runs.windows import Windows
+from smoothing.runs_oracle import deviation, random_runs, spline_of, through
+
+H = 10.0
+
+
+def winding(n: int, seed: int = 3) -> np.ndarray:
+    """(n, 6) points of a winding five-axis path with noise, lines of 0.2 to 1 mm."""
+    rng = np.random.default_rng(seed)
+    heading, tilt = np.cumsum(rng.normal(0, 0.05, n)), 0.3 * np.sin(np.arange(n) * 0.02)
+    step = np.stack((np.cos(heading) * np.cos(tilt), np.sin(heading) * np.cos(tilt), np.sin(tilt)), axis=1)
+    tip = np.cumsum(rng.uniform(0.2, 1.0, n)[:, None] * step, axis=0) + rng.normal(0, 0.002, (n, 3))
+    swing = 0.4 * np.sin(np.arange(n) * 0.006)
+    axis = np.stack((np.sin(swing) * 0.6, np.sin(swing) * 0.8, np.cos(swing)), axis=1)
+    return np.hstack((tip, tip + H * axis))
+
+
+def jerk(curves: RunCurves) -> float:
+    """∫|C‴|² of all runs."""
+    return sum(
+        float((np.diff(spline.t[3:-3])[:, None] * spline.derivative(3)(spline.t[3:-4]) ** 2).sum())
+        for spline in (spline_of(curves, run) for run in range(len(curves.kept)))
+    )
+
+
+def test_splines_are_those_of_scipy() -> None:
+    rng = np.random.default_rng(0)
+    count = np.array([2, 5, 9])
+    splines = Splines(np.concatenate([np.sort(rng.random(k)) for k in count]), count)
+    control = rng.normal(size=(splines.control_first[-1], 2))
+    for run in range(len(count)):
+        knots = splines.knot[splines.first[run] : splines.first[run + 1]]
+        own = control[splines.control_first[run] : splines.control_first[run + 1]]
+        spline = BSpline(np.concatenate(([knots[0]] * 3, knots, [knots[-1]] * 3)), own, 3)
+        span = np.arange(splines.span_first[run], splines.span_first[run + 1])
+        taps = control[splines.span_control[span][:, None] + np.arange(4)]
+        low, high = knots[:-1] + 0.2 * np.diff(knots), knots[:-1] + 0.9 * np.diff(knots)
+        np.testing.assert_allclose(np.einsum("sk,skd->sd", splines.basis(span, low), taps), spline(low), atol=1e-12)
+        third = spline.derivative(3)(low)
+        got = np.einsum("sk,skd->sd", splines.third[span], taps)
+        np.testing.assert_allclose(got, third, atol=1e-12 * np.abs(third).max())
+        hull = splines.bernstein(span, low, high) @ taps
+        u = 0.3
+        bernstein = np.array([(1 - u) ** 3, 3 * u * (1 - u) ** 2, 3 * u * u * (1 - u), u**3])
+        np.testing.assert_allclose(np.einsum("i,sid->sd", bernstein, hull), spline(low + u * (high - low)), atol=1e-12)
+
+
+def test_banded_sums_and_solutions_are_those_of_full_matrices() -> None:
+    rng = np.random.default_rng(1)
+    size, rows = 9, 40
+    first = np.sort(rng.integers(0, size - 3, rows))
+    tap = rng.normal(size=(rows, 4))
+    full = np.zeros((rows, size))
+    np.put_along_axis(full, first[:, None] + np.arange(4), tap, axis=1)
+    gather = Gather(first, tap, size)
+    off = rng.normal(size=(rows, 3))
+    np.testing.assert_allclose(gather.sums(off), full.T @ off, atol=1e-12)
+    np.testing.assert_allclose(gather.apply(rng_like(size)), full @ rng_like(size), atol=1e-12)
+    free = np.arange(size) % 5 != 4
+    blocks = np.einsum("mi,mj->mij", off, off) + np.eye(3)
+    six = np.stack([blocks[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], axis=1)
+    right = rng.normal(size=(size, 3))
+    matrix = np.einsum("ma,mb,mij->aibj", full, full, blocks)[free][:, :, free].reshape(3 * free.sum(), -1)
+    expected = np.zeros((size, 3))
+    expected[free] = np.linalg.solve(matrix, right[free].ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(solve_blocks(gather.bands(six), right, free), expected, rtol=1e-8, atol=1e-10)
+
+
+def rng_like(size: int) -> np.ndarray:
+    return np.random.default_rng(2).normal(size=(size, 3))
+
+
+def test_straight_run_stays_a_line() -> None:
+    tip = np.outer(np.array([0.0, 1, 1.5, 4, 4.001, 9]), [1.0, 2, -1])
+    curves = solve_runs(through(np.hstack((tip, tip + np.array([0, 0, H])))), (0.01, 0.01), H)
+    assert curves.kept.all()
+    assert max(curves.tip_bound[0], curves.axis_bound[0]) < 1e-9
+
+
+@pytest.mark.parametrize("tolerance", [0.001, 0.01, 0.15])
+@pytest.mark.parametrize("seed", range(4))
+def test_every_run_is_within_its_bounds(seed: int, tolerance: float) -> None:
+    lines = random_runs(seed, 24, 14, H)
+    curves = solve_runs(lines, (tolerance, tolerance), H)
+    assert curves.kept.all()
+    for run in range(len(lines.count)):
+        tip, axis = deviation(curves, run, H)
+        assert tip <= curves.tip_bound[run] * (1 + 1e-9) + 1e-11
+        assert axis <= curves.axis_bound[run] * (1 + 1e-9) + 1e-11
+        assert curves.tip_bound[run] <= tolerance
+        assert curves.axis_bound[run] <= tolerance
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    corners=st.integers(1, 40),
+    exponent=st.floats(-3, -0.8),
+    axis_length=st.sampled_from([1.0, 10.0, 80.0]),
+    shift=st.sampled_from([0.0, 1e5]),
+)
+def test_random_runs_keep_their_tolerance(
+    seed: int, corners: int, exponent: float, axis_length: float, shift: float
+) -> None:
+    tolerance = 10**exponent
+    lines = random_runs(seed, 6, corners, axis_length)
+    lines = Polylines.through(lines.point + shift, lines.count)
+    curves = solve_runs(lines, (tolerance, 0.9 * tolerance), axis_length)
+    assert curves.kept.all()
+    for run in range(len(lines.count)):
+        tip, axis = deviation(curves, run, axis_length)
+        assert tip <= tolerance * (1 + 1e-9) + 1e-9
+        assert axis <= 0.9 * tolerance * (1 + 1e-9) + 1e-9
+
+
+def test_runs_start_and_end_like_their_segments() -> None:
+    lines = random_runs(7, 24, 12, H)
+    curves = solve_runs(lines, (0.02, 0.02), H)
+    for run in range(len(lines.count)):
+        spline = spline_of(curves, run)
+        own = np.arange(lines.first[run], lines.first[run + 1])
+        for at, pose, segment in ((spline.t[0], own[0], own[0]), (spline.t[-1], own[-1], own[-2])):
+            step = lines.point[segment + 1] - lines.point[segment]
+            speed = step / (lines.s[segment + 1] - lines.s[segment])
+            np.testing.assert_allclose(spline(at), lines.point[pose], rtol=0, atol=1e-11 * np.abs(lines.point).max())
+            bend = spline.derivative(2)(at) * np.diff(spline.t)[np.diff(spline.t) > 0].min()
+            np.testing.assert_allclose(spline.derivative(1)(at), speed, rtol=0, atol=1e-8)
+            assert np.abs(bend).max() < 1e-7
+
+
+def test_smoothest_is_what_a_general_solver_finds() -> None:
+    lines = through(winding(9))
+    rough = fit(lines, (0.05, 0.05))
+    splines = rough.splines
+    samples = Samples.of(splines, lines, Pieces.of(splines, lines))
+    windows = Windows.of(splines, splines.span_first[:-1], np.diff(splines.span_first))
+    radius = np.full((len(samples.s), 2), 0.05)
+    control = rough.control.copy()
+    control[windows.control] = smoothest(splines, windows, samples, control, radius, (0.05, 0.05), 1e-4)
+    assert over(deviations(samples, splines, control), (0.05, 0.05)).max() <= 1.0
+    free = np.flatnonzero(windows.free)
+    basis = np.zeros((len(samples.s), len(control)))
+    np.put_along_axis(basis, splines.span_control[samples.span][:, None] + np.arange(4), samples.basis, axis=1)
+    third = np.zeros((len(splines.width), len(control)))
+    np.put_along_axis(third, splines.span_control[:, None] + np.arange(4), splines.third, axis=1)
+    third *= np.sqrt(splines.width)[:, None]
+    for part in (slice(0, 3), slice(3, 6)):
+        fixed, scale = rough.control[:, part], np.square(third @ rough.control[:, part]).sum()
+
+        def moved(x: np.ndarray, fixed: np.ndarray = fixed) -> np.ndarray:
+            whole = fixed.copy()
+            whole[free] += 0.05 * x.reshape(-1, 3)
+            return whole
+
+        reference = minimize(
+            lambda x, moved=moved, scale=scale: np.square(third @ moved(x)).sum() / scale,
+            np.zeros(3 * len(free)),
+            jac=lambda x, moved=moved, scale=scale: (0.1 / scale * third.T @ (third @ moved(x)))[free].ravel(),
+            constraints=NonlinearConstraint(
+                lambda x, moved=moved, part=part: np.square((basis @ moved(x) - samples.target[:, part]) / 0.05).sum(
+                    axis=1
+                ),
+                -np.inf,
+                1.0,
+            ),
+            method="SLSQP",
+            options={"maxiter": 500, "ftol": 1e-12},
+        )
+        assert np.square(third @ control[:, part]).sum() / scale <= reference.fun * 1.001
+
+
+def test_long_runs_are_smooth_where_windows_meet() -> None:
+    lines = through(winding(2500))
+    curves = solve_runs(lines, (0.005, 0.005), H)
+    assert curves.kept.all()
+    assert curves.splines.count[0] > 600  # several windows
+    spline = spline_of(curves, 0)
+    inner = spline.t[4:-4]
+    for order in (1, 2):
+        derivative = spline.derivative(order)
+        step = 1e-9
+        jump = np.linalg.norm(derivative(inner + step) - derivative(inner - step), axis=1)
+        slope = np.linalg.norm(spline.derivative(order + 1)(spline.t[3:-3]), axis=1).max()
+        assert jump.max() <= 2 * step * slope * 1.1 + 1e-9 * np.linalg.norm(derivative(inner), axis=1).max()
+    # as smooth as it is where one window holds all: no seam adds to the jerk
+    third = np.linalg.norm(spline.derivative(3)((spline.t[3:-4] + spline.t[4:-3]) / 2), axis=1)
+    assert jerk(curves) <= np.square(third).max() * (spline.t[-1] - spline.t[0])
+
+
+def test_few_control_points_where_poses_are_dense() -> None:
+    t = np.linspace(0, 2 * np.pi, 4000)
+    rng = np.random.default_rng(5)
+    tip = np.stack((30 * np.cos(t), 30 * np.sin(t), 3 * np.sin(3 * t)), axis=1) + rng.normal(0, 0.001, (len(t), 3))
+    axis = np.stack((0.3 * np.cos(2 * t), 0.3 * np.sin(2 * t), np.ones_like(t)), axis=1)
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    curves = solve_runs(through(np.hstack((tip, tip + H * axis))), (0.02, 0.02), H)
+    assert curves.kept.all()
+    assert len(curves.control) < 0.2 * len(t)
+
+
+def test_translation_rotation_and_scaling_commute() -> None:
+    points = winding(300, seed=11)
+    plain = solve_runs(through(points), (0.01, 0.01), H)
+    q, _ = np.linalg.qr(np.random.default_rng(6).normal(size=(3, 3)))
+    turned = np.hstack((points[:, :3] @ q.T, points[:, 3:] @ q.T))
+    shifted = points + np.tile([12.0, -34.0, 56.0], 2)
+    for other, back in (
+        (solve_runs(through(turned), (0.01, 0.01), H), lambda c: np.hstack((c[:, :3] @ q, c[:, 3:] @ q))),
+        (solve_runs(through(shifted), (0.01, 0.01), H), lambda c: c - np.tile([12.0, -34.0, 56.0], 2)),
+        (solve_runs(through(2.5 * points), (0.025, 0.025), 2.5 * H), lambda c: c / 2.5),
+    ):
+        assert len(other.control) == len(plain.control)
+        np.testing.assert_allclose(back(other.control), plain.control, rtol=0, atol=1e-6 * np.abs(points).max())
+
+
+def test_same_input_gives_the_same_curve() -> None:
+    lines = through(winding(200), winding(40, seed=9))
+    one, other = (solve_runs(lines, (0.01, 0.01), H) for _ in range(2))
+    np.testing.assert_array_equal(one.control, other.control)
+    np.testing.assert_array_equal(one.splines.knot, other.splines.knot)
