@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cornersmooth import Settings, read, smooth, write
+from cornersmooth import Settings, choose_form, read, smooth, write
 from cornersmooth.verify import Distribution, deviation_along
 
 HERE = Path(__file__).resolve().parent
@@ -26,9 +26,10 @@ def measure(tolerance: float) -> Distribution:
     """Deviation of the paper's method along its example."""
     path = HERE.parent / "samples" / "paper_table1.csv"
     program = read(path)
-    smoothed = smooth(program, Settings(tolerance=tolerance, method="zhang2016"))
+    form = choose_form("fanuc", "g6.2")
+    smoothed = smooth(program, Settings(tolerance=tolerance, method="zhang2016"), form=form)
     text = io.BytesIO()
-    write(smoothed, text, form="g6.2")
+    write(smoothed, text, form=form)
     return deviation_along(program, text.getvalue(), tolerance=tolerance, samples=80)
 
 

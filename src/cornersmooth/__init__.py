@@ -1,67 +1,112 @@
 """Rounds the corners of five-axis tool paths within a tolerance.
 
-The whole program in three calls::
+What the command does, in one call: read, smooth, write, measure the text, and only then replace the file::
 
-    program = cornersmooth.read("part.cls")
-    smoothed = cornersmooth.smooth(program, cornersmooth.Settings(tolerance=0.04))
+    result = cornersmooth.postprocess("part.cls", "part.nc", cornersmooth.Settings(tolerance=0.04))
+    result.verification.max_tip_deviation_mm, result.findings, result.report()
+
+Step by step, with the numbers in between; the form says which digits the control keeps::
+
+    form = cornersmooth.choose_form("fanuc", "g1")
+    program = cornersmooth.read("part.cls")  # or cornersmooth.from_poses(tips, axes, feed=1500)
+    smoothed = cornersmooth.smooth(program, cornersmooth.Settings(tolerance=0.04), form=form)
     with open("part.nc", "wb") as stream:
-        cornersmooth.write(smoothed, stream)
+        cornersmooth.write(smoothed, stream, form=form)
+    found = cornersmooth.verify(program, "part.nc", tolerance=0.04)
 
-`cornersmooth.verify.verify` measures NC text against a program, `cornersmooth.report.report` tells the whole story as
-a dictionary, `cornersmooth.plan` says how long a machine takes. Nothing is imported before it is used, so that the
-command line answers at once.
+- `sample` gives points on the smoothed path, `report` the whole story as a dictionary
+- `plan` and `direct` say how long a machine takes for the smoothed and the original path, `compare` both
+- `choose_form`, `load_control` and `load_machine` take names or TOML files; `Frame` holds what stands around the motion
+- `CornersmoothError` is what everything here raises; its text says where, what, and what to do
+
+Nothing is imported before it is used, so that the command line answers at once.
 """
 
 from __future__ import annotations
 
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cornersmooth.cl import read
-    from cornersmooth.errors import CornersmoothError, Finding
+    from cornersmooth.errors import CornersmoothError, Finding, PromiseError
     from cornersmooth.feedrate import Limits, TimeLaw, compare, direct, plan
+    from cornersmooth.kinematics import load_machine
     from cornersmooth.model import Corners, Program, SmoothProgram, Statement
-    from cornersmooth.nc import fit_settings, write
+    from cornersmooth.nc import Frame, choose_form, fit_settings, load_control, write
+    from cornersmooth.path_points import PathPoints, sample
+    from cornersmooth.pipeline import Result, postprocess, smooth
+    from cornersmooth.report import report
     from cornersmooth.settings import Settings
-    from cornersmooth.smoothing import smooth
+    from cornersmooth.verify import Verification, verify
+
+    from_poses = Program.from_poses
 
 __version__ = "0.1.0"
 
+#: module of each public name
 _HOME = {
-    "read": "cl",
-    "smooth": "smoothing",
-    "fit_settings": "nc",
-    "write": "nc",
-    "Settings": "settings",
-    "plan": "feedrate",
-    "direct": "feedrate",
-    "compare": "feedrate",
-    "Limits": "feedrate",
-    "TimeLaw": "feedrate",
+    "Corners": "model",
     "CornersmoothError": "errors",
     "Finding": "errors",
-    "Corners": "model",
+    "Frame": "nc",
+    "Limits": "feedrate",
+    "PathPoints": "path_points",
     "Program": "model",
+    "PromiseError": "errors",
+    "Result": "pipeline",
+    "Settings": "settings",
     "SmoothProgram": "model",
     "Statement": "model",
+    "TimeLaw": "feedrate",
+    "Verification": "verify",
+    "choose_form": "nc",
+    "compare": "feedrate",
+    "direct": "feedrate",
+    "fit_settings": "nc",
+    "from_poses": "model",
+    "load_control": "nc",
+    "load_machine": "kinematics",
+    "plan": "feedrate",
+    "postprocess": "pipeline",
+    "read": "cl",
+    "report": "report",
+    "sample": "path_points",
+    "smooth": "pipeline",
+    "verify": "verify",
+    "write": "nc",
 }
 
 __all__ = [
     "Corners",
     "CornersmoothError",
     "Finding",
+    "Frame",
     "Limits",
+    "PathPoints",
     "Program",
+    "PromiseError",
+    "Result",
     "Settings",
     "SmoothProgram",
     "Statement",
     "TimeLaw",
+    "Verification",
+    "choose_form",
     "compare",
     "direct",
     "fit_settings",
+    "from_poses",
+    "load_control",
+    "load_machine",
     "plan",
+    "postprocess",
     "read",
+    "report",
+    "sample",
     "smooth",
+    "verify",
     "write",
 ]
 
@@ -71,4 +116,20 @@ def __getattr__(name: str) -> Any:
 
     if name not in _HOME:
         raise AttributeError(f"module 'cornersmooth' has no attribute {name!r}")
-    return getattr(import_module(f"cornersmooth.{_HOME[name]}"), name)
+    module = import_module(f"cornersmooth.{_HOME[name]}")
+    return module.Program.from_poses if name == "from_poses" else getattr(module, name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
+
+
+class _Package(ModuleType):
+    """The package, whose functions are not hidden by the packages of the same name that they come from."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in _HOME and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

@@ -7,7 +7,7 @@ Both carry a stable code. The library raises and returns them; only `cornersmoot
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 Severity = Literal["note", "warning", "error"]
 
@@ -94,6 +94,19 @@ class OutputError(CornersmoothError):
     """The result cannot be written."""
 
     exit_code = 4
+
+
+class PromiseError(CornersmoothError):
+    """The text was written, and verification found that it does not keep what was asked for.
+
+    Parameters
+    ----------
+    result : object
+        What there is all the same (`cornersmooth.Result`).
+    """
+
+    exit_code = 1
+    result: Any = None
 
 
 @dataclass(frozen=True, slots=True)

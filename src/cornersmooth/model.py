@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.errors import Finding
+from cornersmooth.errors import Finding, InputError
 from cornersmooth.settings import Settings
 
 Floats = NDArray[np.float64]
@@ -219,15 +219,30 @@ class Program:
         tip : (n, 3) array_like, mm
         axis : (n, 3) array_like
             Any length but zero; normalised here.
+        feed : (n,) array_like or float, mm/min
+            Positive, NaN where there is none.
+
+        Raises
+        ------
+        InputError
+            CS167: a number that is not finite, an axis of length zero, or a feed that is not positive.
+        ValueError
+            Arrays whose shapes do not fit.
         """
         tip = np.array(tip, dtype=np.float64).reshape(-1, 3)
         axis = np.array(axis, dtype=np.float64).reshape(-1, 3)
         n = len(tip)
+        feed = np.broadcast_to(np.asarray(feed, np.float64), (n,)).copy()
+        _refuse(~np.isfinite(tip).all(axis=1), "tip", tip, "give finite numbers, in mm")
+        largest = np.abs(axis).max(axis=1, initial=0.0)
+        _refuse(~((largest > 0.0) & (largest < np.inf)), "axis", axis, "give a direction: finite numbers, not all zero")
+        _refuse((feed <= 0.0) | np.isinf(feed), "feed", feed, "give a positive number, or NaN for none")
+        axis = np.ldexp(axis, -np.frexp(largest)[1][:, None])  # squares neither overflow nor vanish
         return cls(
             tip=tip,
             axis=axis / np.linalg.norm(axis, axis=1, keepdims=True),
             kind=np.full(n, Move.LINEAR, np.uint8) if kind is None else np.asarray(kind, np.uint8),
-            feed=np.broadcast_to(np.asarray(feed, np.float64), (n,)).copy(),
+            feed=feed,
             line=np.arange(1, n + 1) if line is None else np.asarray(line, np.int64),
             feed_mode=rest.pop("feed_mode", np.zeros(n, np.uint8)),
             keep=rest.pop("keep", np.zeros(n, np.uint8)),
@@ -266,6 +281,14 @@ class Program:
         first = np.flatnonzero(linear & ~np.concatenate(([False], inner[:-1]))) - 1
         last = np.flatnonzero(linear & ~inner)
         return np.stack((first, last), axis=1).astype(np.int64)
+
+
+def _refuse(wrong: Bools | np.bool_, what: str, values: Floats, hint: str) -> None:
+    """Say which pose is the first that is wrong (n,), and the value (n,) or (n, 3) that it has."""
+    if wrong.any():
+        pose = int(np.argmax(wrong))
+        told = ", ".join(f"{value:g}" for value in np.atleast_1d(values[pose]))
+        raise InputError("CS167", f"the {what} of pose {pose} is {told}", hint)
 
 
 class Status(IntEnum):

@@ -75,12 +75,7 @@ class Shelf:
             The name is unknown, or the file cannot be read.
         """
         given = str(name_or_path)
-        if (
-            not isinstance(name_or_path, Path)
-            and not given.endswith(".toml")
-            and "/" not in given
-            and "\\" not in given
-        ):
+        if not is_file(name_or_path):
             return TableText(self.built_in(given), f"{given}.toml", given)
         try:
             text = Path(name_or_path).read_text(encoding="utf-8")
@@ -168,6 +163,12 @@ def _by_name(rows: Any) -> dict[str, Table]:
     if not isinstance(rows, list) or not all(isinstance(row, dict) and "name" in row for row in rows):
         return {}
     return {str(row["name"]): row for row in rows}
+
+
+def is_file(name_or_path: str | Path) -> bool:
+    """Whether a file is meant: a path, or a text that ends in ``.toml`` or holds a path separator."""
+    text = str(name_or_path)
+    return isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or "\\" in text
 
 
 def closest(word: str, known: Sequence[str]) -> str:

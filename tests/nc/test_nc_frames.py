@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import io
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from cornersmooth.cl import read
 from cornersmooth.errors import OutputError, SettingsError
-from cornersmooth.nc import Frame, choose_form, control_names, control_table, write
+from cornersmooth.model import MM_PER_UNIT, Units
+from cornersmooth.nc import Frame, choose_form, control_names
 from cornersmooth.nc.control_tables import parse_control
-from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
+from cornersmooth.nc.program_frame import blend_word
 from nc.cases import RUNNABLE, Case
 from nc.writing import lines_of
 
@@ -251,21 +248,13 @@ def test_comments_hold_what_controls_take() -> None:
 
 
 @pytest.mark.parametrize(
-    ("tolerance", "units", "word"), [(0.05, "MM", "0.00500"), (1e-5, "MM", "0.00001"), (0.001, "INCHES", "0.00001")]
+    ("tolerance", "units", "word"), [(0.05, "mm", "0.00500"), (1e-5, "mm", "0.00001"), (0.001, "inch", "0.00001")]
 )
-def test_blending_is_never_without_limit(tolerance: float, units: str, word: str) -> None:
+def test_blending_is_never_without_limit(tolerance: float, units: Units, word: str) -> None:
     """G64 P0 would let LinuxCNC cut corners as far as it likes."""
+    assert blend_word(tolerance / MM_PER_UNIT[units]) == word
+
+
+def test_blending_is_a_tenth_of_the_tolerance() -> None:
     form = Case("linuxcnc", "g1", "xyzac-trt").choose()
-    program = read(CL.replace("UNITS/MM", f"UNITS/{units}").encode(), name="part.cls")
-    stream = io.BytesIO()
-    write(smooth(program, Settings(tolerance=tolerance)), stream, form=form)
-    assert f"G64 P{word} Q0" in stream.getvalue().decode().splitlines()
-
-
-def test_tables_can_be_started_from(tmp_path: Path) -> None:
-    for name in control_names():
-        file = tmp_path / f"{name}.toml"
-        file.write_text(control_table(name))
-        case = next(case for case in RUNNABLE if case.control == name)
-        form = choose_form(file, case.form, machine=case.choose().machine, tcp=case.tcp)
-        assert lines_of(form, CL) == lines_of(case.choose(), CL)
+    assert "G64 P0.00500 Q0" in lines_of(form, CL)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.model import Move, Program
-from cornersmooth.nc import write
+from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import blocks, read_nc, verify, workers
@@ -103,7 +103,7 @@ def test_verification_is_the_same(monkeypatch):
     kind = np.where(np.arange(1500) % 60, Move.LINEAR, Move.RAPID).astype(np.uint8)
     program = Program.from_poses(tip, axis, kind=kind, feed=np.full(1500, 250.0))
     stream = io.BytesIO()
-    write(smooth(program, Settings(tolerance=0.02)), stream)
+    write(smooth(program, fit_settings(Settings(tolerance=0.02), choose_form(), "mm")), stream)
     nc = read_nc(stream.getvalue())
     used = []
     monkeypatch.setattr(workers._Crew, "start", _counted(workers._Crew.start, used))

@@ -90,9 +90,9 @@ def main() -> NoReturn:
 
 def run(args: list[str] | None = None) -> int:
     """Run the command line with the given arguments; returns the exit code."""
-    from cornersmooth.cli.files import ClosedPipe
     from cornersmooth.cli.job import EXIT_INTERNAL, internal_error
     from cornersmooth.errors import CornersmoothError
+    from cornersmooth.output import ClosedPipe
 
     try:
         result: Any = cli.main(args=args, standalone_mode=False)

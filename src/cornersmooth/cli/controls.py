@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from cornersmooth.cli import options
+
 #: what the modes of a form are called for people
 _MODES = {
     "vector": "tool vectors",
@@ -20,7 +22,7 @@ _MODES = {
     epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]")
-@click.option("--table", is_flag=True, help="Print the table of a control: what a TOML file of your own starts from.")
+@options.table
 def command(name: str | None, table: bool) -> int:
     """List the controls with their forms, or check and describe one.
 

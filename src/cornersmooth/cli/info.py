@@ -13,8 +13,6 @@ from cornersmooth.cli.files import read_input
 if TYPE_CHECKING:
     from cornersmooth.report.info import Info, Spread
 
-_READING = ("dialect", "units", "arc_rule", "lenient")
-
 
 @click.command(
     "info",
@@ -25,7 +23,7 @@ _READING = ("dialect", "units", "arc_rule", "lenient")
 @options.tolerance
 @options.axis_length
 @options.reading
-@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines to read.")
+@options.as_json
 def command(source: str, tolerance: float, axis_length: float, as_json: bool, **given: Any) -> int:
     """Say what the CL file IN holds: dialect, moves, lengths, turns, axis changes, arcs, statements, findings.
 
@@ -42,8 +40,7 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     from cornersmooth.report.info import describe, info_json
 
     data, name = read_input(source)
-    reading = {key: given[key] for key in _READING} | {"format": given["input_format"]}
-    info = describe(read(data, name=name, **reading), tolerance, axis_length)
+    info = describe(read(data, name=name, **options.reading_of(given)), tolerance, axis_length)
     if as_json:
         click.echo(info_json(info), nl=False)
         return 0

@@ -1,20 +1,20 @@
-"""One input from reading to report: what `smooth` does for each file, in this process or another."""
+"""One input of the command line: what to do with it, and what became of it, in this process or another."""
 
 from __future__ import annotations
 
 import os
-import time
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from cornersmooth.cli.files import REJECTED, STANDARD, ClosedPipe, check_output, open_output, read_input
-from cornersmooth.errors import CornersmoothError, Finding, InputError, OutputError, SettingsError
+from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.errors import CornersmoothError, PromiseError, SettingsError
+from cornersmooth.output import ClosedPipe, open_output
 
 if TYPE_CHECKING:
     from cornersmooth.nc import Form, Frame
+    from cornersmooth.pipeline import Progress, Result
+    from cornersmooth.settings import Settings
 
 #: how the reports of earlier runs begin; such files are replaced without being asked
 _OUR_JSON = b'{\n "schema": "cornersmooth-report/'
@@ -25,64 +25,6 @@ EXIT_INTERNAL = 70
 
 #: problems of a rejected file that are printed
 _PROBLEMS_SHOWN = 5
-
-Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class Writing:
-    """What is asked for the NC text.
-
-    Parameters
-    ----------
-    control : str
-        Name or TOML file.
-    form : str or None
-        None for the control's default.
-    machine : str or None
-        Name or TOML file.
-    tcp : bool
-        Whether the control keeps the tool tip.
-    extras : tuple of str
-        Functions of the control that are switched on.
-    program : str or None
-        Name of the NC program.
-    header, footer : tuple of str
-        Lines behind the head and before the tail.
-    comments : bool
-        Whether what the CL file says in words is written.
-    """
-
-    control: str = "fanuc"
-    form: str | None = None
-    machine: str | None = None
-    tcp: bool = True
-    extras: tuple[str, ...] = ()
-    program: str | None = None
-    block_numbers: bool = False
-    header: tuple[str, ...] = ()
-    footer: tuple[str, ...] = ()
-    comments: bool = True
-
-    def choose(self) -> Form:
-        """Form of the control.
-
-        Raises
-        ------
-        SettingsError
-            Unknown names, or what the control cannot run.
-        """
-        from cornersmooth.kinematics import load_machine
-        from cornersmooth.nc import choose_form
-
-        machine = load_machine(self.machine) if self.machine else None
-        return choose_form(self.control, self.form, machine=machine, tcp=self.tcp, extras=self.extras)
-
-    def frame(self) -> Frame:
-        """What stands around the motion."""
-        from cornersmooth.nc import Frame
-
-        return Frame(self.program, self.block_numbers, self.header, self.footer, self.comments)
 
 
 @dataclass(frozen=True)
@@ -95,10 +37,10 @@ class Job:
         Input and NC file; ``-`` for the standard streams.
     reports : tuple of str
     reading : dict
-        Keyword arguments of `cornersmooth.cl.read`.
-    settings : dict
-        Keyword arguments of `Settings`.
-    writing : Writing
+        Keyword arguments of `cornersmooth.read`.
+    settings : Settings
+    form : Form
+    frame : Frame
     feed : float or None, mm/min
         For moves without one.
     alone : bool
@@ -109,8 +51,9 @@ class Job:
     target: str
     reports: tuple[str, ...]
     reading: dict[str, Any]
-    settings: dict[str, Any]
-    writing: Writing
+    settings: Settings
+    form: Form
+    frame: Frame
     feed: float | None
     force: bool
     verify: bool = True
@@ -130,13 +73,13 @@ class Outcome:
 def check(job: Job) -> None:
     """Refuse what would fail later or destroy something; nothing is read or written."""
     outputs = [job.target, *job.reports]
-    check_output(job.target, [job.source], force=job.force)
+    check_path(job.target, [job.source], force=job.force)
     for path in job.reports:
         suffix = os.path.splitext(path)[1].lower()
         if suffix not in (".json", ".csv"):
             raise SettingsError("CS221", f"cannot tell the form of the report {path}", "let it end in .json or .csv")
-        check_output(path, [job.source], force=job.force, ours=_OUR_JSON if suffix == ".json" else _OUR_CSV)
-    real = [os.path.realpath(path) for path in outputs if path != "-"]
+        check_path(path, [job.source], force=job.force, ours=_OUR_JSON if suffix == ".json" else _OUR_CSV)
+    real = [os.path.realpath(path) for path in outputs if path != STANDARD]
     if len(set(real)) < len(real):
         raise SettingsError("CS222", "two outputs have the same name", "give each its own")
 
@@ -149,19 +92,16 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     outcome = Outcome(job)
     try:
         check(job)
-        outcome.contents = _smooth_file(job, progress)
-        if not outcome.contents.get("verification", {"passed": True})["passed"]:
-            outcome.exit_code = 1
-            outcome.message = _say_rejected(job, outcome.contents["verification"])
+        outcome.contents = _smooth_file(job, outcome, progress)
     except CornersmoothError as failure:
         outcome.exit_code = failure.exit_code
         outcome.message = str(failure)
     except MemoryError:
         outcome.exit_code = 3
         outcome.message = f"{job.source}: error: not enough memory for this file; cut it at a tool change"
+    except ClosedPipe:
+        raise
     except Exception as failure:
-        if isinstance(failure, ClosedPipe):
-            raise
         outcome.exit_code = EXIT_INTERNAL
         outcome.message = internal_error(failure, job.source)
     return outcome
@@ -177,121 +117,54 @@ def internal_error(failure: Exception, source: str = "") -> str:
     )
 
 
-def _smooth_file(job: Job, progress: Progress | None) -> dict[str, Any]:
-    import numpy as np
+def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
+    """Make text and reports; a broken promise goes to the outcome."""
+    from cornersmooth.pipeline import postprocess
 
-    from cornersmooth.cl import read
-    from cornersmooth.cli.readback import readback
-    from cornersmooth.nc import fit_settings, write
-    from cornersmooth.report import corners_csv, report, report_json
-    from cornersmooth.settings import Settings
-    from cornersmooth.smoothing import smooth
-
-    seconds: dict[str, float] = {}
-
-    def step(stage: str) -> Callable[[int, int], None] | None:
-        return None if progress is None else lambda done, total: progress(stage, done, total)
-
-    form = job.writing.choose()
-    how = readback(job.writing.control, form.machine if form.rotary else None, tcp=form.orientation != "machine")
-    unread = "" if how.control else "its table is like no control whose text is known"
-    unread = unread if job.verify else "not asked for"
-    with _timed(seconds, "read"):
-        data, name = read_input(job.source)
-        program = read(data, name=name, **job.reading)
-        del data
-        if job.feed is not None:
-            program = replace(program, feed=np.where(np.isnan(program.feed), job.feed, program.feed))
-    settings = fit_settings(Settings(**job.settings), form, program.units)
-    with _timed(seconds, "smooth"):
-        smoothed = smooth(program, settings, progress=step("smoothing"))
-    verification: dict[str, Any] | None = None
-    with open_output(job.target, hold=not unread) as output, ExitStack() as stack:
-        verifier = None
-        if not unread:
-            from cornersmooth.verify import Verifier
-            from cornersmooth.verify.processes import useful_processes
-
-            verifier = stack.enter_context(
-                Verifier(
-                    program,
-                    output.path,
-                    tolerance=settings.verified_tolerance,
-                    axis_length=settings.axis_length,
-                    words=not how.own,
-                    processes=useful_processes() if job.alone else 1,
-                    **how.reading,
-                )
-            )
-        with _timed(seconds, "write"):
-            written = write(smoothed, output.stream, form=form, frame=job.writing.frame(), progress=step("writing"))
-            output.stream.flush()
-        if verifier is not None:
-            with _timed(seconds, "verify"):
-                try:
-                    verified = verifier.result()
-                    verification = verified.to_dict()
-                    output.rejected = not verified.passed
-                except InputError as failure:
-                    if not (job.writing.header or job.writing.footer or how.own):
-                        raise
-                    where = "a table of your own" if how.own else "header and footer"
-                    unread = f"{failure.what} in line {failure.line}; {where} may hold any words"
-    findings = written.findings
-    if job.verify and unread:
-        findings += (Finding("CS509", "note", 0, f"the text is not read back: {unread}"),)
-    dense = not form.curve
-    contents = report(
-        smoothed,
-        dense=dense,
-        blocks_out=written.blocks,
-        seconds=seconds,
-        findings=findings,
-        verification=verification,
-    )
+    source, name = read_input(job.source)
+    try:
+        result = postprocess(
+            source,
+            target_of(job.target),
+            job.settings,
+            form=job.form,
+            frame=job.frame,
+            reading={"name": name, **job.reading},
+            feed=job.feed,
+            verify=job.verify,
+            force=True,  # `check` has looked
+            processes=None if job.alone else 1,
+            progress=progress,
+        )
+    except PromiseError as broken:
+        result = broken.result
+        outcome.exit_code = broken.exit_code
+        outcome.message = _say_rejected(name, result, broken)
+    contents = result.report()
     for path in job.reports:
-        with open_output(path) as output:
-            texts = (
-                iter([report_json(contents)]) if path.lower().endswith(".json") else corners_csv(smoothed, dense=dense)
-            )
-            for text in texts:
-                output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8
+        _write_report(path, result, contents)
     return contents
 
 
-def _say_rejected(job: Job, verification: dict[str, Any]) -> str:
+def _write_report(path: str, result: Result, contents: dict[str, Any]) -> None:
+    from cornersmooth.report import corners_csv, report_json
+
+    if path.lower().endswith(".json"):
+        texts = iter([report_json(contents)])
+    else:
+        texts = corners_csv(result.smoothed, dense=not result.form.curve)
+    with open_output(target_of(path)) as output:
+        for text in texts:
+            output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8
+
+
+def _say_rejected(name: str, result: Result, broken: PromiseError) -> str:
     """Say what verification found, and where the text is now."""
-    source = "<stdin>" if job.source == STANDARD else job.source
-    lines = [
-        f"{source}:{problem['cl_line']}: error: {problem['text']} (NC line {problem['nc_line']})"
-        for problem in verification["problems"][:_PROBLEMS_SHOWN]
-    ]
-    more = verification["problem_count"] - len(lines)
+    assert result.verification is not None
+    problems = result.verification.problems[:_PROBLEMS_SHOWN]
+    lines = [f"{name}:{problem.cl_line}: error: {problem.text} (NC line {problem.nc_line})" for problem in problems]
+    more = result.verification.problem_count - len(lines)
     if more > 0:
-        lines.append(f"{source}: {more} more; a JSON report lists them")
-    kept = "nothing was written" if job.target == STANDARD else f"the text is in {job.target}{REJECTED}"
-    lines.append(f"{source}: error: the written text breaks its promise; {kept}")
+        lines.append(f"{name}: {more} more; a JSON report lists them")
+    lines.append(f"{name}: error: {broken.what}")
     return "\n".join(lines)
-
-
-@contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    begin = time.perf_counter()
-    yield
-    seconds[stage] = round(time.perf_counter() - begin, 6)
-
-
-def make_folder(path: str) -> None:
-    """Make the folder for the outputs.
-
-    Raises
-    ------
-    OutputError
-        It cannot be made.
-    """
-    try:
-        os.makedirs(path, exist_ok=True)
-    except OSError as failure:
-        raise OutputError(
-            "CS405", f"cannot make the folder: {failure.strerror}", "choose another", file=path
-        ) from failure

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from cornersmooth.cli import options
+
 
 @click.command(
     "machines",
@@ -11,7 +13,7 @@ import click
     epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]")
-@click.option("--table", is_flag=True, help="Print the table of a machine: what a TOML file of your own starts from.")
+@options.table
 def command(name: str | None, table: bool) -> int:
     """List the machines that come with the program, or check and describe one.
 

@@ -6,11 +6,16 @@ Lengths are millimetres; the suffixes ``mm`` and ``in`` are accepted.
 from __future__ import annotations
 
 import math
+import os
 import re
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from cornersmooth.feedrate import Limits
+    from cornersmooth.settings import Settings
 
 _LENGTH = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(mm|in|inch|\")?")
 
@@ -31,6 +36,21 @@ class Length(click.ParamType[float]):
         if not (math.isfinite(number) and number > 0.0):
             self.fail(f"{value!r} is not a positive length", param, ctx)
         return number
+
+
+class Duration(click.ParamType[float]):
+    """A time in seconds, or with a suffix ``s``, ``ms``."""
+
+    name = "time"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Text to seconds."""
+        if isinstance(value, float):
+            return value
+        match = re.fullmatch(r"(\d+\.?\d*|\.\d+)\s*(s|ms)?", str(value).strip())
+        if not match or not float(match[1]):
+            self.fail(f"{value!r} is not a time; write 2ms or 0.002s", param, ctx)
+        return float(match[1]) * (1e-3 if match[2] == "ms" else 1.0)
 
 
 class Weights(click.ParamType[tuple[float, float]]):
@@ -115,8 +135,11 @@ reversal_angle = click.option(
     show_default=True,
     help="Corners that turn by more stay sharp.",
 )
-chord = click.option(
-    "--chord", type=LENGTH, help="Distance between the written lines and the curve. [default: a tenth of -e]"
+chord_tolerance = click.option(
+    "--chord",
+    "chord_tolerance",
+    type=LENGTH,
+    help="Distance between the written lines and the curve. [default: a tenth of -e]",
 )
 axis_step = click.option(
     "--axis-step",
@@ -201,17 +224,136 @@ units = click.option(
 )
 dialect = click.option("--dialect", type=str, metavar="NAME", help="CL dialect, instead of what the text looks like.")
 input_format = click.option(
-    "--input-format", type=click.Choice(["apt", "points"]), help="Form of the input, instead of what it looks like."
+    "--input-format",
+    "format",
+    type=click.Choice(["apt", "points"]),
+    help="Form of the input, instead of what it looks like.",
 )
 arc_rule = click.option(
     "--arc-rule", type=click.Choice(["left", "right", "tangent"]), help="Sense of CIRCLE about its axis."
 )
 lenient = click.option("--lenient", is_flag=True, help="Go on after errors in the input where it is safe.")
+found_reports = click.option(
+    "--report",
+    "reports",
+    type=click.Path(),
+    multiple=True,
+    help="Write what was found: .json for the results, .csv for a row per pose. May be repeated.",
+)
+plot_deviation = click.option(
+    "--plot",
+    type=click.Path(),
+    help="Draw the deviation along the path: .png, .svg or .pdf.",
+)
+plot_motion = click.option(
+    "--plot",
+    type=click.Path(),
+    help="Draw speed and acceleration over time: .png, .svg or .pdf.",
+)
+as_json = click.option("--json", "as_json", is_flag=True, help="One JSON object instead of text to read.")
+table = click.option(
+    "--table", is_flag=True, help="Print the table of the name: what a TOML file of your own starts from."
+)
+law = click.option(
+    "--law",
+    type=click.Choice(["direct_exact_stop", "direct_velocity_jump", "zhang2016", "proportional"]),
+    default="proportional",
+    show_default=True,
+    help="Motion that --csv writes.",
+)
+motion_csv = click.option("--csv", type=click.Path(), help="Write the motion, a row every period.")
+limits_machine = click.option(
+    "--machine",
+    type=str,
+    metavar="NAME|FILE",
+    help="Keep the limits of this machine's five axes, too: a name that 'cornersmooth machines' lists (its numbers are "
+    "examples), or a TOML file with [dynamics.X] and so on.",
+)
+
+_LIMITS = {
+    "feed": click.option(
+        "--feed", type=float, metavar="MM/MIN", help="Feed of all feed moves instead of the programmed ones."
+    ),
+    "accel": click.option(
+        "--accel", type=float, default=1000.0, show_default=True, metavar="MM/S2", help="Acceleration along the path."
+    ),
+    "jerk": click.option(
+        "--jerk", type=float, default=5000.0, show_default=True, metavar="MM/S3", help="Jerk along the path."
+    ),
+    "centripetal": click.option(
+        "--centripetal", type=float, metavar="MM/S2", help="Acceleration across the path. [default: that of --accel]"
+    ),
+    "period": click.option(
+        "--period",
+        type=Duration(),
+        default=0.002,
+        metavar="TIME",
+        help="Interpolation period, as in 2ms: at corners that stay sharp the velocity changes by at most accel times "
+        "period. [default: 2ms]",
+    ),
+    "rapid": click.option(
+        "--rapid", type=float, default=10000.0, show_default=True, metavar="MM/MIN", help="Speed of rapid moves."
+    ),
+    "rapid_accel": click.option(
+        "--rapid-accel", type=float, metavar="MM/S2", help="Acceleration of rapids. [default: that of --accel]"
+    ),
+    "rapid_jerk": click.option(
+        "--rapid-jerk", type=float, metavar="MM/S3", help="Jerk of rapids. [default: that of --jerk]"
+    ),
+    "angular_feed": click.option(
+        "--angular-feed",
+        type=float,
+        default=30.0,
+        show_default=True,
+        metavar="DEG/S",
+        help="Speed of moves that only turn the tool axis.",
+    ),
+    "angular_accel": click.option(
+        "--angular-accel", type=float, default=150.0, show_default=True, metavar="DEG/S2", help="Their acceleration."
+    ),
+    "angular_jerk": click.option(
+        "--angular-jerk", type=float, default=3000.0, show_default=True, metavar="DEG/S3", help="Their jerk."
+    ),
+    "vector_jerk": click.option(
+        "--vector-jerk", type=float, metavar="MM/S3", help="Jerk of the tip in any direction. [default: no limit]"
+    ),
+    "turn_speed": click.option(
+        "--turn-speed", type=float, metavar="DEG/S", help="Turning of the tool axis in all moves. [default: no limit]"
+    ),
+    "turn_accel": click.option(
+        "--turn-accel", type=float, metavar="DEG/S2", help="Its acceleration. [default: no limit]"
+    ),
+    "turn_jerk": click.option("--turn-jerk", type=float, metavar="DEG/S3", help="Its jerk. [default: no limit]"),
+}
+_READING = {
+    "format": input_format,
+    "dialect": dialect,
+    "units": units,
+    "arc_rule": arc_rule,
+    "lenient": lenient,
+}
+_SETTINGS = {
+    "tolerance": tolerance,
+    "axis_length": axis_length,
+    "method": method,
+    "shape": shape,
+    "allocation": allocation,
+    "weights": weights,
+    "orientation_tolerance": orientation_tolerance,
+    "reversal_angle": reversal_angle,
+    "chord_tolerance": chord_tolerance,
+    "axis_step": axis_step,
+}
 
 
 def reading(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that reads CL files."""
-    return _apply(function, (input_format, dialect, units, arc_rule, lenient))
+    return _apply(function, _READING.values())
+
+
+def reading_of(given: dict[str, Any]) -> dict[str, Any]:
+    """Keyword arguments of `cornersmooth.read` that were given."""
+    return {name: given[name] for name in _READING}
 
 
 def writing(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -221,26 +363,34 @@ def writing(function: Callable[..., Any]) -> Callable[..., Any]:
     )
 
 
-def smoothing(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Options of every command that smooths."""
-    return _apply(
-        function,
-        (
-            tolerance,
-            axis_length,
-            method,
-            shape,
-            allocation,
-            weights,
-            orientation_tolerance,
-            reversal_angle,
-            chord,
-            axis_step,
-        ),
-    )
+def limits(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options that say what a machine can do."""
+    return _apply(function, _LIMITS.values())
 
 
-def _apply(function: Callable[..., Any], options: tuple[Decorator, ...]) -> Callable[..., Any]:
-    for option in reversed(options):
+def limits_of(given: dict[str, Any]) -> Limits:
+    """What the machine can do, as given."""
+    from cornersmooth.feedrate import Limits
+
+    return Limits(**{name: given[name] for name in _LIMITS})
+
+
+def settings_of(given: dict[str, Any]) -> Settings:
+    """How to smooth, as given; options that a command does not have keep their defaults."""
+    from cornersmooth.settings import Settings
+
+    return Settings(**{name: given[name] for name in _SETTINGS if name in given})
+
+
+def picture_form(path: str | None) -> str:
+    """Form of the picture that a name asks for: png, svg or pdf."""
+    suffix = os.path.splitext(path or "picture.png")[1].lower().lstrip(".")
+    if suffix not in ("png", "svg", "pdf"):
+        raise click.UsageError(f"--plot {path}: let the name end in .png, .svg or .pdf")
+    return suffix
+
+
+def _apply(function: Callable[..., Any], options: Iterable[Decorator]) -> Callable[..., Any]:
+    for option in reversed(list(options)):
         function = option(function)
     return function

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from cornersmooth.cli.job import Outcome, Progress
+    from cornersmooth.cli.job import Outcome
+    from cornersmooth.pipeline import Progress
 
 #: findings shown without -v
 _FINDINGS_SHOWN = 10

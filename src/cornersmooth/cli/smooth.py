@@ -4,28 +4,19 @@ from __future__ import annotations
 
 import os
 import signal
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from cornersmooth.cli import options, terminate
-from cornersmooth.cli.files import STANDARD, read_input
-from cornersmooth.cli.job import Job, Outcome, Writing, check, make_folder, run_job
+from cornersmooth.cli.files import STANDARD, check_path, read_input
+from cornersmooth.cli.job import Job, Outcome, check, run_job
 from cornersmooth.cli.show import print_line, progress_bar, show_batch, show_findings, show_summary
 from cornersmooth.errors import CornersmoothError
+from cornersmooth.output import make_folder
 
-_READING = ("dialect", "units", "arc_rule", "lenient")
-_SETTINGS = (
-    "tolerance",
-    "axis_length",
-    "method",
-    "shape",
-    "allocation",
-    "weights",
-    "orientation_tolerance",
-    "reversal_angle",
-    "axis_step",
-)
+if TYPE_CHECKING:
+    from cornersmooth.nc import Form, Frame
 
 
 @click.command(
@@ -49,7 +40,7 @@ _SETTINGS = (
 @options.weights
 @options.orientation_tolerance
 @options.reversal_angle
-@options.chord
+@options.chord_tolerance
 @options.axis_step
 @options.feed
 @options.reading
@@ -127,6 +118,8 @@ def _leave_when_told() -> None:
 
 def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
+    from cornersmooth.nc import fit_settings
+
     folder, output = given["directory"], given["output"]
     if given["quiet"] and given["verbose"]:
         raise click.UsageError("-q and -v exclude each other")
@@ -139,10 +132,10 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     reports = given["reports"]
     if len(inputs) > 1 and any("{stem}" not in path for path in reports):
         raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
-    settings = {name: given[name] for name in _SETTINGS} | {"chord_tolerance": given["chord"]}
-    reading = {name: given[name] for name in _READING} | {"format": given["input_format"]}
-    writing = _writing(given)
-    _try_settings(settings, writing, given)
+    settings, form, frame = options.settings_of(given), _form(given), _frame(given)
+    fit_settings(settings, form, "mm")  # refuses wrong ones before any file is touched
+    if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
+        raise click.UsageError("--feed must be a positive number of mm/min")
     jobs = []
     for source in inputs:
         stem = "stdin" if source == STANDARD else os.path.splitext(os.path.basename(source))[0]
@@ -152,9 +145,10 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 source=source,
                 target=target,
                 reports=tuple(path.replace("{stem}", stem) for path in reports),
-                reading=reading,
+                reading=options.reading_of(given),
                 settings=settings,
-                writing=writing,
+                form=form,
+                frame=frame,
                 feed=given["feed"],
                 force=given["force"],
                 verify=not given["no_verify"],
@@ -175,44 +169,35 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     return jobs
 
 
-def _writing(given: dict[str, Any]) -> Writing:
-    """What is asked for the NC text, with the texts of header and footer."""
+def _form(given: dict[str, Any]) -> Form:
+    """Form of the control."""
+    from cornersmooth.kinematics import load_machine
+    from cornersmooth.nc import choose_form
+
+    machine = load_machine(given["machine"]) if given["machine"] else None
+    return choose_form(
+        given["control"], given["form"], machine=machine, tcp=not given["no_tcp"], extras=given["extras"]
+    )
+
+
+def _frame(given: dict[str, Any]) -> Frame:
+    """What stands around the motion, with the texts of header and footer."""
+    from cornersmooth.nc import Frame
+
     texts = {}
     for name in ("header", "footer"):
         path = given[name]
         texts[name] = tuple(read_input(path)[0].decode("utf-8", "replace").splitlines()) if path else ()
-    return Writing(
-        control=given["control"],
-        form=given["form"],
-        machine=given["machine"],
-        tcp=not given["no_tcp"],
-        extras=given["extras"],
-        comments=not given["no_comments"],
-        program=given["program_name"],
-        block_numbers=given["block_numbers"],
-        **texts,
-    )
-
-
-def _try_settings(settings: dict[str, Any], writing: Writing, given: dict[str, Any]) -> None:
-    """Refuse wrong settings before any file is touched."""
-    from cornersmooth.nc import fit_settings
-    from cornersmooth.settings import Settings
-
-    fit_settings(Settings(**settings), writing.choose(), "mm")
-    if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
-        raise click.UsageError("--feed must be a positive number of mm/min")
+    return Frame(given["program_name"], given["block_numbers"], **texts, comments=not given["no_comments"])
 
 
 def _check_against_inputs(jobs: list[Job]) -> None:
     """No output of one job may be the input of another."""
-    from cornersmooth.cli.files import check_output
-
     sources = [job.source for job in jobs]
     for job in jobs:
         for path in (job.target, *job.reports):
             try:
-                check_output(path, sources, force=True)
+                check_path(path, sources, force=True)
             except CornersmoothError as failure:
                 if failure.exit_code == 2:
                     raise

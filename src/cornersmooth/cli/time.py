@@ -2,47 +2,19 @@
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from cornersmooth.cli import options
-from cornersmooth.cli.files import check_output, open_output, read_input
+from cornersmooth.cli.files import check_path, read_input, target_of
 from cornersmooth.cli.show import progress_bar
+from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Comparison
 
-_READING = ("dialect", "units", "arc_rule", "lenient")
-_SETTINGS = (
-    "tolerance",
-    "axis_length",
-    "shape",
-    "allocation",
-    "weights",
-    "orientation_tolerance",
-    "reversal_angle",
-)
-_LIMITS = (
-    "feed",
-    "accel",
-    "jerk",
-    "centripetal",
-    "rapid",
-    "rapid_accel",
-    "rapid_jerk",
-    "angular_feed",
-    "angular_accel",
-    "angular_jerk",
-    "vector_jerk",
-    "turn_speed",
-    "turn_accel",
-    "turn_jerk",
-    "period",
-)
 LAWS = ("direct_exact_stop", "direct_velocity_jump", "zhang2016", "proportional")
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",
@@ -50,21 +22,6 @@ _TITLES = {
     "zhang2016": "smoothed, zhang2016",
     "proportional": "smoothed, proportional",
 }
-
-
-class Duration(click.ParamType[float]):
-    """A time in seconds, or with a suffix ``s``, ``ms``."""
-
-    name = "time"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Text to seconds."""
-        if isinstance(value, float):
-            return value
-        match = re.fullmatch(r"(\d+\.?\d*|\.\d+)\s*(s|ms)?", str(value).strip())
-        if not match or not float(match[1]):
-            self.fail(f"{value!r} is not a time; write 2ms or 0.002s", param, ctx)
-        return float(match[1]) * (1e-3 if match[2] == "ms" else 1.0)
 
 
 @click.command(
@@ -76,64 +33,18 @@ class Duration(click.ParamType[float]):
 @click.argument("source", metavar="IN")
 @options.tolerance
 @options.axis_length
-@click.option("--feed", type=float, metavar="MM/MIN", help="Feed of all feed moves instead of the programmed ones.")
-@click.option(
-    "--accel", type=float, default=1000.0, show_default=True, metavar="MM/S2", help="Acceleration along the path."
-)
-@click.option("--jerk", type=float, default=5000.0, show_default=True, metavar="MM/S3", help="Jerk along the path.")
-@click.option(
-    "--centripetal", type=float, metavar="MM/S2", help="Acceleration across the path. [default: that of --accel]"
-)
-@click.option(
-    "--period",
-    type=Duration(),
-    default=0.002,
-    metavar="TIME",
-    help="Interpolation period, as in 2ms: at corners that stay sharp the velocity changes by at most accel times "
-    "period. [default: 2ms]",
-)
-@click.option("--rapid", type=float, default=10000.0, show_default=True, metavar="MM/MIN", help="Speed of rapid moves.")
-@click.option("--rapid-accel", type=float, metavar="MM/S2", help="Acceleration of rapids. [default: that of --accel]")
-@click.option("--rapid-jerk", type=float, metavar="MM/S3", help="Jerk of rapids. [default: that of --jerk]")
-@click.option(
-    "--angular-feed",
-    type=float,
-    default=30.0,
-    show_default=True,
-    metavar="DEG/S",
-    help="Speed of moves that only turn the tool axis.",
-)
-@click.option(
-    "--angular-accel", type=float, default=150.0, show_default=True, metavar="DEG/S2", help="Their acceleration."
-)
-@click.option("--angular-jerk", type=float, default=3000.0, show_default=True, metavar="DEG/S3", help="Their jerk.")
-@click.option(
-    "--vector-jerk", type=float, metavar="MM/S3", help="Jerk of the tip in any direction. [default: no limit]"
-)
-@click.option(
-    "--turn-speed", type=float, metavar="DEG/S", help="Turning of the tool axis in all moves. [default: no limit]"
-)
-@click.option("--turn-accel", type=float, metavar="DEG/S2", help="Its acceleration. [default: no limit]")
-@click.option("--turn-jerk", type=float, metavar="DEG/S3", help="Its jerk. [default: no limit]")
-@click.option(
-    "--machine",
-    type=str,
-    metavar="NAME|FILE",
-    help="Keep the limits of this machine's five axes, too: a name that 'cornersmooth machines' lists (its numbers are "
-    "examples), or a TOML file with [dynamics.X] and so on.",
-)
+@options.limits
+@options.limits_machine
 @options.shape
 @options.allocation
 @options.weights
 @options.orientation_tolerance
 @options.reversal_angle
 @options.reading
-@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of tables.")
-@click.option(
-    "--law", type=click.Choice(LAWS), default="proportional", show_default=True, help="Motion that --csv writes."
-)
-@click.option("--csv", type=click.Path(), help="Write the motion, a row every period.")
-@click.option("--plot", type=click.Path(), help="Draw speed and acceleration over time: .png, .svg or .pdf.")
+@options.as_json
+@options.law
+@options.motion_csv
+@options.plot_motion
 @options.force
 @options.quiet
 def command(source: str, **given: Any) -> int:
@@ -151,22 +62,22 @@ def command(source: str, **given: Any) -> int:
       cornersmooth time part.cls -e 0.04 --csv motion.csv --plot motion.svg
       cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
     """
-    form = _picture_form(given["plot"])
+    form = options.picture_form(given["plot"])
     for path in (given["csv"], given["plot"]):
         if path:
-            check_output(path, [source], force=given["force"])
+            check_path(path, [source], force=given["force"])
     compared = _compare(source, given)
     if given["csv"]:
         from cornersmooth.report.timelaw import timelaw_csv
 
-        with open_output(given["csv"]) as output:
+        with open_output(target_of(given["csv"])) as output:
             for text in timelaw_csv(compared.laws[given["law"]]):
                 output.stream.write(text.encode("utf-8"))
     if given["plot"]:
         from cornersmooth.report.timeplot import draw
 
         picture = draw({_TITLES[name]: compared.laws[name] for name in LAWS[1:]}, form)
-        with open_output(given["plot"]) as output:
+        with open_output(target_of(given["plot"])) as output:
             output.stream.write(picture)
     if given["as_json"]:
         from cornersmooth.report.timelaw import comparison_json
@@ -178,24 +89,15 @@ def command(source: str, **given: Any) -> int:
     return 0
 
 
-def _picture_form(path: str | None) -> str:
-    suffix = os.path.splitext(path or "picture.png")[1].lower().lstrip(".")
-    if suffix not in ("png", "svg", "pdf"):
-        raise click.UsageError(f"--plot {path}: let the name end in .png, .svg or .pdf")
-    return suffix
-
-
 def _compare(source: str, given: dict[str, Any]) -> Comparison:
     from cornersmooth.cl import read
-    from cornersmooth.feedrate import Limits, compare
+    from cornersmooth.feedrate import compare
     from cornersmooth.kinematics import load_machine
-    from cornersmooth.settings import Settings
 
     machine = load_machine(given["machine"]) if given["machine"] else None
-    limits = Limits(**{name: given[name] for name in _LIMITS})
-    settings = Settings(**{name: given[name] for name in _SETTINGS})
+    limits, settings = options.limits_of(given), options.settings_of(given)
     data, name = read_input(source)
-    program = read(data, name=name, format=given["input_format"], **{key: given[key] for key in _READING})
+    program = read(data, name=name, **options.reading_of(given))
     del data
     with progress_bar(given["quiet"]) as progress:
         return compare(program, settings, limits, machine=machine, progress=progress)

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli import options
-from cornersmooth.cli.files import STANDARD, check_output, open_output, read_input
+from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
 from cornersmooth.errors import SettingsError
+from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.model import Program
     from cornersmooth.verify import Distribution, Verification, Where
-
-_READING = ("dialect", "units", "arc_rule", "lenient")
 
 #: problems shown without -v
 _PROBLEMS_SHOWN = 20
@@ -36,14 +35,8 @@ _PROBLEMS_SHOWN = 20
 @options.machine
 @options.no_tcp
 @options.reading
-@click.option(
-    "--report",
-    "reports",
-    type=click.Path(),
-    multiple=True,
-    help="Write what was found: .json for the results, .csv for a row per pose. May be repeated.",
-)
-@click.option("--plot", type=click.Path(), help="Draw the deviation along the path: .png, .svg or .pdf.")
+@options.found_reports
+@options.plot_deviation
 @options.force
 @options.quiet
 @options.verbose
@@ -62,32 +55,40 @@ def command(source: str, text: str, **given: Any) -> int:
       cornersmooth verify part.cls part.nc -e 0.04 -v --plot deviation.png
     """
     from cornersmooth.cl import read
-    from cornersmooth.cli.readback import readback
-    from cornersmooth.verify import deviation_along, verify
+    from cornersmooth.kinematics import load_machine
+    from cornersmooth.nc import load_control
+    from cornersmooth.verify import CONTROLS, deviation_along, verify
     from cornersmooth.verify.processes import useful_processes
     from cornersmooth.verify.source import readable_twice
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     form = _check_outputs(source, text, given)
-    how = readback(given["control"], given["machine"], tcp=not given["no_tcp"])
-    if not how.control:
+    control = load_control(given["control"])
+    if control.dialect not in CONTROLS:
         raise SettingsError(
             "CS204", f"{given['control']} is like no control that can be read", 'say like = "fanuc" or another in it'
         )
+    how = {
+        "tolerance": given["tolerance"],
+        "axis_length": given["axis_length"],
+        "control": control.dialect,
+        "machine": load_machine(given["machine"]) if given["machine"] else None,
+        "tcp": not given["no_tcp"],
+    }
     data, name = read_input(source)
-    program = read(data, name=name, format=given["input_format"], **{key: given[key] for key in _READING})
-    measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
+    program = read(data, name=name, **options.reading_of(given))
+    del data
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     if given["plot"] or given["verbose"]:  # it is looked at more than once
         nc = readable_twice(nc)
-    found = verify(program, nc, **measures, **how.reading, words=not how.own, processes=useful_processes())
+    found = verify(program, nc, **how, words=not control.own, processes=useful_processes())
     _write_reports(program, found, given["reports"])
     if given["plot"]:
         from cornersmooth.report.deviationplot import draw_deviation
 
-        picture = draw_deviation(deviation_along(program, nc, **measures, **how.reading), given["tolerance"], form)
-        with open_output(given["plot"]) as output:
+        picture = draw_deviation(deviation_along(program, nc, **how), given["tolerance"], form)
+        with open_output(target_of(given["plot"])) as output:
             output.stream.write(picture)
     for line in _problems(found, name, given["verbose"]):
         click.echo(line, err=True)
@@ -95,7 +96,7 @@ def command(source: str, text: str, **given: Any) -> int:
         for line in _summary(found):
             click.echo(line)
         if given["verbose"]:
-            for line in _along(found, deviation_along(program, nc, **measures, **how.reading)):
+            for line in _along(found, deviation_along(program, nc, **how)):
                 click.echo(line)
     return 0 if found.passed else 1
 
@@ -105,12 +106,10 @@ def _check_outputs(source: str, text: str, given: dict[str, Any]) -> str:
     for path in given["reports"]:
         if os.path.splitext(path)[1].lower() not in (".json", ".csv"):
             raise click.UsageError(f"--report {path}: let the name end in .json or .csv")
-    form = os.path.splitext(given["plot"] or "picture.png")[1].lower().lstrip(".")
-    if form not in ("png", "svg", "pdf"):
-        raise click.UsageError(f"--plot {given['plot']}: let the name end in .png, .svg or .pdf")
+    form = options.picture_form(given["plot"])
     for path in (*given["reports"], given["plot"]):
         if path:
-            check_output(path, [source, text], force=given["force"])
+            check_path(path, [source, text], force=given["force"])
     return form
 
 
@@ -119,7 +118,7 @@ def _write_reports(program: Program, found: Verification, paths: tuple[str, ...]
 
     for path in paths:
         parts = verification_csv(program, found) if path.lower().endswith(".csv") else [verification_json(found)]
-        with open_output(path) as output:
+        with open_output(target_of(path)) as output:
             for part in parts:
                 output.stream.write(part.encode("utf-8"))
 

@@ -96,6 +96,27 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
     )
 
 
+def check_fitted(settings: Settings, form: Form, units: Units) -> None:
+    """Refuse settings that know less of the written digits than `fit_settings` would say: ε would be exceeded.
+
+    Raises
+    ------
+    SettingsError
+        CS205, or what `fit_settings` raises.
+    """
+    fitted = fit_settings(settings, form, units)
+    if (
+        settings.tip_resolution < fitted.tip_resolution
+        or settings.axis_point_resolution < fitted.axis_point_resolution
+        or (settings.round_feed_changes and not fitted.round_feed_changes)
+    ):
+        raise SettingsError(
+            "CS205",
+            f"the path was smoothed without regard to what {form.control} form {form.name} can hold",
+            "smooth it for the form that it is written in: smooth(program, settings, form=...)",
+        )
+
+
 def write(
     smoothed: SmoothProgram,
     stream: Stream,
@@ -110,7 +131,7 @@ def write(
     Parameters
     ----------
     smoothed : SmoothProgram
-        Made with settings that fit the form (`fit_settings`), or ε is exceeded by the rounding.
+        Made with settings that fit the form (`fit_settings`).
     stream : binary stream
         Written in blocks; memory does not grow with the program.
     control : str
@@ -125,7 +146,7 @@ def write(
     Raises
     ------
     SettingsError
-        Unknown control or form.
+        Unknown control or form; CS205 where ε would be exceeded, as the settings do not fit the form.
     InputError
         The form or its machine cannot follow the program.
     OutputError
@@ -133,6 +154,7 @@ def write(
     """
     chosen = form if isinstance(form, Form) else choose_form(control, form)
     program, findings = smoothed.program, Findings()
+    check_fitted(smoothed.settings, chosen, program.units)
     check_program(chosen, program, smoothed.settings)
     frame = frame or Frame()
     statements = StatementWriter(

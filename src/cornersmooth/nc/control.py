@@ -222,7 +222,12 @@ class Extra:
 class Control:
     """A control as its table describes it; the first form is the default.
 
-    `like` names the control that comes with the program and that it is like; empty for none.
+    Parameters
+    ----------
+    like : str
+        Control that comes with the program and that it is like; empty for none.
+    own : bool
+        Whether the table is the user's own, whose words may mean what nobody else knows.
     """
 
     name: str
@@ -233,3 +238,9 @@ class Control:
     words: Words
     forms: Mapping[str, FormTable]
     extras: Mapping[str, Extra] = field(default_factory=dict)
+    own: bool = False
+
+    @property
+    def dialect(self) -> str:
+        """Control that comes with the program and whose words the text has; empty for none."""
+        return self.like if self.own else self.name

@@ -7,7 +7,7 @@ keys are those of the tables in the folder ``controls``.
 from __future__ import annotations
 
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -26,7 +26,7 @@ from cornersmooth.nc.control import (
     TextStyle,
     Words,
 )
-from cornersmooth.tables import Shelf, Table
+from cornersmooth.tables import Shelf, Table, is_file
 
 Record = TypeVar("Record", Digits, TextStyle, Words, Motion, Extra)
 
@@ -85,7 +85,8 @@ def load_control(name_or_path: str | Path) -> Control:
         The name is unknown (with the closest known one), the file cannot be read, or it does not describe a control.
     """
     text, file, name = _SHELF.choose(name_or_path)
-    return parse_control(text, file=file, name=name)
+    control = parse_control(text, file=file, name=name)
+    return control if is_file(name_or_path) else replace(control, own=False)
 
 
 def parse_control(text: str, *, file: str = "<control>", name: str = "control") -> Control:
@@ -115,6 +116,7 @@ def parse_control(text: str, *, file: str = "<control>", name: str = "control") 
             words=_words(table.get("words", {})),
             forms=_forms(table),
             extras=_extras(table.get("extras", {})),
+            own=True,
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error

@@ -1,0 +1,58 @@
+"""Points on the smoothed path, for plots and for programs of one's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.model import Floats, Ints, SmoothProgram
+from cornersmooth.smoothing.sampling import dense_rows
+
+
+@dataclass(frozen=True)
+class PathPoints:
+    """Points in path order, m rows; between them the tool moves straight within the chord tolerance.
+
+    Parameters
+    ----------
+    tip : (m, 3) float64, mm
+    axis : (m, 3) float64
+        Unit tool axis vectors.
+    pose : (m,) int64
+        Pose of the program whose move the point belongs to.
+    kind : (m,) uint8
+        `Move`: how the point is reached.
+    """
+
+    tip: Floats
+    axis: Floats
+    pose: Ints
+    kind: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.tip)
+
+
+def sample(smoothed: SmoothProgram, *, chord: float | None = None) -> PathPoints:
+    """Points on the smoothed path, as near to one another as the chord tolerance asks for.
+
+    Parameters
+    ----------
+    smoothed : SmoothProgram
+    chord : float, mm, optional
+        Largest distance between the curves and the lines through the points; that of the settings by default.
+
+    Raises
+    ------
+    SettingsError
+        CS202 for a chord tolerance out of bounds.
+    """
+    if chord is not None:
+        smoothed = replace(smoothed, settings=smoothed.settings.but(chord_tolerance=chord))
+    blocks = list(dense_rows(smoothed))
+    if not blocks:
+        return PathPoints(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.uint8))
+    tip, axis, pose = (np.concatenate([getattr(rows, name) for rows in blocks]) for name in ("tip", "other", "move"))
+    return PathPoints(tip, axis, pose, smoothed.program.kind[pose])

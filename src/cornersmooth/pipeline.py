@@ -1,0 +1,244 @@
+"""The whole way from CL data to verified NC text: what the command does, as one call, and its first half.
+
+Reading, smoothing, writing and verifying know nothing of one another; what one must know of the next (the digits that
+will be written, how the text is to be read back) is put together here.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from cornersmooth import nc, smoothing
+from cornersmooth.cl import read
+from cornersmooth.errors import Finding, InputError, PromiseError
+from cornersmooth.model import Program, SmoothProgram
+from cornersmooth.nc import Form, Frame, Written
+from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
+from cornersmooth.report import report
+from cornersmooth.settings import Settings
+from cornersmooth.verify import CONTROLS, Verification, Verifier
+from cornersmooth.verify.processes import useful_processes
+
+#: called with the stage, what is done of it, and all of it
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What `postprocess` made.
+
+    Parameters
+    ----------
+    program : Program
+    smoothed : SmoothProgram
+    form : Form
+    written : Written
+    verification : Verification or None
+        None where the text was not read back.
+    unverified : str
+        Why not; empty where it was.
+    findings : tuple of Finding
+        Everything that was noticed on the way.
+    seconds : mapping of str to float
+        Time of the stages ``read``, ``smooth``, ``write`` and ``verify``.
+    path : str or None
+        File that holds the text; None where it went to a stream, or nowhere.
+    """
+
+    program: Program
+    smoothed: SmoothProgram
+    form: Form
+    written: Written
+    verification: Verification | None
+    unverified: str
+    findings: tuple[Finding, ...]
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    path: str | None = None
+
+    def report(self) -> dict[str, Any]:
+        """Everything that the JSON report says; see `cornersmooth.report`."""
+        own = len(self.smoothed.findings)
+        return report(
+            self.smoothed,
+            dense=not self.form.curve,
+            blocks_out=self.written.blocks,
+            seconds=self.seconds,
+            findings=self.findings[own:],
+            verification=None if self.verification is None else self.verification.to_dict(),
+        )
+
+
+def smooth(
+    program: Program,
+    settings: Settings | None = None,
+    *,
+    form: Form | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> SmoothProgram:
+    """Round every corner of the program within the tolerance.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings, optional
+        Defaults: ε 0.01 mm, H 10 mm, the proportional method.
+    form : Form, optional
+        What the path will be written in, as `choose_form` gives it: the rounding of its digits is taken off ε. Without
+        it ε holds for the path itself, as for plans and plots, and `write` refuses it.
+    progress : callable, optional
+        Called now and then with (corners done, corners in all).
+
+    Raises
+    ------
+    SettingsError
+        The form cannot hold what the settings ask for.
+    """
+    settings = Settings() if settings is None else settings
+    if form is not None:
+        settings = nc.fit_settings(settings, form, program.units)
+    return smoothing.smooth(program, settings, progress=progress)
+
+
+def reading_back(form: Form) -> dict[str, Any]:
+    """Keyword arguments with which `cornersmooth.verify` reads a text of the form."""
+    return {
+        "control": form.table.dialect if form.table.dialect in CONTROLS else "",
+        "machine": form.machine if form.rotary else None,
+        "tcp": form.orientation != "machine",
+        "words": not form.table.own,
+    }
+
+
+def postprocess(
+    source: Program | bytes | str | os.PathLike[str],
+    target: Target,
+    settings: Settings | None = None,
+    *,
+    form: Form | None = None,
+    frame: Frame | None = None,
+    reading: Mapping[str, Any] | None = None,
+    feed: float | None = None,
+    verify: bool = True,
+    force: bool = False,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Read a CL file, smooth it, write NC text, read that back and measure it: what ``cornersmooth smooth`` does.
+
+    A file takes its place when it is whole, on the disk and verified; until then the old file stays.
+
+    Parameters
+    ----------
+    source : Program, path or bytes
+    target : path or binary stream
+    settings : Settings, optional
+        ε 0.01 mm, H 10 mm, the proportional method; fitted here to the digits of the form.
+    form : Form, optional
+        What `choose_form` gives; fanuc g1 by default.
+    frame : Frame, optional
+        Program name, block numbers, texts before and behind.
+    reading : mapping, optional
+        Keyword arguments of `read`.
+    feed : float, mm/min, optional
+        For moves that have none.
+    verify : bool
+        Whether the text is read back and measured before it takes its place.
+    force : bool
+        Whether an existing file may be replaced.
+    processes : int, optional
+        Processes to verify with; by default as many as are useful. The result does not depend on it.
+    progress : callable, optional
+        Called now and then with the stage, what is done and all there is to do.
+
+    Raises
+    ------
+    PromiseError
+        The text breaks its promise. A file is kept as ``TARGET.rejected``, nothing reaches a stream; `result` of the
+        error says what was found.
+    InputError, SettingsError, OutputError
+        As `read`, `choose_form`, `write` and `open_output` say it.
+    """
+    form = nc.choose_form() if form is None else form
+    if not isinstance(source, (Program, bytes)):
+        check_output(target, [source], force=force)
+    else:
+        check_output(target, force=force)
+    back = reading_back(form)
+    unverified = "" if verify else "not asked for"
+    if verify and not back["control"]:
+        unverified = "its table is like no control whose text is known"
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "read"):
+        program = source if isinstance(source, Program) else read(source, **(reading or {}))
+        if feed is not None:
+            program = replace(program, feed=np.where(np.isnan(program.feed), feed, program.feed))
+    with _timed(seconds, "smooth"):
+        smoothed = smooth(program, settings, form=form, progress=_stage(progress, "smoothing"))
+    with open_output(target, hold=not unverified) as output, ExitStack() as stack:
+        verifier = None
+        if not unverified:
+            verifier = Verifier(
+                program,
+                output.path,
+                tolerance=smoothed.settings.verified_tolerance,
+                axis_length=smoothed.settings.axis_length,
+                processes=useful_processes() if processes is None else processes,
+                **back,
+            )
+            stack.enter_context(verifier)
+        with _timed(seconds, "write"):
+            told = _stage(progress, "writing")
+            written = nc.write(smoothed, output.stream, form=form, frame=frame, progress=told)
+            output.stream.flush()
+        verification = None
+        if verifier is not None:
+            with _timed(seconds, "verify"):
+                verification, unverified = _verified(verifier, form, frame)
+        output.rejected = verification is not None and not verification.passed
+    findings = (*smoothed.findings, *written.findings)
+    if verify and unverified:
+        findings += (Finding("CS509", "note", 0, f"the text is not read back: {unverified}"),)
+    path = path_of(target)
+    if output.rejected and path is not None:
+        path += REJECTED
+    result = Result(program, smoothed, form, written, verification, unverified, findings, seconds, path)
+    if output.rejected:
+        raise _broken(result)
+    return result
+
+
+def _verified(verifier: Verifier, form: Form, frame: Frame | None) -> tuple[Verification | None, str]:
+    """What verification found, or why the text could not be read: the user's own words may be any."""
+    try:
+        return verifier.result(), ""
+    except InputError as failure:
+        own = form.table.own
+        if not own and (frame is None or not (frame.header or frame.footer)):
+            raise
+        where = "a table of your own" if own else "header and footer"
+        return None, f"{failure.what} in line {failure.line}; {where} may hold any words"
+
+
+def _broken(result: Result) -> PromiseError:
+    kept = "nothing was written" if result.path is None else f"the text is in {result.path}"
+    broken = PromiseError("CS508", f"the written text breaks its promise; {kept}", file=result.program.source.name)
+    broken.result = result
+    return broken
+
+
+def _stage(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:
+    return None if progress is None else lambda done, total: progress(stage, done, total)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    begin = time.perf_counter()
+    yield
+    seconds[stage] = round(time.perf_counter() - begin, 6)

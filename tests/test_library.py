@@ -1,0 +1,171 @@
+"""The public API: the example in the package's own words, the one call, refusals at the door."""
+
+from __future__ import annotations
+
+import inspect
+import io
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cornersmooth
+from cornersmooth import CornersmoothError, PromiseError, Settings
+from cornersmooth.cli import run
+
+SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "impeller.cls"
+
+#: what zhang2016 cannot keep: the axis turns fast at a nearly straight tip
+BREAKING = b"""UNITS/MM
+RAPID
+GOTO/0.,0.,50.,0.,0.,1.
+FEDRAT/1000.,MMPM
+GOTO/0.,0.,0.,0.,0.,1.
+GOTO/10.,0.,0.,0.,0.5,0.8660254
+GOTO/20.,0.1,0.,0.5,0.,0.8660254
+GOTO/30.,0.,0.,0.,0.,1.
+FINI
+"""
+
+
+def examples() -> str:
+    """The code of the package's docstring."""
+    text = inspect.getdoc(cornersmooth)
+    assert text
+    blocks = re.findall(r"::\n\n((?:    .*\n)+)", text + "\n")
+    assert len(blocks) == 2
+    return "".join(inspect.cleandoc(block) + "\n" for block in blocks)
+
+
+def run_examples(folder: Path, monkeypatch: pytest.MonkeyPatch, tolerance: float) -> dict[str, object]:
+    """Names that are left by the examples, run with this tolerance in a folder with a ``part.cls``."""
+    monkeypatch.chdir(folder)
+    code = examples()
+    assert code.count("tolerance=0.04") == 3
+    names: dict[str, object] = {"cornersmooth": cornersmooth}
+    exec(code.replace("tolerance=0.04", f"tolerance={tolerance}"), names)
+    return names
+
+
+@pytest.mark.parametrize("tolerance", [0.005, 0.04])
+def test_the_documented_examples_keep_the_tolerance(tmp_path, monkeypatch, tolerance):
+    (tmp_path / "part.cls").write_bytes(SAMPLE.read_bytes())
+    names = run_examples(tmp_path, monkeypatch, tolerance)
+    assert names["found"].passed
+    assert 0.9 * tolerance < names["found"].max_tip_deviation_mm <= tolerance
+    assert names["result"].verification.passed
+    one, steps = io.BytesIO(), (tmp_path / "part.nc").read_bytes()
+    cornersmooth.postprocess(SAMPLE, one, Settings(tolerance=tolerance))
+    assert one.getvalue() == steps
+
+
+@pytest.mark.corpus
+@pytest.mark.parametrize("tolerance", [0.005, 0.04])
+def test_the_documented_examples_keep_the_tolerance_on_a_real_file(tmp_path, monkeypatch, corpus, tolerance):
+    (source,) = corpus.rglob("nx_clsf_varcontour5x_ust_a.cls")
+    (tmp_path / "part.cls").write_bytes(source.read_bytes())
+    found = run_examples(tmp_path, monkeypatch, tolerance)["found"]
+    assert found.passed
+    assert found.max_axis_point_deviation_mm <= tolerance
+
+
+def test_every_public_name_is_there_and_help_lists_the_functions():
+    import cornersmooth.report  # the packages of the same name do not hide the functions
+    import cornersmooth.verify
+
+    for name in cornersmooth.__all__:
+        assert callable(getattr(cornersmooth, name))
+    text = subprocess.run(
+        [sys.executable, "-c", "import cornersmooth; help(cornersmooth)"], capture_output=True, text=True, check=True
+    ).stdout
+    for name in cornersmooth.__all__:
+        assert re.search(rf"^    (class )?{name}\(", text, re.MULTILINE), name
+
+
+def test_text_is_not_written_with_digits_that_were_not_reckoned_with():
+    program = cornersmooth.read(SAMPLE)
+    plain = cornersmooth.smooth(program, Settings(tolerance=0.04))
+    with pytest.raises(CornersmoothError, match=r"fanuc form g1 can hold; smooth it for the form"):
+        cornersmooth.write(plain, io.BytesIO())
+    lines = cornersmooth.smooth(program, Settings(tolerance=0.04), form=cornersmooth.choose_form("fanuc", "g1"))
+    cornersmooth.write(lines, io.BytesIO())
+    with pytest.raises(CornersmoothError, match="siemens form bspline can hold"):  # three decimals, no F in curves
+        cornersmooth.write(lines, io.BytesIO(), control="siemens", form="bspline")
+
+
+@pytest.mark.parametrize(
+    ("tip", "axis", "feed", "message"),
+    [
+        ([[0, 0, 0], [1, np.nan, 0]], [[0, 0, 1]] * 2, 100, "the tip of pose 1 is 1, nan, 0"),
+        ([[np.inf, 0, 0]], [[0, 0, 1]], 100, "the tip of pose 0 is inf, 0, 0"),
+        ([[0, 0, 0]], [[0, 0, 0]], 100, "the axis of pose 0 is 0, 0, 0"),
+        ([[0, 0, 0]], [[0, np.nan, 1]], 100, "the axis of pose 0 is 0, nan, 1"),
+        ([[0, 0, 0]], [[0, np.inf, 1]], 100, "the axis of pose 0 is 0, inf, 1"),
+        ([[0, 0, 0]], [[0, 0, 1]], 0, "the feed of pose 0 is 0"),
+        ([[0, 0, 0]], [[0, 0, 1]], np.inf, "the feed of pose 0 is inf"),
+    ],
+)
+def test_poses_that_are_none_are_refused(tip, axis, feed, message):
+    with pytest.raises(CornersmoothError, match=f"^error: {message}; give "):
+        cornersmooth.from_poses(tip, axis, feed=feed)
+
+
+def test_poses_may_have_axes_of_any_length_and_no_feed():
+    program = cornersmooth.from_poses(np.zeros((3, 3)), [[0, 0, 1e300], [0, 3e-200, 4e-200], [2, 0, 0]])
+    np.testing.assert_allclose(program.axis, [[0, 0, 1], [0, 0.6, 0.8], [1, 0, 0]], rtol=1e-15)
+    assert np.isnan(program.feed).all()
+
+
+def test_points_on_the_smoothed_path():
+    program = cornersmooth.read(SAMPLE)
+    smoothed = cornersmooth.smooth(program, Settings(tolerance=0.04))
+    points, finer = cornersmooth.sample(smoothed), cornersmooth.sample(smoothed, chord=1e-4)
+    assert len(program) < len(points) < len(finer)
+    np.testing.assert_allclose(np.linalg.norm(points.axis, axis=1), 1.0)
+    np.testing.assert_array_equal(points.kind, program.kind[points.pose])
+    assert (np.diff(points.pose) >= 0).all()
+    np.testing.assert_allclose(points.tip[-1], program.tip[-1])
+    none = cornersmooth.from_poses(np.zeros((0, 3)), np.zeros((0, 3)))
+    assert len(cornersmooth.sample(cornersmooth.smooth(none))) == 0
+
+
+def test_one_call_does_what_the_command_does(tmp_path, capsys):
+    out, ours = tmp_path / "command.nc", tmp_path / "call.nc"
+    assert run(["smooth", str(SAMPLE), "-e", "0.02", "-f", "g6.2", "-o", str(out)]) == 0
+    stages = set()
+    form = cornersmooth.choose_form("fanuc", "g6.2")
+    result = cornersmooth.postprocess(
+        SAMPLE, ours, Settings(tolerance=0.02), form=form, progress=lambda stage, done, total: stages.add(stage)
+    )
+    assert ours.read_bytes() == out.read_bytes()
+    assert stages == {"smoothing", "writing"}
+    assert set(result.seconds) == {"read", "smooth", "write", "verify"}
+    assert (result.path, result.unverified) == (str(ours), "")
+    assert result.report()["verification"]["passed"]
+    assert {finding.code for finding in result.findings} >= {"CS132", "CS317"}
+    with pytest.raises(CornersmoothError, match="exists already"):
+        cornersmooth.postprocess(SAMPLE, ours)
+    with pytest.raises(CornersmoothError, match="is the input"):
+        cornersmooth.postprocess(ours, ours, force=True)
+
+
+def test_a_broken_promise_is_an_error_and_the_old_file_stays(tmp_path):
+    out = tmp_path / "o.nc"
+    out.write_text("old")
+    settings = Settings(tolerance=0.01, method="zhang2016")
+    with pytest.raises(PromiseError, match=r"breaks its promise; the text is in .*o\.nc\.rejected") as caught:
+        cornersmooth.postprocess(BREAKING, out, settings, force=True)
+    assert out.read_text() == "old"
+    result = caught.value.result
+    assert result.verification.problems
+    assert Path(result.path).read_text().endswith("M30\n%\n")
+    stream = io.BytesIO()
+    with pytest.raises(PromiseError, match="nothing was written"):
+        cornersmooth.postprocess(BREAKING, stream, settings)
+    assert stream.getvalue() == b""
+    result = cornersmooth.postprocess(BREAKING, stream, settings, verify=False)
+    assert (result.verification, result.unverified) == (None, "not asked for")
+    assert stream.getvalue()
