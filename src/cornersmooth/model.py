@@ -8,6 +8,7 @@ and what the NC text will speak.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
@@ -334,7 +335,7 @@ class Corners:
     trim_in, trim_out : (k,) float64
         Fraction of the tip segment taken by the transition before and after the corner; 0 where not smoothed.
     axis_trim_in, axis_trim_out : (k,) float64
-        The same for the axis-point segments; the same numbers for the proportional method.
+        The same for the axis-point segments; the same numbers where one parameter drives both curves.
     weights : (k, 2) float64
         w1 (second and fourth control point) and w2 (third); the first and the last are 1.
     ratio : (k,) float64
@@ -344,10 +345,8 @@ class Corners:
         themselves are at least as near (`smoothing.path_distance`).
     orientation_error : (k,) float64, rad
         Largest angle between the axis on the transition and on the original motion at the common parameter.
-    sync_residual : (k,) float64, mm
-        Largest ``||Q−P|−H|`` left by the synchronisation of `zhang2016`; NaN for the proportional method.
-    jump_in, jump_out : (k,) float64, rad
-        Jump of the axis at the two joints (`zhang2016`); NaN for the proportional method.
+    extra : mapping of str to (k,) float64
+        What only the method knows of its transitions, NaN where not smoothed; the method's module says what it is.
     """
 
     pose: Ints
@@ -364,9 +363,7 @@ class Corners:
     tip_error: Floats
     axis_error: Floats
     orientation_error: Floats
-    sync_residual: Floats
-    jump_in: Floats
-    jump_out: Floats
+    extra: Mapping[str, Floats] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.pose)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.methods import DEFAULT_METHOD, METHODS
 
-Method = Literal["proportional", "zhang2016"]
 Shape = Literal["paper", "auto"]
 Allocation = Literal["half", "fair"]
 
@@ -23,7 +23,8 @@ class Settings:
         ε: bound on the deviation of the written tip path and axis-point path (design section 4).
     axis_length : float, mm
         H: distance of the axis point from the tip. Choose the length of the cutting edge.
-    method : {"proportional", "zhang2016"}
+    method : str
+        A name in `cornersmooth.methods.METHODS`.
     shape : {"paper", "auto"}
         Weights of the curves: `weights` everywhere, or w2 chosen for every corner by its turn (docs/shape.md).
     allocation : {"half", "fair"}
@@ -57,7 +58,7 @@ class Settings:
 
     tolerance: float = 0.01
     axis_length: float = 10.0
-    method: Method = "proportional"
+    method: str = DEFAULT_METHOD
     shape: Shape = "paper"
     allocation: Allocation = "half"
     weights: tuple[float, float] = (1.0, 1.0)
@@ -74,16 +75,16 @@ class Settings:
     shortest_line: float = 1e-3
 
     def __post_init__(self) -> None:
-        if self.method not in ("proportional", "zhang2016"):
-            raise SettingsError("CS201", f"unknown method {self.method!r}", "use proportional or zhang2016")
+        if self.method not in METHODS:
+            raise SettingsError("CS201", f"unknown method {self.method!r}", f"use {' or '.join(METHODS)}")
         if self.shape not in ("paper", "auto"):
             raise SettingsError("CS201", f"unknown shape {self.shape!r}", "use paper or auto")
         if self.allocation not in ("half", "fair"):
             raise SettingsError("CS201", f"unknown allocation {self.allocation!r}", "use half or fair")
-        if self.method == "zhang2016" and (self.shape != "paper" or self.allocation != "half"):
-            raise SettingsError(
-                "CS207", "the method zhang2016 has its own shape and lengths", "leave out shape and allocation"
-            )
+        prescribed = METHODS[self.method].prescribed
+        if any(getattr(self, name) != value for name, value in prescribed.items()):
+            names = " and ".join(prescribed)
+            raise SettingsError("CS207", f"the method {self.method} has its own {names}", f"leave out {names}")
         object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
         if self.shape == "auto" and self.weights != (1.0, 1.0):
             raise SettingsError("CS207", "shape auto chooses the weights", "leave out the weights, or use shape paper")
@@ -111,14 +112,11 @@ class Settings:
 
     @property
     def verified_tolerance(self) -> float:
-        """What verification allows: ε, and for the paper's method, which has no part in the digits, a little more.
-
-        On the paper's own Table 1 its axis point leaves the path by 0.0783 mm where ε is 0.078 mm: the bound (10) holds
-        for each curve, not for the synchronised motion. One per cent and the rounding are let pass.
-        """
-        if self.method == "zhang2016":
-            return 1.01 * self.tolerance + math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
-        return self.tolerance
+        """What verification allows: ε, and more for a method that does not promise ε of the written digits."""
+        excess = METHODS[self.method].excess
+        if not excess:
+            return self.tolerance
+        return (1.0 + excess) * self.tolerance + math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
 
     @property
     def chord(self) -> float:

@@ -150,7 +150,9 @@ def test_pose_is_continuous(chain: Callable[[int], Program], method: str) -> Non
     assert np.linalg.norm(np.diff(states.tip, axis=0), axis=1).max() < 5e-3
     # the paper's method leaves small jumps of the axis at the joints, and says how large
     corners = law.path.corners
-    allowed = 1e-4 + (np.nanmax([corners.jump_in, corners.jump_out]) if method == "zhang2016" else 0.0)
+    allowed = 1e-4 + (
+        np.nanmax([corners.extra["jump_in"], corners.extra["jump_out"]]) if method == "zhang2016" else 0.0
+    )
     assert np.linalg.norm(np.diff(states.axis, axis=0), axis=1).max() < allowed
     assert states.tip[[0, -1]] == pytest.approx(program.tip[[0, -1]])
 

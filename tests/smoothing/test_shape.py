@@ -97,7 +97,7 @@ def test_auto_is_nowhere_slower(turn, change, tolerance):
 def test_auto_goes_with_no_other_choice_of_weights():
     with pytest.raises(SettingsError, match="chooses the weights"):
         Settings(shape="auto", weights=(1.0, 0.5))
-    with pytest.raises(SettingsError, match="own shape and lengths"):
+    with pytest.raises(SettingsError, match="own shape and allocation"):
         Settings(shape="auto", method="zhang2016")
     with pytest.raises(SettingsError, match="unknown shape"):
         Settings(shape="round")  # type: ignore[arg-type]

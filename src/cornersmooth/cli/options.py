@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from cornersmooth.methods import DEFAULT_METHOD, METHODS
+
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
     from cornersmooth.settings import Settings
@@ -102,10 +104,10 @@ axis_length = click.option(
 )
 method = click.option(
     "--method",
-    type=click.Choice(["proportional", "zhang2016"]),
-    default="proportional",
+    type=click.Choice(list(METHODS)),
+    default=DEFAULT_METHOD,
     show_default=True,
-    help="How the pair of curves is made: the default, or the paper as published.",
+    help="How the curves are made. " + "; ".join(f"{item.name}: {item.summary}" for item in METHODS.values()) + ".",
 )
 shape = click.option(
     "--shape",
@@ -256,8 +258,8 @@ table = click.option(
 )
 law = click.option(
     "--law",
-    type=click.Choice(["direct_exact_stop", "direct_velocity_jump", "zhang2016", "proportional"]),
-    default="proportional",
+    type=click.Choice(["direct_exact_stop", "direct_velocity_jump", *METHODS]),
+    default=DEFAULT_METHOD,
     show_default=True,
     help="Motion that --csv writes.",
 )

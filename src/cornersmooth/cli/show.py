@@ -62,6 +62,8 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
     """Print the small table of one file."""
     from rich.table import Table
 
+    from cornersmooth.smoothing.construction import construction_of
+
     summary, settings = contents["summary"], contents["settings"]
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold")
@@ -77,12 +79,8 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
         f"(H {settings['axis_length']:g} mm), tolerance {settings['tolerance']:g} mm",
     )
     table.add_row("tool axis", f"{summary['max_orientation_error_deg']:.4f} deg")
-    if "max_sync_residual_mm" in summary:
-        table.add_row(
-            "zhang2016",
-            f"largest ||Q-P|-H| {summary['max_sync_residual_mm']:.4g} mm, "
-            f"largest jump of the axis at a joint {summary['max_joint_jump_deg']:.4g} deg",
-        )
+    if text := construction_of(settings["method"]).summary_text(summary):
+        table.add_row(settings["method"], text)
     if "verification" in contents:
         found = contents["verification"]
         table.add_row(

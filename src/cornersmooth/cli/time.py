@@ -10,18 +10,18 @@ import click
 from cornersmooth.cli import options
 from cornersmooth.cli.files import check_path, read_input, target_of
 from cornersmooth.cli.show import progress_bar
+from cornersmooth.methods import METHODS
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Comparison
 
-LAWS = ("direct_exact_stop", "direct_velocity_jump", "zhang2016", "proportional")
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",
     "direct_velocity_jump": "direct, velocity jump",
-    "zhang2016": "smoothed, zhang2016",
-    "proportional": "smoothed, proportional",
+    **{name: f"smoothed, {name}" for name in METHODS},
 }
+LAWS = tuple(_TITLES)
 
 
 @click.command(
@@ -53,7 +53,7 @@ def command(source: str, **given: Any) -> int:
     The direct path is driven twice: with a stop at the end of every move, and with jumps of velocity at corners as far
     as the acceleration allows in one period. The smoothed path is that of each method. Delays, tool changes and the
     strokes of hole cycles are not counted. Limits are those of the tip; where it stands still while the axis turns the
-    angular ones count (zhang2016 has such places where its transitions use up a short tip segment).
+    angular ones count (some methods have such places where transitions use up a short tip segment).
 
     \b
     Examples:

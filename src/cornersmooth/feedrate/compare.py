@@ -13,6 +13,7 @@ from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics import Machine
+from cornersmooth.methods import METHODS
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
@@ -21,7 +22,6 @@ SCHEMA = "cornersmooth-time/1"
 
 #: rows of `Comparison.laws`, in this order
 BASELINES = ("direct_exact_stop", "direct_velocity_jump")
-METHODS = ("zhang2016", "proportional")
 
 #: states looked at together for peaks
 _BLOCK = 65536
@@ -77,10 +77,10 @@ class Comparison:
     ----------
     program : Program
     settings : Settings
-        Of the smoothing; its `method` is replaced by each of the two.
+        Of the smoothing; its `method` is replaced by each method in turn.
     limits : Limits
     laws : mapping of str to TimeLaw
-        ``direct_exact_stop``, ``direct_velocity_jump``, ``zhang2016``, ``proportional``.
+        The two `BASELINES`, and every method by its name.
     machine : Machine or None
         Whose axes keep their limits.
     """
@@ -144,7 +144,7 @@ def compare(
     machine: Machine | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Plan a program four ways: directly with stops and with jumps of velocity, and smoothed by both methods.
+    """Plan a program directly, with stops and with jumps of velocity, and smoothed by every method.
 
     Parameters
     ----------
@@ -180,10 +180,9 @@ def compare(
             progress=step("direct_velocity_jump"),
         ),
     }
-    # the paper's method has one shape and one allocation
-    paper = settings.but(method="zhang2016", shape="paper", allocation="half")
-    for method, chosen in (("zhang2016", paper), ("proportional", settings.but(method="proportional"))):
-        laws[method] = plan(smooth(program, chosen), limits, machine=machine, progress=step(method))
+    for name, method in METHODS.items():
+        chosen = settings.but(method=name, **method.prescribed)
+        laws[name] = plan(smooth(program, chosen), limits, machine=machine, progress=step(name))
     return Comparison(program, settings, limits, laws, machine)
 
 

@@ -11,8 +11,7 @@ from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.path import Kind, Path, line_axes
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing import nurbs, synchronise
-from cornersmooth.vectors import norm
+from cornersmooth.smoothing.construction import construction_of
 
 _HALVINGS = 60
 
@@ -158,7 +157,7 @@ class TimeLaw:
     def axes_at(self, t: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Position, speed, acceleration and jerk (m, 5) of the machine's axes at times t (m,), in mm, degrees and s.
 
-        From exact derivatives. On transitions of `zhang2016` the axis point is taken at the parameter of the tip.
+        From exact derivatives. On all transitions the axis point is taken at the parameter of the tip.
 
         Raises
         ------
@@ -269,29 +268,6 @@ def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tup
     axis = bezier_halves.axis_vectors(tip_half[which], axis_half[which], t[:, None])[:, 0]
     kappa = bezier_halves.curvature(tip_half[which], t[:, None])[:, 0]
     row, half = path.corner[element], half[which]
-    paper = np.flatnonzero(np.isfinite(corners.sync_residual[row]))
-    if len(paper):
-        axis[paper] = _paper_axes(path, row[paper], 0.5 * (half[paper] + t[paper]))
+    own = construction_of(path.settings.method).axes(program, corners, path.settings, row, 0.5 * (half + t))
+    axis = axis if own is None else own
     return tip + program.tip[corners.pose[row]], axis, kappa
-
-
-def _paper_axes(path: Path, row: Ints, u: Floats) -> Floats:
-    """Axis on transitions of `zhang2016`, whose axis-point curve has a parameter v(u) of its own (equations 20 to 22).
-
-    v(u) is followed from u = 0 over a common set of parameters and interpolated in between.
-    """
-    corners = path.corners
-    if corners is None:
-        raise ValueError("a direct path has no curves")
-    rows, which = np.unique(row, return_inverse=True)
-    tip_curve, axis_curve = nurbs.control_points(path.program, corners, rows, path.settings.axis_length)
-    weights = corners.weights[rows]
-    grid = synchronise.REPORT_PARAMETERS
-    v, _ = synchronise.matching_parameters(tip_curve, axis_curve, weights, grid, path.settings.axis_length)
-    cell = np.clip(np.searchsorted(grid, u, side="right") - 1, 0, len(grid) - 2)
-    part = (u - grid[cell]) / (grid[cell + 1] - grid[cell])
-    at = v[which, cell] + part * (v[which, cell + 1] - v[which, cell])
-    tips = nurbs.evaluate(tip_curve[which], weights[which], u[:, None])[:, 0]
-    points = nurbs.evaluate(axis_curve[which], weights[which], at[:, None])[:, 0]
-    unit: Floats = (points - tips) / norm(points - tips)[:, None]
-    return unit

@@ -11,6 +11,7 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status
 from cornersmooth.report.corners import STATUS_NAMES, corner_table, worst_corners
+from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import dot, norm
 
 __all__ = ["SCHEMA", "corners_csv", "report", "report_json"]
@@ -69,11 +70,7 @@ def report(
         "blocks_out": blocks_out,
         "seconds": dict(seconds or {}),
     }
-    if smoothed.settings.method == "zhang2016":
-        summary["max_sync_residual_mm"] = _largest(corners.sync_residual[done])
-        summary["max_joint_jump_deg"] = float(
-            np.degrees(max(_largest(corners.jump_in[done]), _largest(corners.jump_out[done])))
-        )
+    summary |= construction_of(smoothed.settings.method).report_summary(corners)
     contents: dict[str, Any] = {
         "schema": SCHEMA,
         "tool": {"name": "cornersmooth", "version": __version__},

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.vectors import angle_between, norm
 
@@ -53,8 +54,8 @@ def corner_table(smoothed: SmoothProgram, rows: Ints, *, dense: bool = True) -> 
     Returns
     -------
     dict
-        Column name, with its unit, to an array of g values; the columns of design section 7, and for the paper's
-        method `sync_residual_mm`, `joint_jump_in_deg` and `joint_jump_out_deg`.
+        Column name, with its unit, to an array of g values; the columns of design section 7, and those
+        that only the method has.
     """
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
     pose, before, after = corners.pose[rows], corners.before[rows], np.maximum(corners.after[rows], 0)
@@ -84,10 +85,7 @@ def corner_table(smoothed: SmoothProgram, rows: Ints, *, dense: bool = True) -> 
         "limited_by": _names(LIMIT_NAMES, corners.limited_by[rows]),
         "status": _names(STATUS_NAMES, corners.status[rows]),
     }
-    if settings.method == "zhang2016":
-        columns["sync_residual_mm"] = corners.sync_residual[rows]
-        columns["joint_jump_in_deg"] = np.degrees(corners.jump_in[rows])
-        columns["joint_jump_out_deg"] = np.degrees(corners.jump_out[rows])
+    columns.update(construction_of(settings.method).report_columns(corners, rows))
     return columns
 
 

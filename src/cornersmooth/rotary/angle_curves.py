@@ -22,6 +22,7 @@ import numpy as np
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import continued
+from cornersmooth.methods import DEFAULT_METHOD, METHODS
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.rotary.angle_fit import (
     MEASURE_SAMPLES,
@@ -125,7 +126,7 @@ def rotary_curves(
     Parameters
     ----------
     smoothed : SmoothProgram
-        Made with the proportional method: only there P and Q run with one parameter.
+        Made with a method in which one parameter drives P and Q.
     machine : Machine
     tolerance : float, degrees
         Largest angle between the tool axis and that of the ruled motion on straight motion: ε at H where nothing else
@@ -143,11 +144,11 @@ def rotary_curves(
     InputError
         The machine cannot follow the path (`rotary_angles`).
     """
-    if smoothed.settings.method != "proportional":
+    if not METHODS[smoothed.settings.method].one_parameter:
         raise SettingsError(
             "CS254",
             f"method {smoothed.settings.method} has no curves in rotary axes",
-            "use the method proportional, or write lines",
+            f"use the method {DEFAULT_METHOD}, or write lines",
         )
     corners = smoothed.corners
     allowed = np.full(len(corners), tolerance) if allowance is None else np.minimum(allowance, tolerance)

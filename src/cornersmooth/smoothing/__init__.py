@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from cornersmooth.model import Program, SmoothProgram
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.transition import place_corners
+from cornersmooth.smoothing.construction import construction_of
 
 __all__ = ["smooth"]
 
@@ -33,5 +33,4 @@ def smooth(
         Also where nothing can be rounded; every corner has a status that says why not.
     """
     settings = Settings() if settings is None else settings
-    corners = place_corners(program, settings, progress)
-    return SmoothProgram(program=program, corners=corners, settings=settings, findings=program.findings)
+    return construction_of(settings.method).smooth(program, settings, progress)

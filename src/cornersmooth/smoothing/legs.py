@@ -1,12 +1,10 @@
-"""The segments at corners, what a method makes of them, and the vector arithmetic that methods share."""
+"""The segments at corners."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.vectors import norm
@@ -30,24 +28,6 @@ class Legs(NamedTuple):
     turn_in: Floats
     turn_out: Floats
     axis: Floats
-
-
-@dataclass
-class Placed:
-    """What a method computes for a block of g corners; the names are those of `Corners`."""
-
-    status: NDArray[np.uint8]
-    limited_by: NDArray[np.uint8]
-    trim_in: Floats
-    trim_out: Floats
-    axis_trim_in: Floats
-    axis_trim_out: Floats
-    tip_error: Floats
-    axis_error: Floats
-    orientation_error: Floats
-    sync_residual: Floats
-    jump_in: Floats
-    jump_out: Floats
 
 
 def legs_at(program: Program, axis_length: float, pose: Ints, before: Ints, after: Ints) -> Legs:

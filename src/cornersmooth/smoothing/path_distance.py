@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.methods import METHODS
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.legs import legs_at
@@ -106,7 +107,7 @@ def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple
     """
     corners = smoothed.corners
     tip, axis_point = corners.tip_error[rows].copy(), corners.axis_error[rows].copy()
-    if smoothed.settings.method == "zhang2016":
+    if not METHODS[smoothed.settings.method].one_parameter:
         return tip, axis_point
     for begin in range(0, len(rows), _BLOCK):
         chosen = begin + np.flatnonzero(corners.smoothed[rows[begin : begin + _BLOCK]])

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Floats, LimitedBy, Status
+from cornersmooth.model import Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs
+from cornersmooth.smoothing.allocation import fair_room
+from cornersmooth.smoothing.construction import Construction
+from cornersmooth.smoothing.corner_table import CornerTable, Placed, Remainders, ShapedCorners
 from cornersmooth.smoothing.deviation import BETWEEN_PROBES, EXACT, Bends, keep
-from cornersmooth.smoothing.legs import Legs, Placed, divide, half_angle_cosine
-from cornersmooth.vectors import dot, norm, square
+from cornersmooth.smoothing.legs import Legs, divide, half_angle_cosine
+from cornersmooth.vectors import dot, norm, square, unit
 
 #: while the lever turns by less than this many times the deviation, relative to it, the deviation is largest at u = ½:
 #: half of what is proven, for all weights 1 at the paper's ratio and for every other shape
@@ -124,7 +127,6 @@ def place_proportional(asked: Wanted, room: Floats, settings: Settings) -> Place
     if len(probed):
         axis_error[probed] = np.maximum(axis_error[probed], bends.probe(length[probed], probed))
     trim_in, trim_out = length / asked.length_in, length / asked.length_out
-    nothing = np.full(len(length), np.nan)
     return Placed(
         status=status,
         limited_by=limited_by,
@@ -135,9 +137,6 @@ def place_proportional(asked: Wanted, room: Floats, settings: Settings) -> Place
         tip_error=per_length_tip * length,
         axis_error=axis_error,
         orientation_error=bends.middle_turn(length),
-        sync_residual=nothing,
-        jump_in=nothing,
-        jump_out=nothing,
     )
 
 
@@ -156,3 +155,72 @@ def _largest_in_the_middle(bends: Bends, length: Floats, turned: Floats) -> NDAr
     tilt = 2.0 * turn * turned
     largest: NDArray[np.bool_] = (tilt <= np.where(paper, _TILT_PAPER, _TILT_ANY) * bends.middle(length)) & (turn < 0.5)
     return largest
+
+
+class Proportional(Construction):
+    """Tip and axis-point segment are trimmed by the same fraction, and one parameter drives both curves."""
+
+    def room(self, table: CornerTable) -> Floats | None:
+        """Share every segment fairly between its corners where the settings ask for it."""
+        if table.settings.allocation != "fair":
+            return None
+        length_in, length_out, length, cosine = np.zeros((4, len(table.pose)))
+        for _, rows in table.blocks():
+            if len(rows):
+                asked = wanted(*table.shaped(rows), table.settings)
+                length_in[rows], length_out[rows], cosine[rows] = asked.length_in, asked.length_out, asked.cosine
+                length[rows] = np.where(
+                    asked.status == Status.SMOOTHED, np.minimum(asked.by_tolerance, asked.by_orientation), 0.0
+                )
+        return fair_room(table.pose, table.after, length_in, length_out, length, cosine)
+
+    def place(self, shaped: ShapedCorners, settings: Settings, room: Floats | None) -> Placed:
+        """Give every corner the length that the tolerances and its room allow."""
+        asked = wanted(*shaped, settings)
+        if room is None:
+            room = np.minimum(asked.length_in, asked.length_out) / 2.0
+        return place_proportional(asked, room, settings)
+
+    def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
+        """Both curves at the same parameters."""
+        program, corners = smoothed.program, smoothed.corners
+        u = np.concatenate(([0.0], u))
+        weights, ratio = corners.weights[rows], corners.ratio[rows]
+        pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
+        trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
+        tips, levers = np.zeros((2, len(rows), 3, 3))
+        for parts, values in ((tips, program.tip), (levers, program.axis)):
+            at = values[pose]
+            parts[:, 0] = at
+            parts[:, 1] = trim_in * (at - values[before])
+            parts[:, 2] = trim_out * (values[after] - at)
+        # corners with all weights 1 share one table of coefficients, the others at least its numerators
+        plain = (weights == 1.0).all(axis=1) & (ratio == ratio[0])
+        coefficients = nurbs.leg_coefficients(u, np.ones(2), ratio[0])
+        points, vectors = coefficients @ tips, coefficients @ levers
+        other = np.flatnonzero(~plain)
+        if len(other):
+            shares = nurbs.basis(u)
+            sums = nurbs.full_weights(weights[other]) @ shares.T
+            inner = (ratio[other] * weights[other, 0])[:, None]
+            incoming = -(shares[:, 0] + inner * shares[:, 1]) / sums
+            outgoing = (shares[:, 4] + inner * shares[:, 3]) / sums
+            along = np.stack((np.ones_like(incoming), incoming, outgoing), axis=-1)
+            points[other], vectors[other] = along @ tips[other], along @ levers[other]
+        return points, vectors
+
+    def divide(
+        self, program: Program, settings: Settings, remainders: Remainders, number: int
+    ) -> tuple[Floats, Floats]:
+        """Equal angles of the ruled motion: tan φ is linear in the fraction, φ the angle from the middle."""
+        first = program.axis[remainders.start]
+        turn = program.axis[remainders.end] - first
+        slope = np.tan(np.arcsin(np.minimum(norm(turn) / 2.0, 1.0)))[:, None]
+        ends = np.arctan((2.0 * remainders.tip - 1.0) * slope)
+        share = np.arange(1, number) / number
+        angle = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * share
+        fraction: Floats = (np.tan(angle) / slope + 1.0) / 2.0
+        return fraction, unit(first[:, None] + fraction[..., None] * turn[:, None])
+
+
+CONSTRUCTION = Proportional()

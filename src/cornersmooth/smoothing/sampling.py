@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
+from cornersmooth.smoothing.construction import construction_of
+from cornersmooth.smoothing.corner_table import Remainders
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
-from cornersmooth.smoothing.synchronise import matching_parameters
-from cornersmooth.vectors import angle_between, norm, unit
+from cornersmooth.vectors import unit
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,7 @@ def nodes(lines: int) -> Floats:
 
 def _fill_transitions(smoothed: SmoothProgram, segments: Segments, block: _Block, halves: Ints) -> None:
     """Points of the transitions of the block, first point included; corners of equal count together."""
-    points_of = _paper_points if smoothed.settings.method == "zhang2016" else _proportional_points
+    construction = construction_of(smoothed.settings.method)
     here = segments.row[block.poses] >= 0
     poses, last = block.poses[here], block.last[here]
     rows = segments.row[poses]
@@ -212,7 +213,7 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, block: _Block
     for lines in np.unique(number):
         chosen = np.flatnonzero(number == lines)
         u = nodes(int(lines))
-        points, levers = points_of(smoothed, rows[chosen], u)
+        points, levers = construction.points(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
         block.tip[where], block.other[where] = points[:, 1:], unit(levers[:, 1:])
         block.move[where[:, len(u) // 2 :]] = segments.following[poses[chosen]][:, None]
@@ -221,86 +222,24 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, block: _Block
         block.tip[at], block.other[at] = points[first, 0], unit(levers[first, 0])
 
 
-def _proportional_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
-    """Tips and vectors along the tool, (g, 1 + m, 3) each, of transitions at u = 0 and the given parameters."""
-    program, corners = smoothed.program, smoothed.corners
-    u = np.concatenate(([0.0], u))
-    weights, ratio = corners.weights[rows], corners.ratio[rows]
-    pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
-    trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
-    tips, levers = np.zeros((2, len(rows), 3, 3))
-    for parts, values in ((tips, program.tip), (levers, program.axis)):
-        at = values[pose]
-        parts[:, 0] = at
-        parts[:, 1] = trim_in * (at - values[before])
-        parts[:, 2] = trim_out * (values[after] - at)
-    # corners with all weights 1 share one table of coefficients, the others at least its numerators
-    plain = (weights == 1.0).all(axis=1) & (ratio == ratio[0])
-    coefficients = nurbs.leg_coefficients(u, np.ones(2), ratio[0])
-    points, vectors = coefficients @ tips, coefficients @ levers
-    other = np.flatnonzero(~plain)
-    if len(other):
-        shares = nurbs.basis(u)
-        sums = nurbs.full_weights(weights[other]) @ shares.T
-        inner = (ratio[other] * weights[other, 0])[:, None]
-        incoming = -(shares[:, 0] + inner * shares[:, 1]) / sums
-        outgoing = (shares[:, 4] + inner * shares[:, 3]) / sums
-        along = np.stack((np.ones_like(incoming), incoming, outgoing), axis=-1)
-        points[other], vectors[other] = along @ tips[other], along @ levers[other]
-    return points, vectors
-
-
-def _paper_points(smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
-    """Return the same for the paper's method, the axis-point curve at the synchronised parameters."""
-    corners, height = smoothed.corners, smoothed.settings.axis_length
-    weights = corners.weights[rows]
-    tip_curve, axis_curve = nurbs.control_points(smoothed.program, corners, rows, height)
-    v, _ = matching_parameters(tip_curve, axis_curve, weights, u, height)
-    points = nurbs.evaluate(tip_curve, weights, np.concatenate(([0.0], u)))
-    tops = nurbs.evaluate(axis_curve, weights, np.concatenate((np.zeros((len(rows), 1)), v), axis=1))
-    tops[:, -1] = axis_curve[:, -1]  # the straight motion behind starts from its own axis: equation (26)
-    return points, tops - points
-
-
 def _fill_divided(smoothed: SmoothProgram, segments: Segments, block: _Block) -> None:
-    """Inner points of the straight remainders that are written as several lines.
-
-    They divide the angle of the ruled motion equally, that of the paper's method by equation (24).
-    """
+    """Inner points of the straight remainders that are written as several lines."""
     program, settings = smoothed.program, smoothed.settings
-    pieces = np.where(segments.has_line[block.poses] & (block.last > block.first), segments.lines[block.poses], 1)
-    for number in np.unique(pieces):
+    construction = construction_of(settings.method)
+    lines = np.where(segments.has_line[block.poses] & (block.last > block.first), segments.lines[block.poses], 1)
+    for number in np.unique(lines):
         if number < 2:
             continue
-        pose, first = block.poses[pieces == number], block.first[pieces == number]
-        start, entry, leave = segments.start[pose], segments.entry[pose], segments.exit[pose]
+        pose, first = block.poses[lines == number], block.first[lines == number]
+        start = segments.start[pose]
+        remainders = Remainders(
+            start,
+            pose,
+            np.stack((segments.entry[pose], segments.exit[pose]), axis=1),
+            np.stack((segments.axis_entry[pose], segments.axis_exit[pose]), axis=1),
+        )
+        fraction, axis = construction.divide(program, settings, remainders, int(number))
+        rows = first[:, None] + np.arange(number - 1)
         step = program.tip[pose] - program.tip[start]
-        turn = program.axis[pose] - program.axis[start]
-        slope = np.tan(np.arcsin(np.minimum(norm(turn) / 2.0, 1.0)))
-        low, high = np.arctan((2.0 * entry - 1.0) * slope), np.arctan((2.0 * leave - 1.0) * slope)
-        ends = [
-            unit(
-                settings.axis_length * program.axis[start]
-                + axis_at[pose][:, None] * (step + settings.axis_length * turn)
-                - at[pose][:, None] * step
-            )
-            for at, axis_at in ((segments.entry, segments.axis_entry), (segments.exit, segments.axis_exit))
-        ]
-        for j in range(1, int(number)):
-            place = first + j - 1
-            if settings.method == "zhang2016":
-                at = entry + j / number * (leave - entry)
-                block.other[place] = _great_circle(ends[0], ends[1], j / number)
-            else:
-                at = (np.tan(low + (high - low) * j / number) / slope + 1.0) / 2.0
-                block.other[place] = unit(program.axis[start] + at[:, None] * turn)
-            block.tip[place] = program.tip[start] + at[:, None] * step
-
-
-def _great_circle(one: Floats, other: Floats, share: float) -> Floats:
-    """Rotate unit vectors `one` towards `other` by the share of the angle between them: what equation (27) means."""
-    angle = angle_between(one, other)[:, None]
-    sine = np.sin(angle)
-    flat = sine < 1e-12
-    turned = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * other
-    return unit(np.where(flat, (1.0 - share) * one + share * other, turned))
+        block.tip[rows] = program.tip[start][:, None] + fraction[..., None] * step[:, None]
+        block.other[rows] = axis

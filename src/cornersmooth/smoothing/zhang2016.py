@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
-from cornersmooth.model import Floats, LimitedBy, Status
+from cornersmooth.model import Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.legs import Legs, Placed, divide, half_angle_cosine
-from cornersmooth.smoothing.synchronise import synchronisation_report
-from cornersmooth.vectors import dot, norm
+from cornersmooth.smoothing.construction import Construction
+from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
+from cornersmooth.smoothing.legs import Legs, divide, half_angle_cosine
+from cornersmooth.smoothing.synchronise import REPORT_PARAMETERS, matching_parameters, synchronisation_report
+from cornersmooth.vectors import angle_between, dot, norm, unit
+
+#: what `Corners.extra` holds: the largest ``||Q−P|−H|`` that the synchronisation leaves (mm), and the jumps of the axis
+#: at both ends of the transition (rad)
+EXTRA = ("sync_residual", "jump_in", "jump_out")
 
 
 def place_zhang2016(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Placed:
@@ -60,7 +69,6 @@ def place_zhang2016(legs: Legs, weights: Floats, ratio: Floats, settings: Settin
         ratio,
         settings.axis_length,
     )
-    nothing = np.full(len(tip_length), np.nan)
     return Placed(
         status=status,
         limited_by=limited_by,
@@ -71,9 +79,10 @@ def place_zhang2016(legs: Legs, weights: Floats, ratio: Floats, settings: Settin
         tip_error=factor * tip_length * sine_tip,  # equation (10)
         axis_error=factor * axis_length * sine_axis,
         orientation_error=np.where(smoothed, orientation, 0.0),
-        sync_residual=np.where(smoothed, residual, nothing),
-        jump_in=np.where(smoothed, jump_in, nothing),
-        jump_out=np.where(smoothed, jump_out, nothing),
+        extra={
+            name: np.where(smoothed, values, np.nan)
+            for name, values in zip(EXTRA, (residual, jump_in, jump_out), strict=True)
+        },
     )
 
 
@@ -83,3 +92,92 @@ def _half_turn_sine(leg_in: Floats, leg_out: Floats, length_in: Floats, length_o
     safe_in, safe_out = np.where(proper, length_in, 1.0), np.where(proper, length_out, 1.0)
     difference = leg_out / safe_out[:, None] - leg_in / safe_in[:, None]
     return np.where(proper, norm(difference) / 2.0, 0.0)
+
+
+class Zhang2016(Construction):
+    """The paper as published: every curve trimmed on its own, with a parameter of its own."""
+
+    extra = EXTRA
+
+    def place(self, shaped: ShapedCorners, settings: Settings, room: Floats | None) -> Placed:
+        """Trim by the paper's equations; half of each segment is the most."""
+        return place_zhang2016(*shaped, settings)
+
+    def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
+        """The axis-point curve at the synchronised parameters."""
+        corners, height = smoothed.corners, smoothed.settings.axis_length
+        weights = corners.weights[rows]
+        tip_curve, axis_curve = nurbs.control_points(smoothed.program, corners, rows, height)
+        v, _ = matching_parameters(tip_curve, axis_curve, weights, u, height)
+        points = nurbs.evaluate(tip_curve, weights, np.concatenate(([0.0], u)))
+        tops = nurbs.evaluate(axis_curve, weights, np.concatenate((np.zeros((len(rows), 1)), v), axis=1))
+        tops[:, -1] = axis_curve[:, -1]  # the straight motion behind starts from its own axis: equation (26)
+        return points, tops - points
+
+    def divide(
+        self, program: Program, settings: Settings, remainders: Remainders, number: int
+    ) -> tuple[Floats, Floats]:
+        """Equal parts of the tip segment and of the great circle: equations (24) to (28)."""
+        height = settings.axis_length
+        start = program.axis[remainders.start]
+        step = program.tip[remainders.end] - program.tip[remainders.start]
+        axis_step = step + height * (program.axis[remainders.end] - start)
+        ends = [
+            unit(height * start + remainders.axis[:, [at]] * axis_step - remainders.tip[:, [at]] * step)
+            for at in (0, 1)
+        ]
+        share = np.arange(1, number) / number
+        fraction: Floats = remainders.tip[:, :1] + share * (remainders.tip[:, 1:] - remainders.tip[:, :1])
+        return fraction, _great_circle(ends[0], ends[1], share)
+
+    def axes(self, program: Program, corners: Corners, settings: Settings, rows: Ints, u: Floats) -> Floats:
+        """Axes with the axis-point curve at its own parameter v(u): equations (20) to (22).
+
+        v(u) is followed from u = 0 over a common set of parameters and interpolated in between.
+        """
+        distinct, which = np.unique(rows, return_inverse=True)
+        tip_curve, axis_curve = nurbs.control_points(program, corners, distinct, settings.axis_length)
+        weights = corners.weights[distinct]
+        v, _ = matching_parameters(tip_curve, axis_curve, weights, REPORT_PARAMETERS, settings.axis_length)
+        cell = np.clip(np.searchsorted(REPORT_PARAMETERS, u, side="right") - 1, 0, len(REPORT_PARAMETERS) - 2)
+        part = (u - REPORT_PARAMETERS[cell]) / (REPORT_PARAMETERS[cell + 1] - REPORT_PARAMETERS[cell])
+        at = v[which, cell] + part * (v[which, cell + 1] - v[which, cell])
+        tips = nurbs.evaluate(tip_curve[which], weights[which], u[:, None])[:, 0]
+        return unit(nurbs.evaluate(axis_curve[which], weights[which], at[:, None])[:, 0] - tips)
+
+    def report_columns(self, corners: Corners, rows: Ints) -> dict[str, Floats]:
+        """What the synchronisation leaves at every corner."""
+        residual, jump_in, jump_out = (corners.extra[name][rows] for name in EXTRA)
+        return {
+            "sync_residual_mm": residual,
+            "joint_jump_in_deg": np.degrees(jump_in),
+            "joint_jump_out_deg": np.degrees(jump_out),
+        }
+
+    def report_summary(self, corners: Corners) -> dict[str, float]:
+        """The largest of what the synchronisation leaves."""
+        residual, jump_in, jump_out = (corners.extra[name][corners.smoothed] for name in EXTRA)
+        jump = max(jump_in.max(initial=0.0), jump_out.max(initial=0.0))
+        return {
+            "max_sync_residual_mm": float(residual.max(initial=0.0)),
+            "max_joint_jump_deg": float(np.degrees(jump)),
+        }
+
+    def summary_text(self, summary: Mapping[str, Any]) -> str:
+        """One line about what the synchronisation leaves."""
+        return (
+            f"largest ||Q-P|-H| {summary['max_sync_residual_mm']:.4g} mm, "
+            f"largest jump of the axis at a joint {summary['max_joint_jump_deg']:.4g} deg"
+        )
+
+
+CONSTRUCTION = Zhang2016()
+
+
+def _great_circle(one: Floats, other: Floats, share: Floats) -> Floats:
+    """Unit vectors (g, m, 3) from `one` (g, 3) to `other` at shares (m,) of the angle: what equation (27) means."""
+    angle, share = angle_between(one, other)[:, None, None], share[:, None]
+    one, other = one[:, None], other[:, None]
+    sine = np.sin(angle)
+    turned = np.sin((1.0 - share) * angle) * one + np.sin(share * angle) * other
+    return unit(np.where(sine < 1e-12, (1.0 - share) * one + share * other, turned))

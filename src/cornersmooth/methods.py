@@ -1,0 +1,68 @@
+"""The methods of smoothing by name: what settings, command line and reports have to know of a method.
+
+How a method makes its curves is in a module of its own, which is imported when the method is used. To add one, write
+that module with a `cornersmooth.smoothing.construction.Construction` named ``CONSTRUCTION``, and an entry here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to make the pair of curves.
+
+    Parameters
+    ----------
+    name : str
+        As on the command line and in reports.
+    summary : str
+        A few words for the help.
+    module : str
+        Where its `CONSTRUCTION` is.
+    one_parameter : bool
+        Whether one parameter drives both curves. Only then do the errors at a common parameter bound the distances of
+        the paths, and can rotary words follow the curves.
+    prescribed : mapping of str to object
+        Settings that the method does not leave open.
+    excess : float
+        By how much of ε the written text may exceed ε, besides the rounding of its digits; 0 for a method that takes
+        the rounding off ε and keeps its promise.
+    """
+
+    name: str
+    summary: str
+    module: str
+    one_parameter: bool = True
+    prescribed: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
+    excess: float = 0.0
+
+
+#: in the order of tables, the oldest first
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        method.name: method
+        for method in (
+            Method(
+                "zhang2016",
+                "the paper as published",
+                "cornersmooth.smoothing.zhang2016",
+                one_parameter=False,
+                prescribed=MappingProxyType({"shape": "paper", "allocation": "half"}),
+                # On the paper's own Table 1 its axis point leaves the path by 0.0783 mm where ε is 0.078 mm: the bound
+                # (10) holds for each curve, not for the synchronised motion.
+                excess=0.01,
+            ),
+            Method(
+                "proportional",
+                "both segments cut at the same fraction, one parameter for both curves",
+                "cornersmooth.smoothing.proportional",
+            ),
+        )
+    }
+)
+
+DEFAULT_METHOD = "proportional"
