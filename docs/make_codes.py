@@ -1,0 +1,196 @@
+"""Writes docs/codes.md: every code of an error, a warning or a problem, with its text, as the source code has them.
+
+python docs/make_codes.py
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+SOURCE = HERE.parent / "src" / "cornersmooth"
+CODE = re.compile(r"CS\d{3}")
+SEVERITIES = ("note", "warning", "error")
+
+#: what the hundreds of the codes are about
+PARTS = {
+    "1": "CL input",
+    "2": "Settings, controls and machines",
+    "3": "NC output",
+    "4": "Files",
+    "5": "Verification",
+}
+HEAD = """# Codes
+
+Errors, warnings and notes carry a code that does not change; reports name it. This table is made from the source code
+(`python docs/make_codes.py`); `…` stands for what is filled in.
+
+An *error* ends the command (exit code 2 for settings, 3 for input, 4 for output); a *problem* is something that
+verification finds in a text (exit code 1); *warnings* and *notes* are findings, and the work goes on.
+"""
+#: arguments by which a code is given to a method that is called with its texts
+CALLS = {"wrong_value": "wrong"}
+ERRORS = ("InputError", "SettingsError", "OutputError", "PromiseError", "CornersmoothError")
+
+
+@dataclass(frozen=True, order=True)
+class Entry:
+    """One code at one place of the source."""
+
+    code: str
+    text: str
+    kind: str
+    package: str
+
+
+def called(call: ast.Call) -> str:
+    """Name of what is called."""
+    return call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+
+
+class Module:
+    """A source file, with what encloses each of its nodes."""
+
+    def __init__(self, path: Path, names: dict[str, frozenset[str]]) -> None:
+        self.package = path.relative_to(SOURCE).with_suffix("").parts[0]
+        self.tree = ast.parse(path.read_text(encoding="utf-8"))
+        self.names = names
+        self.parent = {child: node for node in ast.walk(self.tree) for child in ast.iter_child_nodes(node)}
+
+    def entries(self) -> Iterator[Entry]:
+        """Codes with the texts beside them."""
+        for node in ast.walk(self.tree):
+            for code in self.codes(node):
+                around, siblings = self._beside(node)
+                texts = [list(self._texts(sibling)) for sibling in siblings]
+                kind = next((text for several in texts for text in several if text in SEVERITIES), "")
+                kind = kind or self._kind(around, code)
+                said = ([text for text in several if re.search("[a-z]", text)] for several in texts)
+                for text in next((several for several in said if several and several != [kind]), []):
+                    if text != kind:
+                        yield Entry(code, text, kind, self.package)
+
+    def codes(self, node: ast.AST) -> frozenset[str]:
+        """Codes that a node stands for."""
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.fullmatch(node.value):
+            return frozenset({node.value})
+        name = node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
+        return self.names.get(name, frozenset())
+
+    def _beside(self, node: ast.AST) -> tuple[ast.AST, list[ast.expr]]:
+        """What a code stands in, and what stands behind it there."""
+        around = self.parent[node]
+        if isinstance(around, ast.Dict) and node in around.keys:
+            value = around.values[around.keys.index(node)]
+            parts = value.elts if isinstance(value, ast.Tuple) else [value]
+            return around, parts if next(self._texts(parts[0]), "") in SEVERITIES else parts[:1]
+        items = around.args if isinstance(around, ast.Call) else getattr(around, "elts", [])
+        if node in items:
+            return around, items[items.index(node) + 1 :] or items[:-1]
+        if isinstance(around, ast.keyword) and around.arg in CALLS:
+            name = CALLS[around.arg]
+            calls = [call for call in ast.walk(self.tree) if isinstance(call, ast.Call) and called(call) == name]
+            return around, [ast.Tuple([call.args[0] for call in calls])]
+        return around, []
+
+    def _kind(self, around: ast.AST, code: str) -> str:
+        """Whether it is an error, or what the loop over a table of codes makes of it."""
+        call = around
+        while call in self.parent and not isinstance(call, (ast.Call, ast.For)):
+            call = self.parent[call]
+        if isinstance(call, ast.Call) and called(call) in ERRORS:
+            return "error"
+        for node in ast.walk(call) if isinstance(call, ast.For) else ():
+            if isinstance(node, ast.Constant) and node.value in SEVERITIES:
+                return str(node.value)
+        return "problem" if code.startswith("CS5") else "error"
+
+    def _texts(self, node: ast.expr) -> Iterator[str]:
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield re.sub(r"\{[^{}]*\}", "…", node.value)
+        elif isinstance(node, ast.JoinedStr):
+            yield "".join(str(part.value) if isinstance(part, ast.Constant) else "…" for part in node.values)
+        elif isinstance(node, ast.Tuple):
+            for item in node.elts:
+                yield from self._texts(item)
+        elif isinstance(node, ast.IfExp):
+            yield from self._texts(node.body)
+            yield from self._texts(node.orelse)
+        elif isinstance(node, ast.BinOp):
+            parts = [next(self._texts(side), "…") for side in (node.left, node.right)]
+            yield "".join(parts)
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "format":
+            yield from self._texts(node.func.value)
+        elif isinstance(node, ast.Name):
+            yield from self._assigned(node)
+
+    def _assigned(self, name: ast.Name) -> Iterator[str]:
+        """Texts that a name is given in the function it stands in, or by those who call that function."""
+        around: ast.AST = name
+        while around in self.parent and not isinstance(around, ast.FunctionDef):
+            around = self.parent[around]
+        given_here = [
+            node
+            for node in ast.walk(around)
+            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == name.id and node.lineno <= name.lineno
+        ]
+        if given_here:
+            yield from self._texts(max(given_here, key=lambda node: node.lineno).value)
+        if isinstance(around, ast.FunctionDef):
+            names = [argument.arg for argument in around.args.args]
+            for call in ast.walk(self.tree) if name.id in names else ():
+                if isinstance(call, ast.Call) and called(call) == around.name:
+                    given = call.args[names.index(name.id) - (names[0] == "self") :][:1]
+                    yield from (text for value in given for text in self._texts(value))
+
+
+def names_of_codes() -> dict[str, frozenset[str]]:
+    """Names of the source that stand for codes: constants, and arguments by name."""
+    found: dict[str, set[str]] = {}
+    for path in SOURCE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.keyword):
+                name = node.arg or ""
+            elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+                name = ast.unparse(node.targets[0] if isinstance(node, ast.Assign) else node.target)
+            else:
+                continue
+            if isinstance(node.value, ast.Constant) and CODE.fullmatch(str(node.value.value)):
+                found.setdefault(name, set()).add(str(node.value.value))
+    return {name: frozenset(codes) for name, codes in found.items()}
+
+
+def entries() -> list[Entry]:
+    """Every code of the source with its texts, sorted."""
+    names = names_of_codes()
+    return sorted({entry for path in SOURCE.rglob("*.py") for entry in Module(path, names).entries()})
+
+
+def codes_in_source() -> set[str]:
+    """Every code that is written anywhere in the source, but in running text."""
+    return {code for path in SOURCE.rglob("*.py") for code in re.findall(r'"(CS\d{3})"', path.read_text("utf-8"))}
+
+
+def page() -> str:
+    """Text of docs/codes.md."""
+    rows: dict[tuple[str, str, str], list[str]] = {}
+    for entry in entries():
+        rows.setdefault((entry.code, entry.kind, entry.text), []).append(f"`{entry.package}`")
+    lines = [HEAD]
+    for digit, title in PARTS.items():
+        lines += [f"## CS{digit}xx: {title}", "", "| code | kind | says | from |", "|---|---|---|---|"]
+        lines += [
+            f"| {code} | {kind} | {text.replace('|', chr(92) + '|')} | {', '.join(packages)} |"
+            for (code, kind, text), packages in rows.items()
+            if code[2] == digit
+        ]
+        lines.append("")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    (HERE / "codes.md").write_text(page(), encoding="utf-8")
