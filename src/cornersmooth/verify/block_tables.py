@@ -1,7 +1,7 @@
 """Text to tables: runs of motion blocks at once, and the other lines one by one.
 
 Lines of few digit patterns are nearly every text and are read by `line_patterns`. Where a chunk has too many patterns,
-or numbers of another kind, its lines are known by their letters, and the numbers of a run are parsed together.
+or numbers of another kind, its lines are known by what stands between the numbers, which are parsed all at once.
 """
 
 from __future__ import annotations
@@ -9,28 +9,24 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Generator, Iterator
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
 
+from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats
 from cornersmooth.text import NumberError, parse_numbers
 from cornersmooth.verify.lexer import Lexer
-from cornersmooth.verify.line_patterns import SILENT, LinePatterns, lines_of, merged
+from cornersmooth.verify.line_patterns import Group, LinePatterns, lines_of, merged
 from cornersmooth.verify.words import Line, Table
 
 #: bytes read at a time
 CHUNK = 1 << 20
 
-#: all but numbers to blanks
-_TO_BLANKS: Final = bytes(code if code in SILENT + b"\n" else ord(" ") for code in range(256))
-
-#: a line that does not begin with its first letter; one that does not begin with its number and a blank
-_ODD_BEGIN: Final = re.compile(rb"^[-+.0-9 \t\r]", re.MULTILINE)
-_ODD_NUMBER: Final = re.compile(rb"^(?!\d+ +[^-+.0-9 \t\r\n])", re.MULTILINE)
-
-#: a letter without its number right behind it
-_BARE: Final = re.compile(rb"[^-+.0-9 \t\r\n](?![-+.0-9])")
+#: stands for a number where only the kind of line matters: no sign or digit may stand before or behind it
+_ANY_NUMBER: Final = b"+1.5"
+_BLOCK_NUMBER: Final = re.compile(rb"^(N?)\d+(?= )", re.MULTILINE)
 
 
 class Readable(Protocol):
@@ -53,7 +49,7 @@ class RunLines(Protocol):
 def read_lines(
     data: bytes | Readable,
     name: str | None,
-    lexer: Lexer | None = None,
+    lexer: Lexer,
     *,
     patterns: LinePatterns | None = None,
     number: int = 1,
@@ -65,8 +61,8 @@ def read_lines(
     data : bytes or file, open at its start
     name : str or None
         For messages.
-    lexer : Lexer, optional
-        Of the control; single letters by default.
+    lexer : Lexer
+        Of the control.
     patterns : LinePatterns, optional
         Those met so far in the same text.
     number : int
@@ -77,9 +73,7 @@ def read_lines(
     InputError
         CS501 where a line is not made of words.
     """
-    lexer = lexer or Lexer()
-    if patterns is None:
-        patterns = LinePatterns(lexer.columns, numbered=lexer.numbered)
+    patterns = patterns or LinePatterns(lexer)
     for chunk in _chunks(data, lexer):
         number += yield from _read_chunk(chunk, number, lexer, patterns, name)
 
@@ -107,8 +101,7 @@ def _read_chunk(
 ) -> Generator[Table | Line, None, int]:
     """Give out the lines of a chunk and return how many there are."""
     chunk = lexer.unfolded(chunk)
-    text = lexer.respell(chunk)
-    lines = lines_of(text, patterns) or LetteredLines(text, lexer)
+    lines = lines_of(chunk, patterns) or LetteredLines(chunk, lexer)
     return (yield from _in_order(lines, chunk, number, lexer, name))
 
 
@@ -121,9 +114,8 @@ def _in_order(
     written: list[bytes] = []
     for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         columns = lines.columns(start, stop) if bulk[start] else None
-        table = lexer.table(Table(np.arange(number + start, number + stop), columns)) if columns else None
-        if table is not None:
-            yield table
+        if columns is not None:
+            yield Table(np.arange(number + start, number + stop), columns)
             continue
         written = written or chunk.split(b"\n")
         for row in range(start, stop):
@@ -132,7 +124,7 @@ def _in_order(
 
 
 class LetteredLines:
-    """Lines known by their letters alone: slower than patterns, for numbers of any kind.
+    """Lines known by what stands between their numbers: slower than digit patterns, for numbers of any kind.
 
     Parameters
     ----------
@@ -143,33 +135,69 @@ class LetteredLines:
 
     def __init__(self, text: bytes, lexer: Lexer) -> None:
         self._lines = text.split(b"\n")[:-1]
-        self._numbered = lexer.numbered
-        letters = text.translate(None, SILENT).split(b"\n")[:-1]
-        known = {signature: lexer.columns(signature) for signature in set(letters)}
-        self._names = [known[signature] for signature in letters]
+        self._measure = lexer.measure
+        kinds = lexer.measure.sub(_ANY_NUMBER, _BLOCK_NUMBER.sub(rb"\g<1>0", text)).split(b"\n")[:-1]
+        known = {kind: _LineKind.of(kind, lexer) for kind in set(kinds)}
+        self._kinds = [known[kind] for kind in kinds]
 
     def bulk(self) -> Bools:
         """(l,) whether each line can be read in a run."""
-        return np.array([names is not None for names in self._names])
+        return np.array([kind is not None for kind in self._kinds])
 
     def columns(self, first: int, last: int) -> dict[str, Floats] | None:
         """Numbers of lines ``first`` to ``last`` (excluded), NaN where a line has none; None if the run is none."""
-        run = b"\n".join(self._lines[first:last])
-        if (_ODD_NUMBER if self._numbered else _ODD_BEGIN).search(run) or _BARE.search(run):
-            return None
-        names = [found or () for found in self._names[first:last]]
-        count = np.array([len(found) for found in names]) + self._numbered
+        kinds = self._kinds[first:last]
+        found = self._measure.findall(b"\n".join(self._lines[first:last]))
         try:
-            values = parse_numbers(run.translate(_TO_BLANKS))
-        except NumberError:
+            values = parse_numbers(b" ".join(found))
+        except NumberError:  # too large
             return None
-        if len(values) != count.sum():
+        count = np.array([kind.count for kind in kinds if kind is not None])
+        begin = np.cumsum(count) - count
+        order = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
+        label = np.array([order[kind] for kind in kinds])
+        groups: list[Group] = []
+        for kind, k in order.items():
+            assert kind is not None
+            rows = np.flatnonzero(label == k)
+            numbers = [
+                np.full(len(rows), column) if isinstance(column, float) else values[begin[rows] + column]
+                for column in kind.columns.values()
+            ]
+            groups.append((rows, tuple(kind.columns), numbers))
+        return merged(groups, last - first)
+
+
+@dataclass(frozen=True, eq=False)
+class _LineKind:
+    """What lines have in common that differ in their numbers only.
+
+    Parameters
+    ----------
+    count : int
+        Numbers of a line.
+    columns : dict of str to int or float
+        Which of them stands in a column, or the value that all lines have there.
+    """
+
+    count: int
+    columns: dict[str, int | float]
+
+    @classmethod
+    def of(cls, kind: bytes, lexer: Lexer) -> _LineKind | None:
+        """Kind of a line in which all numbers are `_ANY_NUMBER`; None for lines that are read on their own."""
+        try:
+            line = lexer.line(kind, 0, None)
+        except InputError:
             return None
-        begin = np.cumsum(count) - count + self._numbered
-        kinds = {found: k for k, found in enumerate(dict.fromkeys(names))}
-        kind = np.array([kinds[found] for found in names])
-        groups = ((np.flatnonzero(kind == k), found) for found, k in kinds.items())
-        return merged(
-            ((rows, found, [values[begin[rows] + place] for place in range(len(found))]) for rows, found in groups),
-            last - first,
-        )
+        found = None if line.comments or line.skipped else lexer.motion(line)
+        if found is None:
+            return None
+        place = {match.start(): k for k, match in enumerate(re.finditer(re.escape(_ANY_NUMBER), kind))}
+        columns: dict[str, int | float] = {}
+        for name, word in found.items():
+            if isinstance(word, float) or word.start not in place:
+                columns[name] = word if isinstance(word, float) else word.value
+            else:
+                columns[name] = place[word.start]
+        return cls(len(place), columns)

@@ -1,104 +1,115 @@
-"""How the words of a control are spelt: what `block_tables` asks to read most of a text at once.
+"""Lines to words, and which words make a motion block: each control's grammar, written once.
 
-A lexer may write words of several characters as single bytes above 127 before a chunk is looked at, line for line.
-Such bytes in the text itself are made question marks first, so that nothing can be mistaken for them.
+A grammar reads one line. For texts of millions of lines it is asked once for every digit pattern (`line_patterns`):
+it says where in such a line the numbers stand and what their columns are called.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final
 
-import numpy as np
+from cornersmooth.errors import InputError
+from cornersmooth.verify.words import Columns, Line, Word
 
-from cornersmooth.verify.words import MOTION_CODES, MOTION_LETTERS, PLACE_LETTERS, Line, Table, tokenise
+#: a number as controls write it
+NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 
-#: bytes above 127 to question marks
-_PLAIN: Final = bytes(code if code < 128 else ord("?") for code in range(256))
-
-#: blocks with a number and a G word
-_NUMBERED: Final = re.compile(rb"\n[ /]*N\d+ *G")
-
-#: bytes at the end of a chunk in which a numbered block is looked for
+#: bytes at the end of a chunk in which the begin of a block is looked for first
 _TAIL: Final = 1 << 16
+
+_HEAD: Final = re.compile(r"\s*(/\d?)?\s*")
 
 
 class Lexer:
-    """Words of one letter and a number: what FANUC and its like write.
+    """How a control spells its words."""
 
-    Parameters
-    ----------
-    letters : str
-        Those of motion blocks.
-    places : str
-        Those of them that make a block move the tool or belong to a curve.
-    codes : iterable of float
-        G words that a run may contain.
-    """
-
-    #: whether a block begins with its bare number
-    numbered = False
-
-    def __init__(
-        self,
-        letters: str = MOTION_LETTERS,
-        places: Iterable[str] = PLACE_LETTERS,
-        codes: Iterable[float] = MOTION_CODES,
-    ) -> None:
-        self.letters, self.places, self.codes = frozenset(letters), frozenset(places), tuple(codes)
-
-    def unfolded(self, chunk: bytes) -> bytes:
-        """Return the text with every block on one line, and as many lines as before."""
-        return chunk
-
-    def respell(self, chunk: bytes) -> bytes:
-        """Return the text as `block_tables` is to read it, with the same lines."""
-        return chunk
-
-    def cut(self, piece: bytes) -> int:
-        """Where to cut a text so that no curve is cut in two: behind a line end; 0 where there is no such place."""
-        place = piece.rfind(b"\nG") + 1
-        if place:
-            return place
-        return last_match(_NUMBERED, piece)
-
-    def columns(self, signature: bytes) -> tuple[str, ...] | None:
-        """Return a name for every letter of a line; None for a line that is read on its own."""
-        text = signature.decode("latin-1")
-        if len(set(text)) != len(text) or not set(text) <= self.letters or not set(text) & self.places:
-            return None
-        return tuple(text)
-
-    def table(self, table: Table) -> Table | None:
-        """Return a run as the rest of the reader wants it; None where its lines must be read one by one."""
-        code = table.columns.get("G")
-        if code is not None and not (np.isnan(code) | np.isin(code, self.codes)).all():
-            return None
-        return table
+    #: one word at a time, in upper case
+    word: re.Pattern[str]
+    #: what the machine does not read
+    comment: re.Pattern[str]
+    #: the number of a block, before its words
+    block_number = re.compile(r"N\s*(\d+)\s*")
+    #: numbers that differ from block to block: those with a point
+    measure = re.compile(rb"(?<![G.\d])[-+]?(?:\d+\.\d*|\.\d+)")
+    #: what a line begins with that can begin a curve, behind a line end
+    begins: re.Pattern[bytes]
+    #: names of words that make a block move the tool or belong to a curve
+    places: frozenset[str] = frozenset()
 
     def line(self, text: bytes, number: int, name: str | None) -> Line:
-        """Take one line apart, as it was written.
+        """Take one line apart.
 
         Raises
         ------
         InputError
             CS501 where it is not made of words.
         """
-        return tokenise(text, number, name)
+        line = text.decode("latin-1")
+        comments = tuple(next(filter(None, match.groups()), "").strip() for match in self.comment.finditer(line))
+        rest = self.comment.sub(lambda match: " " * len(match[0]), text.upper().decode("latin-1")).rstrip()
+        head = _HEAD.match(rest)
+        place = head.end() if head else 0
+        block_number = None
+        if found := self.block_number.match(rest, place):
+            block_number = Word("N", float(found[1]), found[0].strip(), *found.span(1))
+            place = found.end()
+        words = self.words(rest, place, number, name)
+        return Line(number, tuple(words), comments, block_number, bool(head and head[1]))
+
+    def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
+        """Words of a line from a place on; raises CS501."""
+        words: list[Word] = []
+        while place < len(rest):
+            match = self.word.match(rest, place)
+            found = self.named(match) if match else None
+            if match is None or found is None:
+                raise InputError(
+                    "CS501",
+                    f"{rest[place : place + 20]!r} is no NC word",
+                    "give a file written for this control",
+                    file=name,
+                    line=number,
+                )
+            words += found
+            place = match.end()
+            while place < len(rest) and rest[place] in " \t":
+                place += 1
+        return words
+
+    def named(self, match: re.Match[str]) -> Iterable[Word] | None:
+        """Words of one match of `word`; None where it is none after all."""
+        raise NotImplementedError
+
+    def motion(self, line: Line) -> Columns | None:
+        """Columns of a motion block; None where the line is something else."""
+        given = {word.name: word for word in line.words}
+        return self.block(given) if len(given) == len(line.words) else None
+
+    def block(self, given: Mapping[str, Word]) -> Columns | None:
+        """Columns of a block with such words; None where they are no motion block."""
+        raise NotImplementedError
+
+    def unfolded(self, chunk: bytes) -> bytes:
+        """Return the text with every block on one line, and as many lines as before."""
+        return chunk
+
+    def cut(self, piece: bytes) -> int:
+        """Where to cut a text so that no curve is cut in two: behind a line end; 0 where there is no such place."""
+        for begin in (max(len(piece) - _TAIL, 0), 0):
+            found = [match.start() for match in self.begins.finditer(piece, begin)]
+            if found:
+                return found[-1] + 1
+        return 0
 
 
-def last_match(pattern: re.Pattern[bytes], piece: bytes) -> int:
-    """Place behind the line end with which a pattern was found last; 0 where it is not found near the end."""
-    begin = max(len(piece) - _TAIL, 0)
-    found = [match.start() for match in pattern.finditer(piece, begin)]
-    return found[-1] + 1 if found else 0
+def number_of(match: re.Match[str], group: str | int, name: str) -> Word:
+    """Word whose number is a group of a match."""
+    start, stop = match.span(group)
+    return Word(name, float(match[group]), match[0].strip(), start, stop)
 
 
-def respelt(chunk: bytes, words: Iterable[tuple[bytes, bytes]]) -> bytes:
-    """Write words as others, after bytes above 127 have been made harmless."""
-    if not chunk.isascii():
-        chunk = chunk.translate(_PLAIN)
-    for old, new in words:
-        chunk = chunk.replace(old, new)
-    return chunk
+def fixed(match: re.Match[str], name: str, value: float) -> Word:
+    """Word that is always written alike."""
+    return Word(name, value, match[0].strip())

@@ -10,39 +10,40 @@ regular is left to the careful reading in `block_tables`.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
+from cornersmooth.verify.lexer import Lexer
+from cornersmooth.verify.words import Word
 
 #: line ends that must stand before and behind a chunk, so that words beyond its ends can be fetched
 MARGIN: Final = 24
 
 #: bits of a word that can be had from any bit on, and words that tell the digits of a line
 _BITS: Final = 57
-_MOST_WORDS: Final = 4
+_MOST_WORDS: Final = 9
 
 #: lines up to so many bytes are compared with their patterns apart from longer ones
 _SHORT: Final = 16
 
 #: longest line, its end included, that is read in runs
-LONGEST: Final = 224
+LONGEST: Final = 512
 
 #: a chunk with fewer lines for each pattern than this is read otherwise, unless it has few patterns at all
 _FEWEST_LINES: Final = 8
 _FEW_PATTERNS: Final = 256
 
 _LINE_END: Final = 10
-#: bytes that are part of numbers, or blanks between words
-SILENT: Final = b"0123456789.-+ \t\r"
 _TO_ZERO: Final = bytes(ord("0") if code in b"0123456789" else code for code in range(256))
-_FIELD: Final = re.compile(rb"[^-+.0 \t\r](?P<minus>-?)(?:(?P<whole>0+)(?P<point>\.?)|(?=\.0))(?P<part>\.?0*)[ \t\r]*")
-_NUMBER: Final = re.compile(rb"0{1,8} ")
+_CARE: Final = bytes(0 if code in b"0123456789" else 255 for code in range(256))
+_NUMBER: Final = re.compile(rb"(?P<sign>[-+]?)(?P<whole>\d*)(?P<point>\.?)(?P<part>\d*)(?:E(?P<power>[-+]?\d+))?")
 
 #: numbers of so few bytes are compared before they are read: they may all be the same
 _FEW: Final = 4
@@ -78,15 +79,18 @@ class LinePattern:
     Parameters
     ----------
     names : tuple of str or None
-        Column of each number; None for lines that are read on their own.
+        Columns, those of `constants` at the end; None for lines that are read on their own.
+    constants : bytes
+        Float64 of the columns that are the same in all lines.
     literal, care : bytes
-        The bytes of the line with its end, and 255 for those that are no digits; `LONGEST` of either.
+        The bytes of the line with its end, and 255 for those that are always the same; `LONGEST` of either.
     fields : bytes
-        For each column four int64: where in the line the number ends, its digits, its decimals (-1 without a point)
-        and 1 with a minus sign.
+        For each other column five int64: where in the line the number ends, its digits, its decimals (-1 without a
+        point), the power of ten to divide by and 1 with a minus sign.
     """
 
     names: tuple[str, ...] | None
+    constants: bytes
     literal: bytes
     care: bytes
     fields: bytes
@@ -97,55 +101,69 @@ class LinePatterns:
 
     Parameters
     ----------
-    columns : callable
-        Names of the columns for the letters of a line, or None.
-    numbered : bool
-        Whether lines begin with a bare number.
+    lexer : Lexer
     """
 
-    def __init__(self, columns: Callable[[bytes], tuple[str, ...] | None], *, numbered: bool) -> None:
-        self._columns, self._numbered = columns, numbered
-        self._known: dict[bytes, LinePattern | None] = {}
+    def __init__(self, lexer: Lexer) -> None:
+        self._lexer = lexer
+        self._known: dict[bytes, list[tuple[LinePattern | None, int, int]]] = {}
 
     def of(self, line: bytes) -> LinePattern | None:
-        """LinePattern of a line without its end; None where its numbers are not of a kind that is read here."""
+        """Pattern of a line without its end; None where its numbers are not of a kind that is read here."""
         shape = line.translate(_TO_ZERO)
-        if shape not in self._known:
-            self._known[shape] = self._make(shape)
-        return self._known[shape]
+        value = int.from_bytes(line)
+        for pattern, literal, care in self._known.get(shape, ()):
+            if not (value ^ literal) & care:
+                return pattern
+        pattern, alike = self._make(line)
+        self._known.setdefault(shape, []).append((pattern, value, int.from_bytes(alike)))
+        return pattern
 
-    def _make(self, shape: bytes) -> LinePattern | None:
-        names = self._columns(shape.translate(None, SILENT))
-        fields: list[tuple[int, int, int, bool]] = []
-        if names is not None:
-            start = _NUMBER.match(shape) if self._numbered else None
-            place = start.end() if start else 0
-            if self._numbered and not start:
-                return None
-            while place < len(shape):
-                found = _FIELD.match(shape, place)
-                if found is None:
-                    return None
-                whole, part = len(found["whole"] or b""), found["part"]
-                point = bool(found["point"]) or part[:1] == b"."
-                if found["point"] and part[:1] == b".":
-                    return None
-                decimals = len(part) - (part[:1] == b".") if point else -1
-                digits = whole + max(decimals, 0)
-                if not 1 <= digits <= DIGITS:
-                    return None
-                fields.append((found.end("part"), digits, decimals, bool(found["minus"])))
-                place = found.end()
-            if len(fields) != len(names):
-                return None
-        literal = shape + b"\n"
-        care = bytes(0 if code == ord("0") else 255 for code in literal)
-        return LinePattern(
+    def _make(self, line: bytes) -> tuple[LinePattern | None, bytes]:
+        """Pattern of a line, and 255 for its bytes that make it one."""
+        names: tuple[str, ...] | None = None
+        numbers: list[Word] = []
+        constants: dict[str, float] = {}
+        try:
+            found = self._lexer.line(line, 0, None)
+        except InputError:
+            spans = [(0, len(line))]
+        else:
+            spans = [(word.start, word.stop) for word in (*found.words, found.block_number) if word is not None]
+            spans += [match.span() for match in self._lexer.comment.finditer(line.decode("latin-1"))]
+            columns = None if found.comments or found.skipped else self._lexer.motion(found)
+            if columns is not None:
+                own = {name: word for name, word in columns.items() if isinstance(word, Word) and not word.fixed}
+                constants = {
+                    name: word if isinstance(word, float) else word.value
+                    for name, word in columns.items()
+                    if name not in own
+                }
+                names, numbers = (*own, *constants), list(own.values())
+        care = bytearray(b"\xff" * len(line))
+        for start, stop in spans:
+            care[start:stop] = line[start:stop].translate(_CARE)
+        fields = []
+        for word in numbers:
+            match = _NUMBER.fullmatch(line, word.start, word.stop)
+            if match is None:
+                return None, bytes(care)
+            decimals = len(match["part"]) if match["point"] else -1
+            digits = len(match["whole"]) + len(match["part"])
+            power = max(decimals, 0) - int(match["power"] or 0)
+            if match["power"]:
+                care[match.start("power") : match.end("power")] = b"\xff" * len(match["power"])
+            if not 1 <= digits <= DIGITS or not 0 <= power < len(_TENS):
+                return None, bytes(care)
+            fields.append((match.end("part"), digits, decimals, power, match["sign"] == b"-"))
+        pattern = LinePattern(
             names,
-            literal.ljust(LONGEST, b"\0"),
-            care.ljust(LONGEST, b"\0"),
+            np.array([*constants.values()]).tobytes(),
+            (line + b"\n").ljust(LONGEST, b"\0"),
+            (bytes(care) + b"\xff").ljust(LONGEST, b"\0"),
             np.array(fields, np.int64).tobytes(),
         )
+        return pattern, bytes(care)
 
 
 @dataclass(frozen=True)
@@ -191,10 +209,12 @@ class Lines:
             kind[mine], place[mine] = number, np.arange(len(mine))
         kinds = kind[label] if len(of_names) > 1 else None
         for number, (names, mine) in enumerate(of_names.items()):
-            fields = np.frombuffer(b"".join([self.patterns[k].fields for k in mine]), np.int64)
             rows = slice(None) if kinds is None else np.flatnonzero(kinds == number)
-            start = self.start[first:last][rows]
-            yield rows, names, self._numbers(start, place[label[rows]], fields.reshape(-1, len(names), 4))
+            start, own = self.start[first:last][rows], place[label[rows]]
+            fields = np.frombuffer(b"".join([self.patterns[k].fields for k in mine]), np.int64)
+            constants = np.frombuffer(b"".join([self.patterns[k].constants for k in mine])).reshape(len(mine), -1)
+            numbers = self._numbers(start, own, fields.reshape(len(mine), -1, 5))
+            yield rows, names, [*numbers, *(column.take(own) for column in constants.T)]
 
     def _numbers(self, start: Ints, label: Ints, table: Ints) -> list[Floats]:
         """Numbers of lines with the same letters, one array for each of them; `table` as in `LinePattern.fields`."""
@@ -252,10 +272,10 @@ class _Column:
 
 def _columns(table: Ints) -> list[_Column]:
     """Columns of a table as in `LinePattern.fields`."""
-    end, digits, decimals, minus = np.ascontiguousarray(table.transpose(2, 0, 1))
+    end, digits, decimals, power, minus = np.ascontiguousarray(table.transpose(2, 0, 1))
     size = digits + (decimals >= 0)
-    divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[np.maximum(decimals, 0)]
-    short = (size <= _FEW) & (size == size[0]) & (minus == minus[0])
+    divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[power]
+    short = (size <= _FEW) & (size == size[0]) & (minus == minus[0]) & (power == np.maximum(decimals, 0))
     return [
         _Column(*column)
         for column in zip(
@@ -279,7 +299,7 @@ def _each(values: Any, label: Ints) -> Any:
     return values.take(label) if isinstance(values, np.ndarray) else values
 
 
-_TENS = np.array([10.0**k for k in range(9)])
+_TENS = np.array([float(f"1e{k}") for k in range(23)])
 _EIGHT, _REST = np.uint64(8), np.uint64(56)
 
 

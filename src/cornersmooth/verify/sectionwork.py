@@ -115,7 +115,7 @@ class _Worker:
         self.task, self.place, self.source = task, place, task.source
         self.original, self.exact = task.original, task.exact
         self.lexer = task.style.dialect.lexer
-        self.patterns = LinePatterns(self.lexer.columns, numbered=self.lexer.numbered)
+        self.patterns = LinePatterns(self.lexer)
         self.steps = task.style.steps(self.source.read(0, DIGITS_SAMPLE))
         self._head: Standing | None = None
         self._stops: Ints | None = None

@@ -1,25 +1,18 @@
 """Blocks of an NC text as words: the table that a run of motion blocks becomes, and the single line.
 
 A *motion block* consists of axis, vector, knot, weight and feed words with at most one G word of group 01. Runs of
-them make up nearly all of a file and are read by `block_tables`; every other line is taken apart here on its own.
+them make up nearly all of a file and are read together; every other line is taken apart on its own.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from cornersmooth.errors import InputError
 from cornersmooth.model import Floats, Ints
-
-#: letters of a motion block; N is a block number and says nothing
-MOTION_LETTERS = "GXYZIJKUVWFRPN"
-
-#: letters that make a block move the tool or belong to a curve
-PLACE_LETTERS = frozenset("XYZUVWIJK")
 
 #: code of FANUC's curves, and what stands for those of controls that say it in words
 NURBS, BSPLINE, POLY, SPL = 6.2, 901.0, 902.0, 903.0
@@ -27,8 +20,36 @@ NURBS, BSPLINE, POLY, SPL = 6.2, 901.0, 902.0, 903.0
 #: G words of group 01 that a run may contain
 MOTION_CODES = (0.0, 1.0, 2.0, 3.0, NURBS)
 
-_WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
-_COMMENT = re.compile(r"\(([^)]*)\)|;(.*)$")
+
+class Word(NamedTuple):
+    """A word of a line.
+
+    Parameters
+    ----------
+    name : str
+        The same for all controls where it means the same: vectors are I J K, second points U V W.
+    value : float
+    text : str
+        As written.
+    start, stop : int
+        Where in the line the digits stand that may differ from block to block; equal where the word is always the
+        same, as G1 is.
+    """
+
+    name: str
+    value: float
+    text: str
+    start: int = 0
+    stop: int = 0
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the word has no number of its own."""
+        return self.start == self.stop
+
+
+#: what a column of a motion block is: a word of the line, or a number that stands for what it says in words
+Columns = dict[str, Word | float]
 
 
 @dataclass(frozen=True)
@@ -71,43 +92,19 @@ class Line:
     Parameters
     ----------
     number : int
-    words : tuple of (letter, value, text)
+    words : tuple of Word
+        Without the block number.
     comments : tuple of str
+    block_number : Word or None
+    skipped : bool
+        Whether a slash stands before the block: the operator chooses whether it is executed.
     """
 
     number: int
-    words: tuple[tuple[str, float, str], ...]
-    comments: tuple[str, ...]
-
-
-def tokenise(text: bytes, number: int, name: str | None) -> Line:
-    """Take one line apart.
-
-    Raises
-    ------
-    InputError
-        CS501
-    """
-    line = text.decode("latin-1").strip()
-    comments = tuple((first or second or "").strip() for first, second in _COMMENT.findall(line))
-    rest = _COMMENT.sub("", line).strip().upper().lstrip("/").lstrip()
-    if rest == "%":
-        rest = ""
-    words = []
-    place = 0
-    while place < len(rest):
-        match = _WORD.match(rest, place)
-        if match is None:
-            raise InputError(
-                "CS501",
-                f"{rest[place : place + 20]!r} is no NC word",
-                "give a file written for this control",
-                file=name,
-                line=number,
-            )
-        words.append((match[1], float(match[2]), match[0].strip()))
-        place = match.end()
-    return Line(number, tuple(words), comments)
+    words: tuple[Word, ...]
+    comments: tuple[str, ...] = ()
+    block_number: Word | None = None
+    skipped: bool = False
 
 
 def table_of(rows: list[tuple[int, dict[str, float]]]) -> Table:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from cornersmooth.verify.lexer import Lexer
-from cornersmooth.verify.words import Line
+from cornersmooth.verify.words import Columns, Line
 
 if TYPE_CHECKING:
     from cornersmooth.verify.motion import Modal
@@ -72,11 +72,12 @@ class Dialect:
     def __init__(self, lexer: Lexer, rotary: str = "") -> None:
         self.lexer, self.rotary = lexer, rotary
         if rotary:
-            self.digits = re.compile(rb"(?:([XYZ])|(?<![A-Z0-9])([%b]))[-+]?\d*\.(\d*)" % rotary.encode())
+            self.digits = re.compile(rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b]))[-+]?\d*\.(\d*)" % rotary.encode())
 
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""
-        raise NotImplementedError
+        columns = self.lexer.motion(line)
+        return None if columns is None else values(columns)
 
     def words(self, line: Line, state: State) -> None:
         """Interpret a line that is no motion block."""
@@ -85,7 +86,7 @@ class Dialect:
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """Decimals of the tip and of the second triple, from a sample of the text; None without any."""
         tip, second = 0, None
-        for _, other, fraction in self.digits.findall(self.lexer.respell(_COMMENT.sub(b"", text))):
+        for _, other, fraction in self.digits.findall(_COMMENT.sub(b"", text)):
             if other:
                 second = max(second or 0, len(fraction))
             else:
@@ -94,3 +95,8 @@ class Dialect:
 
 
 _COMMENT = re.compile(rb"\([^)\n]*\)|;[^\n]*")
+
+
+def values(columns: Columns) -> dict[str, float]:
+    """Numbers of a single motion block."""
+    return {name: word if isinstance(word, float) else word.value for name, word in columns.items()}

@@ -6,43 +6,14 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-import numpy as np
+from cornersmooth.verify.dialects.base import AFTER_MOTION, Dialect, State, values
+from cornersmooth.verify.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.verify.words import SPL, Columns, Line, Word
 
-from cornersmooth.errors import InputError
-from cornersmooth.verify.dialects.base import AFTER_MOTION, Dialect, State
-from cornersmooth.verify.lexer import Lexer, respelt
-from cornersmooth.verify.words import SPL, Line, Table
-
-_AXES: Final = "XYZABC"
 _VECTOR: Final = {"TX": "I", "TY": "J", "TZ": "K"}
-_FACTORS: Final = tuple(f"K{power}{axis}" for axis in _AXES for power in "321")
+_PATHS: Final = ("L", "LN", "SPL")
 
-#: what a block begins with, and the bytes that stand for words
-_LINES: Final = {"L": 1.0, "LN": 2.0, "SPL": 3.0}
-_PATH, _RAPID = b"\x84", b"\x85"
-_BYTES: Final = {
-    **{name: bytes([0x81 + place]) for place, name in enumerate(_VECTOR)},
-    **{name: bytes([0x91 + place]) for place, name in enumerate(_FACTORS)},
-}
-_SPELT: Final = (
-    *((f" {word} ".encode(), b" " + _PATH + b"%d " % value) for word, value in _LINES.items()),
-    (b" FMAX", b" " + _RAPID + b"1"),
-    *((name.encode(), spelt) for name, spelt in _BYTES.items()),
-    *((spelt + b"+", spelt) for spelt in (*_BYTES.values(), *(axis.encode() for axis in _AXES), b"E")),
-)
-_COLUMNS: Final[Mapping[int, str]] = {
-    **{spelt[0]: _VECTOR.get(name, name) for name, spelt in _BYTES.items()},
-    _PATH[0]: "PATH",
-    _RAPID[0]: "RAPID",
-}
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
-_WORD: Final = re.compile(
-    rf"(?P<factor>K[123][XYZABC])(?P<of>{_NUMBER}(?:E[-+]?\d+)?)|(?P<vector>T[XYZ])(?P<part>{_NUMBER})"
-    rf"|(?P<rapid>F ?MAX\b)|(?P<turn>DR[-+])|(?P<side>R[0LR])(?!\w)|(?P<letter>[A-Z])(?P<value>{_NUMBER})"
-)
-_TOOL_CALL: Final = re.compile(rf"TOOL CALL(?: (\d+))?(?: [XYZ])?(?: S({_NUMBER}))?(?: F{_NUMBER})?(?: D.*)?")
-_COMMENT: Final = re.compile(r";(.*)$")
-_START: Final = re.compile(r"(?P<number>\d+)\s+(?P<rest>.*)|(?P<bare>.*)")
+_TOOL_CALL: Final = re.compile(rf"TOOL CALL(?: (\d+))?(?: [XYZ])?(?: S({NUMBER}))?(?: F{NUMBER})?(?: D.*)?")
 _FOLDED: Final = re.compile(rb"[^\n]*~[ \r]*\n(?:[^\n]*~[ \r]*\n)*[^\n]*\n?")
 
 #: blocks that change nothing measured here
@@ -59,39 +30,30 @@ class Heidenhain(Dialect):
         Addresses of the rotary axes; empty without a machine.
     """
 
+    lexer: _KlartextLexer
     feed_step = 1e-3
     inch_feed = 0.1
     unsaid = frozenset(("offset", "compensation", "register", ("spindle", 19.0), ("coolant", 7.0), ("coolant", 88.0)))
     controls = {"vector": ("TCPM VECTOR", "M128"), "angles": ("TCPM AXIS", "M128"), "machine": ("",)}  # noqa: RUF012
-    digits = re.compile(rb"(?:([XYZ])|([\x81-\x83]))[-+]?\d*\.(\d*)")
+    digits = re.compile(rb"(?<!K\d)(?:(?<!T)([XYZ])|(T[XYZ]))[-+]?\d*\.(\d*)")
 
     def __init__(self, rotary: str = "") -> None:
-        super().__init__(_Lexer(rotary), rotary)
-
-    def row(self, line: Line) -> dict[str, float] | None:
-        """Words of a motion block; None where the line is something else."""
-        row = {name: value for name, value, _ in line.words}
-        if len(row) != len(line.words) or not {*row} <= self.lexer.letters or "PATH" not in row:
-            return None
-        if not {*row} & self.lexer.places:
-            return None
-        return _coded(row)
+        super().__init__(_KlartextLexer(rotary), rotary)
 
     def words(self, line: Line, state: State) -> None:
         """Interpret a line that is no motion block."""
-        name, value, text = line.words[0]
-        if name == "block":
-            self._block(text, line, state)
+        if line.words[0].name == "block":
+            self._block(line.words[0].text, line, state)
             return
         motion: dict[str, float] = {}
-        for name, value, text in line.words:
+        for name, value, text, *_ in line.words:
             if name == "M":
                 self._miscellaneous(value, text, line, state)
             elif name == "side":
                 state.event(line, "G", value, text)
             elif name == "S":
                 state.event(line, "S", value, text)
-            elif name in self.lexer.letters or name in ("circle", "centre", "turn"):
+            elif name in self.lexer.names or name in ("circle", "centre", "turn"):
                 motion[name] = value
             elif name in "ABC":
                 state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
@@ -102,14 +64,15 @@ class Heidenhain(Dialect):
         elif "circle" in motion:
             state.move(line, self._circle(motion, line, state))
         else:
-            if motion and "PATH" not in motion and motion.keys() - {"F"}:
+            paths = motion.keys() & set(_PATHS)
+            if motion and not paths and motion.keys() - {"F"}:
                 state.refuse(line, "words of a path without L, LN or SPL", "give the whole block")
-            coded = _coded(motion)
-            if coded is None:
+            columns = self.lexer.coded({word.name: word for word in line.words if word.name in motion})
+            if columns is None:
                 state.refuse(
                     line, "words that this kind of block does not take", "give L, LN or SPL what belongs to it"
                 )
-            state.move(line, coded or {})
+            state.move(line, values(columns or {}))
 
     def _circle(self, motion: dict[str, float], line: Line, state: State) -> dict[str, float]:
         """C: about the centre that CC has said, in the plane XY."""
@@ -146,7 +109,7 @@ class Heidenhain(Dialect):
                 state.event(line, "S", float(match[2]), text)
         elif match := re.fullmatch(r"TOOL DEF (\d+)(?: .*)?", text):
             state.event(line, "T", float(match[1]), text)
-        elif match := re.fullmatch(rf"CYCL DEF 9\.1 (?:DWELL|V\.ZEIT) ?({_NUMBER})", text):
+        elif match := re.fullmatch(rf"CYCL DEF 9\.1 (?:DWELL|V\.ZEIT) ?({NUMBER})", text):
             state.event(line, "G", 4.0, f"{1000.0 * float(match[1]):.10g}")
         elif text == "STOP":
             state.event(line, "M", 0.0, text, late=True)
@@ -158,16 +121,77 @@ class Heidenhain(Dialect):
             state.refuse(line, f"{text} is not understood", "see that the control is the one the text is for")
 
 
-class _Lexer(Lexer):
-    """Words of several letters as one byte each; blocks begin with their number."""
+class _KlartextLexer(Lexer):
+    """Blocks that begin with their number and with what they are.
 
-    numbered = True
+    Parameters
+    ----------
+    rotary : str
+        Addresses of the rotary axes; empty without a machine.
+    """
+
+    word = re.compile(
+        rf"(?P<factor>K[123][XYZABC])(?P<of>{NUMBER}(?:E[-+]?\d+)?)|(?P<vector>T[XYZ])(?P<part>{NUMBER})"
+        rf"|(?P<rapid>F ?MAX\b)|(?P<turn>DR[-+])|(?P<side>R[0LR])(?!\w)|(?P<letter>[A-Z])(?P<value>{NUMBER})"
+    )
+    comment = re.compile(r";(.*)$")
+    block_number = re.compile(r"(\d+)(?:\s+|$)")
+    measure = re.compile(
+        rb"(?<=K\d[A-Z])[-+]?(?:\d+\.\d*|\.\d+)E[-+]?\d+|(?<![.\d])[-+]?(?:\d+\.\d*|\.\d+)(?![.\dE])"
+    )
 
     def __init__(self, rotary: str) -> None:
-        known = {*"XYZF", *rotary, "PATH", "RAPID", *(() if rotary else _VECTOR.values())}
-        known |= {name for name in _FACTORS if name[2] in "XYZ" + rotary}
-        super().__init__("", {*"XYZ", *(rotary or "IJK")})
-        self.letters = frozenset(known)
+        axes = "XYZ" + rotary
+        self.factors = frozenset(f"K{power}{axis}" for axis in axes for power in "321")
+        self.names = frozenset((*axes, "F", "RAPID", *_PATHS, *self.factors, *(() if rotary else "IJK")))
+        self.places = frozenset("XYZ" + (rotary or "IJK"))
+
+    def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
+        """Words of a line from a place on, or the whole block as one; raises CS501."""
+        rest = rest.rstrip()
+        head = rest[place:].partition(" ")[0]
+        if head in ("", "%"):
+            return []
+        heads = {"C": "circle", "CC": "centre"} | dict(zip(_PATHS, _PATHS, strict=True))
+        if head in heads:
+            tail = place + len(head)
+            tail += len(rest[tail:]) - len(rest[tail:].lstrip())
+            return [Word(heads[head], 0.0, head), *super().words(rest, tail, number, name)]
+        if not re.match(rf"[A-Z]{NUMBER}(?:\s|$)", rest[place:]):
+            return [Word("block", 0.0, " ".join(rest[place:].split()))]
+        return super().words(rest, place, number, name)
+
+    def named(self, match: re.Match[str]) -> list[Word]:
+        """Word of one match."""
+        if match["factor"]:
+            return [number_of(match, "of", match["factor"])]
+        if match["vector"]:
+            return [number_of(match, "part", _VECTOR[match["vector"]])]
+        if match["rapid"]:
+            return [fixed(match, "RAPID", 1.0)]
+        if match["turn"]:
+            return [fixed(match, "turn", 3.0 if match[0].endswith("+") else 2.0)]
+        if match["side"]:
+            return [fixed(match, "side", _SIDES[match["side"]])]
+        return [number_of(match, "value", match["letter"])]
+
+    def block(self, given: Mapping[str, Word]) -> Columns | None:
+        """Columns of a block with such words; None where they are no motion block."""
+        if not given.keys() <= self.names or not given.keys() & self.places or not given.keys() & set(_PATHS):
+            return None
+        return self.coded(given)
+
+    def coded(self, given: Mapping[str, Word]) -> Columns | None:
+        """Words of a path with its code; None where they do not go together."""
+        spline = "SPL" in given
+        if ("LN" not in given and given.keys() & {"I", "J", "K"}) or (
+            given.keys() & self.factors and (not spline or "RAPID" in given)
+        ):
+            return None
+        columns: Columns = {name: word for name, word in given.items() if name not in (*_PATHS, "RAPID")}
+        if given.keys() & set(_PATHS):
+            columns["G"] = SPL if spline else 0.0 if "RAPID" in given else 1.0
+        return columns
 
     def unfolded(self, chunk: bytes) -> bytes:
         """Return the text with every block on one line, and as many lines as before."""
@@ -183,105 +207,9 @@ class _Lexer(Lexer):
 
         return _FOLDED.sub(joined, chunk)
 
-    def respell(self, chunk: bytes) -> bytes:
-        """Return the text as `block_tables` is to read it, with the same lines."""
-        if b"++" in chunk or b"+-" in chunk or b"-+" in chunk:  # no numbers: read line by line, they are refused
-            return respelt(chunk, ())
-        return respelt(chunk, _SPELT)
-
     def cut(self, piece: bytes) -> int:
         """Where no block is cut in two."""
         place = piece.rfind(b"\n")
         while place > 0 and piece[:place].rstrip(b" \r").endswith(b"~"):
             place = piece.rfind(b"\n", 0, place)
         return place + 1
-
-    def columns(self, signature: bytes) -> tuple[str, ...] | None:
-        """Return a name for every letter of a line; None for a line that is read on its own."""
-        names: list[str] = []
-        for code in signature:
-            exponent = code == ord("E") and bool(names)
-            names.append(f"{names[-1]} E" if exponent else _COLUMNS.get(code, chr(code)))
-        known = {name for name in names if not name.endswith(" E")}
-        if any(name[:-2] not in _FACTORS for name in names if name.endswith(" E")):
-            return None
-        if len(set(names)) != len(names) or not known <= self.letters or not known & self.places:
-            return None
-        return tuple(names) if "PATH" in known else None
-
-    def table(self, table: Table) -> Table | None:
-        """Return a run with codes for what is said in words."""
-        path, rapid = table.column("PATH"), table.column("RAPID")
-        columns = {name: column for name, column in table.columns.items() if name not in ("PATH", "RAPID")}
-        for name in [name for name in columns if name.endswith(" E")]:
-            exponent = columns.pop(name)
-            columns[name[:-2]] = columns[name[:-2]] * 10.0 ** np.nan_to_num(exponent)
-        vectors = ~np.isnan(np.stack([table.column(name) for name in "IJK"])).all(axis=0)
-        factors = np.zeros(len(table), np.bool_)
-        for name in columns.keys() & set(_FACTORS):
-            factors |= ~np.isnan(columns[name])
-        if (vectors & (path != _LINES["LN"])).any() or (factors & (path != _LINES["SPL"])).any():
-            return None
-        code = np.where(np.isnan(rapid), 1.0, 0.0)
-        if (~np.isnan(rapid) & (path == _LINES["SPL"])).any():
-            return None
-        columns["G"] = np.where(path == _LINES["SPL"], SPL, code)
-        return Table(table.line, columns)
-
-    def line(self, text: bytes, number: int, name: str | None) -> Line:
-        """Take one line apart, as it was written."""
-        line = text.decode("latin-1").strip()
-        comments = tuple(comment.strip() for comment in _COMMENT.findall(line))
-        rest = _COMMENT.sub("", line).strip().upper().lstrip("/").lstrip()
-        match = _START.fullmatch(rest)
-        rest = (match["rest"] if match and match["number"] else rest).strip()
-        if not rest or rest == "%" or rest.isdigit():
-            return Line(number, (), comments)
-        head, _, tail = rest.partition(" ")
-        known: dict[str, tuple[str, float]] = {"C": ("circle", 0.0), "CC": ("centre", 0.0)}
-        known |= {word: ("PATH", value) for word, value in _LINES.items()}
-        words: list[tuple[str, float, str]] = []
-        if head in known:
-            words.append((*known[head], head))
-            rest = tail.strip()
-        elif not re.match(rf"[A-Z]{_NUMBER}(?:\s|$)", rest):
-            return Line(number, (("block", 0.0, " ".join(rest.split())),), comments)
-        place = 0
-        while place < len(rest):
-            found = _WORD.match(rest, place)
-            if found is None:
-                what = f"{rest[place : place + 20]!r} is no word of Klartext"
-                raise InputError("CS501", what, "give a file written for this control", file=name, line=number)
-            words.append(_word_of(found))
-            place = found.end()
-            while place < len(rest) and rest[place] in " \t":
-                place += 1
-        return Line(number, tuple(words), comments)
-
-
-def _word_of(found: re.Match[str]) -> tuple[str, float, str]:
-    text = found[0].strip()
-    if found["factor"]:
-        return found["factor"], float(found["of"]), text
-    if found["vector"]:
-        return _VECTOR[found["vector"]], float(found["part"]), text
-    if found["rapid"]:
-        return "RAPID", 1.0, text
-    if found["turn"]:
-        return "turn", 3.0 if text.endswith("+") else 2.0, text
-    if found["side"]:
-        return "side", _SIDES[text], text
-    return found["letter"], float(found["value"]), text
-
-
-def _coded(row: Mapping[str, float]) -> dict[str, float] | None:
-    """Words of a path with its code; None where they do not go together."""
-    path = row.get("PATH", 0.0)
-    if ({"I", "J", "K"} & row.keys() and path != _LINES["LN"]) or (
-        row.keys() & set(_FACTORS) and (path != _LINES["SPL"] or "RAPID" in row)
-    ):
-        return None
-    coded = {name: value for name, value in row.items() if name not in ("PATH", "RAPID")}
-    if path:
-        coded["G"] = SPL if path == _LINES["SPL"] else 0.0 if "RAPID" in row else 1.0
-    return coded

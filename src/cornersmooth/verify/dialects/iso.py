@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from cornersmooth.verify.dialects.base import AFTER_MOTION, HIGH_SPEED, Dialect, State
-from cornersmooth.verify.lexer import Lexer
-from cornersmooth.verify.words import MOTION_CODES, MOTION_LETTERS, PLACE_LETTERS, Line, Table
+from cornersmooth.verify.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.verify.words import MOTION_CODES, Columns, Line, Word
 
 #: letters whose words are events
 _EVENT_LETTERS = "TSMHD"
@@ -87,33 +86,20 @@ class Iso(Dialect):
         Addresses of the rotary axes; empty without a machine.
     """
 
+    lexer: _IsoLexer
+
     def __init__(self, name: str, rotary: str = "") -> None:
         self.iso = ISO_WORDS[name]
-        letters, places = MOTION_LETTERS, set(PLACE_LETTERS)
-        if rotary:  # I J stand on arcs only, and such lines are read one by one; K is a knot
-            letters = "".join(letter for letter in letters if letter not in "IJUVW") + rotary
-            places = (places - set("IJUVW")) | set(rotary)
-        super().__init__(_IsoLexer(letters, places, rotary), rotary)
+        super().__init__(_IsoLexer(rotary), rotary)
         self.controls, self.unsaid, self.curves_need = self.iso.controls, self.iso.unsaid, self.iso.curves_need
-        self.letters = frozenset(letters) | ({"I", "J"} if rotary else set())
-
-    def row(self, line: Line) -> dict[str, float] | None:
-        """Words of a motion block; None where the line is something else."""
-        row = {letter: value for letter, value, _ in line.words}
-        letters = set(row)
-        if len(row) != len(line.words) or not letters <= self.lexer.letters or not letters & self.lexer.places:
-            return None
-        if "G" in row and row["G"] not in MOTION_CODES:
-            return None
-        return None if _odd_vector(row, self.rotary) else row
 
     def words(self, line: Line, state: State) -> None:
         """Interpret a line that is no motion block."""
         motion: dict[str, float] = {}
-        given = {letter: value for letter, value, _ in line.words}
+        given = {letter: value for letter, value, *_ in line.words}
         if given.get("G") == 5.0:
             state.memory[HIGH_SPEED] = given.get("P", 0.0) >= 10000.0
-        for letter, value, text in line.words:
+        for letter, value, text, *_ in line.words:
             if letter == "G":
                 if value in MOTION_CODES:
                     motion["G"] = value
@@ -124,13 +110,13 @@ class Iso(Dialect):
                     self._mode(value, line, state)
             elif letter in _EVENT_LETTERS:
                 state.event(line, letter, value, text, late=letter == "M" and value in AFTER_MOTION)
-            elif letter in self.letters and letter != "N":
+            elif letter in self.lexer.letters:
                 motion[letter] = value
             elif letter in "ABC":
                 state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
             elif letter not in self.iso.others:
                 state.refuse(line, f"{text} is not understood", "see that the control is the one the text is for")
-        if _odd_vector(motion, self.rotary):
+        if self.lexer.odd_vector(motion.keys(), motion.get("G")):
             state.refuse(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
         state.move(line, motion)
 
@@ -158,29 +144,43 @@ class Iso(Dialect):
 
 
 class _IsoLexer(Lexer):
-    """The same, where K is a knot and never a vector beside rotary words."""
+    """Words of one letter and a number; a program name in brackets.
 
-    def __init__(self, letters: str, places: set[str], rotary: str) -> None:
-        super().__init__(letters, places)
+    Parameters
+    ----------
+    rotary : str
+        Addresses of the rotary axes; empty without a machine.
+    """
+
+    word = re.compile(rf"([A-Z])\s*({NUMBER})|(<[^>]*>)")
+    comment = re.compile(r"\(([^)]*)\)|;(.*)$")
+    begins = re.compile(rb"\n[ /]*(?:N\d+ *)?G")
+
+    def __init__(self, rotary: str) -> None:
         self._rotary = rotary
+        # beside rotary words K is a knot, and I J stand on arcs only
+        self.letters = frozenset("GXYZFRPIJK" + (rotary or "UVW"))
+        self.places = frozenset("XYZK" + (rotary or "IJUVW"))
 
-    def line(self, text: bytes, number: int, name: str | None) -> Line:
-        """Take one line apart; a program name in brackets says nothing."""
-        plain = text.strip()
-        if plain[:1] == b"<" and plain.find(b">") == len(plain) - 1:
-            return Line(number, (("O", 0.0, plain.decode("latin-1")),), ())
-        return super().line(text, number, name)
+    def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
+        """Words of a line from a place on; raises CS501."""
+        return [] if rest[place:] == "%" else super().words(rest, place, number, name)
 
-    def table(self, table: Table) -> Table | None:
-        """Return the run; None where its lines must be read one by one."""
-        if self._rotary and "K" in table.columns and "G" in table.columns:
-            code, knot = table.columns["G"], table.columns["K"]
-            if (~np.isnan(knot) & (code <= 1.0)).any():
-                return None
-        return super().table(table)
+    def named(self, match: re.Match[str]) -> list[Word]:
+        """Word of one letter."""
+        if match[3]:
+            return [fixed(match, "O", 0.0)]
+        return [fixed(match, "G", float(match[2])) if match[1] == "G" else number_of(match, 2, match[1])]
 
+    def block(self, given: Mapping[str, Word]) -> Columns | None:
+        """Columns of a block with such words; None where they are no motion block."""
+        code = given["G"].value if "G" in given else None
+        if not given.keys() <= self.letters or not given.keys() & self.places or self.odd_vector(given.keys(), code):
+            return None
+        return dict(given) if code is None or code in MOTION_CODES else None
 
-def _odd_vector(row: Mapping[str, float], rotary: str) -> bool:
-    """Whether a block has words of a vector that rotary words have no use for."""
-    code = row.get("G", -1.0)
-    return bool(rotary) and bool({"I", "J", "K"} & row.keys()) and (code in (0.0, 1.0) or ("I" in row and code < 0))
+    def odd_vector(self, names: Set[str], code: float | None) -> bool:
+        """Whether a block has words of a vector that rotary words have no use for."""
+        if not self._rotary:
+            return False
+        return bool(names & {"I", "J", "K"}) and (code in (0.0, 1.0) or (code is None and "I" in names))
