@@ -50,7 +50,7 @@ def test_corpus(corpus: Path) -> None:
         careful = outcome(data, fast=False)
         assert isinstance(careful, Program), careful
         assert_same(outcome(data, fast=True), careful)
-        with patch.object(bulk, "BLOCK", 300):
+        with patch.object(bulk, "CHUNK", 300):
             assert_same(outcome(data, fast=True), careful)
         seen += 1
     assert seen >= 20
@@ -114,17 +114,17 @@ def test_random_programs(lines: list[str], head: str, small: bool) -> None:
     careful = outcome(data, fast=False)
     assert_same(outcome(data, fast=True), careful)
     if small:
-        with patch.object(bulk, "BLOCK", 40):
+        with patch.object(bulk, "CHUNK", 40):
             assert_same(outcome(data, fast=True), careful)
 
 
 def test_plain_lines_take_the_fast_path() -> None:
     text = b"GOTO/1.,2.,3.,0,0,1\nGOTO/1.,2.,4.\n" * 10 + b"RAPID\nGOTO / 1., 2., 3.,  $\n0., 0., 1.\n"
-    (block,) = bulk.blocks(text)
-    assert len(block.tip) == 21
-    assert block.runs.tolist() == [[0, 20], [21, 23]]
-    assert block.line.tolist() == [*range(1, 21), 22]
-    assert np.array_equal(block.own_axis, [True, False] * 10 + [True])
+    (chunk,) = bulk.chunks(text)
+    assert len(chunk.tip) == 21
+    assert chunk.runs.tolist() == [[0, 20], [21, 23]]
+    assert chunk.line.tolist() == [*range(1, 21), 22]
+    assert np.array_equal(chunk.own_axis, [True, False] * 10 + [True])
 
 
 @pytest.mark.parametrize(
@@ -133,5 +133,5 @@ def test_plain_lines_take_the_fast_path() -> None:
     "|GOTO/1,2,3\n 4,5,6|GOTO/1,2,3,$ 9\n0,0,1|GOTO/1,-,3|GOTO/1,2,3,$\nRAPID|GOTO/1,2,3\n5e1,1,1".split("|"),
 )
 def test_odd_lines_are_left_to_the_careful_reader(line: str) -> None:
-    (block,) = bulk.blocks(f"{line}\n".encode())
-    assert len(block.tip) == 0
+    (chunk,) = bulk.chunks(f"{line}\n".encode())
+    assert len(chunk.tip) == 0

@@ -314,7 +314,7 @@ def test_fast_way_takes_what_it_should(monkeypatch: pytest.MonkeyPatch):
         raise AssertionError("the careful way was taken")
 
     monkeypatch.setattr(points_table, "careful", careful)
-    monkeypatch.setattr(points_table, "_BLOCK", 1000)
+    monkeypatch.setattr(points_table, "_CHUNK", 1000)
     expected = np.round(np.random.default_rng(1).uniform(-99, 99, (500, 3)), 4)
     axes = np.tile([0.0, 0.6, 0.8], (500, 1))
     for text in (

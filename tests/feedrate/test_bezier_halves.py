@@ -45,7 +45,7 @@ def test_halves_are_the_curve(given: tuple[float, float, float, tuple[float, flo
 def test_arc_length_and_back(given: tuple[float, float, float, tuple[float, float]]) -> None:
     points, weights = corner(*given)
     powers = bezier_halves.half_curves(points, weights, SIDES)
-    lengths = bezier_halves.piece_lengths(powers, bezier_halves.pieces(SIDES)).sum(axis=1)
+    lengths = bezier_halves.interval_lengths(powers, bezier_halves.interval_borders(SIDES)).sum(axis=1)
     dense = bezier_halves.evaluate(powers, np.tile(np.linspace(0.0, 1.0, 100_001), (2, 1)))
     chords = np.linalg.norm(np.diff(dense, axis=1), axis=2)
     assert lengths == pytest.approx(chords.sum(axis=1), rel=1e-6)
@@ -63,7 +63,7 @@ def test_curvature_closed_form(turn: float) -> None:
     points, weights = corner(turn, 0.4, 0.4, (1.0, 1.0))
     beta = np.radians(turn) / 2
     powers = bezier_halves.half_curves(points, weights, SIDES)
-    largest = bezier_halves.piece_curvatures(powers, bezier_halves.pieces(SIDES)).max(axis=1)
+    largest = bezier_halves.interval_curvatures(powers, bezier_halves.interval_borders(SIDES)).max(axis=1)
     assert largest == pytest.approx(2 * np.sin(beta) / (0.4 * np.cos(beta) ** 2), rel=1e-9)
     assert bezier_halves.curvature(powers, np.array([[0.0], [1.0]])) == pytest.approx(0.0, abs=1e-9)
 
@@ -72,9 +72,9 @@ def test_curvature_closed_form(turn: float) -> None:
 def test_piece_curvature_is_an_upper_bound(given: tuple[float, float, float, tuple[float, float]]) -> None:
     points, weights = corner(*given)
     powers = bezier_halves.half_curves(points, weights, SIDES)
-    borders = bezier_halves.pieces(SIDES)
-    bound = bezier_halves.piece_curvatures(powers, borders)
-    for piece in range(bezier_halves.PIECES):
+    borders = bezier_halves.interval_borders(SIDES)
+    bound = bezier_halves.interval_curvatures(powers, borders)
+    for piece in range(bezier_halves.INTERVALS):
         inside = borders[:, piece : piece + 1] + (borders[:, piece + 1 : piece + 2] - borders[:, piece : piece + 1]) * (
             np.linspace(0.0, 1.0, 301)
         )
@@ -84,5 +84,7 @@ def test_piece_curvature_is_an_upper_bound(given: tuple[float, float, float, tup
 def test_a_leg_of_length_zero_is_straight() -> None:
     points, weights = corner(60.0, 0.4, 0.0, (1.0, 1.0))
     powers = bezier_halves.half_curves(points, weights, SIDES)
-    assert bezier_halves.piece_curvatures(powers, bezier_halves.pieces(SIDES)).max() == 0.0
-    assert bezier_halves.piece_lengths(powers, bezier_halves.pieces(SIDES)).sum() == pytest.approx(0.4, rel=1e-12)
+    assert bezier_halves.interval_curvatures(powers, bezier_halves.interval_borders(SIDES)).max() == 0.0
+    assert bezier_halves.interval_lengths(powers, bezier_halves.interval_borders(SIDES)).sum() == pytest.approx(
+        0.4, rel=1e-12
+    )

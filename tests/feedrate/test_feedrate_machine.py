@@ -14,7 +14,7 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, direct, plan
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
-from cornersmooth.feedrate.timelaw import TimeLaw, places, poses
+from cornersmooth.feedrate.timelaw import TimeLaw, poses, shares_at
 from cornersmooth.kinematics import Dynamics, Machine, load_machine, machine_position, solutions, tool_axis
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.settings import Settings
@@ -81,7 +81,7 @@ def test_derivatives_are_those_of_the_kinematics(chain: Callable[[int], Program]
             way = 0.4 * path.length[element] + h * np.arange(-3, 4)
             same: Ints = np.full(7, element)
             tip, axis, _ = poses(path, same, way)
-            q, one, two, three = machine_axes.orders(same, places(path, same, way))
+            q, one, two, three = machine_axes.orders(same, shares_at(path, same, way))
             assert tool_axis(machine, q[:, 3:]) == pytest.approx(axis, abs=1e-12)
             assert machine_position(machine, tip, q[:, 3:]) == pytest.approx(q[:, :3], abs=1e-9)
             for order, of in ((one, q), (two, one), (three, two)):

@@ -9,7 +9,7 @@ import numpy as np
 from cornersmooth.cl import arcs as arc_geometry
 from cornersmooth.cl.arcs import ArcRule
 from cornersmooth.cl.builder import Builder
-from cornersmooth.cl.bulk import blocks
+from cornersmooth.cl.bulk import chunks
 from cornersmooth.cl.dialects import by_name, recognise
 from cornersmooth.cl.grammar import Decode, Record, read_records
 from cornersmooth.cl.interpret import end, obey, plain
@@ -99,21 +99,21 @@ def _run(data: bytes, state: ReaderState, decode: Decode, fast: bool) -> None:
         if key and len(remembered) < REMEMBERED:
             remembered[key] = records
 
-    for block in blocks(data, fast=fast):
-        state.builder.enter(block)
-        done += block.size
+    for chunk in chunks(data, fast=fast):
+        state.builder.enter(chunk)
+        done += chunk.size
         follows = "GOTO" if done < len(data) else "the end of the file"
         begin = 0
-        rows = block.rows.tolist()
-        for run, (start, stop) in enumerate(block.runs.tolist()):
+        rows = chunk.rows.tolist()
+        for run, (start, stop) in enumerate(chunk.runs.tolist()):
             if begin < start:
-                take(block.lines[begin:start], block.first + begin, "GOTO")
+                take(chunk.lines[begin:start], chunk.first + begin, "GOTO")
             if state.stopped:
                 return
-            plain(state, rows[run + 1] - rows[run], block.first + start)
+            plain(state, rows[run + 1] - rows[run], chunk.first + start)
             begin = stop
-        if begin < len(block.lines):
-            take(block.lines[begin:], block.first + begin, follows)
+        if begin < len(chunk.lines):
+            take(chunk.lines[begin:], chunk.first + begin, follows)
         if state.stopped:
             return
 

@@ -13,7 +13,7 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.cl.bulk import FARTHEST, Block
+from cornersmooth.cl.bulk import FARTHEST, Chunk
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import Bools, Floats, Ints, Keep, Move
@@ -81,7 +81,7 @@ class Builder:
     axis_locked: Changes = field(default_factory=lambda: Changes([0], [0.0]))
     special: dict[int, Move] = field(default_factory=dict)
     axis_set: list[tuple[int, Vector]] = field(default_factory=lambda: [(0, UP)])
-    _blocks: list[Block] = field(default_factory=list)
+    _chunks: list[Chunk] = field(default_factory=list)
     _single_at: list[int] = field(default_factory=list)
     _single_tip: list[Vector] = field(default_factory=list)
     _single_axis: list[Vector | None] = field(default_factory=list)
@@ -91,15 +91,15 @@ class Builder:
     _axis_now: Vector = UP
     _axis_row: int = 0
 
-    def enter(self, block: Block) -> None:
-        """Take the next block; its plain poses follow by `take`."""
-        if self._blocks:
+    def enter(self, chunk: Chunk) -> None:
+        """Take the next chunk; its plain poses follow by `take`."""
+        if self._chunks:
             self._remember(self.last_axis())
-            self._rows_before += len(self._blocks[-1].tip)
-        self._blocks.append(block)
+            self._rows_before += len(self._chunks[-1].tip)
+        self._chunks.append(chunk)
 
     def take(self, count: int) -> None:
-        """Append the next poses of the block."""
+        """Append the next poses of the chunk."""
         self.n += count
         self._last_single = False
 
@@ -125,24 +125,24 @@ class Builder:
         """Tip of the last pose."""
         if self._last_single:
             return self._single_tip[-1]
-        row, block = self._row(), len(self._blocks) - 1
-        while row < 0:  # nothing of the last block was taken yet
-            block -= 1
-            row += len(self._blocks[block].tip)
-        x, y, z = self._blocks[block].tip[row].tolist()
+        row, chunk = self._row(), len(self._chunks) - 1
+        while row < 0:  # nothing of the last chunk was taken yet
+            chunk -= 1
+            row += len(self._chunks[chunk].tip)
+        x, y, z = self._chunks[chunk].tip[row].tolist()
         return x, y, z
 
     def last_axis(self) -> Vector:
         """Axis of the last pose; where it has none of its own, the one that was set before it, or +Z."""
         rows = self._row() + 1
-        if self.axis_locked.now or not self._blocks or rows <= 0 or self._rows_before + rows <= self._axis_row:
+        if self.axis_locked.now or not self._chunks or rows <= 0 or self._rows_before + rows <= self._axis_row:
             return self._axis_now
-        own = self._blocks[-1].own_axis[:rows]
+        own = self._chunks[-1].own_axis[:rows]
         if self.short_axis_up and not own[-1]:
             return self.axis_set[-1][1]
         if not own[max(self._axis_row - self._rows_before, 0) :].any():
             return self._axis_now
-        x, y, z = self._blocks[-1].axis[np.count_nonzero(own) - 1].tolist()
+        x, y, z = self._chunks[-1].axis[np.count_nonzero(own) - 1].tolist()
         return x, y, z
 
     def held_axis(self) -> Vector | None:
@@ -164,16 +164,16 @@ class Builder:
         self._axis_row = self.n - len(self._single_at)
 
     def _row(self) -> int:
-        """Row of the last plain pose in the last block."""
+        """Row of the last plain pose in the last chunk."""
         return self.n - 1 - len(self._single_at) - self._rows_before
 
     def tips(self) -> Floats:
         """(n, 3) float64: all tips, as written."""
-        return self._merge([block.tip for block in self._blocks], np.array(self._single_tip).reshape(-1, 3))
+        return self._merge([chunk.tip for chunk in self._chunks], np.array(self._single_tip).reshape(-1, 3))
 
     def lines(self) -> Ints:
         """(n,) int64: line of every pose."""
-        return self._merge([block.line for block in self._blocks], np.array(self._single_line, np.int64))
+        return self._merge([chunk.line for chunk in self._chunks], np.array(self._single_line, np.int64))
 
     def axes(self) -> tuple[Floats, list[Finding]]:
         """(n, 3) float64: the unit axis of every pose, and what is to be said about them.
@@ -184,11 +184,11 @@ class Builder:
             CS111 for a zero vector, CS112 for one that is no unit vector.
         """
         single = [axis is not None for axis in self._single_axis]
-        own = self._merge([block.own_axis for block in self._blocks], np.array(single, np.bool_))
+        own = self._merge([chunk.own_axis for chunk in self._chunks], np.array(single, np.bool_))
         given = np.flatnonzero(own)
         single_axis = np.array([axis for axis in self._single_axis if axis is not None]).reshape(-1, 3)
         single_at = np.array(self._single_at, np.int64)[np.array(single, np.bool_)]
-        bulk = [block.axis for block in self._blocks]
+        bulk = [chunk.axis for chunk in self._chunks]
         vector = merge(bulk, single_axis, np.searchsorted(given, single_at), len(given))
         findings: list[Finding] = []
         unit = self._normalise(vector, given, findings)
@@ -253,7 +253,7 @@ def check_range(values: Iterable[float], file: str, line: int) -> None:
 def merge(bulk: list[NDArray[T]], single: NDArray[T], at: Ints, n: int) -> NDArray[T]:
     """Put single rows at their places among the bulk rows."""
     whole = bulk[0] if len(bulk) == 1 else np.concatenate(bulk)
-    whole = whole[: n - len(single)]  # reading may have stopped inside a block
+    whole = whole[: n - len(single)]  # reading may have stopped inside a chunk
     if not len(single):
         return whole
     if not len(whole):

@@ -1,6 +1,6 @@
-"""The fast path: plain GOTO lines, recognised and converted a block at a time.
+"""The fast path: plain GOTO lines, recognised and converted a chunk at a time.
 
-Deleting digits, signs, points and blanks from a block leaves a few bytes a line that say what kind of line it is:
+Deleting digits, signs, points and blanks from a chunk leaves a few bytes a line that say what kind of line it is:
 ``GOTO/,,,,,`` is a GOTO of six numbers. They are compared as eight-byte words, all lines at once. Everything that is
 not surely plain is left to the careful reader of `grammar`; both give the same bits.
 """
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.text import parse_numbers
 
-#: bytes of a block: enough to make the fixed cost of a block small, little enough to stay in cache
-BLOCK: Final = 1 << 20
+#: bytes of a chunk: enough to make the fixed cost of a chunk small, little enough to stay in cache
+CHUNK: Final = 1 << 20
 
 #: no machine reaches farther, in units of the file
 FARTHEST: Final = 1e7
@@ -36,7 +36,7 @@ Words = NDArray[np.uint64]
 
 
 @dataclass(frozen=True)
-class Block:
+class Chunk:
     """Consecutive lines of a file.
 
     Parameters
@@ -75,8 +75,8 @@ class Block:
     line: Ints
 
 
-def blocks(data: bytes, *, fast: bool = True) -> Iterator[Block]:
-    """Cut a text into blocks that end before a GOTO line, and find the plain GOTO statements.
+def chunks(data: bytes, *, fast: bool = True) -> Iterator[Chunk]:
+    """Cut a text into chunks that end before a GOTO line, and find the plain GOTO statements.
 
     Parameters
     ----------
@@ -87,27 +87,27 @@ def blocks(data: bytes, *, fast: bool = True) -> Iterator[Block]:
     """
     start, first = 0, 1
     while start < len(data):
-        stop = _block_end(data, start)
+        stop = _chunk_end(data, start)
         text = data[start:stop]
-        block = (_find_plain(text, first) if fast else None) or _all_careful(text, first)
-        yield block
+        chunk = (_find_plain(text, first) if fast else None) or _all_careful(text, first)
+        yield chunk
         start = stop
-        first += block.count
+        first += chunk.count
 
 
-def _block_end(data: bytes, start: int) -> int:
-    if len(data) - start <= BLOCK:
+def _chunk_end(data: bytes, start: int) -> int:
+    if len(data) - start <= CHUNK:
         return len(data)
-    stop = data.rfind(b"\nGOTO", start + BLOCK // 2, start + BLOCK)
+    stop = data.rfind(b"\nGOTO", start + CHUNK // 2, start + CHUNK)
     if stop < 0:
-        stop = data.find(b"\nGOTO", start + BLOCK)
+        stop = data.find(b"\nGOTO", start + CHUNK)
     return len(data) if stop < 0 else stop + 1
 
 
-def _all_careful(text: bytes, first: int) -> Block:
+def _all_careful(text: bytes, first: int) -> Chunk:
     none = np.zeros(0, np.int64)
     lines = text.split(b"\n")[:-1]
-    return Block(
+    return Chunk(
         lines,
         len(lines),
         len(text),
@@ -140,7 +140,7 @@ def _line_starts(text: bytes) -> Ints:
     return np.concatenate(([0], ends + 1))
 
 
-def _find_plain(text: bytes, first: int) -> Block | None:
+def _find_plain(text: bytes, first: int) -> Chunk | None:
     """Find and convert the plain GOTO statements; None if there are none or any of them needs care."""
     starts = _line_starts(text)
     taken, pair = _classify(text, starts[:-1])
@@ -167,7 +167,7 @@ def _find_plain(text: bytes, first: int) -> Block | None:
     if not (np.abs(tip) <= FARTHEST).all():
         return None
     poses = np.concatenate(([0], np.cumsum(taken > 0)))
-    return Block(
+    return Chunk(
         [] if plain.all() else text.split(b"\n")[:-1],
         len(plain),
         len(text),

@@ -1,6 +1,6 @@
 """Text of point files into a table of numbers: separators, decimal commas, comments, encodings, line numbers.
 
-Two ways lead to the same table. The fast one converts a block of lines at once and only accepts it where every line is
+Two ways lead to the same table. The fast one converts a chunk of lines at once and only accepts it where every line is
 laid out like its first; the careful one goes line by line, accepts what is unusual and names the line of what is wrong.
 """
 
@@ -28,7 +28,7 @@ _FIRST_ROW = re.compile(rb"[^\n]*[^\s,;][^\n]*")
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 #: bytes converted at once; large enough for whole-array speed, small enough for the caches
-_BLOCK = 1 << 18
+_CHUNK = 1 << 18
 
 _PART, _BLANK, _COMMA, _NEWLINE, _OTHER = range(5)
 
@@ -83,7 +83,7 @@ def clean(data: bytes, file: str) -> PointText:
     if data.startswith(_UTF16):
         data = data.decode("utf-16", "replace").encode()
     data = data.removeprefix(b"\xef\xbb\xbf")
-    if b"\0" in data[:_BLOCK]:
+    if b"\0" in data[:_CHUNK]:
         raise error("CS161", file, data.count(b"\n", 0, data.index(b"\0")) + 1)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
@@ -123,23 +123,23 @@ def numbers(text: PointText, columns: Columns, file: str) -> tuple[Floats, Ints]
     tables, lines = [], []
     first, start = text.first_line, 0
     while start < len(text.body):
-        end = text.body.find(b"\n", start + _BLOCK) + 1 or len(text.body)
-        block = text.body[start:end]
-        table, row = _fast(block, columns.width) or careful(block, columns, first, file)
+        end = text.body.find(b"\n", start + _CHUNK) + 1 or len(text.body)
+        chunk = text.body[start:end]
+        table, row = _fast(chunk, columns.width) or careful(chunk, columns, first, file)
         tables.append(table)
         lines.append(row + first)
-        first, start = first + block.count(b"\n"), end
+        first, start = first + chunk.count(b"\n"), end
     if not tables:
         return np.zeros((0, columns.width)), np.zeros(0, np.int64)
     return np.concatenate(tables), np.concatenate(lines)
 
 
-def careful(block: bytes, columns: Columns, first_line: int, file: str) -> tuple[Floats, Ints]:
-    """Table of a block that starts at `first_line`, and the line of each row less that; one line at a time."""
+def careful(chunk: bytes, columns: Columns, first_line: int, file: str) -> tuple[Floats, Ints]:
+    """Table of a chunk that starts at `first_line`, and the line of each row less that; one line at a time."""
     used = {*columns.wanted, *(() if columns.feed is None else (columns.feed,))}
     table: list[list[float]] = []
     offsets: list[int] = []
-    for offset, line in enumerate(_decode(block).split("\n")):
+    for offset, line in enumerate(_decode(chunk).split("\n")):
         cells = _cells(line)
         while len(cells) > columns.width and not cells[-1]:
             cells.pop()
@@ -224,9 +224,9 @@ def _number(cell: str) -> float:
     return float(cell.upper().replace("D", "E")) if _NUMBER.fullmatch(cell) else math.nan
 
 
-def _fast(block: bytes, width: int) -> tuple[Floats, Ints] | None:
-    """Do what `careful` does if all lines of the block are laid out like its first; None for any other."""
-    kinds = _CLASS[np.frombuffer(block, np.uint8)]
+def _fast(chunk: bytes, width: int) -> tuple[Floats, Ints] | None:
+    """Do what `careful` does if all lines of the chunk are laid out like its first; None for any other."""
+    kinds = _CLASS[np.frombuffer(chunk, np.uint8)]
     part = kinds == _PART
     cell = np.flatnonzero(part & ~np.concatenate(([False], part[:-1])))
     if not len(cell) or len(cell) % width or bool((kinds == _OTHER).any()):
@@ -235,11 +235,11 @@ def _fast(block: bytes, width: int) -> tuple[Floats, Ints] | None:
     row = np.searchsorted(newline, cell[::width])
     if (row != np.searchsorted(newline, cell[width - 1 :: width])).any() or (np.diff(row) == 0).any():
         return None
-    end = newline[row[0]] if row[0] < len(newline) else len(block)
-    if not _same_gaps(cell.reshape(-1, width), np.flatnonzero(kinds == _COMMA), end, len(block)):
+    end = newline[row[0]] if row[0] < len(newline) else len(chunk)
+    if not _same_gaps(cell.reshape(-1, width), np.flatnonzero(kinds == _COMMA), end, len(chunk)):
         return None
     try:
-        values = parse_numbers(block.replace(b",", b" "))  # a comma may end a row
+        values = parse_numbers(chunk.replace(b",", b" "))  # a comma may end a row
     except ValueError:
         return None
     if len(values) != len(cell):

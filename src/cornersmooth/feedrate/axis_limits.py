@@ -23,17 +23,17 @@ from cornersmooth.feedrate.speed_limits import SpeedLimits
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.vectors import norm
 
-#: pieces of a line or arc
-PIECES = 4
-#: pieces on either side of the nearest point to the pole of a machine, and the first of them over the way on which the
-#: pole is felt
-POLE_PIECES, FIRST_PIECE = 40, 0.05
+#: intervals of a line or arc
+INTERVALS = 4
+#: intervals on either side of the point nearest to the pole of a machine, and the first of them over the way on which
+#: the pole is felt
+POLE_INTERVALS, FIRST_INTERVAL = 40, 0.05
 #: the cone at the pole in which derivatives are cut off here, over the cone of the machine: smaller, to be safe
 WITHIN = 0.5
-#: places inside every piece at which derivatives are looked at
+#: points inside every interval at which derivatives are looked at
 _INNER = np.array([0.25, 0.5, 0.75])
 #: elements looked at together
-_BLOCK = 4096
+_TOGETHER = 4096
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class LimitCoefficients:
         return np.stack((self.accel_slope, self.accel_level, self.jerk_bend, self.jerk_slope, self.jerk_level))
 
 
-#: first three derivatives (m, d) of d axes at places (m,) on elements (m,)
+#: first three derivatives (m, d) of d axes at points (m,) on elements (m,)
 Orders = Callable[[Ints, Floats], tuple[Floats, Floats, Floats]]
 
 
@@ -125,7 +125,9 @@ def find_limit_coefficients(
         return None
     curved = (path.kind == Kind.CURVE) & ~path.turning
     asked = np.logical_or.reduce([where for _, _, where in given])
-    count = np.where(asked, np.where(close, 2 * POLE_PIECES, np.where(curved, bezier_halves.PIECES, PIECES)), 1)
+    count = np.where(
+        asked, np.where(close, 2 * POLE_INTERVALS, np.where(curved, bezier_halves.INTERVALS, INTERVALS)), 1
+    )
     begin = np.concatenate(([0], np.cumsum(count)))
     total = int(begin[-1])
     width, cap = np.repeat(path.length, count), np.full(total, np.inf)
@@ -133,8 +135,8 @@ def find_limit_coefficients(
     for curve in (True, False):
         for near in (True, False):
             chosen = np.flatnonzero(asked & (curved == curve) & (close == near))
-            for at in range(0, len(chosen), _BLOCK // 8 if near else _BLOCK):
-                element = chosen[at : at + (_BLOCK // 8 if near else _BLOCK)]
+            for at in range(0, len(chosen), _TOGETHER // 8 if near else _TOGETHER):
+                element = chosen[at : at + (_TOGETHER // 8 if near else _TOGETHER)]
                 graded = _around(*machine_axes.closest(element)) if machine_axes is not None and near else None
                 borders, share = _borders(path, element, curve, graded)
                 into = begin[element][:, None] + np.arange(borders.shape[1] - 1)
@@ -186,9 +188,9 @@ def _stalling(path: Path) -> Bools:
 
 
 def _around(closest: Floats, felt: Floats) -> Floats:
-    """Borders (g, p + 1) of pieces that grow on either side of the place nearest to the pole."""
-    smallest = FIRST_PIECE * felt[:, None]
-    steps = np.linspace(0.0, 1.0, POLE_PIECES + 1)
+    """Borders (g, p + 1) of intervals that grow on either side of the point nearest to the pole."""
+    smallest = FIRST_INTERVAL * felt[:, None]
+    steps = np.linspace(0.0, 1.0, POLE_INTERVALS + 1)
     away = smallest * np.sinh(steps * np.arcsinh(1.0 / smallest))
     both = np.concatenate((closest[:, None] - away[:, :0:-1], closest[:, None] + away), axis=1)
     borders: Floats = np.clip(both, 0.0, 1.0)
@@ -198,20 +200,20 @@ def _around(closest: Floats, felt: Floats) -> Floats:
 def _borders(path: Path, element: Ints, curve: bool, given: Floats | None) -> tuple[Floats, Floats]:
     """Parameters that divide elements, and the shares of their length between them."""
     if not curve:
-        borders = np.tile(np.linspace(0.0, 1.0, PIECES + 1), (len(element), 1)) if given is None else given
+        borders = np.tile(np.linspace(0.0, 1.0, INTERVALS + 1), (len(element), 1)) if given is None else given
         return borders, np.diff(borders, axis=1)
     half = (path.span[element, 0] > 0.0).astype(np.int64)
     corners = path.corners
     if corners is None:
         raise ValueError("a direct path has no curves")
     tip, _ = bezier_halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
-    borders = bezier_halves.pieces(half) if given is None else given
-    lengths = bezier_halves.piece_lengths(tip, borders)
+    borders = bezier_halves.interval_borders(half) if given is None else given
+    lengths = bezier_halves.interval_lengths(tip, borders)
     return borders, lengths / lengths.sum(axis=1, keepdims=True)
 
 
 def _judge(element: Ints, borders: Floats, orders: Orders, bounds: Floats) -> tuple[Floats, Floats]:
-    """Bounds of v² (g, p) and coefficients (5, g, p) from samples at the ends and inside every piece."""
+    """Bounds of v² (g, p) and coefficients (5, g, p) from samples at the ends and inside every interval."""
     step = np.diff(borders, axis=1)
     inner = borders[:, :-1, None] + step[..., None] * _INNER
     share = np.concatenate((borders, inner.reshape(len(borders), -1)), axis=1)
@@ -224,8 +226,8 @@ def _judge(element: Ints, borders: Floats, orders: Orders, bounds: Floats) -> tu
     return steady.min(axis=-1), rows.max(axis=-1)
 
 
-def _largest(orders: tuple[Floats, Floats, Floats], shape: tuple[int, ...], pieces: int) -> list[Floats]:
-    """Largest amounts (g, p, d) in every piece; not at an end where the tip comes to a stand and they are infinite.
+def _largest(orders: tuple[Floats, Floats, Floats], shape: tuple[int, ...], intervals: int) -> list[Floats]:
+    """Largest amounts (g, p, d) in every interval; not at an end where the tip comes to a stand and they are infinite.
 
     Between two samples a smooth function exceeds them by at most an eighth of its second difference.
     """
@@ -233,8 +235,8 @@ def _largest(orders: tuple[Floats, Floats, Floats], shape: tuple[int, ...], piec
     for order in orders:
         values = order.reshape(*shape, -1)
         ends, inner = (
-            values[:, : pieces + 1, None],
-            values[:, pieces + 1 :].reshape(len(values), pieces, len(_INNER), -1),
+            values[:, : intervals + 1, None],
+            values[:, intervals + 1 :].reshape(len(values), intervals, len(_INNER), -1),
         )
         along = np.concatenate((ends[:, :-1], inner, ends[:, 1:]), axis=2)
         known = np.isfinite(along).all(axis=2)

@@ -11,7 +11,7 @@ from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics.dynamics import LINEAR
 
 #: states looked at together
-_BLOCK = 65536
+_TOGETHER = 65536
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ def axis_peaks(law: TimeLaw) -> list[AxisPeaks]:
         return []
     times = law.every_period()
     largest = np.zeros((3, len(law.machine_axes.names)))
-    for begin in range(0, len(times), _BLOCK):
-        _, *orders = law.axes_at(times[begin : begin + _BLOCK])
+    for begin in range(0, len(times), _TOGETHER):
+        _, *orders = law.axes_at(times[begin : begin + _TOGETHER])
         largest = np.maximum(largest, [np.abs(order).max(axis=0) for order in orders])
     rows = zip(law.machine_axes.names, largest.T.tolist(), law.machine_axes.limits.T.tolist(), strict=True)
     return [AxisPeaks(name, (v, a, j), (most_v, most_a, most_j)) for name, (v, a, j), (most_v, most_a, most_j) in rows]

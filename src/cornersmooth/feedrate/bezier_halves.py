@@ -18,7 +18,7 @@ from cornersmooth.vectors import norm
 STANDSTILL = 1e-7
 
 #: curves worked on at once: their intermediate arrays fit the processor's cache
-BLOCK = 512
+TOGETHER = 512
 
 #: Bernstein coefficients of the five basis functions on the first half: Bézier point j is Σ w_i·P_i·_TO_BEZIER[j, i]
 _TO_BEZIER = np.array([[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0.5, 0.5, 0, 0], [0, 0.25, 0.5, 0.25, 0]])
@@ -29,13 +29,14 @@ _SECOND = _TO_POWERS @ _TO_BEZIER[::-1, ::-1]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
-#: pieces of a half over which lengths are summed and curvature is bounded; shorter towards u = ½, where it turns most
-PIECES = 12
-_PROGRESS = 1.0 - np.linspace(1.0, 0.0, PIECES + 1) ** 1.7
+#: intervals of a half over which lengths are summed and curvature is bounded; shorter towards u = ½, where the curve
+#: turns most
+INTERVALS = 12
+_PROGRESS = 1.0 - np.linspace(1.0, 0.0, INTERVALS + 1) ** 1.7
 _NEWTON_STEPS = 3
 #: a radius of curvature below this is a cusp and is passed with the speed for this radius, mm
 SMALLEST_RADIUS = 1e-6
-#: samples of the curvature per piece, and rounds of closer sampling where it is largest
+#: samples of the curvature per interval, and rounds of closer sampling where it is largest
 _SAMPLES = 4
 _CLOSER = 3
 
@@ -110,13 +111,13 @@ def _size(vectors: Floats) -> Floats:
     return size
 
 
-def pieces(half: Ints) -> Floats:
-    """(g, PIECES + 1) parameters t that divide the halves, dense towards u = ½."""
+def interval_borders(half: Ints) -> Floats:
+    """(g, INTERVALS + 1) parameters t that divide the halves, dense towards u = ½."""
     borders: Floats = np.where(half[:, None] == 0, _PROGRESS, 1.0 - _PROGRESS[::-1])
     return borders
 
 
-def piece_lengths(powers: Floats, borders: Floats) -> Floats:
+def interval_lengths(powers: Floats, borders: Floats) -> Floats:
     """Arc lengths (g, p) between neighbouring parameters `borders` (g, p + 1), by Gauss-Legendre with 5 points."""
     g, p = len(powers), borders.shape[1] - 1
     step = np.diff(borders, axis=1)
@@ -126,7 +127,7 @@ def piece_lengths(powers: Floats, borders: Floats) -> Floats:
     return lengths
 
 
-def piece_curvatures(powers: Floats, borders: Floats) -> Floats:
+def interval_curvatures(powers: Floats, borders: Floats) -> Floats:
     """Upper ends of the curvature (g, p) between neighbouring parameters, 1/mm.
 
     Sampled, and sampled again ever more closely around the largest sample.
@@ -148,8 +149,8 @@ def piece_curvatures(powers: Floats, borders: Floats) -> Floats:
         near = low[:, None] + (high - low)[:, None] * part
         kappa = curvature(powers, near)
         at = kappa.argmax(axis=1)
-        piece = np.clip((borders <= near[rows, at][:, None]).sum(axis=1) - 1, 0, p - 1)
-        largest[rows, piece] = np.maximum(largest[rows, piece], kappa[rows, at])
+        interval = np.clip((borders <= near[rows, at][:, None]).sum(axis=1) - 1, 0, p - 1)
+        largest[rows, interval] = np.maximum(largest[rows, interval], kappa[rows, at])
         low, high = near[rows, np.maximum(at - 1, 0)], near[rows, np.minimum(at + 1, 8)]
     found: Floats = largest
     return found
@@ -166,7 +167,7 @@ def curvature(powers: Floats, t: Floats) -> Floats:
 
 
 def _turns_back(powers: Floats, borders: Floats) -> Bools:
-    """(g, p) bool: pieces on which the curve turns by more than a right angle."""
+    """(g, p) bool: intervals on which the curve turns by more than a right angle."""
     _, d1 = _derivatives(powers, borders, 1)
     back: Bools = (d1[:, :, 1:] * d1[:, :, :-1]).sum(axis=0) < 0.0
     return back
@@ -174,16 +175,16 @@ def _turns_back(powers: Floats, borders: Floats) -> Bools:
 
 def parameters_at(powers: Floats, half: Ints, which: Ints, distance: Floats) -> Floats:
     """Parameters t (q,) at arc length `distance` (q,) from the start of the halves `which` (q,)."""
-    borders = pieces(half)
-    lengths = np.concatenate((np.zeros((len(powers), 1)), np.cumsum(piece_lengths(powers, borders), axis=1)), axis=1)
-    piece = np.clip((lengths[which] <= distance[:, None]).sum(axis=1) - 1, 0, PIECES - 1)
-    low, high = borders[which, piece], borders[which, piece + 1]
-    missing = distance - lengths[which, piece]
-    whole = np.maximum(lengths[which, piece + 1] - lengths[which, piece], np.finfo(np.float64).tiny)
+    borders = interval_borders(half)
+    lengths = np.concatenate((np.zeros((len(powers), 1)), np.cumsum(interval_lengths(powers, borders), axis=1)), axis=1)
+    interval = np.clip((lengths[which] <= distance[:, None]).sum(axis=1) - 1, 0, INTERVALS - 1)
+    low, high = borders[which, interval], borders[which, interval + 1]
+    missing = distance - lengths[which, interval]
+    whole = np.maximum(lengths[which, interval + 1] - lengths[which, interval], np.finfo(np.float64).tiny)
     t = low + (high - low) * np.clip(missing / whole, 0.0, 1.0)
     curves = powers[which]
     for _ in range(_NEWTON_STEPS):
-        gone = piece_lengths(curves, np.stack((low, t), axis=1))[:, 0]
+        gone = interval_lengths(curves, np.stack((low, t), axis=1))[:, 0]
         speed = _size(_derivatives(curves, t[:, None], 1)[1])[:, 0]
         t = np.clip(t + (missing - gone) / np.maximum(speed, np.finfo(np.float64).tiny), low, high)
     found: Floats = t
@@ -196,11 +197,11 @@ def half_lengths(program: Program, corners: Corners, axis_length: float) -> tupl
     The angle is only worked out where the tip stands still.
     """
     lengths, angles = np.zeros((2, len(corners))), np.zeros((2, len(corners)))
-    for rows in _blocks(np.flatnonzero(corners.smoothed)):
+    for rows in _groups(np.flatnonzero(corners.smoothed)):
         for side in range(2):
             half = np.full(len(rows), side)
             tip, axis_point = corner_halves(program, corners, rows, half, axis_length)
-            lengths[side, rows] = piece_lengths(tip, pieces(half)).sum(axis=1)
+            lengths[side, rows] = interval_lengths(tip, interval_borders(half)).sum(axis=1)
             still = np.flatnonzero(
                 ~(corners.trim_in[rows] + corners.trim_out[rows] > 0.0) | (lengths[side, rows] <= STANDSTILL)
             )
@@ -210,7 +211,7 @@ def half_lengths(program: Program, corners: Corners, axis_length: float) -> tupl
 
 def turned_angle(tip: Floats, axis_point: Floats, half: Ints) -> Floats:
     """Angle (g,) that the axis sweeps over each half, rad."""
-    axis = axis_vectors(tip, axis_point, pieces(half))
+    axis = axis_vectors(tip, axis_point, interval_borders(half))
     step = norm(np.diff(axis, axis=1))
     swept: Floats = (2.0 * np.arcsin(np.minimum(0.5 * step, 1.0))).sum(axis=1)
     return swept
@@ -238,35 +239,35 @@ def curvature_limits(
     -------
     which : (b,) int64
         The curves that are slowed down, ascending.
-    share : (b, PIECES) float64
+    share : (b, INTERVALS) float64
         Parts of their length.
-    cap : (b, PIECES) float64, (mm/s)²
+    cap : (b, INTERVALS) float64, (mm/s)²
         v² at most, per part.
     """
     which, shares, bounds = [], [], []
-    for block in _blocks(np.arange(len(rows))):
-        tip, _ = corner_halves(program, corners, rows[block], half[block], axis_length)
-        borders = pieces(half[block])
+    for group in _groups(np.arange(len(rows))):
+        tip, _ = corner_halves(program, corners, rows[group], half[group], axis_length)
+        borders = interval_borders(half[group])
         # a look at the borders alone leaves few curves that need the careful one
         rough = curvature(tip, borders).max(axis=1)
         turning_back = _turns_back(tip, borders)
-        slowed = np.flatnonzero((2.0 * rough * speed[block] ** 2 > limits.centripetal_accel) | turning_back.any(axis=1))
+        slowed = np.flatnonzero((2.0 * rough * speed[group] ** 2 > limits.centripetal_accel) | turning_back.any(axis=1))
         if not len(slowed):
             continue
         tip, borders = tip[slowed], borders[slowed]
-        kappa, share = piece_curvatures(tip, borders), piece_lengths(tip, borders)
-        # a piece that turns back must be bent by that much; where no sample shows it, it is a cusp
+        kappa, share = interval_curvatures(tip, borders), interval_lengths(tip, borders)
+        # a interval that turns back must be bent by that much; where no sample shows it, it is a cusp
         cusp = turning_back[slowed] & (kappa * share < 1.0)
         kappa = np.where(cusp, np.inf, kappa)
-        fastest = speed[block[slowed], None] ** 2
+        fastest = speed[group[slowed], None] ** 2
         kappa = np.clip(kappa, limits.centripetal_accel / fastest, 1.0 / SMALLEST_RADIUS)
-        which.append(block[slowed])
+        which.append(group[slowed])
         shares.append(share)
         bounds.append(np.minimum(limits.centripetal_accel / kappa, fastest))
     if not which:
-        return np.zeros(0, np.int64), np.zeros((0, PIECES)), np.zeros((0, PIECES))
+        return np.zeros(0, np.int64), np.zeros((0, INTERVALS)), np.zeros((0, INTERVALS))
     return np.concatenate(which), np.concatenate(shares), np.concatenate(bounds)
 
 
-def _blocks(rows: Ints) -> list[Ints]:
-    return [rows[at : at + BLOCK] for at in range(0, len(rows), BLOCK)]
+def _groups(rows: Ints) -> list[Ints]:
+    return [rows[at : at + TOGETHER] for at in range(0, len(rows), TOGETHER)]

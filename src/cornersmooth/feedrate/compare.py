@@ -24,13 +24,13 @@ SCHEMA = "cornersmooth-time/1"
 BASELINES = ("direct_exact_stop", "direct_velocity_jump")
 
 #: states looked at together for peaks
-_BLOCK = 65536
+_TOGETHER = 65536
 
 Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
-class Place:
+class SlowMove:
     """A move that takes longer than its length over its feed.
 
     Parameters
@@ -111,7 +111,7 @@ class Comparison:
         path = self.laws[BASELINES[0]].path
         return float((path.length / path.speed).sum())
 
-    def as_dict(self, places: int = 10) -> dict[str, Any]:
+    def as_dict(self, slow_moves: int = 10) -> dict[str, Any]:
         """Everything, plain; keys carry their unit."""
         source = self.program.source
         contents: dict[str, Any] = {
@@ -126,7 +126,7 @@ class Comparison:
             "stops": {name: stops(law) for name, law in self.laws.items()},
             "turning_seconds": {name: turning_seconds(law) for name, law in self.laws.items()},
             "peaks": {name: vars(peaks(law)) for name, law in self.laws.items()},
-            "slowest": {name: [vars(place) for place in slowest(law, places)] for name, law in self.laws.items()},
+            "slowest": {name: [vars(move) for move in slowest(law, slow_moves)] for name, law in self.laws.items()},
         }
         if self.machine is not None:
             contents["machine"] = self.machine.name
@@ -201,7 +201,7 @@ def turning_seconds(law: TimeLaw) -> float:
     return float(took[law.path.turning].sum())
 
 
-def slowest(law: TimeLaw, count: int = 10) -> list[Place]:
+def slowest(law: TimeLaw, count: int = 10) -> list[SlowMove]:
     """Moves that lose most time against their programmed speed, the worst first."""
     path = law.path
     if not len(path):
@@ -214,12 +214,12 @@ def slowest(law: TimeLaw, count: int = 10) -> list[Place]:
     lost = np.add.reduceat(took - path.length / path.speed, first)
     length = np.add.reduceat(np.where(path.turning, 0.0, path.length), first)
     least = np.minimum.reduceat(np.minimum(speeds[:-1], speeds[1:]), first)
-    places = []
+    moves = []
     for row in np.argsort(-lost, kind="stable")[:count]:
         pose = int(path.move[first[row]])
         x, y, z = path.program.tip[pose].tolist()
-        places.append(
-            Place(
+        moves.append(
+            SlowMove(
                 line=int(path.program.line[pose]),
                 x=x,
                 y=y,
@@ -230,15 +230,15 @@ def slowest(law: TimeLaw, count: int = 10) -> list[Place]:
                 slowest_mm_per_s=float(least[row]),
             )
         )
-    return places
+    return moves
 
 
 def peaks(law: TimeLaw) -> Peaks:
     """Largest speed, accelerations and jerk of a law at the multiples of the period."""
     times = law.every_period()
     largest = np.zeros((2, 4))
-    for begin in range(0, len(times), _BLOCK):
-        states = law.at(times[begin : begin + _BLOCK])
+    for begin in range(0, len(times), _TOGETHER):
+        states = law.at(times[begin : begin + _TOGETHER])
         rows = np.abs(np.stack((states.v, states.a, states.centripetal, states.j)))
         for turning in (False, True):
             chosen = rows[:, states.turning == turning]

@@ -98,34 +98,34 @@ def make_grid(
     front, back = _end_cells(half_speed, run, low, change, begin, end, accel, jerk)
     front, back = resolution.end * front, resolution.end * back
 
-    # places where the size of the cells is given: where the limit changes, and next to the end cells
+    # knots where the size of the cells is given: where the limit changes, and next to the end cells
     slow = np.sqrt(np.minimum(cap, before))
     size = (resolution.part * slow**1.5 / np.sqrt(jerk[run]))[change]
     inner = np.clip(low, (begin + front)[run], (end - back)[run])[change]
-    place = np.concatenate((begin + front, inner, end - back))
+    knot = np.concatenate((begin + front, inner, end - back))
     size = np.concatenate((resolution.growth * front, size, resolution.growth * back))
     # in order along the path; the ends of a run enclose its changes
     rank = np.repeat([0, 1, 2], (len(runs), len(inner), len(runs)))
     run = np.concatenate((np.arange(len(runs)), run[change], np.arange(len(runs))))
-    order = np.lexsort((place, rank, run))
-    place, size, run = place[order], size[order], run[order]
+    order = np.lexsort((knot, rank, run))
+    knot, size, run = knot[order], size[order], run[order]
 
     g = resolution.growth
     size = np.maximum(size, SMALLEST * speed_limits.edge[-1])
-    size = g * place + np.minimum.accumulate(size - g * place)
-    size = -g * place + np.minimum.accumulate((size + g * place)[::-1])[::-1]
+    size = g * knot + np.minimum.accumulate(size - g * knot)
+    size = -g * knot + np.minimum.accumulate((size + g * knot)[::-1])[::-1]
     left, right = np.flatnonzero(run[1:] == run[:-1]), np.flatnonzero(run[1:] == run[:-1]) + 1
-    gap = place[right] - place[left]
+    gap = knot[right] - knot[left]
     peak = 0.5 * (size[left] + size[right] + g * gap)
     up, down = (np.log(np.maximum(peak / size[side], 1.0)) / g for side in (left, right))
     summed = np.concatenate(([0.0], np.cumsum(up + down)))
-    stretch = run[left]
-    low_at = np.searchsorted(stretch, np.arange(len(runs)), side="left")
-    high_at = np.searchsorted(stretch, np.arange(len(runs)), side="right")
+    of_knot = run[left]
+    low_at = np.searchsorted(of_knot, np.arange(len(runs)), side="left")
+    high_at = np.searchsorted(of_knot, np.arange(len(runs)), side="right")
     amount = summed[high_at] - summed[low_at]
     cells = np.maximum(np.ceil(amount).astype(np.int64), resolution.fewest)
 
-    # borders at equal parts of ∫ds/size, found in closed form between two places
+    # borders at equal parts of ∫ds/size, found in closed form between two knots
     borders = cells + 1
     of_border = np.repeat(np.arange(len(runs)), borders)
     number = np.arange(len(of_border)) - np.repeat(np.cumsum(borders) - borders, borders)
@@ -134,7 +134,7 @@ def make_grid(
     rest = target - summed[at]
     forth = size[left][at] * np.expm1(g * np.minimum(rest, up[at])) / g
     back_way = size[right][at] * np.expm1(g * np.clip(up[at] + down[at] - rest, 0.0, down[at])) / g
-    border = np.where(rest <= up[at], place[left][at] + forth, place[right][at] - back_way)
+    border = np.where(rest <= up[at], knot[left][at] + forth, knot[right][at] - back_way)
 
     # two more cells per run, next to the stops
     first = np.cumsum(cells + 2) - (cells + 2)

@@ -141,7 +141,7 @@ class Batch:
         bend = self.bend[0] * c + self.bend[1] * after + self.bend[2] * _ahead(after)
         return z, slope, bend
 
-    def places(self, c: Floats, idle: float) -> tuple[list[Floats], list[Floats], Floats]:
+    def seen_by_rows(self, c: Floats, idle: float) -> tuple[list[Floats], list[Floats], Floats]:
         """Arrays z and z′ as rows see them, by `Row.at`, and z″/2; `idle` is the z of slots without node."""
         z, slope, bend = self.forms(c)
         z = z + idle * self.idle
@@ -149,7 +149,7 @@ class Batch:
 
     def slacks(self, c: Floats) -> tuple[Floats, list[Floats]]:
         """(rows, n) distances to the limits, and z by `Row.at`."""
-        z, slope, bend = self.places(c, 1.0)
+        z, slope, bend = self.seen_by_rows(c, 1.0)
         root = [1.0 / np.sqrt(values) for values in z]
         slack = np.empty((len(self.rows), len(c)))
         for row, into in zip(self.rows, slack, strict=True):
@@ -160,7 +160,7 @@ class Batch:
         """Coefficients of constant profiles, one per run, that keep every limit with room to spare."""
         c = np.ones(len(self))
         self.follow(c)
-        z, slope, bend = self.places(c, 1.0)
+        z, slope, bend = self.seen_by_rows(c, 1.0)
         use = np.zeros(len(self))
         for row in self.rows:
             left = np.maximum(_left(row, z, slope, bend), 0.0)
@@ -246,7 +246,7 @@ def _weight_of_z(row: Row, bites: list[Floats]) -> Floats:
 
 def _change(batch: Batch, step: Floats, bites: list[Floats]) -> Floats:
     """(rows, n) linear change of the limits' left minus right sides with a step of the coefficients."""
-    z, slope, bend = batch.places(step, 0.0)
+    z, slope, bend = batch.seen_by_rows(step, 0.0)
     change = np.empty((len(batch.rows), len(step)))
     for row, into in zip(batch.rows, change, strict=True):
         np.multiply(_weight_of_z(row, bites), z[row.at], out=into)

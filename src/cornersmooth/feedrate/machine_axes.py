@@ -27,7 +27,7 @@ from cornersmooth.rotary import rapid_moves, rotary_angles
 
 #: an element whose axis comes nearer to the pole than so many times its own turn is looked at closely there
 NEAR_POLE = 5.0
-#: places at which such an element is searched for its nearest point to the pole, and rounds of closer search
+#: points at which such an element is searched for its nearest point to the pole, and rounds of closer search
 _SEARCHED, _ROUNDS = 17, 4
 #: rotary angles may lie beyond the reach by so many times the cone: as many as `rotary_angles` lets pass
 _CONES = 2.0
@@ -72,7 +72,7 @@ class MachineAxes:
         ----------
         element : (m,) int64
         share : (m,) float64
-            Place on each element as in `motion.derivatives`; infinite derivatives where the tip comes to a stand.
+            Where on each element, as in `motion.derivatives`; infinite derivatives where the tip comes to a stand.
         """
         tip, axis, speed = taylor_along(self.path, element, share)
         position = self.positions(element, share, tip, axis)
@@ -207,7 +207,7 @@ def follow(machine: Machine, path: Path) -> MachineAxes:
 
 
 def _fractions(path: Path, element: Ints, share: Floats) -> Floats:
-    """Part of its move (m,) at which each place on an element lies, as good as a guess of angles needs it."""
+    """Part of its move (m,) at which each point of an element lies, as good as a guess of angles needs it."""
     span = path.span[element]
     part = span[:, 0] + share * (span[:, 1] - span[:, 0])
     curve = path.kind[element] == Kind.CURVE

@@ -32,7 +32,7 @@ def derivatives(path: Path, element: Ints, share: Floats, position: Callable[[Fl
     path : Path
     element : (m,) int64
     share : (m,) float64
-        Place on each element: the part of its length for lines and arcs, the parameter t of its half for curves. Curves
+        Where on each element: the part of its length for lines and arcs, the parameter t of its half for curves. Curves
         of the paper's method are taken at v = u.
     position : callable
         From the Taylor series of tip and unit tool axis, (4, m, 3) each, to that of the position, (4, m, d).
@@ -51,7 +51,7 @@ def derivatives(path: Path, element: Ints, share: Floats, position: Callable[[Fl
 def taylor_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
     """Taylor series of tip and unit tool axis, (4, m, 3) each, and of the speed of the coordinate, (3, m).
 
-    By the place on each element, which is `share` as in `derivatives`.
+    By where it is on each element, which is `share` as in `derivatives`.
     """
     count = len(element)
     tip, lever, speed = np.zeros((taylor.ORDERS, count, 3)), np.zeros((taylor.ORDERS, count, 3)), np.zeros((3, count))

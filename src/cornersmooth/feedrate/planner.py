@@ -156,7 +156,7 @@ def plan_path(
 
 
 def _level_runs(speed_limits: SpeedLimits, runs: Ints, accel: Floats, jerk: Floats) -> tuple[Floats | Ints, ...]:
-    """Pieces of runs with one speed limit: S-curves in closed form."""
+    """Phases of runs with one speed limit: S-curves in closed form."""
     begin, end = speed_limits.edge[speed_limits.run[runs]], speed_limits.edge[speed_limits.run[runs + 1]]
     limit = np.sqrt(speed_limits.cap[speed_limits.run[runs]])
     duration, signed, _ = scurve.rest_to_rest(end - begin, limit, accel[runs], jerk[runs])
@@ -197,7 +197,7 @@ def _uneven_runs(
     resolution: Resolution | None,
     progress: Progress | None,
 ) -> tuple[Floats | Ints, ...]:
-    """Pieces of runs whose speed limit changes on the way: one per cell."""
+    """Phases of runs whose speed limit changes on the way: one per cell."""
     more = None if coefficients is None else coefficients.speed_limits
     grid: Grid = make_grid(speed_limits, runs, accel[runs], jerk[runs], resolution, more)
     of_cell = lookahead.run_of_cells(grid)

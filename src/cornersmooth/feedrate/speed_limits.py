@@ -1,4 +1,4 @@
-"""How fast each stretch of a path may be driven: feed, curvature and junctions as one row of intervals."""
+"""How fast each part of a path may be driven: feed, curvature and junctions as one row of intervals."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SpeedLimits:
 def find_speed_limits(path: Path, limits: Limits) -> SpeedLimits:
     """Intervals of constant speed limit of a whole path.
 
-    The limit of κ·v² is applied over short pieces of each curve with the largest curvature in the piece.
+    The limit of κ·v² is applied over short intervals of each curve with the largest curvature in the interval.
     """
     m = len(path)
     cap = path.speed**2
@@ -46,14 +46,14 @@ def find_speed_limits(path: Path, limits: Limits) -> SpeedLimits:
         bound = limits.centripetal_accel / arcs.curvature(path.program, path.move[arc])
         cap[arc] = np.minimum(cap[arc], bound)
     curve = np.flatnonzero((path.kind == Kind.CURVE) & ~path.turning)
-    which, share, piece_cap = (
+    which, share, interval_cap = (
         np.zeros(0, np.int64),
-        np.zeros((0, bezier_halves.PIECES)),
-        np.zeros((0, bezier_halves.PIECES)),
+        np.zeros((0, bezier_halves.INTERVALS)),
+        np.zeros((0, bezier_halves.INTERVALS)),
     )
     if len(curve) and path.corners is not None:
         half = (path.span[curve, 0] > 0.0).astype(np.int64)
-        which, share, piece_cap = bezier_halves.curvature_limits(
+        which, share, interval_cap = bezier_halves.curvature_limits(
             path.program,
             path.corners,
             path.corner[curve],
@@ -64,9 +64,9 @@ def find_speed_limits(path: Path, limits: Limits) -> SpeedLimits:
         )
         which = curve[which]
 
-    # one slot for the junction before each element, then its pieces
+    # one slot for the junction before each element, then its intervals
     count = np.ones(m, np.int64)
-    count[which] = bezier_halves.PIECES
+    count[which] = bezier_halves.INTERVALS
     joined = np.isfinite(path.junction_speed[:-1]) & (path.junction_speed[:-1] > 0.0)
     begin = np.concatenate(([0], np.cumsum(count + joined)))
     total = int(begin[-1])
@@ -75,9 +75,9 @@ def find_speed_limits(path: Path, limits: Limits) -> SpeedLimits:
     single = count == 1
     width[first[single]] = path.length[single]
     bounds[first[single]] = cap[single]
-    inside = first[which][:, None] + np.arange(bezier_halves.PIECES)
+    inside = first[which][:, None] + np.arange(bezier_halves.INTERVALS)
     width[inside] = share * (path.length[which] / share.sum(axis=1))[:, None]
-    bounds[inside] = piece_cap
+    bounds[inside] = interval_cap
     bounds[begin[:-1][joined]] = path.junction_speed[:-1][joined] ** 2
 
     stops = np.flatnonzero(path.junction_speed == 0.0)

@@ -1,4 +1,4 @@
-"""Where the tool is at any time: a time law in pieces of closed form."""
+"""Where the tool is at any time: a time law of closed-form phases."""
 
 from __future__ import annotations
 
@@ -51,19 +51,19 @@ class States:
 
 @dataclass(frozen=True)
 class TimeLaw:
-    """A motion over time, p pieces.
+    """A motion over time, p phases.
 
-    In a piece either the jerk is constant (`rate` 0), or the acceleration is linear in the way x, a = a₀ + rate·(x−x₀),
+    In a phase either the jerk is constant (`rate` 0), or the acceleration is linear in the way x, a = a₀ + rate·(x−x₀),
     so that the motion is the solution of x″ = a: hyperbolic or circular functions of √|rate|·t, with jerk rate·v.
 
     Parameters
     ----------
     time : (p + 1,) float64, s
-        Starts of the pieces, and the end.
+        Starts of the phases, and the end.
     way : (p + 1,) float64
         Path coordinate, mm (rad where the tip stands still), running on over all elements.
     speed, accel, jerk, rate : (p,) float64
-        At the start of each piece; `jerk` is that of pieces with constant jerk.
+        At the start of each phase; `jerk` is that of phases with constant jerk.
     path : Path
     limits : Limits
     edge : (m + 1,) float64
@@ -98,16 +98,16 @@ class TimeLaw:
         t = np.clip(np.atleast_1d(np.asarray(t, np.float64)), 0.0, self.total)
         if not len(self.speed):
             return (np.zeros_like(t),) * 4
-        piece = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.speed) - 1)
-        return self._inside(piece, t - self.time[piece])
+        phase = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.speed) - 1)
+        return self._inside(phase, t - self.time[phase])
 
-    def _inside(self, piece: Ints, tau: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        v, a, j, rate = self.speed[piece], self.accel[piece], self.jerk[piece], self.rate[piece]
+    def _inside(self, phase: Ints, tau: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        v, a, j, rate = self.speed[phase], self.accel[phase], self.jerk[phase], self.rate[phase]
         c, s1, s2 = _solution(rate, tau)
-        x = self.way[piece] + v * s1 + a * s2 + j * tau**3 / 6.0
+        x = self.way[phase] + v * s1 + a * s2 + j * tau**3 / 6.0
         speed = v * c + a * s1 + 0.5 * j * tau**2
         accel = a * c + rate * v * s1 + j * tau
-        x = np.clip(x, self.way[piece], self.way[piece + 1])
+        x = np.clip(x, self.way[phase], self.way[phase + 1])
         return x, np.maximum(speed, 0.0), accel, j + rate * speed
 
     def times_at(self, way: Floats) -> Floats:
@@ -115,25 +115,25 @@ class TimeLaw:
         way = np.clip(np.asarray(way, np.float64), self.way[0], self.way[-1])
         if not len(self.speed):
             return np.zeros_like(way)
-        piece = np.clip(np.searchsorted(self.way, way, side="right") - 1, 0, len(self.speed) - 1)
-        gone = way - self.way[piece]
-        v, rate = self.speed[piece], self.rate[piece]
-        squared = v * v + gone * (2.0 * self.accel[piece] + rate * gone)
+        phase = np.clip(np.searchsorted(self.way, way, side="right") - 1, 0, len(self.speed) - 1)
+        gone = way - self.way[phase]
+        v, rate = self.speed[phase], self.rate[phase]
+        squared = v * v + gone * (2.0 * self.accel[phase] + rate * gone)
         both = v + np.sqrt(np.maximum(squared, 0.0))
         moving = both > 0.0
         tau = crossing_time(np.where(moving, gone, 0.0), np.where(moving, both, 1.0), rate)
-        hard = np.flatnonzero((self.jerk[piece] != 0.0) & (gone > 0.0))
-        tau[hard] = self._halve(piece[hard], way[hard])
+        hard = np.flatnonzero((self.jerk[phase] != 0.0) & (gone > 0.0))
+        tau[hard] = self._halve(phase[hard], way[hard])
         # coming to rest, the time hangs on the last digits of the way: the end itself is exact
         tau = np.where(way >= self.way[-1], np.inf, tau)
-        return np.asarray(self.time[piece] + np.minimum(tau, self.time[piece + 1] - self.time[piece]), np.float64)
+        return np.asarray(self.time[phase] + np.minimum(tau, self.time[phase + 1] - self.time[phase]), np.float64)
 
-    def _halve(self, piece: Ints, way: Floats) -> Floats:
-        """Times inside pieces of constant jerk by halving: the way never runs backwards."""
-        low, high = np.zeros(len(way)), self.time[piece + 1] - self.time[piece]
+    def _halve(self, phase: Ints, way: Floats) -> Floats:
+        """Times inside phases of constant jerk by halving: the way never runs backwards."""
+        low, high = np.zeros(len(way)), self.time[phase + 1] - self.time[phase]
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            before = self._inside(piece, middle)[0] < way
+            before = self._inside(phase, middle)[0] < way
             low, high = np.where(before, middle, low), np.where(before, high, middle)
         return 0.5 * (low + high)
 
@@ -172,7 +172,7 @@ class TimeLaw:
             return (np.zeros((len(x), 5)),) * 4
         element = np.clip(np.searchsorted(self.edge, x[:, 0], side="right") - 1, 0, len(path) - 1)
         local = np.clip(x[:, 0] - self.edge[element], 0.0, path.length[element])
-        q, one, two, three = self.machine_axes.orders(element, places(path, element, local))
+        q, one, two, three = self.machine_axes.orders(element, shares_at(path, element, local))
         # a tip that comes to a stand has no derivatives by its way
         one, two, three = (np.where(np.isfinite(order), order, 0.0) for order in (one, two, three))
         return q, one * v, two * v * v + one * a, three * v**3 + 3.0 * two * v * a + one * j
@@ -239,7 +239,7 @@ def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats, Flo
     return tip, axis, kappa
 
 
-def places(path: Path, element: Ints, local: Floats) -> Floats:
+def shares_at(path: Path, element: Ints, local: Floats) -> Floats:
     """Where (m,) a coordinate `local` from each element's start lies: share of the length, or parameter t on curves."""
     share = local / np.maximum(path.length[element], np.finfo(np.float64).tiny)
     corners = path.corners

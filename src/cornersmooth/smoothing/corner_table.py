@@ -15,7 +15,7 @@ from cornersmooth.smoothing.legs import Legs, legs_at
 from cornersmooth.smoothing.shape import corner_weight
 
 #: corners worked on at once: their intermediate arrays fit the processor's cache
-BLOCK = 16384
+BATCH = 16384
 
 
 class ShapedCorners(NamedTuple):
@@ -28,7 +28,7 @@ class ShapedCorners(NamedTuple):
 
 @dataclass(frozen=True)
 class CornerTable:
-    """All corners of a program, looked at in blocks.
+    """All corners of a program, looked at in batches.
 
     Parameters
     ----------
@@ -47,10 +47,10 @@ class CornerTable:
     after: Ints
     status: NDArray[np.uint8]
 
-    def blocks(self) -> Iterator[tuple[int, Ints]]:
-        """Start of each block and its rows that nothing forbids to smooth."""
-        for start in range(0, len(self.pose), BLOCK):
-            yield start, start + np.flatnonzero(self.status[start : start + BLOCK] == Status.SMOOTHED)
+    def batches(self) -> Iterator[tuple[int, Ints]]:
+        """Start of each batch and its rows that nothing forbids to smooth."""
+        for start in range(0, len(self.pose), BATCH):
+            yield start, start + np.flatnonzero(self.status[start : start + BATCH] == Status.SMOOTHED)
 
     def shaped(self, rows: Ints) -> ShapedCorners:
         """Segments at some corners, and the shape of their curves."""

@@ -82,5 +82,5 @@ def _ranges(start: Ints, length: Ints) -> Ints:
     """Concatenation of ``start[i] .. start[i] + length[i] - 1``."""
     total = int(length.sum())
     begin = np.cumsum(length) - length
-    places: Ints = np.arange(total) + np.repeat(start - begin, length)
-    return places
+    ranges: Ints = np.arange(total) + np.repeat(start - begin, length)
+    return ranges

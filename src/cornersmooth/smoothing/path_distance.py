@@ -25,7 +25,7 @@ from cornersmooth.smoothing.segments import lines_of
 from cornersmooth.vectors import dot, norm
 
 #: corners looked at together
-_BLOCK = 4096
+_BATCH = 4096
 
 #: points of the first look at a curve, rounds of looking closer, and points of each
 _FIRST, _ROUNDS, _CLOSER = 17, 5, 7
@@ -109,8 +109,8 @@ def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple
     tip, axis_point = corners.tip_error[rows].copy(), corners.axis_error[rows].copy()
     if not METHODS[smoothed.settings.method].one_parameter:
         return tip, axis_point
-    for begin in range(0, len(rows), _BLOCK):
-        chosen = begin + np.flatnonzero(corners.smoothed[rows[begin : begin + _BLOCK]])
+    for begin in range(0, len(rows), _BATCH):
+        chosen = begin + np.flatnonzero(corners.smoothed[rows[begin : begin + _BATCH]])
         if not len(chosen):
             continue
         transitions = _Transitions.of(smoothed, rows[chosen])
@@ -123,16 +123,16 @@ def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple
 def _passing(transitions: _Transitions, lines: Ints | None, common: Floats, *, whole: bool) -> Floats:
     """How near tip path or (`whole`) axis-point path pass the corner, no farther than at the common parameter."""
 
-    def place(some: _Transitions, u: Floats) -> Floats:
+    def point_at(some: _Transitions, u: Floats) -> Floats:
         return some.axis_point(u) if whole else some.at(u)[0]
 
-    near = place(transitions, np.array([0.5 - 1e-5, 0.5, 0.5 + 1e-5]))
+    near = point_at(transitions, np.array([0.5 - 1e-5, 0.5, 0.5 + 1e-5]))
     along, off = near[:, 2] - near[:, 0], near[:, 1]
     aslant = np.flatnonzero(np.abs(dot(along, off)) > _SQUARE * norm(along) * norm(off))
     passing = common.copy()
     if lines is None:
         some = transitions.only(aslant)
-        passing[aslant] = np.minimum(common[aslant], _nearest_on_curve(lambda u: place(some, u), len(aslant)))
+        passing[aslant] = np.minimum(common[aslant], _nearest_on_curve(lambda u: point_at(some, u), len(aslant)))
         return passing
     for number in np.unique(lines[aslant]):
         chosen = aslant[lines[aslant] == number]
@@ -142,11 +142,11 @@ def _passing(transitions: _Transitions, lines: Ints | None, common: Floats, *, w
     return passing
 
 
-def _nearest_on_curve(place: Callable[[Floats], Floats], count: int) -> Floats:
-    """(count,) least distance of curves from their corners; `place` takes parameters (count, m) to points."""
+def _nearest_on_curve(point_at: Callable[[Floats], Floats], count: int) -> Floats:
+    """(count,) least distance of curves from their corners; `point_at` takes parameters (count, m) to points."""
     low, step, points = np.zeros(count), 1.0 / (_FIRST - 1), _FIRST
     for _ in range(_ROUNDS):
-        point = place(low[:, None] + step * np.arange(points))
+        point = point_at(low[:, None] + step * np.arange(points))
         square = dot(point, point)
         best = np.clip(square.argmin(axis=1), 1, points - 2)
         low, step, points = low + (best - 1) * step, 2.0 * step / (_CLOSER - 1), _CLOSER
@@ -163,10 +163,10 @@ def _nearest_on_lines(transitions: _Transitions, tip: Floats, lever: Floats, *, 
     start, way = point[:, :-1], np.diff(point, axis=1)
     size = dot(way, way)
     share = np.clip(np.divide(-dot(start, way), size, out=np.zeros_like(size), where=size > 0), 0.0, 1.0)[..., None]
-    place = start + share * way
+    nearest = start + share * way
     if whole:  # the control turns the tool between the ends of a line
         turned = lever[:, :-1] + share * np.diff(lever, axis=1)
         turned *= (transitions.height / norm(turned))[..., None]
-        place = tip[:, :-1] + share * np.diff(tip, axis=1) + turned - transitions.lever[:, None, :]
-    least: Floats = norm(place).min(axis=1)
+        nearest = tip[:, :-1] + share * np.diff(tip, axis=1) + turned - transitions.lever[:, None, :]
+    least: Floats = norm(nearest).min(axis=1)
     return least

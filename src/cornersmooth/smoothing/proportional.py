@@ -165,7 +165,7 @@ class Proportional(Construction):
         if table.settings.allocation != "fair":
             return None
         length_in, length_out, length, cosine = np.zeros((4, len(table.pose)))
-        for _, rows in table.blocks():
+        for _, rows in table.batches():
             if len(rows):
                 asked = wanted(*table.shaped(rows), table.settings)
                 length_in[rows], length_out[rows], cosine[rows] = asked.length_in, asked.length_out, asked.cosine

@@ -23,7 +23,7 @@ from cornersmooth.vectors import unit
 
 @dataclass(frozen=True)
 class Rows:
-    """A stretch of the smoothed motion, r rows in path order.
+    """A part of the smoothed motion, r rows in path order.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class _Block:
+class _Batch:
     """Poses begin to end − 1 and the rows they make, filled in place."""
 
     poses: Ints
@@ -74,12 +74,12 @@ class _Block:
 
 
 def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384) -> Iterator[Rows]:
-    """Rows of the smoothed motion as lines with tool vectors, in blocks of about `poses` poses.
+    """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses.
 
     Parameters
     ----------
     circles : (k,) int64, optional
-        Number of circular pieces that each arc of the program is written as, 0 for lines; all lines by default.
+        Number of circular arcs that each arc of the program is written as, 0 for lines; all lines by default.
 
     Yields
     ------
@@ -94,19 +94,19 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
     counts[rounded] = np.where(segments.has_line[rounded], segments.lines[rounded], 0) + 2 * np.abs(
         halves[corners.smoothed]
     )
-    pieces = _pieces(smoothed, circles)
-    for block in _blocks(smoothed, counts, pieces, poses):
-        sharp = (segments.row[block.poses] < 0) & (block.last > block.first)
-        at = block.last[sharp] - 1
-        block.tip[at], block.other[at] = program.tip[block.poses[sharp]], program.axis[block.poses[sharp]]
-        _fill_divided(smoothed, segments, block)
-        _fill_transitions(smoothed, segments, block, halves)
-        arc = _fill_arcs(smoothed, block, pieces, circles)
-        yield Rows(block.tip, block.other, block.move, *_no_curves(len(block.tip)), arc=arc)
+    arc_counts = _arc_row_counts(smoothed, circles)
+    for batch in _batches(smoothed, counts, arc_counts, poses):
+        sharp = (segments.row[batch.poses] < 0) & (batch.last > batch.first)
+        at = batch.last[sharp] - 1
+        batch.tip[at], batch.other[at] = program.tip[batch.poses[sharp]], program.axis[batch.poses[sharp]]
+        _fill_divided(smoothed, segments, batch)
+        _fill_transitions(smoothed, segments, batch, halves)
+        arc = _fill_arcs(smoothed, batch, arc_counts, circles)
+        yield Rows(batch.tip, batch.other, batch.move, *_no_curves(len(batch.tip)), arc=arc)
 
 
 def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16384) -> Iterator[Rows]:
-    """Rows of the smoothed motion as lines and curve pairs, in blocks of about `poses` poses.
+    """Rows of the smoothed motion as lines and curve pairs, in batches of about `poses` poses.
 
     Parameters
     ----------
@@ -122,38 +122,38 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
     segments = segments_of(smoothed, dense=divide)
     counts = np.where(segments.has_line, segments.lines, 0) + np.where(segments.row >= 0, 5, 0)
     counts[segments.skip] = 0
-    pieces = _pieces(smoothed)
-    for block in _blocks(smoothed, counts, pieces, poses):
-        row = segments.row[block.poses]
+    arc_counts = _arc_row_counts(smoothed)
+    for batch in _batches(smoothed, counts, arc_counts, poses):
+        row = segments.row[batch.poses]
         if divide:
-            _fill_divided(smoothed, segments, block)
-            block.other[:] = block.tip + height * block.other
-        sharp = (row < 0) & (block.last > block.first)
-        pose, at = block.poses[sharp], block.last[sharp] - 1
-        block.tip[at] = program.tip[pose]
-        block.other[at] = program.tip[pose] + height * program.axis[pose]
-        _fill_arcs(smoothed, block, pieces, height=height)
+            _fill_divided(smoothed, segments, batch)
+            batch.other[:] = batch.tip + height * batch.other
+        sharp = (row < 0) & (batch.last > batch.first)
+        pose, at = batch.poses[sharp], batch.last[sharp] - 1
+        batch.tip[at] = program.tip[pose]
+        batch.other[at] = program.tip[pose] + height * program.axis[pose]
+        _fill_arcs(smoothed, batch, arc_counts, height=height)
 
-        curve, joined = _no_curves(len(block.tip))
-        weights = np.ones((len(block.tip), 2))
-        pose, first = block.poses[row >= 0], block.last[row >= 0] - 5
+        curve, joined = _no_curves(len(batch.tip))
+        weights = np.ones((len(batch.tip), 2))
+        pose, first = batch.poses[row >= 0], batch.last[row >= 0] - 5
         if len(pose):
             tip_curve, axis_curve = nurbs.control_points(program, corners, segments.row[pose], height)
-            places = first[:, None] + np.arange(5)
-            block.tip[places], block.other[places] = tip_curve, axis_curve
-            curve[places] = np.arange(1, 6)
-            weights[places] = corners.weights[segments.row[pose]][:, None, :]
+            at = first[:, None] + np.arange(5)
+            batch.tip[at], batch.other[at] = tip_curve, axis_curve
+            curve[at] = np.arange(1, 6)
+            weights[at] = corners.weights[segments.row[pose]][:, None, :]
             line = segments.has_line[pose]
             joined[first] = ~line
-            block.tip[first[line] - 1], block.other[first[line] - 1] = tip_curve[line, 0], axis_curve[line, 0]
-        yield Rows(block.tip, block.other, block.move, curve, joined, weights)
+            batch.tip[first[line] - 1], batch.other[first[line] - 1] = tip_curve[line, 0], axis_curve[line, 0]
+        yield Rows(batch.tip, batch.other, batch.move, curve, joined, weights)
 
 
 def _no_curves(count: int) -> tuple[NDArray[np.int8], Bools]:
     return np.zeros(count, np.int8), np.zeros(count, np.bool_)
 
 
-def _pieces(smoothed: SmoothProgram, circles: Ints | None = None) -> Ints:
+def _arc_row_counts(smoothed: SmoothProgram, circles: Ints | None = None) -> Ints:
     """(k,) number of rows of each arc."""
     if not len(smoothed.program.arcs):
         return np.zeros(0, np.int64)
@@ -161,36 +161,36 @@ def _pieces(smoothed: SmoothProgram, circles: Ints | None = None) -> Ints:
     return lines if circles is None else np.where(circles > 0, circles, lines)
 
 
-def _blocks(smoothed: SmoothProgram, counts: Ints, pieces: Ints, poses: int) -> Iterator[_Block]:
-    """Blocks of empty rows, `counts` of them for each pose, `pieces` for each arc."""
+def _batches(smoothed: SmoothProgram, counts: Ints, arc_counts: Ints, poses: int) -> Iterator[_Batch]:
+    """Batches of empty rows, `counts` of them for each pose, `arc_counts` for each arc."""
     program = smoothed.program
-    counts[program.arcs.pose] = pieces
+    counts[program.arcs.pose] = arc_counts
     for begin in range(0, len(program), poses):
         own = np.arange(begin, min(begin + poses, len(program)))
         last = np.cumsum(counts[own])
         total = int(last[-1])
-        yield _Block(
+        yield _Batch(
             own, last - counts[own], last, np.zeros((total, 3)), np.zeros((total, 3)), np.repeat(own, counts[own])
         )
 
 
 def _fill_arcs(
-    smoothed: SmoothProgram, block: _Block, pieces: Ints, circles: Ints | None = None, height: float | None = None
+    smoothed: SmoothProgram, batch: _Batch, arc_counts: Ints, circles: Ints | None = None, height: float | None = None
 ) -> Ints | None:
-    """Points of the arcs in the block with their axes or axis points; returns `Rows.arc`."""
+    """Points of the arcs in the batch with their axes or axis points; returns `Rows.arc`."""
     arcs = smoothed.program.arcs.pose
-    inside = np.flatnonzero((arcs >= block.poses[0]) & (arcs <= block.poses[-1]))
+    inside = np.flatnonzero((arcs >= batch.poses[0]) & (arcs <= batch.poses[-1]))
     if not len(inside):
         return None
-    local, share = divided(pieces[inside])
+    local, share = divided(arc_counts[inside])
     rows = inside[local]
-    where = np.flatnonzero(np.isin(block.move, arcs[inside]))
+    where = np.flatnonzero(np.isin(batch.move, arcs[inside]))
     tip, axis = arc_points(smoothed.program, rows, share)
-    block.tip[where] = tip
-    block.other[where] = axis if height is None else tip + height * axis
+    batch.tip[where] = tip
+    batch.other[where] = axis if height is None else tip + height * axis
     if circles is None:
         return None
-    arc = np.full(len(block.tip), -1, np.int64)
+    arc = np.full(len(batch.tip), -1, np.int64)
     arc[where] = np.where(circles[rows] > 0, rows, -1)
     return arc
 
@@ -203,11 +203,11 @@ def nodes(lines: int) -> Floats:
     return np.concatenate((u, 1.0 - u[-2::-1], [1.0]))
 
 
-def _fill_transitions(smoothed: SmoothProgram, segments: Segments, block: _Block, halves: Ints) -> None:
-    """Points of the transitions of the block, first point included; corners of equal count together."""
+def _fill_transitions(smoothed: SmoothProgram, segments: Segments, batch: _Batch, halves: Ints) -> None:
+    """Points of the transitions of the batch, first point included; corners of equal count together."""
     construction = construction_of(smoothed.settings.method)
-    here = segments.row[block.poses] >= 0
-    poses, last = block.poses[here], block.last[here]
+    here = segments.row[batch.poses] >= 0
+    poses, last = batch.poses[here], batch.last[here]
     rows = segments.row[poses]
     number = halves[rows]
     for lines in np.unique(number):
@@ -215,22 +215,22 @@ def _fill_transitions(smoothed: SmoothProgram, segments: Segments, block: _Block
         u = nodes(int(lines))
         points, levers = construction.points(smoothed, rows[chosen], u)
         where = (last[chosen] - len(u))[:, None] + np.arange(len(u))
-        block.tip[where], block.other[where] = points[:, 1:], unit(levers[:, 1:])
-        block.move[where[:, len(u) // 2 :]] = segments.following[poses[chosen]][:, None]
+        batch.tip[where], batch.other[where] = points[:, 1:], unit(levers[:, 1:])
+        batch.move[where[:, len(u) // 2 :]] = segments.following[poses[chosen]][:, None]
         first = segments.has_line[poses[chosen]]
         at = where[first, 0] - 1
-        block.tip[at], block.other[at] = points[first, 0], unit(levers[first, 0])
+        batch.tip[at], batch.other[at] = points[first, 0], unit(levers[first, 0])
 
 
-def _fill_divided(smoothed: SmoothProgram, segments: Segments, block: _Block) -> None:
+def _fill_divided(smoothed: SmoothProgram, segments: Segments, batch: _Batch) -> None:
     """Inner points of the straight remainders that are written as several lines."""
     program, settings = smoothed.program, smoothed.settings
     construction = construction_of(settings.method)
-    lines = np.where(segments.has_line[block.poses] & (block.last > block.first), segments.lines[block.poses], 1)
+    lines = np.where(segments.has_line[batch.poses] & (batch.last > batch.first), segments.lines[batch.poses], 1)
     for number in np.unique(lines):
         if number < 2:
             continue
-        pose, first = block.poses[lines == number], block.first[lines == number]
+        pose, first = batch.poses[lines == number], batch.first[lines == number]
         start = segments.start[pose]
         remainders = Remainders(
             start,
@@ -241,5 +241,5 @@ def _fill_divided(smoothed: SmoothProgram, segments: Segments, block: _Block) ->
         fraction, axis = construction.divide(program, settings, remainders, int(number))
         rows = first[:, None] + np.arange(number - 1)
         step = program.tip[pose] - program.tip[start]
-        block.tip[rows] = program.tip[start][:, None] + fraction[..., None] * step[:, None]
-        block.other[rows] = axis
+        batch.tip[rows] = program.tip[start][:, None] + fraction[..., None] * step[:, None]
+        batch.other[rows] = axis

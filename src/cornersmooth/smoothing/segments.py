@@ -22,7 +22,7 @@ from cornersmooth.vectors import norm, square
 _BEND_PER_CHORD = 1.0 / PAPER_ERROR
 
 #: poses or corners measured at once: their intermediate arrays fit the processor's cache
-_BLOCK = 16384
+_BATCH = 16384
 
 #: most lines in one half of a transition and in one straight remainder
 _MOST_LINES = 20_000
@@ -70,10 +70,10 @@ def segments_of(smoothed: SmoothProgram, *, dense: bool) -> Segments:
     axis_entry, axis_leave = entry, leave
     if corners.axis_trim_in is not corners.trim_in:
         axis_entry, axis_leave = _ends(n, corners.pose, corners.axis_trim_in, corners.axis_trim_out, linear, known)
-    line, pieces = np.ones(n, np.bool_), np.ones(n, np.int64)
-    segments = Segments(row, skip, start, following, entry, leave, axis_entry, axis_leave, line, pieces)
-    for begin in range(0, n, _BLOCK):
-        poses = begin + np.flatnonzero(linear[begin : begin + _BLOCK] & ~skip[begin : begin + _BLOCK])
+    has_line, lines = np.ones(n, np.bool_), np.ones(n, np.int64)
+    segments = Segments(row, skip, start, following, entry, leave, axis_entry, axis_leave, has_line, lines)
+    for begin in range(0, n, _BATCH):
+        poses = begin + np.flatnonzero(linear[begin : begin + _BATCH] & ~skip[begin : begin + _BATCH])
         _measure_remainders(smoothed, segments, poses, dense=dense)
     return segments
 
@@ -138,18 +138,18 @@ def _divide(settings: Settings, segments: Segments, poses: Ints, chord: Floats) 
     high = np.arctan((2.0 * segments.axis_exit[pose] - 1.0) * np.tan(half))
     turn = high - low
     as_one = turn**2 / 4.0 * np.abs(np.tan((low + high) / 2.0)) + turn**3 / 54.0
-    pieces = np.ceil(turn / _turn_limit(settings, np.maximum(np.abs(low), np.abs(high))) - 1e-9)
+    lines = np.ceil(turn / _turn_limit(settings, np.maximum(np.abs(low), np.abs(high))) - 1e-9)
     if settings.axis_step is None:
-        pieces[as_one <= share] = 1
-    segments.lines[pose] = np.clip(pieces, 1, _MOST_LINES).astype(np.int64)
+        lines[as_one <= share] = 1
+    segments.lines[pose] = np.clip(lines, 1, _MOST_LINES).astype(np.int64)
 
 
 def lines_per_half(smoothed: SmoothProgram) -> Ints:
     """(k,) lines per half of every transition: n for nodes (j/n)^(2/3), −n for nodes j/n; 0 where not smoothed."""
     lines = np.zeros(len(smoothed.corners), np.int64)
     rows = np.flatnonzero(smoothed.corners.smoothed)
-    for block in np.array_split(rows, max(1, len(rows) // _BLOCK)):
-        lines[block] = lines_of(smoothed, block)
+    for batch in np.array_split(rows, max(1, len(rows) // _BATCH)):
+        lines[batch] = lines_of(smoothed, batch)
     return lines
 
 

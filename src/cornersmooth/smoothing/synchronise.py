@@ -81,13 +81,13 @@ def _follow(values: Floats, low_limit: Floats, target: Floats, excess: Callable[
     at_limit = excess(low_limit)
     below = _GRID[None, :] < low_limit[:, None]
     values = np.where(below, at_limit[:, None], values)
-    places = np.maximum(_GRID[None, :], low_limit[:, None])
+    parameters = np.maximum(_GRID[None, :], low_limit[:, None])
     crossing = (values[:, :-1] <= 0.0) != (values[:, 1:] <= 0.0)
-    distance = np.maximum(places[:, :-1] - target[:, None], target[:, None] - places[:, 1:])
+    distance = np.maximum(parameters[:, :-1] - target[:, None], target[:, None] - parameters[:, 1:])
     cell = np.argmin(np.where(crossing, np.maximum(distance, 0.0), np.inf), axis=1)
     has_root = crossing.any(axis=1)
 
-    low, high = places[rows, cell], places[rows, cell + 1]
+    low, high = parameters[rows, cell], parameters[rows, cell + 1]
     negative_low = values[rows, cell] <= 0.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
@@ -98,22 +98,22 @@ def _follow(values: Floats, low_limit: Floats, target: Floats, excess: Callable[
     root = np.where(
         (np.abs(at_limit) <= 1e-12) & (np.abs(target - low_limit) <= np.abs(target - root)), low_limit, root
     )
-    return np.where(has_root, root, _closest(values, places, excess))
+    return np.where(has_root, root, _closest(values, parameters, excess))
 
 
-def _closest(values: Floats, places: Floats, excess: Callable[[Floats], Floats]) -> Floats:
+def _closest(values: Floats, parameters: Floats, excess: Callable[[Floats], Floats]) -> Floats:
     """Parameter with the smallest ``|excess|``: grid minimum refined by ternary search in its two cells."""
     rows = np.arange(len(values))
     best = np.argmin(np.abs(values), axis=1)
-    low = places[rows, np.maximum(best - 1, 0)]
-    high = places[rows, np.minimum(best + 1, len(_GRID) - 1)]
+    low = parameters[rows, np.maximum(best - 1, 0)]
+    high = parameters[rows, np.minimum(best + 1, len(_GRID) - 1)]
     for _ in range(_HALVINGS):
         third = (high - low) / 3.0
         left, right = low + third, high - third
         keep_left = np.abs(excess(left)) <= np.abs(excess(right))
         low, high = np.where(keep_left, low, left), np.where(keep_left, right, high)
     middle = 0.5 * (low + high)
-    candidates = np.stack((middle, low, high, places[rows, best]))
+    candidates = np.stack((middle, low, high, parameters[rows, best]))
     misses = np.abs(np.stack([excess(candidate) for candidate in candidates]))
     closest: Floats = candidates[np.argmin(misses, axis=0), rows]
     return closest

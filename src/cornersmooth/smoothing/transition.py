@@ -1,6 +1,6 @@
 """Where the path is rounded and how far each transition reaches: design 3.1 to 3.3.
 
-Every function works on whole arrays of corners; memory is bounded by working through them in blocks.
+Every function works on whole arrays of corners; memory is bounded by working through them in batches.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Corners, FeedMode, Ints, Move, Program, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.corner_table import BLOCK, CornerTable, Placed
+from cornersmooth.smoothing.corner_table import BATCH, CornerTable, Placed
 from cornersmooth.smoothing.neighbours import find_neighbours
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 #: what a method measures of every transition
 _MEASURES = tuple(name for name in Placed.__dataclass_fields__ if name not in ("status", "limited_by", "extra"))
 
-#: blocks worked on side by side
+#: batches worked on side by side
 THREADS = 2
 
 
@@ -42,7 +42,7 @@ def place_corners(
     settings : Settings
     construction : Construction
     progress : callable, optional
-        Called with (corners done, corners in all) after each block.
+        Called with (corners done, corners in all) after each batch.
 
     Returns
     -------
@@ -68,8 +68,8 @@ def place_corners(
     if METHODS[settings.method].one_parameter:  # the same fractions on both curves: one array
         whole.axis_trim_in, whole.axis_trim_out = whole.trim_in, whole.trim_out
 
-    def settle(block: tuple[int, Ints]) -> int:
-        start, rows = block
+    def settle(batch: tuple[int, Ints]) -> int:
+        start, rows = batch
         if len(rows):
             shaped = table.shaped(rows)
             part = construction.place(shaped, settings, None if room is None else room[rows])
@@ -79,10 +79,10 @@ def place_corners(
                 getattr(whole, name)[rows] = getattr(part, name)
             for name, values in part.extra.items():
                 whole.extra[name][rows] = values
-        return min(start + BLOCK, k)
+        return min(start + BATCH, k)
 
-    with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; blocks share no rows
-        for done in pool.map(settle, table.blocks()):
+    with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; batches share no rows
+        for done in pool.map(settle, table.batches()):
             if progress is not None:
                 progress(done, k)
     ratio = np.broadcast_to(np.float64(settings.ratio), (k,))
