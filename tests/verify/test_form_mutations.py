@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import io
-from collections import Counter
-from functools import cache
+from functools import partial
 
 import pytest
 
-from cornersmooth.errors import InputError
-from cornersmooth.kinematics import Machine
+from cornersmooth.model import Program
 from cornersmooth.nc import fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
@@ -17,7 +15,7 @@ from cornersmooth.verify import verify
 from nc.cases import RUNNABLE, Case
 
 from .form_mutations import EPS, H, mutants, program_of
-from .writing import encode
+from .judging import judge
 
 #: every control in every form; Mitsubishi's lines and those of the neutral form are FANUC's
 CASES = [case for case in RUNNABLE if case.machine in ("", "xyzac-trt" if case.control == "linuxcnc" else "table-ac")]
@@ -28,60 +26,35 @@ CASES = [
 ]
 
 
-def text_of(case: Case) -> list[str]:
-    """Lines of the program of all mutants."""
+def text_of(case: Case, program: Program) -> list[str]:
+    """Lines of a program."""
     form = case.choose()
     settings = fit_settings(Settings(tolerance=EPS, axis_length=H), form, "mm")
     stream = io.BytesIO()
-    write(smooth(program_of(case), settings), stream, form=form)
+    write(smooth(program, settings), stream, form=form)
     return stream.getvalue().decode("ascii").splitlines()
 
 
-@cache
-def machine_of(case: Case) -> Machine | None:
-    """Machine of the control."""
-    return case.choose().machine
-
-
-def lines_named(case: Case, text: bytes) -> list[tuple[int, str]]:
+def named_in(case: Case, program: Program, lines: list[str]) -> list[tuple[int, str]]:
     """What is wrong, and where."""
-    try:
-        found = verify(
-            program_of(case),
-            text,
-            tolerance=EPS,
-            axis_length=H,
-            control=case.control,
-            machine=machine_of(case),
-            tcp=case.tcp,
-        )
-    except InputError as error:
-        return [(error.line or 0, str(error))]
+    found = verify(
+        program,
+        ("\n".join(lines) + "\n").encode("latin-1"),
+        tolerance=EPS,
+        axis_length=H,
+        control=case.control,
+        machine=case.choose().machine,
+        tcp=case.tcp,
+    )
     return [(problem.nc_line, f"{problem.code} {problem.text}") for problem in found.problems]
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_every_mutant_that_matters_is_found(case: Case) -> None:
-    lines = text_of(case)
-    assert lines_named(case, encode(lines)) == []
-    score, missed = Counter(), []
-    for mutant in mutants(case, lines):
-        named = lines_named(case, ("\n".join(mutant.lines) + "\n").encode("latin-1"))
-        if mutant.where is None:
-            good = not named
-        else:
-            good = any(mutant.where[0] <= line <= mutant.where[1] for line, _ in named)
-        score[mutant.kind, good] += 1
-        if not good:
-            missed.append(
-                (
-                    mutant.kind,
-                    mutant.where,
-                    named[:3],
-                    [b for a, b in zip(lines, mutant.lines, strict=False) if a != b][:1],
-                )
-            )
-    total = sum(score.values())
-    print(f"\n{case}: {total - len(missed)} of {total} mutants judged rightly")
-    assert missed == []
-    assert total >= 40
+    program = program_of(case)
+    lines = text_of(case, program)
+    assert named_in(case, program, lines) == []
+    score = judge(program, lines, mutants(case, lines), partial(text_of, case), partial(named_in, case))
+    print(f"\n{case}: {score}")
+    assert score.missed == []
+    assert sum(score.judged.values()) >= 40
