@@ -1,0 +1,8 @@
+"""The report as a page: path, corners, surface and charts in one file that opens in any browser, without network."""
+
+from __future__ import annotations
+
+from cornersmooth.page.document import page
+from cornersmooth.page.scene import Story, Subject
+
+__all__ = ["Story", "Subject", "page"]

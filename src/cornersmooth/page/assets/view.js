@@ -1,0 +1,457 @@
+// The view in three dimensions.
+
+/** More segments than this are drawn as thin lines. */
+const MOST_WIDE = 150000;
+const MOST_WHISKERS = 1500;
+const MOST_RIBS = 20000;
+/** Milliseconds of a flight to a corner. */
+const FLIGHT = 450;
+
+class View {
+  /** @param {Meta} meta @param {Record<string, Values>} arrays @param {HTMLCanvasElement} canvas */
+  constructor(meta, arrays, canvas) {
+    this.meta = meta;
+    this.arrays = arrays;
+    this.canvas = canvas;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(30, 1, 0.1, 1000);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new THREE.OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.controls.dampingFactor = 0.15;
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener("change", () => this.touch());
+    this.scene.add(new THREE.AmbientLight(0xffffff, 1.6));
+    const sun = new THREE.DirectionalLight(0xffffff, 2.2);
+    sun.position.set(0.4, -0.7, 1);
+    this.camera.add(sun);
+    this.scene.add(this.camera);
+    this.wide = /** @type {InstanceType<typeof THREE.LineMaterial>[]} */ ([]);
+    this.height = meta.axis_length;
+    this.bounds = this.boundsOf();
+    this.wanted = { tool: true };
+    /** @type {"surface" | "whiskers" | "none"} */
+    this.axes = "surface";
+    this.drawn = 0;
+    this.waiting = false;
+    this.flight = 0;
+    const { o_tip: tip, o_move: move } = arrays;
+    const cuts = [];
+    const rapids = [];
+    for (let i = 1; i < move.length; i++) {
+      if (move[i] === 2) cuts.push(i);
+      else if (move[i] === 1) rapids.push(i);
+    }
+    this.original = new THREE.LineSegments(pairs(tip, cuts), new THREE.LineBasicMaterial({ color: 0x808080 }));
+    this.rapids = new THREE.LineSegments(
+      pairs(tip, rapids),
+      new THREE.LineDashedMaterial({ color: 0xc08020, dashSize: this.bounds.radius / 60, gapSize: this.bounds.radius / 90 }),
+    );
+    this.rapids.computeLineDistances();
+    this.rapids.visible = false;
+    this.segments = this.writtenSegments();
+    this.written = this.buildWritten();
+    this.ribs = this.buildRibs();
+    this.whiskers = this.buildWhiskers();
+    this.markers = this.buildMarkers();
+    this.ring = this.buildRing();
+    this.surface = this.buildSurface();
+    this.tool = new THREE.Group();
+    /** @type {number} */
+    this.toolShape = -1;
+    this.spot = new THREE.Points(
+      new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(new Float32Array(3), 3)),
+      new THREE.PointsMaterial({ size: 11, sizeAttenuation: false, map: sprite("disk"), transparent: true, depthTest: false }),
+    );
+    this.spot.visible = false;
+    this.spot.frustumCulled = false;
+    this.spot.renderOrder = 6;
+    this.original.renderOrder = 1;
+    this.scene.add(this.original, this.rapids, this.ribs, this.whiskers, this.written, this.markers, this.ring, this.tool, this.spot);
+    if (this.surface) this.scene.add(this.surface);
+    this.setAxes(this.axes);
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+    this.fit();
+  }
+
+  /** Sphere about all cutting moves; `this.cloud` has points of tip and axis for fitting. */
+  boundsOf() {
+    const { w_tip: tip, w_axis: axis, w_rapid: rapid } = this.arrays;
+    const sphere = new THREE.Sphere();
+    /** @type {Vector[]} */
+    this.cloud = [];
+    const step = Math.max(1, Math.floor(rapid.length / 6000));
+    for (let i = 0; i < rapid.length; i += step) {
+      if (rapid[i]) continue;
+      const foot = new THREE.Vector3(tip[3 * i], tip[3 * i + 1], tip[3 * i + 2]);
+      const lean = new THREE.Vector3(axis[3 * i], axis[3 * i + 1], axis[3 * i + 2]);
+      this.cloud.push(foot, foot.clone().addScaledVector(lean, this.height / 32767));
+    }
+    if (!this.cloud.length) this.cloud.push(new THREE.Vector3());
+    sphere.setFromPoints(this.cloud);
+    sphere.radius = Math.max(sphere.radius, 1e-3);
+    return sphere;
+  }
+
+  /** Ends of the segments that cut: index of the point each leads to. */
+  writtenSegments() {
+    const rapid = this.arrays.w_rapid;
+    const ends = [];
+    for (let i = 1; i < rapid.length; i++) if (!rapid[i]) ends.push(i);
+    return ends;
+  }
+
+  buildWritten() {
+    const tip = this.arrays.w_tip;
+    const { segments } = this;
+    if (segments.length > MOST_WIDE) {
+      const geometry = pairs(tip, segments);
+      geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(segments.length * 6), 3));
+      return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: true }));
+    }
+    const geometry = new THREE.LineSegmentsGeometry();
+    const flat = new Float32Array(segments.length * 6);
+    segments.forEach((end, k) => flat.set(/** @type {Float32Array} */ (tip).subarray(3 * end - 3, 3 * end + 3), 6 * k));
+    geometry.setPositions(flat);
+    geometry.setColors(new Float32Array(segments.length * 6));
+    const material = new THREE.LineMaterial({ linewidth: 3, vertexColors: true });
+    this.wide.push(material);
+    const lines = new THREE.LineSegments2(geometry, material);
+    lines.renderOrder = 2;
+    return lines;
+  }
+
+  /** The ruled surface that the tool axis sweeps over its length H. */
+  buildRibs() {
+    const { w_tip: tip, w_axis: axis, w_rapid: rapid } = this.arrays;
+    const count = rapid.length;
+    const step = Math.max(1, Math.ceil(count / MOST_RIBS));
+    this.ribPoints = /** @type {number[]} */ ([]);
+    for (let i = 0; i < count; i++) {
+      const last = i + 1 === count || rapid[i + 1];
+      if (i % step === 0 || rapid[i] || last) this.ribPoints.push(i);
+    }
+    const position = new Float32Array(this.ribPoints.length * 6);
+    const index = /** @type {number[]} */ ([]);
+    this.ribPoints.forEach((i, k) => {
+      for (let j = 0; j < 3; j++) {
+        position[6 * k + j] = tip[3 * i + j];
+        position[6 * k + 3 + j] = tip[3 * i + j] + (this.height * axis[3 * i + j]) / 32767;
+      }
+      if (k && !rapid[i]) index.push(2 * k - 2, 2 * k - 1, 2 * k, 2 * k, 2 * k - 1, 2 * k + 1);
+    });
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(position.length), 3));
+    geometry.setIndex(index);
+    const material = new THREE.MeshBasicMaterial({
+      vertexColors: true, transparent: true, opacity: 0.3, side: THREE.DoubleSide, depthWrite: false,
+    });
+    return new THREE.Mesh(geometry, material);
+  }
+
+  buildWhiskers() {
+    const { w_tip: tip, w_axis: axis, w_rapid: rapid } = this.arrays;
+    const step = Math.max(1, Math.ceil(rapid.length / MOST_WHISKERS));
+    this.whiskerPoints = /** @type {number[]} */ ([]);
+    for (let i = 0; i < rapid.length; i += step) if (!rapid[i]) this.whiskerPoints.push(i);
+    const position = new Float32Array(this.whiskerPoints.length * 6);
+    this.whiskerPoints.forEach((i, k) => {
+      for (let j = 0; j < 3; j++) {
+        position[6 * k + j] = tip[3 * i + j];
+        position[6 * k + 3 + j] = tip[3 * i + j] + (this.height * axis[3 * i + j]) / 32767;
+      }
+    });
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(position.length), 3));
+    return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.75 }));
+  }
+
+  /** Sharp corners, and those out of tolerance, stand out at any distance. */
+  buildMarkers() {
+    const group = new THREE.Group();
+    const { c_tip: tip, c_kind: kind } = this.arrays;
+    if (!kind) return group;
+    for (const wanted of [1, 0]) {
+      const chosen = [];
+      for (let i = 0; i < kind.length; i++) if (kind[i] === wanted) chosen.push(tip[3 * i], tip[3 * i + 1], tip[3 * i + 2]);
+      if (!chosen.length) continue;
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(chosen), 3));
+      const points = new THREE.Points(
+        geometry,
+        new THREE.PointsMaterial({
+          color: KIND_COLOURS[wanted], size: wanted ? 12 : 14, sizeAttenuation: false, map: sprite("diamond"), transparent: true, depthTest: false,
+        }),
+      );
+      points.renderOrder = 4;
+      group.add(points);
+    }
+    return group;
+  }
+
+  buildRing() {
+    const geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(new Float32Array(3), 3));
+    const ring = new THREE.Points(
+      geometry,
+      new THREE.PointsMaterial({ size: 30, sizeAttenuation: false, map: sprite("ring"), transparent: true, depthTest: false }),
+    );
+    ring.frustumCulled = false;
+    ring.visible = false;
+    ring.renderOrder = 5;
+    return ring;
+  }
+
+  /** Points of the machined surface, joined to strips between neighbouring stations where they follow each other. */
+  buildSurface() {
+    const { s_tip: tip, s_off: off, s_station: station, s_level: level } = this.arrays;
+    if (!this.meta.surface || !off.length) return null;
+    const colours = signedColours(off, this.meta.surface.span);
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(tip), 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
+    const at = new Map();
+    for (let i = 0; i < off.length; i++) at.set(station[i] * 256 + level[i], i);
+    const index = [];
+    const far = this.bounds.radius / 8;
+    for (let i = 0; i < off.length; i++) {
+      const [s, l] = [station[i], level[i]];
+      const corners = [i, at.get((s + 1) * 256 + l), at.get(s * 256 + l + 2), at.get((s + 1) * 256 + l + 2)];
+      if (corners.some((corner) => corner === undefined)) continue;
+      const [a, b, c, d] = corners;
+      const gap = Math.hypot(tip[3 * a] - tip[3 * b], tip[3 * a + 1] - tip[3 * b + 1], tip[3 * a + 2] - tip[3 * b + 2]);
+      if (gap < far) index.push(a, b, c, c, b, d);
+    }
+    const group = new THREE.Group();
+    const strips = new THREE.BufferGeometry();
+    strips.setAttribute("position", geometry.getAttribute("position"));
+    strips.setAttribute("color", geometry.getAttribute("color"));
+    strips.setIndex(index);
+    group.add(new THREE.Mesh(strips, new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide })));
+    group.add(new THREE.Points(geometry, new THREE.PointsMaterial({ vertexColors: true, size: 3, sizeAttenuation: false })));
+    return group;
+  }
+
+  /** @param {Float32Array} colours three numbers for each written point */
+  setColours(colours) {
+    const { segments } = this;
+    const flat = new Float32Array(segments.length * 6);
+    segments.forEach((end, k) => {
+      // a segment has the colour of the point it leads to at both ends where kinds meet, so that none bleeds
+      flat.set(colours.subarray(3 * end, 3 * end + 3), 6 * k);
+      flat.set(colours.subarray(3 * end, 3 * end + 3), 6 * k + 3);
+    });
+    if (this.written instanceof THREE.LineSegments2) this.written.geometry.setColors(flat);
+    else attribute(this.written, "color").copyArray(flat).needsUpdate = true;
+    for (const [object, points] of /** @type {[any, number[]][]} */ ([[this.ribs, this.ribPoints], [this.whiskers, this.whiskerPoints]])) {
+      const own = new Float32Array(points.length * 6);
+      points.forEach((i, k) => {
+        own.set(colours.subarray(3 * i, 3 * i + 3), 6 * k);
+        own.set(colours.subarray(3 * i, 3 * i + 3), 6 * k + 3);
+      });
+      attribute(object, "color").copyArray(own).needsUpdate = true;
+    }
+    this.touch();
+  }
+
+  /** @param {"surface" | "whiskers" | "none"} axes */
+  setAxes(axes) {
+    this.axes = axes;
+    this.touch();
+  }
+
+  /** Colours of the scheme. */
+  setScheme() {
+    const style = getComputedStyle(document.documentElement);
+    /** @param {string} name */
+    const colour = (name) => new THREE.Color(style.getPropertyValue(name).trim());
+    this.scene.background = colour("--stage");
+    /** @type {any} */ (this.original.material).color = colour("--original");
+    /** @type {any} */ (this.spot.material).color = colour("--accent");
+    /** @type {any} */ (this.ring.material).color = colour("--text");
+    this.touch();
+  }
+
+  /** Everything into the view, from a corner of the room. */
+  fit() {
+    const from = new THREE.Vector3(0.55, -0.72, 0.5).normalize();
+    const right = new THREE.Vector3().crossVectors(this.camera.up, from).normalize();
+    const up = new THREE.Vector3().crossVectors(from, right);
+    const high = Math.tan((Math.PI / 360) * this.camera.fov);
+    const broad = high * (this.camera.aspect || 1);
+    const target = this.bounds.center.clone();
+    let distance = 0;
+    for (let round = 0; round < 3; round++) {
+      // sides of the cone of sight that touch the cloud; the middle between them is looked at
+      const reach = [-Infinity, -Infinity, -Infinity, -Infinity];
+      for (const point of this.cloud ?? []) {
+        const arm = point.clone().sub(target);
+        const [x, y, z] = [arm.dot(right), arm.dot(up), arm.dot(from)];
+        [x / broad, -x / broad, y / high, -y / high].forEach((side, k) => (reach[k] = Math.max(reach[k], side + z)));
+      }
+      target.addScaledVector(right, 0.5 * broad * (reach[0] - reach[1])).addScaledVector(up, 0.5 * high * (reach[2] - reach[3]));
+      distance = 1.12 * Math.max(0.5 * (reach[0] + reach[1]), 0.5 * (reach[2] + reach[3]), 1e-3);
+    }
+    this.flyTo(target, distance, from);
+  }
+
+  /**
+   * Moves the camera so that it looks at a point.
+   * @param {Vector} target @param {number} distance @param {Vector} [from] direction to look from
+   */
+  flyTo(target, distance, from) {
+    const begin = { target: this.controls.target.clone(), position: this.camera.position.clone() };
+    const way = from ? from.clone() : begin.position.clone().sub(begin.target).normalize();
+    const end = target.clone().addScaledVector(way, distance);
+    const still = this.drawn === 0 || matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const started = performance.now();
+    const flight = ++this.flight;
+    const step = () => {
+      if (flight !== this.flight) return;
+      const share = still ? 1 : Math.min((performance.now() - started) / FLIGHT, 1);
+      const eased = share * share * (3 - 2 * share);
+      // distances shrink evenly in proportion, so that a flight into a corner does not end with a jump
+      const size = begin.position.distanceTo(begin.target) || distance;
+      const reach = size * Math.pow(distance / size, eased);
+      const heading = begin.position.clone().sub(begin.target).normalize().lerp(way, eased).normalize();
+      const aim = begin.target.clone().lerp(target, size > distance ? 1 - Math.pow(1 - eased, 3) : eased);
+      this.controls.target.copy(share === 1 ? target : aim);
+      this.camera.position.copy(share === 1 ? end : aim.addScaledVector(heading.lengthSq() ? heading : way, reach));
+      this.touch();
+      if (share < 1) requestAnimationFrame(step);
+    };
+    step();
+  }
+
+  /** @param {number} i row of the list of corners */
+  showCorner(i) {
+    const { c_tip: tip, c_length: length } = this.arrays;
+    const target = new THREE.Vector3(tip[3 * i], tip[3 * i + 1], tip[3 * i + 2]);
+    attribute(this.ring, "position").setXYZ(0, target.x, target.y, target.z).needsUpdate = true;
+    this.ring.visible = true;
+    const size = Math.max(3 * (length[i] || 0), 20 * this.meta.tolerance, this.bounds.radius / 1000);
+    this.flyTo(target, Math.min(size, this.bounds.radius) * 2.6);
+  }
+
+  /** Marks a place on the path. @param {number[] | null} at */
+  mark(at) {
+    this.spot.visible = at !== null;
+    if (at) attribute(this.spot, "position").setXYZ(0, at[0], at[1], at[2]).needsUpdate = true;
+    this.touch();
+  }
+
+  /** Puts the tool somewhere. @param {number} shape number of the tool @param {number[]} tip @param {number[]} axis */
+  placeTool(shape, tip, axis) {
+    if (shape !== this.toolShape) {
+      this.toolShape = shape;
+      this.tool.clear();
+      const outline = this.meta.tools[shape]?.outline ?? [[0, 0], [0.06 * this.height, 0.25 * this.height], [0.06 * this.height, this.height]];
+      const closed = [...outline, [0, outline[outline.length - 1][1]]].map(([r, h]) => new THREE.Vector2(r, h));
+      const body = new THREE.LatheGeometry(closed, 48);
+      body.rotateX(Math.PI / 2);
+      const look = { color: 0x9fb4c8, metalness: 0.35, roughness: 0.45, transparent: true, opacity: 0.42, side: THREE.DoubleSide, depthWrite: false };
+      const mesh = new THREE.Mesh(body, new THREE.MeshStandardMaterial(look));
+      mesh.renderOrder = 3;
+      this.tool.add(mesh);
+    }
+    this.tool.position.set(tip[0], tip[1], tip[2]);
+    this.tool.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), new THREE.Vector3(axis[0], axis[1], axis[2]).normalize());
+    this.touch();
+  }
+
+  /** What lies under a place of the canvas. @param {number} x @param {number} y @returns {{corner: number} | {point: number} | null} */
+  pick(x, y) {
+    const { c_tip: corners, c_kind: kind, w_tip: tip, w_rapid: rapid } = this.arrays;
+    const near = (/** @type {Values} */ places, /** @type {(i: number) => boolean} */ wanted, /** @type {number} */ reach) => {
+      const point = new THREE.Vector3();
+      let best = -1;
+      let least = reach * reach;
+      for (let i = 0; i < places.length / 3; i++) {
+        if (!wanted(i)) continue;
+        point.set(places[3 * i], places[3 * i + 1], places[3 * i + 2]).project(this.camera);
+        if (point.z > 1) continue;
+        const dx = (0.5 + 0.5 * point.x) * this.canvas.clientWidth - x;
+        const dy = (0.5 - 0.5 * point.y) * this.canvas.clientHeight - y;
+        if (dx * dx + dy * dy < least) {
+          least = dx * dx + dy * dy;
+          best = i;
+        }
+      }
+      return best;
+    };
+    if (kind) {
+      const corner = near(corners, (i) => kind[i] < 2, 13);
+      if (corner >= 0) return { corner };
+    }
+    const point = near(tip, (i) => !rapid[i], 14);
+    return point >= 0 ? { point } : null;
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (!width || !height) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    for (const material of this.wide) material.resolution.set(width, height);
+    this.touch();
+  }
+
+  /** Draws soon; as often as it is asked, once a frame. */
+  touch() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.controls.update();
+      const distance = this.camera.position.distanceTo(this.controls.target);
+      // close by, the tool and the surface of its axis would stand before the eye
+      this.tool.visible = this.wanted.tool && distance > 1.2 * this.height;
+      this.ribs.visible = this.axes === "surface" && this.written.visible && distance > 0.8 * this.height;
+      this.whiskers.visible = this.axes === "whiskers" && this.written.visible;
+      this.camera.near = Math.max(distance / 200, 1e-4);
+      this.camera.far = distance + 6 * this.bounds.radius;
+      this.camera.updateProjectionMatrix();
+      this.renderer.render(this.scene, this.camera);
+      this.drawn++;
+    });
+  }
+}
+
+/** Segments from the points before to these points. @param {Values} tip @param {number[]} ends */
+function pairs(tip, ends) {
+  const flat = new Float32Array(ends.length * 6);
+  ends.forEach((end, k) => flat.set(/** @type {Float32Array} */ (tip).subarray(3 * end - 3, 3 * end + 3), 6 * k));
+  return new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(flat, 3));
+}
+
+/** @param {any} object @param {string} name @returns {Attribute} */
+function attribute(object, name) {
+  return object.geometry.getAttribute(name);
+}
+
+/** Picture of a marker. @param {"diamond" | "ring" | "disk"} shape */
+function sprite(shape) {
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = 64;
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  pen.fillStyle = pen.strokeStyle = "#ffffff";
+  pen.beginPath();
+  if (shape === "diamond") {
+    for (const [x, y] of [[32, 4], [60, 32], [32, 60], [4, 32]]) pen.lineTo(x, y);
+    pen.closePath();
+    pen.fill();
+    pen.lineWidth = 5;
+    pen.strokeStyle = "#000000";
+    pen.stroke();
+  } else {
+    pen.arc(32, 32, shape === "ring" ? 26 : 24, 0, 2 * Math.PI);
+    pen.lineWidth = 6;
+    if (shape === "ring") pen.stroke();
+    else pen.fill();
+  }
+  return new THREE.CanvasTexture(canvas);
+}

@@ -1,0 +1,190 @@
+"""The corners that a page lists, the ones that matter first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints, Program, SmoothProgram, Status
+from cornersmooth.report.corners import LIMIT_NAMES, STATUS_NAMES, corner_table
+from cornersmooth.vectors import angle_between
+from cornersmooth.verify import Verification
+
+#: rounded corners that are listed, beside all sharp ones and all out of tolerance
+_MOST_ROUNDED = 3000
+
+#: sharp corners that are listed, the largest turns first
+_MOST_SHARP = 20_000
+
+#: corners that turn by less are straight, degrees
+_STRAIGHT = 0.5
+
+#: deviation below which a pose of a foreign text is passed exactly, as a part of the tolerance
+_EXACT = 0.02
+
+#: what becomes of a corner, as the page names it (behind the colon what limits it); its colours follow this order
+KINDS = ("out of tolerance", "sharp", "rounded: tolerance", "rounded: segment", "rounded: orientation", "rounded")
+
+
+@dataclass(frozen=True)
+class CornerList:
+    """Corners in the order of what matters: out of tolerance, sharp by turn, rounded by their deviation.
+
+    Parameters
+    ----------
+    pose : (k,) int64
+    kind : (k,) uint8
+        Index into `KINDS`.
+    reason : (k,) int64
+        Index into `reasons`.
+    reasons : tuple of str
+    turn, axis_turn : (k,) float64, degrees
+        Change of direction of the tip path and of the axis-point path.
+    length : (k,) float64, mm
+        What the transition takes of the tip path.
+    tip_off, axis_off : (k,) float64, mm
+        Deviation at the corner: measured in the text where it was, else that of the construction.
+    cl_line, nc_line : (k,) int64
+        0 where no text was read.
+    counts : dict of str to int
+        All corners of the program by kind, listed or not; straight ones as ``"straight"``.
+    """
+
+    pose: Ints
+    kind: Ints
+    reason: Ints
+    reasons: tuple[str, ...]
+    turn: Floats
+    axis_turn: Floats
+    length: Floats
+    tip_off: Floats
+    axis_off: Floats
+    cl_line: Ints
+    nc_line: Ints
+    counts: dict[str, int]
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+
+def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, dense: bool) -> CornerList:
+    """Corners of a program that was smoothed here."""
+    corners, tolerance = smoothed.corners, smoothed.settings.verified_tolerance
+    status = corners.status
+    off = np.maximum(corners.tip_error, corners.axis_error)
+    if found is not None:
+        measured = np.fmax(found.pose_tip, found.pose_axis_point)[corners.pose]
+        off = np.where(np.isfinite(measured), measured, off)
+    out = off > tolerance
+    idle = np.isin(status, (Status.STRAIGHT, Status.DUPLICATE)) & ~out
+    sharp = ~corners.smoothed & ~idle & ~out
+    kind = np.where(out, 0, np.where(sharp, 1, 1 + corners.limited_by.astype(np.int64)))
+    counts = {name: int(np.count_nonzero((kind == index) & ~idle)) for index, name in enumerate(KINDS)}
+    counts["straight"] = int(np.count_nonzero(idle))
+    rounded = np.flatnonzero(corners.smoothed & ~out)
+    rounded = rounded[np.argsort(-off[rounded], kind="stable")][:_MOST_ROUNDED]
+    rows = np.concatenate((np.flatnonzero(out), np.flatnonzero(sharp), rounded))
+    table = corner_table(smoothed, rows, dense=dense)
+    tip, axis = np.asarray(table["tip_error_mm"], np.float64), np.asarray(table["axis_error_mm"], np.float64)
+    pose = corners.pose[rows]
+    if found is not None:
+        tip = np.where(np.isfinite(found.pose_tip[pose]), found.pose_tip[pose], tip)
+        axis = np.where(np.isfinite(found.pose_axis_point[pose]), found.pose_axis_point[pose], axis)
+    names = (
+        *(STATUS_NAMES[item].replace("_", " ") for item in Status),
+        *(name for name in LIMIT_NAMES.values() if name),
+    )
+    reason = np.where(corners.smoothed[rows], len(Status) - 1 + corners.limited_by[rows], status[rows]).astype(np.int64)
+    return _ranked(
+        pose,
+        kind[rows],
+        reason,
+        names,
+        np.asarray(table["tip_angle_deg"], np.float64),
+        np.asarray(table["axis_angle_deg"], np.float64),
+        np.asarray(table["tip_length_in_mm"], np.float64) + np.asarray(table["tip_length_out_mm"], np.float64),
+        tip,
+        axis,
+        smoothed.program.line[pose],
+        np.zeros(len(pose), np.int64) if found is None else found.pose_nc_line[pose],
+        counts,
+    )
+
+
+def measured_corners(program: Program, found: Verification) -> CornerList:
+    """Corners of a program whose text somebody wrote: what was measured there says what became of them."""
+    inner = np.zeros(len(program), np.bool_)
+    for first, last in program.chains.tolist():
+        inner[first + 1 : last] = True
+    pose = np.flatnonzero(inner)
+    turn, axis_turn = (_turns(points, pose) for points in (program.tip, program.tip + found.axis_length * program.axis))
+    off = np.fmax(found.pose_tip[pose], found.pose_axis_point[pose])
+    out = off > found.tolerance
+    straight = (np.maximum(turn, axis_turn) < _STRAIGHT) & ~out
+    exact = ~out & ~(off > _EXACT * found.tolerance)
+    kind = np.where(out, 0, np.where(exact, 1, len(KINDS) - 1))
+    counts = {name: int(np.count_nonzero((kind == index) & ~straight)) for index, name in enumerate(KINDS)}
+    counts["straight"] = int(np.count_nonzero(straight))
+    listed = np.flatnonzero(~straight)
+    rounded = listed[kind[listed] == len(KINDS) - 1]
+    drop = rounded[np.argsort(-off[rounded], kind="stable")][_MOST_ROUNDED:]
+    rows = np.setdiff1d(listed, drop, assume_unique=True)
+    own = pose[rows]
+    return _ranked(
+        own,
+        kind[rows],
+        np.where(kind[rows] == 0, 0, np.where(kind[rows] == 1, 1, 2)).astype(np.int64),
+        ("off the path", "passed exactly", "rounded"),
+        turn[rows],
+        axis_turn[rows],
+        np.full(len(rows), np.nan),
+        found.pose_tip[own],
+        found.pose_axis_point[own],
+        program.line[own],
+        found.pose_nc_line[own],
+        counts,
+    )
+
+
+def _turns(points: Floats, pose: Ints) -> Floats:
+    """Change of direction of a path at its points, degrees; 0 beside a step of no length."""
+    before, after = points[pose] - points[pose - 1], points[pose + 1] - points[pose]
+    moving = before.any(axis=1) & after.any(axis=1)
+    turns: Floats = np.degrees(np.where(moving, angle_between(before, after), 0.0))
+    return turns
+
+
+def _ranked(
+    pose: Ints,
+    kind: Ints,
+    reason: Ints,
+    reasons: tuple[str, ...],
+    turn: Floats,
+    axis_turn: Floats,
+    length: Floats,
+    tip: Floats,
+    axis: Floats,
+    cl_line: Ints,
+    nc_line: Ints,
+    counts: dict[str, int],
+) -> CornerList:
+    rank = np.minimum(kind, 2)
+    by = np.where(rank == 1, np.maximum(turn, axis_turn), np.fmax(tip, axis))
+    order = np.lexsort((pose, -np.nan_to_num(by), rank))
+    sharp = np.flatnonzero(rank[order] == 1)
+    order = np.delete(order, sharp[_MOST_SHARP:])
+    return CornerList(
+        pose=pose[order],
+        kind=kind[order],
+        reason=reason[order],
+        reasons=reasons,
+        turn=turn[order],
+        axis_turn=axis_turn[order],
+        length=length[order],
+        tip_off=tip[order],
+        axis_off=axis[order],
+        cl_line=cl_line[order],
+        nc_line=nc_line[order],
+        counts=counts,
+    )

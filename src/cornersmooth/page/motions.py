@@ -1,0 +1,233 @@
+"""The two motions that a page shows: the original path, and the written one with its deviation at every point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Move, Program
+from cornersmooth.smoothing.arcs import arc_points
+from cornersmooth.vectors import angle_between, dot, norm
+from cornersmooth.verify import NcProgram, deviation_along
+from cornersmooth.verify.ncprogram import Element
+from cornersmooth.verify.trails import written_at
+
+#: points on every curve or arc, and on every line of short texts and of long ones
+_ON_CURVES, _ON_LINES, _ON_MANY_LINES = 8, 2, 1
+
+#: elements from which a text is long
+_MANY = 100_000
+
+#: steps to the nearest point of a move
+_STEPS = 3
+
+#: chords of an original arc
+_ARC_CHORD = np.radians(3.0)
+
+
+@dataclass(frozen=True)
+class OriginalPath:
+    """The CL path as a polyline, k points; arcs in chords.
+
+    Parameters
+    ----------
+    tip, axis : (k, 3) float64
+    pose : (k,) int64
+        Pose that each point belongs to or leads to.
+    rapid : (k,) bool
+        Whether the tool gets here at rapid speed.
+    breaks : (k,) bool
+        Whether nothing is drawn into the point: the tool does not come from the point before.
+    way : (n,) float64, mm
+        Length of the tip path up to every pose of the program.
+    """
+
+    tip: Floats
+    axis: Floats
+    pose: Ints
+    rapid: Bools
+    breaks: Bools
+    way: Floats
+
+
+@dataclass(frozen=True)
+class WrittenPath:
+    """Points of the written path, m of them in order.
+
+    Parameters
+    ----------
+    tip, axis : (m, 3) float64
+    element : (m,) int64
+        Path element of the text, the first with a single point.
+    share : (m,) float64
+        Where on it, 1 at its end.
+    end : (m,) bool
+        Whether the point is a vertex of the path: an end of a line, or any point of a curve.
+    rapid : (m,) bool
+    pose : (m,) int64
+        Pose that the original move leads to which the point belongs to.
+    way : (m,) float64, mm
+        Length of the original tip path up to there; never falls.
+    tip_off, axis_off : (m,) float64, mm
+        Distance of the tip from the original tip path, and of the axis point from its path; NaN in rapids.
+    angle_off : (m,) float64, degrees
+    feed : (m,) float64, mm/min
+        NaN in rapids, and where the text gives none.
+    curvature : (m,) float64, 1/mm
+    cl_line, nc_line : (m,) int64
+    """
+
+    tip: Floats
+    axis: Floats
+    element: Ints
+    share: Floats
+    end: Bools
+    rapid: Bools
+    pose: Ints
+    way: Floats
+    tip_off: Floats
+    axis_off: Floats
+    angle_off: Floats
+    feed: Floats
+    curvature: Floats
+    cl_line: Ints
+    nc_line: Ints
+
+    def __len__(self) -> int:
+        return len(self.element)
+
+
+def original_path(program: Program) -> OriginalPath:
+    """Polyline of a program."""
+    arcs, n = program.arcs, len(program)
+    pieces = np.ones(n, np.int64)
+    pieces[arcs.pose] = np.maximum(np.ceil(arcs.sweep / _ARC_CHORD), 1.0).astype(np.int64)
+    pose = np.repeat(np.arange(n), pieces)
+    last = np.cumsum(pieces)
+    share = (np.arange(len(pose)) - np.repeat(last - pieces, pieces) + 1) / pieces[pose]
+    tip, axis = program.tip[pose].copy(), program.axis[pose].copy()
+    if len(arcs):
+        row = np.full(n, -1, np.int64)
+        row[arcs.pose] = np.arange(len(arcs))
+        bow = np.flatnonzero(row[pose] >= 0)
+        tip[bow], axis[bow] = arc_points(program, row[pose[bow]], share[bow])
+    breaks = np.zeros(len(pose), np.bool_)
+    breaks[:1] = True
+    breaks[1:] = (program.kind[pose[:-1]] == Move.FROM) & (program.kind[pose[1:]] != Move.ARC)
+    step = np.zeros(len(pose))
+    step[1:] = np.linalg.norm(np.diff(tip, axis=0), axis=1)
+    step[breaks] = 0.0
+    rapid = np.isin(program.kind[pose], (Move.RAPID, Move.HOLE))
+    return OriginalPath(tip, axis, pose, rapid, breaks, np.cumsum(step)[last - 1])
+
+
+def written_path(
+    program: Program, nc: NcProgram, original: OriginalPath, *, tolerance: float, axis_length: float
+) -> WrittenPath:
+    """Points of a text that was read, each with its place on the original and its deviation."""
+    bent = np.isin(nc.kind, (Element.ARC, Element.CURVE))
+    lines = _ON_LINES if len(nc) < _MANY else _ON_MANY_LINES
+    samples = _ON_CURVES if bent.any() else lines
+    rapid = nc.kind == Element.RAPID
+    pieces = np.where(rapid, 1, np.where(bent, samples, min(samples, lines)))
+    pieces[:1] = 1
+    element = np.repeat(np.arange(len(nc)), pieces)
+    share = (np.arange(len(element)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1) / pieces[element]
+    tip, axis = written_at(nc, element, share)
+    along = deviation_along(program, nc, tolerance=tolerance, axis_length=axis_length, samples=samples)
+    row = np.full(len(nc) * samples, -1, np.int64)
+    own = np.flatnonzero(along.element >= 0)
+    row[along.element[own] * samples + np.round(along.fraction[own] * samples).astype(np.int64) - 1] = own
+    at = row[element * samples + np.round(share * samples).astype(np.int64) - 1]
+    there = at >= 0
+    pose = np.where(there, along.pose[at], 0)
+    place = np.full(len(element), np.nan)
+    start = original.way[np.maximum(pose - 1, 0)]
+    place[there] = (start + along.share[at] * (original.way[pose] - start))[there]
+    way = _continued(place, tip, original)
+    pose = np.where(there, pose, np.minimum(np.searchsorted(original.way, way), len(program) - 1))
+    tip_off, axis_off = np.where(there, along.tip[at], np.nan), np.where(there, along.axis_point[at], np.nan)
+    straight = np.flatnonzero(there & (program.kind[pose] == Move.LINEAR))
+    place = along.share[at[straight]]
+    for off, height in ((tip_off, 0.0), (axis_off, axis_length)):
+        near = _distance(program, tip[straight] + height * axis[straight], pose[straight], place, height)
+        off[straight] = np.minimum(off[straight], near)
+    end = (share == 1.0) | bent[element]
+    return WrittenPath(
+        tip=tip,
+        axis=axis,
+        element=element,
+        share=share,
+        end=end,
+        rapid=rapid[element],
+        pose=pose,
+        way=way,
+        tip_off=tip_off,
+        axis_off=axis_off,
+        angle_off=np.where(there, along.angle[at], np.nan),
+        feed=np.where(nc.per_revolution[element], np.nan, nc.feed[element]),
+        curvature=_curvature(tip, end, rapid[element]),
+        cl_line=program.line[pose],
+        nc_line=nc.line[element],
+    )
+
+
+def _distance(program: Program, points: Floats, pose: Ints, share: Floats, height: float) -> Floats:
+    """Distance (k,) of points from the original path of the point at `height` on the tool axis.
+
+    The common pose that `deviation_along` finds serves tip and axis point together. Each alone is nearer, on the same
+    move or on one beside it; steps of Gauss and Newton find where.
+    """
+    least = np.full(len(points), np.inf)
+    linear = program.kind == Move.LINEAR
+    linear[:1] = False
+    for beside in (-1, 0, 1):
+        move = np.clip(pose + beside, 1, len(program) - 1)
+        at = np.clip(share - beside, 0.0, 1.0)
+        start, step = program.tip[move - 1], program.tip[move] - program.tip[move - 1]
+        lean, turn = program.axis[move - 1], program.axis[move] - program.axis[move - 1]
+        for rest in range(_STEPS, -1, -1):
+            leaning = lean + at[:, None] * turn
+            length = norm(leaning)[:, None]
+            arm = points - (start + at[:, None] * step + height * leaning / length)
+            if not rest:
+                break
+            axis = leaning / length
+            rate = step + height * (turn - dot(turn, axis)[:, None] * axis) / length
+            size = dot(rate, rate)
+            at = np.clip(at + np.divide(dot(arm, rate), size, out=np.zeros_like(size), where=size > 0.0), 0.0, 1.0)
+        least = np.where(linear[move], np.minimum(least, norm(arm)), least)
+    return least
+
+
+def _continued(place: Floats, tip: Floats, original: OriginalPath) -> Floats:
+    """Places on the original for all points: between known ones in proportion to the way, and never falling."""
+    length = np.zeros(len(tip))
+    np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1), out=length[1:])
+    known = np.flatnonzero(np.isfinite(place))
+    end = float(original.way[-1]) if len(original.way) else 0.0
+    if not len(known):
+        return length * (end / length[-1] if length[-1:].any() else 0.0)
+    first, last = known[0], known[-1]
+    way = np.interp(length, length[known], np.maximum.accumulate(place[known]))
+    way[:first] = np.maximum(place[first] - (length[first] - length[:first]), 0.0)
+    way[last + 1 :] = np.minimum(place[last] + (length[last + 1 :] - length[last]), end)
+    way[known] = place[known]
+    found: Floats = np.maximum.accumulate(way)
+    return found
+
+
+def _curvature(tip: Floats, end: Bools, rapid: Bools) -> Floats:
+    """Turn of the path at its vertices over the way that goes with each, 1/mm; on a line that of its end."""
+    vertex = np.flatnonzero(end)
+    step = np.diff(tip[vertex], axis=0)
+    length = np.linalg.norm(step, axis=1)
+    found = np.zeros(len(vertex))
+    if len(vertex) > 2:
+        moving = (length[:-1] > 0.0) & (length[1:] > 0.0) & ~rapid[vertex[1:-1]] & ~rapid[vertex[2:]]
+        turn = np.where(moving, angle_between(step[:-1], step[1:]), 0.0)
+        found[1:-1] = np.divide(2.0 * turn, length[:-1] + length[1:], out=np.zeros_like(turn), where=moving)
+    whole = np.zeros(len(tip))
+    whole[:] = found[np.minimum(np.searchsorted(vertex, np.arange(len(tip))), max(len(vertex) - 1, 0))]
+    return whole

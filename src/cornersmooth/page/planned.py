@@ -1,0 +1,189 @@
+"""Planned speeds on a common scale: along the original path, and over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.feedrate import Limits, TimeLaw, direct, plan
+from cornersmooth.kinematics import Machine
+from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Statement
+from cornersmooth.page.motions import OriginalPath, WrittenPath
+from cornersmooth.settings import Settings
+from cornersmooth.verify import NcProgram
+
+#: moves up to which a motion is planned: some 10 s of work
+MOST_MOVES = 100_000
+
+#: looks at a law in each step of a chart
+_LOOKS = 6
+
+
+@dataclass(frozen=True)
+class Planned:
+    """Time laws of one program, and where they are on the original path.
+
+    Parameters
+    ----------
+    laws : mapping of str to TimeLaw
+        ``"direct"``, ``"local"`` (the ideal curves), ``"written"`` (the text); those that were planned.
+    ways : mapping of str to ((k,) float64, (k,) float64)
+        For each law path coordinates, ascending, and the way along the original path there, mm.
+    seconds : (m,) float64 or None
+        When the tool passes the points of the written path.
+    left_out : tuple of str
+        What was not planned, and why, in sentences.
+    """
+
+    laws: Mapping[str, TimeLaw]
+    ways: Mapping[str, tuple[Floats, Floats]]
+    seconds: Floats | None
+    left_out: tuple[str, ...]
+
+
+def plan_all(
+    program: Program,
+    original: OriginalPath,
+    *,
+    smoothed: SmoothProgram | None,
+    written: WrittenPath | None,
+    nc: NcProgram | None,
+    limits: Limits,
+    machine: Machine | None,
+    settings: Settings,
+    known: Mapping[str, TimeLaw] | None = None,
+) -> Planned:
+    """Plan what can be planned; laws that are `known` already are taken over."""
+    laws: dict[str, TimeLaw] = dict(known or {})
+    ways: dict[str, tuple[Floats, Floats]] = {}
+    left_out: list[str] = []
+    seconds = None
+    machine = machine if machine is not None and machine.dynamics else None
+    text = None if written is None or nc is None else _program_of(nc, written, program)
+    try:
+        for name, moves in (
+            ("direct", len(program)),
+            ("local", len(program)),
+            ("written", 0 if text is None else len(text)),
+        ):
+            if name in laws or (name == "local" and smoothed is None) or (name == "written" and text is None):
+                continue
+            if moves > MOST_MOVES:
+                left_out.append(f"The {name} path has {moves:,} moves; its speed is planned up to {MOST_MOVES:,}.")
+            elif name == "direct":
+                laws[name] = direct(program, limits, "velocity_jump", settings=settings, machine=machine)
+            elif name == "local" and smoothed is not None:
+                laws[name] = plan(smoothed, limits, machine=machine)
+            elif text is not None:
+                laws[name] = direct(text, limits, "velocity_jump", settings=settings, machine=machine)
+    except SettingsError as refused:
+        left_out.append(f"No speed is planned: {refused.what}" + (f" (line {refused.line})." if refused.line else "."))
+    for name, law in laws.items():
+        if name == "written" and written is not None:
+            vertex = np.flatnonzero(written.end)
+            ways[name] = _places(law, written.way[vertex])
+            seconds = _seconds(law, written, vertex)
+        else:
+            ways[name] = _places(law, original.way)
+    return Planned(laws, ways, seconds, tuple(left_out))
+
+
+def feed_seconds(written: WrittenPath, rapid: float) -> Floats:
+    """When points are passed at programmed feed, without any acceleration; `rapid` is in mm/min."""
+    step = np.zeros(len(written))
+    step[1:] = np.linalg.norm(np.diff(written.tip, axis=0), axis=1)
+    feed = np.where(written.rapid | ~(written.feed > 0.0), rapid, written.feed)
+    return np.cumsum(60.0 * step / feed)
+
+
+def speeds_along(planned: Planned, name: str, steps: Floats) -> Floats:
+    """Lowest and highest speed, mm/min, between neighbouring places (k + 1,) on the original: (2 k,); NaN in rapids."""
+    law, (coordinate, way) = planned.laws[name], planned.ways[name]
+    count = len(steps) - 1
+    # the map may be vertical where the original is only turned: a little slope keeps it one to one
+    looks = np.interp(np.linspace(0.0, count, count * _LOOKS, endpoint=False), np.arange(count + 1), steps)
+    at = np.interp(looks, way + 1e-9 * np.arange(len(way)), coordinate)
+    speed = _path_speed(law, at, law.times_at(at)).reshape(count, _LOOKS)
+    found = np.empty((count, 2))
+    low, high = np.nan_to_num(speed, nan=np.inf), np.nan_to_num(speed, nan=-np.inf)
+    early = low.argmin(axis=1) < high.argmax(axis=1)
+    bottom, top = low.min(axis=1), high.max(axis=1)
+    found[:, 0], found[:, 1] = np.where(early, bottom, top), np.where(early, top, bottom)
+    return np.where(np.isfinite(found), found, np.nan).ravel()
+
+
+def speeds_over(law: TimeLaw, times: Floats) -> Floats:
+    """Speed, mm/min, at times (k,) s; NaN in rapids and after the end."""
+    speed = _path_speed(law, law.kinematics(times)[0], times)
+    return np.where(times <= law.total, speed, np.nan)
+
+
+def axis_loads(law: TimeLaw, times: Floats) -> tuple[tuple[str, ...], Floats]:
+    """Names of a machine's axes, and their speeds (5, k) in per cent of their limits; axes without one are left out."""
+    if law.machine_axes is None:
+        return (), np.zeros((0, len(times)))
+    limit = law.machine_axes.limits[0]
+    own = np.flatnonzero(np.isfinite(limit))
+    speed = np.abs(law.axes_at(times)[1]).T
+    load = 100.0 * speed[own] / limit[own, None]
+    feeding = np.isfinite(speeds_over(law, times))
+    return tuple(law.machine_axes.names[index] for index in own), np.where(feeding, load, np.nan)
+
+
+def _path_speed(law: TimeLaw, at: Floats, times: Floats) -> Floats:
+    speed = 60.0 * law.kinematics(times)[1]
+    path = law.path
+    if not len(path):
+        return speed
+    element = np.clip(np.searchsorted(law.edge, at, side="right") - 1, 0, len(path) - 1)
+    return np.where(path.rapid[element], np.nan, np.where(path.turning[element], 0.0, speed))
+
+
+def _places(law: TimeLaw, way: Floats) -> tuple[Floats, Floats]:
+    """Path coordinates of the ends of moves, and the ways along the original there; `way` by pose."""
+    path = law.path
+    if not len(path):
+        return np.zeros(1), np.zeros(1)
+    last = np.flatnonzero(np.concatenate((path.move[1:] != path.move[:-1], [True])))
+    coordinate = np.concatenate(([0.0], law.edge[last + 1]))
+    return coordinate, np.maximum.accumulate(np.concatenate(([way[path.start[0]]], way[path.move[last]])))
+
+
+def _seconds(law: TimeLaw, written: WrittenPath, vertex: Ints) -> Floats:
+    """Time at every point: by the coordinate, which runs evenly between vertices."""
+    path = law.path
+    if not len(path):
+        return np.zeros(len(written))
+    reached = np.full(len(vertex), -1.0)
+    reached[path.move] = law.edge[1:]  # the last element of a move wins
+    reached = np.maximum.accumulate(np.maximum(reached, 0.0))
+    number = np.searchsorted(vertex, np.arange(len(written)))
+    number = np.minimum(number, len(vertex) - 1)
+    before = np.maximum(number - 1, 0)
+    share = np.where(written.end, 1.0, written.share)
+    at = reached[before] + share * (reached[number] - reached[before])
+    times: Floats = np.maximum.accumulate(law.times_at(at))
+    return times
+
+
+def _program_of(nc: NcProgram, written: WrittenPath, program: Program) -> Program:
+    """The text as a program of moves: what stands between its elements interrupts as it does in the CL file."""
+    vertex = np.flatnonzero(written.end)
+    kind = np.where(written.rapid[vertex], Move.RAPID, Move.LINEAR).astype(np.uint8)
+    first = np.searchsorted(written.element[vertex], np.arange(len(nc) + 1))
+    events = {event.element: event.line for event in nc.events if event.letter != "("}
+    return Program.from_poses(
+        written.tip[vertex],
+        written.axis[vertex],
+        kind=kind,
+        feed=written.feed[vertex],
+        line=written.nc_line[vertex],
+        statements=tuple(
+            Statement(int(first[min(element, len(nc))]), line, "AUXFUN") for element, line in sorted(events.items())
+        ),
+        source=program.source,
+        units=program.units,
+    )

@@ -1,0 +1,358 @@
+"""Everything that a page shows, as arrays and plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cornersmooth.feedrate import Limits, TimeLaw
+from cornersmooth.kinematics import Machine
+from cornersmooth.model import Floats, Ints, Program, SmoothProgram
+from cornersmooth.page.corners import KINDS, CornerList, measured_corners, smoothed_corners
+from cornersmooth.page.motions import OriginalPath, WrittenPath, original_path, written_path
+from cornersmooth.page.packing import Pack
+from cornersmooth.page.planned import Planned, axis_loads, feed_seconds, plan_all, speeds_along, speeds_over
+from cornersmooth.page.thinning import thinned
+from cornersmooth.settings import Settings
+from cornersmooth.surface.tool import Tool, tools_of
+from cornersmooth.verify import NcProgram, Verification
+
+if TYPE_CHECKING:
+    from cornersmooth.surface import SurfaceMap
+
+SCHEMA = "cornersmooth-page/1"
+
+#: about so many points of each path are drawn
+MOST_POINTS = 250_000
+
+#: steps of the charts: this many, or so many for each pose where that is more, but no more than the last
+_STEPS, _STEPS_PER_POSE, _MOST_STEPS = 2000, 6, 12_000
+
+#: points along the axis of a program without a length of anything
+_NO_WAY = 1e-9
+
+
+@dataclass(frozen=True)
+class Story:
+    """What the page says in words.
+
+    Parameters
+    ----------
+    title : str
+        Name of the part.
+    verdict : str
+        One sentence.
+    kept : bool or None
+        Whether the promise is kept; None where nothing was measured.
+    facts : sequence of (str, str)
+        Labels and values: settings, versions, hash.
+    notes : sequence of str
+        Sentences about what is missing.
+    """
+
+    title: str
+    verdict: str
+    kept: bool | None
+    facts: Sequence[tuple[str, str]] = ()
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a page is made of.
+
+    Parameters
+    ----------
+    program : Program
+    nc : NcProgram
+        The written text, read back.
+    settings : Settings
+        At least tolerance and axis length count.
+    verification : Verification or None
+    smoothed : SmoothProgram or None
+        Where the text was made here.
+    dense : bool
+        Whether transitions are written as lines.
+    laws : mapping of str to TimeLaw
+        Laws that are planned already: ``"direct"``, ``"local"``.
+    limits : Limits
+    machine : Machine or None
+    tool : Tool or None
+        Instead of those in the file.
+    surface : SurfaceMap or None
+    """
+
+    program: Program
+    nc: NcProgram
+    settings: Settings
+    verification: Verification | None = None
+    smoothed: SmoothProgram | None = None
+    dense: bool = True
+    laws: Mapping[str, TimeLaw] = field(default_factory=dict)
+    limits: Limits = field(default_factory=Limits)
+    machine: Machine | None = None
+    tool: Tool | None = None
+    surface: SurfaceMap | None = None
+
+
+def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
+    """Plain values and arrays of a page."""
+    program, settings = subject.program, subject.settings
+    original = original_path(program)
+    written = written_path(
+        program, subject.nc, original, tolerance=settings.tolerance, axis_length=settings.axis_length
+    )
+    planned = plan_all(
+        program,
+        original,
+        smoothed=subject.smoothed,
+        written=written,
+        nc=subject.nc,
+        limits=subject.limits,
+        machine=subject.machine,
+        settings=settings,
+        known=subject.laws,
+    )
+    corners = _corners(subject)
+    centre = 0.5 * (program.tip.min(axis=0) + program.tip.max(axis=0)) if len(program) else np.zeros(3)
+    pack = Pack()
+    seconds = planned.seconds
+    timed = seconds is not None
+    if seconds is None:
+        seconds = feed_seconds(written, subject.limits.rapid)
+    places = _place_of_poses(written, program)
+    _add_original(pack, original, program, corners, centre)
+    _add_written(pack, written, planned, seconds, corners, places, settings, centre)
+    charts = _add_charts(pack, original, written, planned, seconds)
+    if corners is not None:
+        _add_corners(pack, corners, program, original, places, centre)
+    meta: dict[str, Any] = {
+        "schema": SCHEMA,
+        "title": story.title,
+        "verdict": story.verdict,
+        "kept": story.kept,
+        "facts": [list(fact) for fact in story.facts],
+        "notes": [*story.notes, *planned.left_out, *_thinning_note(len(written), original)],
+        "tolerance": settings.verified_tolerance,
+        "axis_length": settings.axis_length,
+        "centre": centre.tolist(),
+        "seconds": float(seconds[-1]) if len(seconds) else 0.0,
+        "timed": timed,
+        "way": float(original.way[-1]) if len(original.way) else 0.0,
+        "totals": {name: law.total for name, law in planned.laws.items()},
+        "corners": None
+        if corners is None
+        else {"kinds": list(KINDS), "reasons": list(corners.reasons), "counts": corners.counts},
+        "charts": charts,
+        "tools": _tools(subject, seconds, written),
+    }
+    if subject.surface is not None:
+        meta["surface"] = _add_surface(pack, subject.surface, centre)
+    return meta, pack
+
+
+def _corners(subject: Subject) -> CornerList | None:
+    if subject.smoothed is not None:
+        return smoothed_corners(subject.smoothed, subject.verification, dense=subject.dense)
+    return None if subject.verification is None else measured_corners(subject.program, subject.verification)
+
+
+def _place_of_poses(written: WrittenPath, program: Program) -> Ints:
+    """(n,) point of the written path that is the last on the move into each pose."""
+    return np.clip(
+        np.searchsorted(np.maximum.accumulate(written.pose), np.arange(len(program)), side="right") - 1, 0, None
+    )
+
+
+def _add_original(
+    pack: Pack, original: OriginalPath, program: Program, corners: CornerList | None, centre: Floats
+) -> None:
+    must = original.breaks | original.rapid
+    must[:-1] |= original.rapid[1:] | original.breaks[1:]
+    if len(must) > MOST_POINTS and must.sum() > MOST_POINTS:
+        must = original.breaks.copy()
+    if corners is not None:
+        special = np.zeros(len(program), np.bool_)
+        special[corners.pose] = True
+        must |= special[original.pose]
+    rows = thinned(original.tip, np.zeros(len(must)), must, MOST_POINTS)
+    pack.add("o_tip", original.tip[rows] - centre, "f4")
+    pack.add("o_axis", original.axis[rows], "i2")
+    pack.add("o_way", original.way[original.pose[rows]], "f4")
+    pack.add("o_line", program.line[original.pose[rows]], "i4")
+    pack.add("o_move", np.where(original.breaks, 0, np.where(original.rapid, 1, 2))[rows], "u1")
+
+
+def _add_written(
+    pack: Pack,
+    written: WrittenPath,
+    planned: Planned,
+    seconds: Floats,
+    corners: CornerList | None,
+    places: Ints,
+    settings: Settings,
+    centre: Floats,
+) -> None:
+    larger = np.fmax(written.tip_off, written.axis_off)
+    must = written.rapid.copy()
+    must[:-1] |= written.rapid[1:]
+    if must.sum() > MOST_POINTS:
+        must[:] = False
+    must |= larger > settings.verified_tolerance
+    kind = np.full(len(written), 255, np.uint8)
+    if corners is not None:
+        must[places[corners.pose]] = True
+        kind[:] = _kinds(written, corners, places)
+    rows = thinned(written.tip, larger, must, MOST_POINTS)
+    speed = np.full(len(written), np.nan)
+    if planned.seconds is not None:
+        speed = speeds_over(planned.laws["written"], planned.seconds)
+    pack.add("w_tip", written.tip[rows] - centre, "f4")
+    pack.add("w_axis", written.axis[rows], "i2")
+    pack.add("w_kind", kind[rows], "u1")
+    pack.add("w_rapid", written.rapid[rows], "u1")
+    for name, values in (
+        ("w_way", written.way),
+        ("w_time", seconds),
+        ("w_off", written.tip_off),
+        ("w_axis_off", written.axis_off),
+        ("w_angle", written.angle_off),
+        ("w_feed", written.feed),
+        ("w_speed", speed),
+        ("w_curvature", written.curvature),
+    ):
+        pack.add(name, values[rows], "f4")
+    pack.add("w_line", written.cl_line[rows], "i4")
+    pack.add("w_nc", written.nc_line[rows], "i4")
+
+
+def _kinds(written: WrittenPath, corners: CornerList, places: Ints) -> Ints:
+    """What the corner is that each written point belongs to: those within half its length of it; 255 for none."""
+    kind = np.full(len(written), 255, np.int64)
+    at = places[corners.pose]
+    half = 0.5 * np.nan_to_num(corners.length, nan=0.0)
+    low = np.searchsorted(written.way, written.way[at] - half - _NO_WAY)
+    high = np.maximum(np.searchsorted(written.way, written.way[at] + half + _NO_WAY, side="right"), at + 1)
+    for rank in np.argsort(-corners.kind.astype(np.int64), kind="stable")[::1].tolist():
+        kind[low[rank] : high[rank]] = corners.kind[rank]
+    return kind
+
+
+def _add_corners(
+    pack: Pack, corners: CornerList, program: Program, original: OriginalPath, places: Ints, centre: Floats
+) -> None:
+    pack.add("c_tip", program.tip[corners.pose] - centre, "f4")
+    pack.add("c_axis", program.axis[corners.pose], "i2")
+    pack.add("c_kind", corners.kind, "u1")
+    pack.add("c_reason", corners.reason, "u1")
+    pack.add("c_way", original.way[corners.pose], "f4")
+    for name, values in (
+        ("c_turn", corners.turn),
+        ("c_axis_turn", corners.axis_turn),
+        ("c_length", corners.length),
+        ("c_off", corners.tip_off),
+        ("c_axis_off", corners.axis_off),
+    ):
+        pack.add(name, values, "f4")
+    pack.add("c_line", corners.cl_line, "i4")
+    pack.add("c_nc", corners.nc_line, "i4")
+
+
+def _add_charts(
+    pack: Pack, original: OriginalPath, written: WrittenPath, planned: Planned, seconds: Floats
+) -> dict[str, Any]:
+    """Series of the charts along the way and over time; values come in pairs, so that no peak is lost."""
+    count = int(np.clip(_STEPS_PER_POSE * len(original.way), _STEPS, _MOST_STEPS))
+    charts: dict[str, Any] = {}
+    end = max(float(original.way[-1]) if len(original.way) else 0.0, _NO_WAY)
+    longest = max((law.total for law in planned.laws.values()), default=0.0)
+    longest = max(longest, float(seconds[-1]) if len(seconds) else 0.0, _NO_WAY)
+    written_law = planned.laws.get("written")
+    for scale, last, where in (("way", end, written.way), ("time", longest, seconds)):
+        steps = np.linspace(0.0, last, count + 1)
+        pack.add(f"{scale}_x", np.linspace(0.0, last, 2 * count, endpoint=False), "f4")
+        for name, values in (("off", written.tip_off), ("axis_off", written.axis_off)):
+            pack.add(f"{scale}_{name}", np.repeat(_highest(values, where, steps), 2), "f4")
+        times = np.linspace(0.0, last, 2 * count, endpoint=False)
+        for name in planned.laws:
+            speeds = speeds_along(planned, name, steps) if scale == "way" else speeds_over(planned.laws[name], times)
+            pack.add(f"{scale}_speed_{name}", speeds, "f4")
+        # the machine follows the text; its axes along the way are taken when the text is there
+        law = written_law if written_law is not None else planned.laws.get("local", planned.laws.get("direct"))
+        if law is not None and law.machine_axes is not None:
+            if scale == "way":
+                way, first = np.unique(where, return_index=True)
+                times = np.interp(times, way, seconds[first])
+            names, loads = axis_loads(law, times)
+            for name, load in zip(names, loads, strict=True):
+                pack.add(f"{scale}_axis_{name}", load, "f4")
+            charts["axes"] = list(names)
+    charts["speeds"] = list(planned.laws)
+    return charts
+
+
+def _highest(values: Floats, where: Floats, steps: Floats) -> Floats:
+    """Largest value at places within each step; between places that of the next; NaN where there is none."""
+    index = np.searchsorted(where, steps)
+    first = np.minimum(index[:-1], max(len(values) - 1, 0))
+    if not len(values):
+        return np.full(len(steps) - 1, np.nan)
+    bare = np.where(np.isfinite(values), values, -1.0)
+    top = np.maximum.reduceat(bare, first)
+    return np.where(top < 0.0, np.nan, top)
+
+
+def _tools(subject: Subject, seconds: Floats, written: WrittenPath) -> list[dict[str, Any]]:
+    """Tools with the time from which each is used, and their outline for drawing."""
+    found = [(0, subject.tool, 0)] if subject.tool is not None else tools_of(subject.program)
+    reached = np.maximum.accumulate(written.pose)
+    tools = []
+    for pose, tool, line in found:
+        place = min(int(np.searchsorted(reached, pose)), max(len(seconds) - 1, 0))
+        length = max(3.0 * tool.diameter, 1.5 * subject.settings.axis_length)
+        length = min(length, tool.length) if tool.length > tool.side_from else length
+        steep = np.radians(tool.taper)
+        low = 90.0 - tool.tip_angle
+        sine = np.sin(np.linspace(np.radians(low), steep, 9)) if tool.corner_radius else np.zeros(0)
+        out, up, _ = tool.profile(sine, np.array([tool.side_from, max(length, tool.side_from + 1e-3)]))
+        tools.append(
+            {
+                "from_second": float(seconds[place]) if len(seconds) else 0.0,
+                "text": tool.describe(),
+                "line": line,
+                "outline": [[0.0, 0.0], *np.stack((np.maximum(out, 0.0), up), axis=1).round(6).tolist()],
+            }
+        )
+    if tools:
+        tools[0]["from_second"] = 0.0
+    return tools
+
+
+def _add_surface(pack: Pack, surface: SurfaceMap, centre: Floats) -> dict[str, Any]:
+    known = np.flatnonzero(surface.known)
+    points = surface.points
+    span = float(np.abs(surface.off[known]).max(initial=0.0)) or surface.tolerance
+    edges, counts = surface.histogram()
+    keep = thinned(points.point[known], np.abs(surface.off[known]), np.zeros(len(known), np.bool_), MOST_POINTS)
+    rows = known[keep]
+    pack.add("s_tip", points.point[rows] - centre, "f4")
+    pack.add("s_normal", points.normal[rows], "i2")
+    pack.add("s_off", surface.off[rows], "f4")
+    pack.add("s_line", points.line[rows], "i4")
+    pack.add("s_station", points.station[rows], "i4")
+    pack.add("s_level", 2 * points.level[rows] + points.side[rows], "u1")
+    pack.add("h_edges", edges, "f4")
+    pack.add("h_counts", counts, "f4")
+    return {"span": span, **surface.as_dict()}
+
+
+def _thinning_note(points: int, original: OriginalPath) -> list[str]:
+    if max(points, len(original.tip)) <= MOST_POINTS:
+        return []
+    return [
+        f"Of {points:,} points of the written path about {MOST_POINTS:,} are drawn: ends and bends of the path, the "
+        "largest deviation of every stretch, and all that is out of tolerance. Charts are of all points."
+    ]
