@@ -16,7 +16,7 @@ from cornersmooth.nc import Form
 from cornersmooth.settings import Settings
 from cornersmooth.verify import NcProgram, read_nc, verify
 from cornersmooth.verify.ncprogram import Element
-from cornersmooth.verify.trails import written_at
+from cornersmooth.verify.polyline import written_at
 from nc.cases import CHOSEN, Case
 from nc.grammars import reader
 from nc.promise import tame, upright, written

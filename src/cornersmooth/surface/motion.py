@@ -10,7 +10,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.smoothing.arcs import arc_points
 from cornersmooth.verify import NcProgram
 from cornersmooth.verify.ncprogram import Element
-from cornersmooth.verify.trails import directions, written_at
+from cornersmooth.verify.polyline import directions, written_at
 
 #: largest turn of an arc within one segment, rad: off the arc by its radius times 3e-7
 _ARC_STEP = 1.5e-3

@@ -20,8 +20,9 @@ Where is what:
 from cornersmooth.verify.along import Distribution, deviation_along
 from cornersmooth.verify.ncprogram import Event, NcProgram, Problem
 from cornersmooth.verify.reader import CONTROLS, read_nc
-from cornersmooth.verify.verification import Verification, Where
+from cornersmooth.verify.result import Verification, Where
 from cornersmooth.verify.verifying import Verifier, verify
+from cornersmooth.verify.workers import useful_processes
 
 __all__ = [
     "CONTROLS",
@@ -34,5 +35,6 @@ __all__ = [
     "Where",
     "deviation_along",
     "read_nc",
+    "useful_processes",
     "verify",
 ]

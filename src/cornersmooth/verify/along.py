@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cornersmooth.model import Floats, Ints, Program
-from cornersmooth.verify.blocks import Block, Matcher
-from cornersmooth.verify.gaps import from_original, owner_fraction
-from cornersmooth.verify.holes import divide_at_holes
+from cornersmooth.verify.batches import Batches
+from cornersmooth.verify.distances import from_original, owner_fraction
+from cornersmooth.verify.match import Match, match
 from cornersmooth.verify.ncprogram import NcProgram
 from cornersmooth.verify.nearest import gap_between, nearest_segments
+from cornersmooth.verify.polyline import written_at
 from cornersmooth.verify.reader import read_nc
-from cornersmooth.verify.stops import find_stretches
-from cornersmooth.verify.trails import original_motion, written_at
-from cornersmooth.verify.walking import Track
+from cornersmooth.verify.task import Task
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -93,53 +92,51 @@ def deviation_along(
     text = nc
     if not isinstance(text, NcProgram):
         text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
-    original = original_motion(program, tolerance, axis_length)
-    matcher = Matcher(original, text, Track.of(original.trail.six(axis_length)), tolerance, axis_length)
-    holes = divide_at_holes(original, text, axis_length)
-    stretches, _ = find_stretches(original, text, axis_length, holes.parts)
+    task = Task.of(program, tolerance, axis_length)
     parts = [np.zeros((0, _COLUMNS))]
-    for block in matcher.blocks(stretches):
-        parts += [_of_elements(matcher, block, samples), _of_poses(matcher, block)]
+    for batch in Batches(task).of([text]):
+        matched = match(task, batch)
+        parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
     rows = np.concatenate(parts)
     columns = rows[np.argsort(rows[:, 0], kind="stable")].T
     return Distribution(*columns[:6], *(column.astype(np.int64) for column in columns[6:]))
 
 
-def _of_poses(matcher: Matcher, block: Block) -> Floats:
-    """Columns (k, 10) of the distribution at the original poses of one block."""
-    reached = from_original(matcher, block)
-    original, trail = matcher.original, block.written.trail
+def _of_poses(match: Match) -> Floats:
+    """Columns (k, 10) of the distribution at the original poses of one match."""
+    reached = from_original(match)
+    original, trail = match.original, match.written.trail
     pose = original.pose[original.trail.owner[reached.vertex]]
-    nc_line = matcher.nc.line[trail.owner[np.minimum(reached.place.astype(np.int64) + 1, len(trail) - 1)]]
-    gap, way = reached.gap, matcher.track.length[reached.vertex]
+    nc_line = match.nc.line[trail.owner[np.minimum(reached.place.astype(np.int64) + 1, len(trail) - 1)]]
+    gap, way = reached.gap, match.path.length[reached.vertex]
     share, none = original.trail.fraction[reached.vertex], np.zeros(len(pose))
     places = (share, none, pose, none - 1.0, original.program.line[pose], nc_line)
     columns = (way, gap.tip, gap.axis_point, np.degrees(gap.angle), *places)
     return np.stack([column.astype(np.float64) for column in columns], axis=1)
 
 
-def _of_elements(matcher: Matcher, block: Block, samples: int) -> Floats:
-    """Columns (k, 10) of the distribution at written poses of one block."""
-    trail, first = block.written.trail, block.written.first
+def _of_elements(match: Match, offset: int, samples: int) -> Floats:
+    """Columns (k, 10) of the distribution at written poses of one match."""
+    trail, first = match.written.trail, match.written.first
     end = trail.last[1:]
     start = trail.last[:-1]
-    feeding = np.flatnonzero(block.on[start] & block.on[end] & (block.piece[start] == block.piece[end]))
+    feeding = np.flatnonzero(match.on[start] & match.on[end] & (match.stretch[start] == match.stretch[end]))
     element = np.repeat(feeding + first + 1, samples)
     share = np.tile(np.arange(1, samples + 1) / samples, len(feeding))
-    tip, axis = written_at(matcher.nc, element, share)
+    tip, axis = written_at(match.nc, element, share)
     # somewhere between the places of the element's ends
-    low, high = block.place[start[feeding]], block.place[end[feeding]]
+    low, high = match.place[start[feeding]], match.place[end[feeding]]
     place = np.repeat(low, samples) + share * np.repeat(high - low, samples)
     vertex = np.repeat(end[feeding], samples)
-    limits = block.low[vertex], block.high[vertex]
+    limits = match.low[vertex], match.high[vertex]
     middle = np.clip(place.astype(np.int64), *limits)
-    six = np.hstack((tip, tip + matcher.axis_length * axis))
-    segment, at = nearest_segments(six, matcher.track.six, middle, _REACH, *limits)
-    original, length = matcher.original, matcher.track.length
+    six = np.hstack((tip, tip + match.axis_length * axis))
+    segment, at = nearest_segments(six, match.path.six, middle, _REACH, *limits)
+    original, length = match.original, match.path.length
     owner, fraction = owner_fraction(original.trail.owner, original.trail.fraction, segment, at)
-    gap = gap_between(tip, axis, *original.at(owner, fraction), matcher.axis_length)
+    gap = gap_between(tip, axis, *original.at(owner, fraction), match.axis_length)
     way = length[segment] + at * (length[segment + 1] - length[segment])
     pose = original.pose[owner]
-    places = (fraction, share, pose, element, original.program.line[pose], matcher.nc.line[element])
+    places = (fraction, share, pose, element + offset, original.program.line[pose], match.nc.line[element])
     columns = (way, gap.tip, gap.axis_point, np.degrees(gap.angle), *places)
     return np.stack([column.astype(np.float64) for column in columns], axis=1)

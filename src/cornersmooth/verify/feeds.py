@@ -8,10 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
-from cornersmooth.verify.blocks import Block, Matcher
-from cornersmooth.verify.ncprogram import Element, NcProgram, Problem
+from cornersmooth.verify.distances import Distances
+from cornersmooth.verify.findings import Findings
+from cornersmooth.verify.match import Match
+from cornersmooth.verify.ncprogram import Element, Elements, Problem
+from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.rotary import SHORT_STEPS
-from cornersmooth.verify.stops import ARITHMETIC
 
 #: a rounding reaches at most so many times as far as its first vertex that is visibly off the line
 _BEYOND_VISIBLE = 3.0
@@ -19,36 +21,24 @@ _BEYOND_VISIBLE = 3.0
 #: a tip that creeps goes at most so many times the room of the feed: `SHORT_STEPS` and two of which the room is two
 _CREEPING = (SHORT_STEPS + 2) / 2
 
-#: roundings that are looked at one by one in a block
+#: roundings that are looked at one by one in a batch
 _MOST_SINGLE = 5000
 
 
-def check_feeds(matcher: Matcher, block: Block, off: Floats) -> list[tuple[float, Problem]]:
-    """Compare the feeds of one block.
-
-    Parameters
-    ----------
-    matcher : Matcher
-    block : Block
-    off : (v,) float64, mm
-        Distance of every written vertex from the original.
-
-    Returns
-    -------
-    list of (place, Problem)
-        CS541 a wrong feed, CS542 no feed, CS543 the wrong feed mode; one for each run of elements.
-    """
-    nc, original = matcher.nc, matcher.original
+def check_feeds(distances: Distances, found: Findings) -> None:
+    """Every element must carry the feed of its move: CS541 a wrong feed, CS542 none, CS543 the wrong feed mode."""
+    match, off = distances.match, distances.off
+    nc, original = match.nc, match.original
     program = original.program
-    trail, first = block.written.trail, block.written.first
+    trail, first = match.written.trail, match.written.first
     end = trail.last[1:]
     start = trail.last[:-1]
-    feeding = block.on[start] & block.on[end] & (block.piece[start] == block.piece[end])
+    feeding = match.on[start] & match.on[end] & (match.stretch[start] == match.stretch[end])
     element = np.flatnonzero(feeding) + first + 1
     if not len(element):
-        return []
+        return
     start, end = start[feeding], end[feeding]
-    low, high = _touched(matcher, block, start, end)
+    low, high = _touched(match, start, end)
     feed, mode = program.feed[original.pose], program.feed_mode[original.pose] == FeedMode.PER_REVOLUTION
     said, per_revolution, room = nc.feed[element], nc.per_revolution[element], nc.feed_room[element]
     rapid = nc.kind[element] == Element.RAPID
@@ -63,32 +53,29 @@ def check_feeds(matcher: Matcher, block: Block, off: Floats) -> list[tuple[float
             good[k] = bool(_same(own[0], own[1], own[2], feed, mode, among).any())
     wrong = np.flatnonzero(~good)
     for k in wrong[:_MOST_SINGLE].tolist():
-        among = _alike(matcher, block, int(element[k]), int(start[k]), int(end[k]))
+        among = _alike(match, int(element[k]), int(start[k]), int(end[k]))
         own = tuple(np.full(len(among), column[k]) for column in (said, per_revolution, room))
         if _same(own[0], own[1], own[2], feed, mode, among).any():
             good[k] = True
             continue
         pair = float(said[k]), float(room[k])
-        good[k] = _inside_rounding(matcher, block, off, int(start[k]), int(end[k]), int(low[k]), pair, feed)
+        good[k] = _inside_rounding(match, off, int(start[k]), int(end[k]), int(low[k]), pair, feed)
     wrong = np.flatnonzero(~good)
-    if not len(wrong):
-        return []
-    runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
-    return [
-        (float(block.place[start[run[0]]]), _problem(program, nc, original.pose, element, low, run[0])) for run in runs
-    ]
+    if len(wrong):
+        runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
+        found.problems += [_problem(program, nc, original.pose, element, low, int(run[0])) for run in runs]
 
 
-def _touched(matcher: Matcher, block: Block, start: Ints, end: Ints) -> tuple[Ints, Ints]:
+def _touched(match: Match, start: Ints, end: Ints) -> tuple[Ints, Ints]:
     """First and last original move that an element runs along."""
-    length = matcher.track.length
-    owner = matcher.original.trail.owner
-    segment, at = block.segment[start], block.fraction[start]
+    length = match.path.length
+    owner = match.original.trail.owner
+    segment, at = match.segment[start], match.fraction[start]
     rest = (1 - at) * (length[segment + 1] - length[segment])
-    segment = np.where((rest <= matcher.margin) & (segment < block.high[start]), segment + 1, segment)
-    last, at = block.segment[end], block.fraction[end]
+    segment = np.where((rest <= match.margin) & (segment < match.high[start]), segment + 1, segment)
+    last, at = match.segment[end], match.fraction[end]
     gone = at * (length[last + 1] - length[last])
-    last = np.where((gone <= matcher.margin) & (last > segment), last - 1, last)
+    last = np.where((gone <= match.margin) & (last > segment), last - 1, last)
     last = np.maximum(last, segment)
     return owner[segment + 1], owner[last + 1]
 
@@ -101,29 +88,29 @@ def _same(said: Floats, per_revolution: Bools, room: Floats, feed: Floats, mode:
     return same
 
 
-def _alike(matcher: Matcher, block: Block, element: int, start: int, end: int) -> Ints:
+def _alike(match: Match, element: int, start: int, end: int) -> Ints:
     """Moves that an element may run along as well: its ends are as far from theirs as nobody can tell.
 
     Digits do not tell apart what poses a digit apart lie between, and near the pole the axis turns ahead of time.
     """
-    nc, six = matcher.nc, matcher.track.six
-    pole = matcher.axis_length * float(nc.second_room[element - 1 : element + 1].max()) if nc.rotary else 0.0
-    room = 2 * matcher.margin + pole  # a pose is a rounding off, and its place as far from it as the margin
+    nc, six = match.nc, match.path.six
+    pole = match.axis_length * float(nc.second_room[element - 1 : element + 1].max()) if nc.rotary else 0.0
+    room = 2 * match.margin + pole  # a pose is a rounding off, and its place as far from it as the margin
     found = []
     for vertex, step in ((start, -1), (end, 1)):
-        segment, fraction = int(block.segment[vertex]), block.fraction[vertex]
+        segment, fraction = int(match.segment[vertex]), match.fraction[vertex]
         here = six[segment] + fraction * (six[segment + 1] - six[segment])
-        low, high = int(block.low[vertex]), int(block.high[vertex])
+        low, high = int(match.low[vertex]), int(match.high[vertex])
         k = segment
         while low <= k <= high and np.linalg.norm(six[k + (step > 0)] - here) <= room:
             k += step
         found.append(min(max(k, low), high))
-    return np.unique(matcher.original.trail.owner[found[0] + 1 : found[1] + 2])
+    return np.unique(match.original.trail.owner[found[0] + 1 : found[1] + 2])
 
 
 def _inside_rounding(
     matcher: Matcher,
-    block: Block,
+    match: Match,
     off: Floats,
     start: int,
     end: int,
@@ -132,15 +119,15 @@ def _inside_rounding(
     feed: Floats,
 ) -> bool:
     """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
-    length, trail = matcher.track.length, matcher.original.trail
+    length, trail = match.path.length, match.original.trail
     said, room = pair[0], abs(pair[1]) + ARITHMETIC * max(abs(pair[0]), 1.0)
     creeping = -_CREEPING * pair[1]
-    visible = matcher.margin / 2
-    low, high = int(block.low[start]), int(block.high[start])
+    visible = match.margin / 2
+    low, high = int(match.low[start]), int(match.high[start])
 
     def at(vertex: int) -> float:
-        segment = int(block.segment[vertex])
-        here: float = length[segment] + block.fraction[vertex] * (length[segment + 1] - length[segment])
+        segment = int(match.segment[vertex])
+        here: float = length[segment] + match.fraction[vertex] * (length[segment + 1] - length[segment])
         return here
 
     def beyond(towards: int) -> list[int]:
@@ -149,7 +136,7 @@ def _inside_rounding(
         other = move + towards
         while 0 <= other < len(feed):
             found.append(other)
-            if length[trail.last[other]] - (length[trail.last[other - 1]] if other else 0.0) > matcher.margin:
+            if length[trail.last[other]] - (length[trail.last[other - 1]] if other else 0.0) > match.margin:
                 break
             other += towards
         return found
@@ -165,23 +152,23 @@ def _inside_rounding(
         pose = length[pose_vertex]
         begin, other = length[trail.last[move - 1]], length[trail.last[move]]
         far = abs(at(vertex) - pose)
-        if far > (other - begin) / 2 + matcher.margin:
+        if far > (other - begin) / 2 + match.margin:
             continue
         reach = largest = 0.0
         walker = vertex
-        while 0 <= walker < len(off) and block.on[walker] and step * (at(walker) - pose) <= 0:
+        while 0 <= walker < len(off) and match.on[walker] and step * (at(walker) - pose) <= 0:
             if off[walker] > visible:
                 reach = max(reach, abs(at(walker) - pose))
                 largest = max(largest, float(off[walker]))
             walker += step
         if 0 <= walker < len(off):
             largest = max(largest, float(off[walker]))
-        if far <= _BEYOND_VISIBLE * reach + matcher.margin or 0 < largest <= 8 * visible:
+        if far <= _BEYOND_VISIBLE * reach + match.margin or 0 < largest <= 8 * visible:
             return True
     return False
 
 
-def _problem(program: Program, nc: NcProgram, pose: Ints, element: Ints, low: Ints, k: int) -> Problem:
+def _problem(program: Program, nc: Elements, pose: Ints, element: Ints, low: Ints, k: int) -> Problem:
     own, move = int(element[k]), int(pose[low[k]])
     cl_line, nc_line = int(program.line[move]), int(nc.line[own])
     unit = "rev" if program.feed_mode[move] == FeedMode.PER_REVOLUTION else "min"

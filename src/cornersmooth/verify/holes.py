@@ -13,9 +13,9 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.verify.cycles import Drilling, drillings
-from cornersmooth.verify.ncprogram import Element, NcProgram, Problem
-from cornersmooth.verify.stops import digit_errors
-from cornersmooth.verify.trails import Original, directions
+from cornersmooth.verify.ncprogram import Element, Elements, Problem
+from cornersmooth.verify.polyline import Original, directions
+from cornersmooth.verify.rapids import digit_errors
 
 #: elements looked through at a time for the beginning of a run
 _WINDOW = 512
@@ -43,7 +43,7 @@ class HoleRuns:
     problems: list[Problem] = field(default_factory=list)
 
 
-def divide_at_holes(original: Original, nc: NcProgram, axis_length: float) -> HoleRuns:
+def divide_at_holes(original: Original, nc: Elements, axis_length: float) -> HoleRuns:
     """Find the elements of all holes and check them; say what lies between."""
     hole = original.program.kind[original.pose] == Move.HOLE
     found = HoleRuns()
@@ -78,7 +78,7 @@ def divide_at_holes(original: Original, nc: NcProgram, axis_length: float) -> Ho
 class _Search:
     """Looks for holes in the text."""
 
-    def __init__(self, original: Original, nc: NcProgram, axis_length: float) -> None:
+    def __init__(self, original: Original, nc: Elements, axis_length: float) -> None:
         self.original, self.nc, self.axis_length = original, nc, axis_length
         program = original.program
         self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]

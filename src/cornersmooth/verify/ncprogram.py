@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,39 @@ class Curves:
     def __len__(self) -> int:
         return len(self.element)
 
+    def part(self, first: int, stop: int) -> Curves:
+        """Curves that are elements from `first` to `stop`, the latter excluded."""
+        a, b = np.searchsorted(self.element, (first, stop)).tolist()
+        if a == b:
+            return Curves()
+        order, points = self.order[a:b], self.points[a:b]
+        point, knot = int(self.first_point[a]), int(self.first_knot[a])
+        last_point = int(self.first_point[b - 1] + points[-1])
+        last_knot = int(self.first_knot[b - 1] + points[-1] + order[-1])
+        return Curves(
+            self.element[a:b] - first,
+            order,
+            self.first_point[a:b] - point,
+            points,
+            self.first_knot[a:b] - knot,
+            self.point[point:last_point],
+            self.weight[point:last_point],
+            self.knot[knot:last_knot],
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Curves], start: Sequence[int]) -> Curves:
+        """Curves of parts of a text whose elements are counted from `start` on."""
+        pairs = [(part, first) for part, first in zip(parts, start, strict=False) if len(part)]
+        if not pairs:
+            return cls()
+        own = {name: np.concatenate([getattr(part, name) for part, _ in pairs]) for name in vars(pairs[0][0])}
+        own["element"] = np.concatenate([part.element + first for part, first in pairs])
+        own["first_point"] = np.cumsum(own["points"]) - own["points"]
+        size = own["points"] + own["order"]
+        own["first_knot"] = np.cumsum(size) - size
+        return cls(**own)
+
 
 @dataclass(frozen=True)
 class NcArcs:
@@ -79,6 +113,21 @@ class NcArcs:
 
     def __len__(self) -> int:
         return len(self.element)
+
+    def part(self, first: int, stop: int) -> NcArcs:
+        """Arcs that are elements from `first` to `stop`, the latter excluded."""
+        a, b = np.searchsorted(self.element, (first, stop)).tolist()
+        return NcArcs(self.element[a:b] - first, self.centre[a:b], self.normal[a:b], self.sweep[a:b])
+
+    @classmethod
+    def joined(cls, parts: Sequence[NcArcs], start: Sequence[int]) -> NcArcs:
+        """Arcs of parts of a text whose elements are counted from `start` on."""
+        pairs = [(part, first) for part, first in zip(parts, start, strict=False) if len(part)]
+        if not pairs:
+            return cls()
+        own = {name: np.concatenate([getattr(part, name) for part, _ in pairs]) for name in vars(pairs[0][0])}
+        own["element"] = np.concatenate([part.element + first for part, first in pairs])
+        return cls(**own)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +178,9 @@ class Problem:
     amount: float = float("nan")
 
 
-@dataclass(frozen=True)
-class NcProgram:
-    """An NC text as a control understands it: m path elements and what stands between them.
+@dataclass(frozen=True, kw_only=True)
+class Elements:
+    """Path elements of a text or of a part of it, m of them.
 
     Parameters
     ----------
@@ -146,28 +195,19 @@ class NcProgram:
     feed : (m,) float64
         mm/min or mm/rev; NaN for rapids and where none was given.
     per_revolution : (m,) bool
-    curves : Curves
-    arcs : NcArcs
-    events : tuple of Event
-        In the order of the text.
-    problems : tuple of Problem
-        What breaks the rules of the control.
-    units : {"mm", "inch"}
-    second_is : {"vector", "point"}
-    tip_step, second_step : float
-        Value of the last printed digit of tip (mm) and of vector (1) or axis point (mm).
-    blocks : int
-        Number of blocks that are not empty, ``%`` and comments left out.
     feed_room : (m,) float64
         mm/min or mm/rev by which the feed is not known: digits of F, and of times and ways where it is timed.
         Negative where the feed is that of the axis point, if the tip stands still, but where the tip may as well creep
         by what the digits do not show: its feed is then anything up to a few times that room.
     second_room : (m,) float64
         By how much, as `second`, directions that must be exact may be off beside the printed digits.
+    curves : Curves
+    arcs : NcArcs
+    second_is : {"vector", "point"}
+    tip_step, second_step : float
+        Value of the last printed digit of tip (mm) and of vector (1) or axis point (mm).
     rotary : bool
         Whether the text has rotary words.
-    unsaid : frozenset
-        Kinds of tokens (see `statements`), or pairs of kind and value, that the control has no words for.
     """
 
     kind: NDArray[np.uint8]
@@ -176,22 +216,61 @@ class NcProgram:
     line: Ints
     feed: Floats
     per_revolution: NDArray[np.bool_]
+    feed_room: Floats
+    second_room: Floats
     curves: Curves
     arcs: NcArcs
-    events: tuple[Event, ...]
-    problems: tuple[Problem, ...]
-    units: Units
     second_is: Second
     tip_step: float
     second_step: float
-    blocks: int
-    feed_room: Floats = field(default_factory=lambda: np.zeros(0))
-    second_room: Floats = field(default_factory=lambda: np.zeros(0))
     rotary: bool = False
-    unsaid: frozenset[str | tuple[str, float]] = frozenset()
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    def part(self, first: int, stop: int) -> Elements:
+        """Elements from `first` to `stop`, the latter excluded, counted anew."""
+        rows = slice(first, stop)
+        own = {name: getattr(self, name)[rows] for name in _COLUMNS}
+        return replace(self, **own, curves=self.curves.part(first, stop), arcs=self.arcs.part(first, stop))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Elements]) -> Elements:
+        """Put parts of a text together, at least one; what holds for all elements is that of the last."""
+        if len(parts) == 1:
+            return parts[0]
+        start = np.cumsum([0, *map(len, parts)]).tolist()
+        own = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS}
+        curves = Curves.joined([part.curves for part in parts], start)
+        return replace(parts[-1], **own, curves=curves, arcs=NcArcs.joined([part.arcs for part in parts], start))
+
+
+#: fields of `Elements` with a row for each
+_COLUMNS: Final = ("kind", "tip", "second", "line", "feed", "per_revolution", "feed_room", "second_room")
+
+
+@dataclass(frozen=True, kw_only=True)
+class NcProgram(Elements):
+    """An NC text as a control understands it: path elements and what stands between them.
+
+    Parameters
+    ----------
+    events : tuple of Event
+        In the order of the text.
+    problems : tuple of Problem
+        What breaks the rules of the control.
+    units : {"mm", "inch"}
+    blocks : int
+        Number of blocks that are not empty, ``%`` and comments left out.
+    unsaid : frozenset
+        Kinds of tokens (see `statements`), or pairs of kind and value, that the control has no words for.
+    """
+
+    events: tuple[Event, ...]
+    problems: tuple[Problem, ...]
+    units: Units
+    blocks: int
+    unsaid: frozenset[str | tuple[str, float]] = frozenset()
 
     @property
     def mm_per_unit(self) -> float:

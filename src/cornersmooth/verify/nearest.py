@@ -8,12 +8,19 @@ from typing import Literal
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.polyline import Polyline
 
 #: which distance is made smallest: tip and axis point together, or one of them
 Metric = Literal["both", "tip", "axis point"]
 
 #: segments that the nearest place may be away from where it is looked for
 _MOST_STEPS = 200
+
+#: segments looked at on either side of a repeated pose
+_BEYOND_REPEATED = 4
+
+#: squared distance that is none, mm²
+_NOTHING = 1e-9
 
 #: rows taken at a time, so that the work arrays stay in the cache
 _BLOCK = 16384
@@ -119,6 +126,39 @@ def nearest_places(
                 np.copyto(best, d, where=nearer)
                 np.copyto(segment[part], j, where=nearer)
                 np.copyto(fraction[part], t, where=nearer)
+    return segment, fraction, square
+
+
+def nearest_from(point: Floats, path: Polyline, about: Floats, low: Ints, high: Ints) -> tuple[Ints, Floats, Floats]:
+    """Nearest places of points from path lengths on, where the distance grows no more.
+
+    Parameters
+    ----------
+    point : (k, 6) float64
+    path : Polyline
+    about : (k,) float64, mm
+        Path length where to begin to look.
+    low, high : (k,) int64
+        First and last segment allowed.
+
+    Returns
+    -------
+    As `nearest_places`.
+    """
+    middle = np.clip(np.searchsorted(path.length, about, side="right") - 1, low, high)
+    segment, fraction, square = nearest_places(point, path.six, middle, 1, low, high)
+    moved = climb(point, path.six, middle, low, high, segment, fraction)
+    ended = np.flatnonzero(((fraction <= 0.0) | (fraction >= 1.0)) & (square > _NOTHING))
+    beside = np.stack([np.clip(segment[ended] + step, 0, len(path.six) - 2) for step in (-1, 0, 1)])
+    stuck = ended[(path.length[beside] == path.length[beside + 1]).any(axis=0)]
+    if len(stuck):  # at a repeated pose, beyond which it may be nearer
+        own, part = point[stuck], (low[stuck], high[stuck])
+        there, share = nearest_segments(own, path.six, segment[stuck], _BEYOND_REPEATED, *part)
+        climb(own, path.six, segment[stuck], *part, there, share)
+        segment[stuck], fraction[stuck] = there, share
+        moved = np.union1d(moved, stuck)
+    away = point[moved] - path.point_at(segment[moved], fraction[moved])
+    square[moved] = np.einsum("ij,ij->i", away, away)
     return segment, fraction, square
 
 

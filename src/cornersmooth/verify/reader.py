@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import io
-import math
 import os
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, NoReturn
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import numpy as np
 
@@ -18,13 +16,11 @@ from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.dialects import CONTROLS
 from cornersmooth.verify.dialects.base import HIGH_SPEED
 from cornersmooth.verify.motion import Modal, Piece, execute
-from cornersmooth.verify.ncprogram import Element, Event, NcProgram, Problem, Second
-from cornersmooth.verify.pile import Pile
-from cornersmooth.verify.source import readable_twice, unreadable
-from cornersmooth.verify.stops import moving_rapids
+from cornersmooth.verify.ncprogram import Curves, Element, Elements, Event, NcArcs, NcProgram, Problem, Second
+from cornersmooth.verify.source import Source, readable_twice
 from cornersmooth.verify.style import DIGITS_SAMPLE, Steps, Style
 from cornersmooth.verify.unknown import settle
-from cornersmooth.verify.words import NURBS, Line, Table, table_of
+from cornersmooth.verify.words import MOTION_CODES, NURBS, Line, Table, table_of
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -39,6 +35,9 @@ CONTROL_WORDS: Final = "CS506"
 
 #: runs of fewer blocks are executed together: each folded block of Klartext is a run of its own
 FEW_ROWS: Final = 64
+
+#: elements that are given out together
+GIVEN_OUT: Final = 1 << 15
 
 #: words that say what is in force when it must be
 _NEEDS = {
@@ -93,42 +92,16 @@ def read_nc(
 
 def read_styled(data: bytes | str | os.PathLike[str], style: Style, name: str | None = None) -> NcProgram:
     """Read an NC text; see `read_nc`."""
-
-    def read(file: BinaryIO, label: str | None) -> NcProgram:
-        steps = style.steps(file.read(DIGITS_SAMPLE))
-        file.seek(0)
-        reader = Reader(label, style, steps)
-        reader.take(read_lines(file, label, style.dialect.lexer))
-        return reader.result()
-
     label = name if name is not None or isinstance(data, bytes) else str(data)
-    data = readable_twice(data)
-    if isinstance(data, bytes):
-        return read(io.BytesIO(data), label)
-    path = Path(data)
+    source = Source(readable_twice(data))
     try:
-        with path.open("rb") as file:
-            return read(file, label)
-    except OSError as error:
-        raise unreadable(error, label) from error
-
-
-@dataclass(frozen=True)
-class Standing:
-    """All that holds at a place of a text where no curve is open.
-
-    Parameters
-    ----------
-    modal : Modal
-    tip_control : str
-        See `dialects.State`.
-    memory : dict
-        See `dialects.State`.
-    """
-
-    modal: Modal
-    tip_control: str = ""
-    memory: dict[str, Any] = field(default_factory=dict)
+        source.finish()
+        reader = Reader(label, style, style.steps(source.read(0, DIGITS_SAMPLE)))
+        reader.comments = []
+        parts = list(reader.chunks(read_lines(source.part(0, sys.maxsize), label, style.dialect.lexer)))
+        return reader.program(parts)
+    finally:
+        source.close()
 
 
 class Reader:
@@ -140,81 +113,48 @@ class Reader:
         For messages.
     style : Style
     steps : Steps
-    standing : Standing, optional
-        What holds in front of the first line.
+    lever : float, optional
+        Longest distance, mm, at which rotary axes move the tip; as far as the text goes by default.
     """
 
-    def __init__(self, name: str | None, style: Style, steps: Steps, standing: Standing | None = None) -> None:
+    def __init__(self, name: str | None, style: Style, steps: Steps, lever: float | None = None) -> None:
         self.name, self.style, self.dialect, self.steps = name, style, style.dialect, steps
         self.rotary = style.rotary(steps)
-        if standing is None:
-            standing = Standing(Modal(rotary=self.rotary.names if self.rotary is not None else ""))
-        self.began = standing
-        self.modal, self.tip_control, self.memory = standing.modal, standing.tip_control, dict(standing.memory)
-        self.pile = Pile()
+        self.modal = Modal(rotary=self.rotary.names if self.rotary is not None else "")
+        self.tip_control = ""
+        self.memory: dict[str, Any] = {}
         self.waiting: list[Table | tuple[int, dict[str, float]]] = []
+        self.ready: list[Elements] = []
         self.events: list[Event] = []
         self.late: list[tuple[Line, str, float, str]] = []
-        self.comments: list[tuple[int, str]] = []
+        self.comments: list[tuple[int, str]] | None = None
         self.problems: list[Problem] = []
         self.complained: set[tuple[str, str]] = set()
-        self.feed_units: set[float] = set()
-        self.lines = 0
-        self.lever = 0.0
-        self.elements = self.pointless = 0
+        self.lever, self._given_lever = 0.0, lever
+        self.elements = self.given_out = self.curves = 0
+        #: elements before any word of a second point on the axis
+        self.pointless = 0
+        #: whether the tool has been fed from a position that was known
+        self.placed = False
         self.blocks = 0
 
-    def take(self, items: Iterable[Table | Line]) -> None:
-        """Take runs of motion blocks and other lines, to the end of a text or to where no curve is open."""
+    def chunks(self, items: Iterable[Table | Line]) -> Iterator[Elements]:
+        """Take runs of motion blocks and other lines, and give out the path elements as they come."""
         for item in items:
-            self.take_one(item)
+            if isinstance(item, Table):
+                self.rows(item)
+            else:
+                self.line(item)
+            if self.placed and self.elements - self.given_out >= GIVEN_OUT:
+                yield self._collected()
         self.flush()
-
-    def take_one(self, item: Table | Line) -> None:
-        """Take a run of motion blocks, or another line."""
-        if isinstance(item, Table):
-            self.rows(item)
-            self.lines = int(item.line[-1])
-        else:
-            self.line(item)
-            self.lines = item.number
-
-    @property
-    def standing(self) -> Standing:
-        """What holds now, all lines being executed."""
-        return Standing(self.modal, self.tip_control, dict(self.memory))
-
-    def began_with(self, standing: Standing | None) -> bool:
-        """Whether all would be the same if this had held in front of the first line, but for feeds not known there."""
-        if standing is None or (self.began.tip_control, self.began.memory) != (standing.tip_control, standing.memory):
-            return False
-        mine, true = self.began.modal, standing.modal
-        if math.isnan(mine.feed):
-            mine = mine.but(feed=true.feed)
-        return repr(mine) == repr(true) and len(self.feed_units) <= 1  # NaN is not equal to itself
-
-    def know_feed(self, feed: float) -> None:
-        """Say which feed, in units of the text, held in front of the first line, where that was not known."""
-        if math.isnan(self.began.modal.feed) and self.feed_units:
-            rows = self.pile.feed.rows
-            rows[np.isnan(rows) & (self.pile.kind.rows != Element.RAPID)] = feed * next(iter(self.feed_units))
-
-    def next_stop(self, first: int) -> int | None:
-        """First element from `first` on that is rapid and moves the tool; None where there is none yet."""
-        pile = self.pile
-        if first == 0 and self.elements:
-            began, factor = self.began.modal, MM_PER_UNIT[self.units]
-            place = [factor * value for value in began.tip]
-            second = [factor * value for value in began.second] if began.points else began.second
-            moves = (pile.tip.rows[0] != place).any() or (pile.second.rows[0] != second).any()
-            if moves and pile.kind.rows[0] == Element.RAPID:
-                return 0
-        found = moving_rapids(pile.kind.rows, pile.tip.rows, pile.second.rows, max(first, 1), self.elements)
-        return int(found[0]) if len(found) else None
+        self._settle()
+        if self.ready:
+            yield self._collected()
 
     def rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
-        if closed(table) and len(table) + len(self.waiting) > FEW_ROWS:
+        if len(table) + len(self.waiting) > FEW_ROWS and (closed(table) or self._code in MOTION_CODES[:4]):
             self.flush()
         self.waiting.append(table)
         self.blocks += len(table)
@@ -223,7 +163,8 @@ class Reader:
         """Take a line of another kind."""
         if line.words:
             self.blocks += 1
-        self.comments.extend((line.number, text) for text in line.comments)
+        if self.comments is not None:
+            self.comments.extend((line.number, text) for text in line.comments)
         row = self.dialect.row(line) if line.words else None
         if row is not None:
             self.waiting.append((line.number, row))
@@ -243,12 +184,10 @@ class Reader:
             piece, self.modal = execute(table, before)
             self._check_control(table, before.code)
             if self.modal.points and not before.points:
-                self.pointless = self.elements
+                self._know_points(piece)
             self.problems.extend(piece.problems)
             unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
             unit = 1.0 if before.inverse_time else unit
-            if math.isnan(before.feed):
-                self.feed_units.add(1.0 if factor == 1.0 else unit)
             piece = _in_mm(piece, factor, unit, points=self.modal.points)
             piece.feed_room += self.dialect.feed_step / 2 * unit
             if self.rotary is not None:
@@ -257,9 +196,98 @@ class Reader:
                 piece = rotary.resolve(piece, start, inverse_time=before.inverse_time)
                 levers = self.rotary.levers(piece.tip)
                 self.lever = max(self.lever, float(levers.max(initial=0.0, where=~np.isnan(levers))))
-            self.pile.add(piece)
-            self.elements += len(piece.kind)
+            self._add(piece)
         self.waiting = []
+
+    @property
+    def _code(self) -> float:
+        """G word of group 01 behind what waits."""
+        for item in reversed(self.waiting):
+            words = item.column("G") if isinstance(item, Table) else np.array([item[1].get("G", np.nan)])
+            known = words[~np.isnan(words)]
+            if len(known):
+                return float(known[-1])
+        return self.modal.code
+
+    def _know_points(self, piece: Piece) -> None:
+        """From here on U V W are a point on the axis: what was said before of the axis is no such point."""
+        if self.given_out:
+            self._refuse_unknown(int(piece.line[0]))
+        for part in self.ready:
+            part.second[:] = np.nan
+
+    def _add(self, piece: Piece) -> None:
+        """Take over the elements of a run."""
+        if not len(piece.kind):
+            return
+        second_is: Second = "point" if self.modal.points else "vector"
+        scale = MM_PER_UNIT[self.units]
+        steps = (self.steps.tip * scale, self.steps.second * (scale if second_is == "point" else 1.0))
+        if self.rotary is not None:
+            lever = self.lever if self._given_lever is None else self._given_lever
+            steps = replace(self.rotary, tip_step=steps[0]).steps(lever)
+        curves = piece.curves
+        size = curves.points + curves.order
+        self.ready.append(
+            Elements(
+                kind=piece.kind,
+                tip=piece.tip,
+                second=piece.second,
+                line=piece.line,
+                feed=piece.feed,
+                per_revolution=piece.per_revolution,
+                feed_room=piece.feed_room,
+                second_room=np.zeros(len(piece.kind)),
+                curves=Curves(
+                    piece.curve_element,
+                    curves.order,
+                    np.cumsum(curves.points) - curves.points,
+                    curves.points,
+                    np.cumsum(size) - size,
+                    curves.control,
+                    curves.weight,
+                    curves.knot,
+                ),
+                arcs=NcArcs(piece.arc_element, piece.arc_centre, piece.arc_normal, piece.arc_sweep),
+                second_is=second_is,
+                tip_step=steps[0],
+                second_step=steps[1],
+                rotary=self.rotary is not None,
+            )
+        )
+        self.elements += len(piece.kind)
+        self.curves += len(curves)
+        if not self.placed and (piece.kind != Element.RAPID).any():
+            self._settle()
+
+    def _settle(self) -> None:
+        """Where words of the position come late, put the tool where they send it first."""
+        if self.placed or not self.ready:
+            return
+        whole = Elements.joined(self.ready)
+        whole = replace(whole, tip=whole.tip.copy(), second=whole.second.copy())
+        line = settle(
+            {"kind": whole.kind, "line": whole.line, "tip": whole.tip, "second": whole.second}, ("tip", "second")
+        )
+        if line is not None:
+            self._refuse_unknown(line)
+        self.ready = [whole]
+        self.placed = bool((whole.kind != Element.RAPID).any())
+
+    def _refuse_unknown(self, line: int) -> NoReturn:
+        hint = "say X Y Z, and U V W where there are any, before the first feed"
+        raise InputError("CS503", "a feed move where not all of the position is known", hint, file=self.name, line=line)
+
+    def _collected(self) -> Elements:
+        """Give out what is ready."""
+        found = Elements.joined(self.ready)
+        self.ready, self.given_out = [], self.elements
+        room = np.zeros(len(found))
+        if self.rotary is not None:
+            room = self.rotary.pole_room(found.second)
+        elif found.second_is == "vector" and not self.steps.second:  # no word says anything of the tool axis
+            room += FIXED_SHARE * self.style.tolerance / self.style.axis_length
+        return replace(found, second_room=room)
 
     @property
     def units(self) -> Units:
@@ -325,47 +353,44 @@ class Reader:
         text = f"{_NEEDS[kind]} under {self.tip_control or 'no tool tip control'}, where {need} must be in force"
         self.problems.append(Problem(CONTROL_WORDS, 0, int(table.line[rows[0]]), text))
 
-    def result(self) -> NcProgram:
-        """Put all pieces together, in millimetres."""
-        second_is: Second = "point" if self.modal.points else "vector"
-        scale = MM_PER_UNIT[self.units]
-        elements, curves, arcs = self.pile.whole()
-        elements["second"][: self.pointless] = np.nan
-        line = settle(elements, ("tip", "second"))
-        if line is not None:
-            hint = "say X Y Z, and U V W where there are any, before the first feed"
-            raise InputError(
-                "CS503", "a feed move where not all of the position is known", hint, file=self.name, line=line
-            )
-        place = np.searchsorted(elements["line"], [number for number, _ in self.comments])
-        self.events.extend(
-            Event(int(element), number, "(", 0.0, text)
-            for element, (number, text) in zip(place, self.comments, strict=True)
+    def program(self, parts: list[Elements]) -> NcProgram:
+        """Put all that was given out together."""
+        elements = Elements.joined(parts) if parts else _nothing(self.steps)
+        events = list(self.events)
+        comments = self.comments or []
+        place = np.searchsorted(elements.line, [number for number, _ in comments])
+        events.extend(
+            Event(int(element), number, "(", 0.0, text) for element, (number, text) in zip(place, comments, strict=True)
         )
-        self.events.sort(key=lambda event: event.line)
-        steps = (self.steps.tip * scale, self.steps.second * (scale if second_is == "point" else 1.0))
-        if self.rotary is not None:
-            steps = replace(self.rotary, tip_step=steps[0]).steps(self.lever)
-        room = np.zeros(len(elements["kind"]))
-        if self.rotary is not None:
-            room = self.rotary.pole_room(elements["second"])
-        elif second_is == "vector" and not self.steps.second:  # no word says anything of the tool axis
-            room += FIXED_SHARE * self.style.tolerance / self.style.axis_length
+        events.sort(key=lambda event: event.line)
         return NcProgram(
-            **elements,
-            curves=curves,
-            arcs=arcs,
-            events=tuple(self.events),
+            **vars(elements),
+            events=tuple(events),
             problems=tuple(self.problems),
             units=self.units,
-            second_is=second_is,
-            tip_step=steps[0],
-            second_step=steps[1],
             blocks=self.blocks,
-            second_room=room,
-            rotary=self.rotary is not None,
             unsaid=self.dialect.unsaid,
         )
+
+
+def _nothing(steps: Steps) -> Elements:
+    """No elements at all."""
+    none, rows = np.zeros(0), np.zeros((0, 3))
+    return Elements(
+        kind=np.zeros(0, np.uint8),
+        tip=rows,
+        second=rows,
+        line=np.zeros(0, np.int64),
+        feed=none,
+        per_revolution=np.zeros(0, np.bool_),
+        feed_room=none,
+        second_room=none,
+        curves=Curves(),
+        arcs=NcArcs(),
+        second_is="vector",
+        tip_step=steps.tip,
+        second_step=steps.second,
+    )
 
 
 def _joined(waiting: list[Table | tuple[int, dict[str, float]]]) -> Iterable[Table]:

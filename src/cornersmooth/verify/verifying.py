@@ -4,38 +4,40 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, fields
+from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
 
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.model import Floats, Program, Units
+from cornersmooth.model import Ints, Program, Units
 from cornersmooth.settings import BOUNDS
-from cornersmooth.verify.comparison import BEFORE, Compared, Comparison, Joints
-from cornersmooth.verify.deviation import Largest, exact_poses
-from cornersmooth.verify.farther import way_apart
-from cornersmooth.verify.holes import divide_at_holes
-from cornersmooth.verify.ncprogram import Event, NcProgram, Problem
-from cornersmooth.verify.processes import can_fork
-from cornersmooth.verify.reader import CONTROL_WORDS, read_styled
-from cornersmooth.verify.ring import Place, Ring
-from cornersmooth.verify.sections import Found, Task, put_together
-from cornersmooth.verify.sectionwork import work_on
+from cornersmooth.verify.batches import Batch, Batches
+from cornersmooth.verify.block_tables import read_lines
+from cornersmooth.verify.checks import Examined, examine
+from cornersmooth.verify.findings import Findings, Largest, Poses
+from cornersmooth.verify.ncprogram import Elements, Event, NcProgram, Problem
+from cornersmooth.verify.reader import CONTROL_WORDS, Reader
+from cornersmooth.verify.result import Verification
 from cornersmooth.verify.source import Source, readable_twice
-from cornersmooth.verify.statements import asked, compare, said, way_between
-from cornersmooth.verify.stops import find_stretches
-from cornersmooth.verify.style import Style
-from cornersmooth.verify.trails import Original, original_motion
-from cornersmooth.verify.verification import Verification
+from cornersmooth.verify.statements import asked, compare, said
+from cornersmooth.verify.style import DIGITS_SAMPLE, Style
+from cornersmooth.verify.task import Task
+from cornersmooth.verify.wide_search import way_apart
+from cornersmooth.verify.workers import Helper, can_fork, map_in_processes
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
 
-#: poses of programs whose text is looked at in sections
-LONG: Final = 30_000
+#: poses from which on it is worth while to let other processes work
+_LONG: Final = 30_000
+
+#: CL path length of what stands before the first motion, mm
+_BEFORE: Final = -1.0
 
 
 def verify(
@@ -80,8 +82,10 @@ def verify(
     """
     if isinstance(nc, NcProgram):
         _check_bounds(tolerance, axis_length)
-        original = original_motion(program, tolerance, axis_length)
-        return _whole(original, nc, tolerance, axis_length, words, processes)
+        elements = Elements(**{column.name: getattr(nc, column.name) for column in fields(Elements)})
+        text = _Text(iter([elements]), list(nc.events))
+        measured = _measure(Task.of(program, tolerance, axis_length), text, words=words, processes=processes)
+        return measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
     with Verifier(
         program,
         nc,
@@ -124,27 +128,23 @@ class Verifier:
         processes: int = 1,
     ) -> None:
         _check_bounds(tolerance, axis_length)
+        self._program, self._words, self._processes = program, words, processes
         self._name = None if isinstance(nc, bytes) else str(nc)
-        nc = readable_twice(nc)
-        self._program, self._nc, self._words, self._processes = program, nc, words, processes
         self._style = Style.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
-        self._source = Source(nc)
-        self._task: Task | None = None
-        if len(program) >= LONG:
-            self._task = Task.of(program, self._source, self._style, words=words)
-        self._ring: Ring | None = None
+        self._source = Source(readable_twice(nc))
+        self._helper: Helper | None = None
 
     def __enter__(self) -> Self:
-        if self._task is not None and self._processes > 1 and can_fork():
-            with contextlib.suppress(OSError):  # without them it takes longer
-                self._ring = Ring(partial(work_on, self._task), self._processes)
+        if self._processes > 1 and can_fork() and len(self._program) >= _LONG:
+            with contextlib.suppress(OSError):  # without it it takes longer
+                self._helper = Helper(self._work)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._ring is not None:
-            self._ring.end()
+        if self._helper is not None:
+            self._helper.end()
         self._source.close()
 
     def result(self) -> Verification:
@@ -156,115 +156,153 @@ class Verifier:
             Where the text cannot be read.
         """
         self._source.finish()
-        if self._task is not None:
-            if self._ring is None:
-                shares = [work_on(self._task, Place())]
-            else:
-                _ = self._task.length  # while the others are still at work
-                shares = self._ring.results()
-            found = put_together(shares)
-            verification = None if found is None else self._of_sections(self._task, found)
-            if verification is not None:
-                return verification
-        nc = read_styled(self._nc, self._style, self._name)
-        return _whole(self._original, nc, self._style.tolerance, self._style.axis_length, self._words, self._processes)
+        if self._helper is None:
+            return self._work()
+        found: Verification = self._helper.result()
+        return found
 
-    @cached_property
-    def _original(self) -> Original:
-        if self._task is not None:
-            return self._task.original
-        return original_motion(self._program, self._style.tolerance, self._style.axis_length)
-
-    def _of_sections(self, task: Task, found: Found) -> Verification | None:
-        """Put the sections together; None where something is wrong."""
-        original, length, style, program = task.original, task.length, task.style, task.program
-        problems = _units_problems(program, found.units)
-        compared = Compared(Largest(), Joints(), [], [], np.zeros(0))
-        events: list[Event] = []
-        places: list[Floats] = []
-        for section in found.sections:
-            compared.largest.take(section.compared.largest)
-            compared.joints.take(section.compared.joints)
-            compared.poses += section.compared.poses
-            events += section.events
-            places.append(section.places + length[section.vertex])
-        if self._words:
-            unsaid = style.dialect.unsaid
-            whole = np.concatenate(places)
-            rooms = np.zeros(len(whole))
-            problems += _statement_problems(original, length, events, whole, rooms, found.margin, unsaid)
-        if problems:
-            return None
-        return Verification.of(
-            compared,
-            [],
-            tolerance=style.tolerance,
-            axis_length=style.axis_length,
-            poses=len(program),
-            blocks=found.end.blocks,
-            elements=found.end.elements,
-            curves=found.end.curves,
+    def _work(self) -> Verification:
+        """Read and measure the text as far as it goes."""
+        style, source = self._style, self._source
+        task = Task.of(self._program, style.tolerance, style.axis_length)
+        steps = style.steps(source.read(0, DIGITS_SAMPLE))
+        rotary = style.rotary(steps)
+        lever = None
+        if rotary is not None:
+            lever = float(rotary.levers(task.original.trail.tip).max(initial=0.0))
+        reader = Reader(self._name, style, steps, lever)
+        lines = read_lines(source.part(0, sys.maxsize), self._name, style.dialect.lexer)
+        text = _Text(reader.chunks(lines), reader.events)
+        measured = _measure(task, text, words=self._words, processes=self._processes)
+        return measured.verification(
+            reader.problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
 
 
-def _whole(
-    original: Original, nc: NcProgram, tolerance: float, axis_length: float, words: bool, processes: int
-) -> Verification:
-    """Measure a text that has been read as a whole."""
-    program = original.program
-    problems = [problem for problem in nc.problems if words or problem.code != CONTROL_WORDS]
-    problems += _units_problems(program, nc.units)
-    holes = divide_at_holes(original, nc, axis_length)
-    stretches, found = find_stretches(original, nc, axis_length, holes.parts)
-    problems += holes.problems + found
-    own = np.array([event.element - 1 for event in nc.events], np.int64)
-    elements = np.unique(own)
-    comparison = Comparison(original, exact_poses(original), nc, tolerance, axis_length)
-    compared = comparison.compare(stretches, elements, holes=holes.element_move, processes=processes)
-    problems += compared.problems
-    if words and len(nc):  # without any motion nothing has a place
-        places = compared.places[np.searchsorted(elements, own)]
-        length, margin = comparison.matcher.track.length, comparison.matcher.margin
-        rooms = np.where(nc.rotary & (own >= 0), axis_length * nc.second_room[own], 0.0)
-        apart = partial(way_apart, comparison.matcher.track)
-        problems += _statement_problems(original, length, nc.events, places, rooms, margin, nc.unsaid, apart)
-    return Verification.of(
-        compared,
-        problems,
-        tolerance=tolerance,
-        axis_length=axis_length,
-        poses=len(program),
-        blocks=nc.blocks,
-        elements=len(nc),
-        curves=len(nc.curves),
-    )
+@dataclass(frozen=True)
+class _Text:
+    """The path elements of a text as they are read, and the words between those that have been given out."""
+
+    chunks: Iterator[Elements]
+    events: list[Event]
 
 
-def _statement_problems(
-    original: Original,
-    length: Floats,
-    events: Sequence[Event],
-    places: Floats,
-    rooms: Floats,
-    margin: float,
-    unsaid: frozenset[str | tuple[str, float]],
-    apart: Callable[[float, float], float] = way_between,
-) -> list[Problem]:
-    """What words beside the motion say wrongly; `length` is that of the original path up to its vertices."""
-    program = original.program
-    move = np.searchsorted(original.pose, [statement.pose for statement in program.statements]) - 1
-    moves = len(original.pose)
-    end = float(length[-1]) if moves else 0.0
-    asked_at = np.where(move >= 0, length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0, BEFORE)
-    theirs = asked(program, asked_at.tolist(), end)
-    ours = said(events, np.nan_to_num(places, nan=0.0).tolist(), rooms.tolist())
-    return compare(theirs, ours, margin, unsaid, apart)
+@dataclass
+class _Measured:
+    """What all batches show together.
+
+    Parameters
+    ----------
+    task : Task
+    batches : Batches
+    findings : Findings
+    poses : Poses
+        Of the whole CL program.
+    lengths : dict of int to float
+        CL path length, mm, at the ends of elements that have words behind them, where batches tell.
+    rooms : dict of int to float
+        How far that is uncertain, mm.
+    events : list of Event
+    words : bool
+    margin : float, mm
+    """
+
+    task: Task
+    batches: Batches
+    findings: Findings
+    poses: Poses
+    lengths: dict[int, float]
+    rooms: dict[int, float]
+    events: list[Event]
+    words: bool
+    margin: float = 0.0
+
+    def verification(
+        self,
+        problems: list[Problem],
+        units: Units,
+        unsaid: frozenset[str | tuple[str, float]],
+        *,
+        blocks: int,
+        curves: int,
+    ) -> Verification:
+        """Put everything together; `problems` are those of the text alone, the rest is as of `NcProgram`."""
+        program = self.task.original.program
+        problems = [problem for problem in problems if self.words or problem.code != CONTROL_WORDS]
+        if units != program.units:
+            text = f"the text is in {units}, the CL file in {program.units}"
+            problems.append(Problem("CS505", 0, 1, text))
+        problems += self.batches.problems + self.findings.problems + self.findings.violations.problems()
+        if self.words and self.batches.elements:  # without any motion nothing has a place
+            problems += self._statement_problems(unsaid)
+        return Verification.of(
+            self.findings,
+            self.poses,
+            problems,
+            tolerance=self.task.tolerance,
+            axis_length=self.task.axis_length,
+            poses=len(program),
+            blocks=blocks,
+            elements=self.batches.elements,
+            curves=curves,
+        )
+
+    def _statement_problems(self, unsaid: frozenset[str | tuple[str, float]]) -> list[Problem]:
+        """What words beside the motion say wrongly."""
+        original, length = self.task.original, self.task.path.length
+        program = original.program
+        move = np.searchsorted(original.pose, [statement.pose for statement in program.statements]) - 1
+        moves = len(original.pose)
+        end = float(length[-1]) if moves else 0.0
+        there = length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0
+        theirs = asked(program, np.where(move >= 0, there, _BEFORE).tolist(), end)
+        known = self.lengths | self.batches.stops.lengths()
+        known |= {element: float(length[original.trail.last[move]]) for element, move in self.batches.holes.items()}
+        first = self.batches.stops.first
+        places = [known.get(event.element - 1, _BEFORE if event.element - 1 < first else 0.0) for event in self.events]
+        rooms = [self.rooms.get(event.element - 1, 0.0) for event in self.events]
+        apart: Callable[[float, float], float] = partial(way_apart, self.task.path)
+        return compare(theirs, said(self.events, places, rooms), self.margin, unsaid, apart)
 
 
-def _units_problems(program: Program, units: Units) -> list[Problem]:
-    if units == program.units:
-        return []
-    return [Problem("CS505", 0, 1, f"the text is in {units}, the CL file in {program.units}")]
+def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measured:
+    """Match and measure all that is read."""
+    batches = Batches(task)
+    program = task.original.program
+    found = _Measured(task, batches, Findings(), Poses.nowhere(len(program)), {}, {}, text.events, words)
+
+    def items() -> Iterator[tuple[Batch, Ints, Largest]]:
+        for batch in batches.of(_noted(text, found)):
+            own = np.array([event.element - 1 for event in text.events], np.int64)
+            last = batch.offset + batch.last
+            own = np.unique(own[(own >= batch.offset) & (own <= last)])
+            yield batch, own, found.findings.largest.copy()
+
+    def work(item: tuple[Batch, Ints, Largest]) -> Examined:
+        return examine(task, *item)
+
+    for examined in map_in_processes(work, items(), processes):
+        for poses in examined.findings.poses:
+            found.poses.put(poses)
+        examined.findings.poses = []
+        found.findings.take(examined.findings)
+        for element, length in zip(examined.elements.tolist(), examined.lengths.tolist(), strict=True):
+            found.lengths.setdefault(element, length)
+    return found
+
+
+def _noted(text: _Text, found: _Measured) -> Iterable[Elements]:
+    """Give out the elements of a text, and take down what is to be known of those with words behind them."""
+    offset = 0
+    for nc in text.chunks:
+        found.margin = found.task.margin(nc)
+        if nc.rotary and len(nc):
+            own = [event.element - 1 for event in text.events]
+            for element in {*own, offset + len(nc) - 1}:  # words behind the last are still to come
+                if offset <= element < offset + len(nc):
+                    found.rooms[element] = found.task.axis_length * float(nc.second_room[element - offset])
+        offset += len(nc)
+        yield nc
 
 
 def _check_bounds(tolerance: float, axis_length: float) -> None:

@@ -1,30 +1,85 @@
-"""Work on several pieces in processes of their own, one after another as they come."""
+"""Processes of their own: how many, how they begin and end, and work that they share.
+
+Between small arrays the interpreter is the bottleneck, and threads only wait for one another. A forked process has all
+data of its parent without copying it.
+"""
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
+from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, Final, TypeVar
 
-from cornersmooth.verify.processes import CONTEXT, can_fork, end_all, forked
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+#: more find too little to do
+MOST_PROCESSES: Final = 4
 
 #: items taken ahead of what has been given out, whatever the number of processes: what comes out never depends on it
 _AHEAD: Final = 5
 
+#: only used where the system can fork
+_CONTEXT: Final = get_context("fork" if sys.platform == "linux" else None)
 
-def apart(
-    work: Callable[[Item], Result], items: Iterable[Item], processes: int, here: Callable[[Item], bool]
-) -> Iterator[Result]:
+#: what is said of a process that has gone without a word, which is what a system short of memory does
+_ENDED: Final = "a process of the verification was ended"
+
+
+def useful_processes() -> int:
+    """Processes that this computer has room for."""
+    allowed = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    return max(1, min(MOST_PROCESSES, allowed))
+
+
+def can_fork() -> bool:
+    """Whether the system can fork a process with numpy in it safely."""
+    return sys.platform == "linux"
+
+
+class Helper:
+    """A process that works on one thing while this one does another.
+
+    Parameters
+    ----------
+    work : callable
+        Called in the process, which has all that this one has; it may fork processes of its own.
+    """
+
+    def __init__(self, work: Callable[[], Any]) -> None:
+        self._connection, theirs = _CONTEXT.Pipe()
+        self._process = _forked(_report, work, theirs, self._connection, daemon=False)
+        theirs.close()
+
+    def result(self) -> Any:
+        """Wait for what the work returns, or raise what it raised.
+
+        Raises
+        ------
+        MemoryError
+            The process has been ended from outside, which is what a system short of memory does.
+        """
+        return _received(self._connection)
+
+    def end(self) -> None:
+        """End the process, whatever it is at."""
+        self._connection.close()
+        _end([self._process])
+
+
+def map_in_processes(work: Callable[[Item], Result], items: Iterable[Item], processes: int) -> Iterator[Result]:
     """Give out what `work` makes of each item, in order, as `processes` processes find it.
 
-    Items are taken as they are needed, a fixed number ahead. Few items, and those that are to be worked on `here`, do
-    not leave this process; nor does any where there is only one process or the system cannot fork safely.
+    Items are taken as they are needed, a fixed number ahead. Few items do not leave this process; nor does any where
+    there is only one process or the system cannot fork safely.
 
     Raises
     ------
@@ -38,16 +93,18 @@ def apart(
     waiting: deque[Callable[[], Result]] = deque()
 
     def start(item: Item) -> Callable[[], Result]:
-        if crew is not None and not here(item):
+        if crew is not None:
             return crew.start(item)
         found = work(item)
         return lambda: found
 
     try:
-        waiting.extend(start(item) for item in first)
+        while first:
+            waiting.append(start(first.pop(0)))
         for item in source:
             yield waiting.popleft()()
             waiting.append(start(item))
+            del item
         while waiting:
             yield waiting.popleft()()
     finally:
@@ -60,7 +117,7 @@ class _Member:
 
     def __init__(self, process: BaseProcess, connection: Connection) -> None:
         self.process, self.connection = process, connection
-        self.given, self.found = 0, deque[tuple[bool, Any]]()
+        self.given, self.found = 0, deque[Any]()
         self.fetched = 0
 
     def start(self, item: Any) -> None:
@@ -69,26 +126,20 @@ class _Member:
         try:
             self.connection.send(item)
         except BrokenPipeError:
-            raise MemoryError("a process of the verification was ended") from None
+            raise MemoryError(_ENDED) from None
         self.given += 1
 
     def take(self) -> None:
         """Receive what is still to come."""
         if self.fetched < self.given:
-            try:
-                self.found.append(self.connection.recv())
-            except EOFError:
-                raise MemoryError("a process of the verification was ended") from None
+            self.found.append(_received(self.connection))
             self.fetched += 1
 
     def result(self) -> Any:
         """Next result, in the order of the items."""
         if not self.found:
             self.take()
-        good, found = self.found.popleft()
-        if not good:
-            raise found
-        return found
+        return self.found.popleft()
 
 
 class _Crew:
@@ -98,9 +149,9 @@ class _Crew:
         self.members: list[_Member] = []
         self.turn = 0
         for _ in range(processes):
-            ours, theirs = CONTEXT.Pipe()
+            ours, theirs = _CONTEXT.Pipe()
             own = [member.connection for member in self.members] + [ours]
-            self.members.append(_Member(forked(_serve, work, theirs, own), ours))
+            self.members.append(_Member(_forked(_serve, work, theirs, own, daemon=True), ours))
             theirs.close()
 
     def start(self, item: Any) -> Callable[[], Any]:
@@ -114,7 +165,7 @@ class _Crew:
         """Let all go home; whoever is still at work is sent away."""
         for member in self.members:
             member.connection.close()
-        end_all([member.process for member in self.members])
+        _end([member.process for member in self.members])
 
 
 def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Connection]) -> None:
@@ -126,11 +177,59 @@ def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Con
             item = connection.recv()
         except (EOFError, OSError):
             return
-        try:
-            found = True, work(item)
-        except BaseException as error:
-            found = False, error
-        try:
-            connection.send(found)
-        except (BrokenPipeError, OSError):
-            return
+        _answer(connection, lambda item=item: work(item))  # type: ignore[misc]
+        del item
+
+
+def _report(work: Callable[[], Any], connection: Connection, parent: Connection) -> None:
+    """Work once."""
+    parent.close()
+    _answer(connection, work)
+
+
+def _answer(connection: Connection, work: Callable[[], Any]) -> None:
+    """Send what the work returns, or what it raises."""
+    try:
+        found = True, work()
+    except BaseException as error:
+        found = False, error
+    try:
+        connection.send(found)
+    except (BrokenPipeError, OSError):
+        return
+
+
+def _received(connection: Connection) -> Any:
+    """Receive what `_answer` sends."""
+    try:
+        good, found = connection.recv()
+    except (EOFError, ConnectionResetError):
+        raise MemoryError(_ENDED) from None
+    if not good:
+        raise found
+    return found
+
+
+def _forked(target: Callable[..., None], *args: Any, daemon: bool) -> BaseProcess:
+    """Start a process that calls `target`; it has all that this one has."""
+    with warnings.catch_warnings():  # newer Pythons warn of threads, of which only numpy's idle ones are left
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process: BaseProcess = _CONTEXT.Process(target=_obeying, args=(target, args), daemon=daemon)
+        process.start()
+    return process
+
+
+def _end(processes: list[BaseProcess]) -> None:
+    """Let processes go home; who is still at work is sent away."""
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        process.join()
+        process.close()
+
+
+def _obeying(target: Callable[..., None], args: tuple[Any, ...]) -> None:
+    """Work so that the parent can end this process, and an interruption ends the parent only, which does so."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    target(*args)

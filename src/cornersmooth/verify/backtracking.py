@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.blocks import Block, Matcher
-from cornersmooth.verify.gaps import Reached
+from cornersmooth.verify.distances import Distances, Reached
+from cornersmooth.verify.findings import Findings
+from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import nearest_segments
 
 #: segments looked at on either side
@@ -22,7 +23,15 @@ _STRAIGHT = 1.2
 Found = tuple[Floats, Ints, Ints, Floats]
 
 
-def written_backwards(matcher: Matcher, block: Block, written: Reached) -> Found | None:
+def check_backtracking(distances: Distances, found: Findings) -> None:
+    """The path must be run in order: CS523."""
+    match = distances.match
+    for places in (written_backwards(match, distances.written), original_backwards(match, distances.original)):
+        if places is not None:
+            found.violations.add(523, *places)
+
+
+def written_backwards(match: Match, written: Reached) -> Found | None:
     """Written vertices that would fit clearly better before the one in front of them.
 
     Returns
@@ -30,24 +39,24 @@ def written_backwards(matcher: Matcher, block: Block, written: Reached) -> Found
     place, cl_line, nc_line, amount
         (k,) place on the original, lines, and mm gained; None where there are none.
     """
-    vertex = written.vertex[block.backward[written.vertex]]
+    vertex = written.vertex[match.backward[written.vertex]]
     if not len(vertex):
         return None
-    own, six, length = block.six[vertex], matcher.track.six, matcher.track.length
-    segment, at = nearest_segments(own, six, block.segment[vertex], _REACH, block.low[vertex], block.high[vertex])
-    free, held = segment + at, block.place[vertex]
+    own, six, length = match.six[vertex], match.path.six, match.path.length
+    segment, at = nearest_segments(own, six, match.segment[vertex], _REACH, match.low[vertex], match.high[vertex])
+    free, held = segment + at, match.place[vertex]
     gain = _distance(own, _on(six, held)) - _distance(own, _on(six, free))
-    wrong = (gain > matcher.slack) & (free < held)
-    wrong &= _way(length, free, held) <= _STRAIGHT * _distance(_on(six, held), _on(six, free)) + matcher.slack
+    wrong = (gain > match.slack) & (free < held)
+    wrong &= _way(length, free, held) <= _STRAIGHT * _distance(_on(six, held), _on(six, free)) + match.slack
     if not wrong.any():
         return None
-    original = matcher.original
-    move = original.trail.owner[block.segment[vertex[wrong]] + 1]
-    nc_line = matcher.nc.line[block.written.trail.owner[vertex[wrong]]]
+    original = match.original
+    move = original.trail.owner[match.segment[vertex[wrong]] + 1]
+    nc_line = match.nc.line[match.written.trail.owner[vertex[wrong]]]
     return held[wrong], original.program.line[original.pose[move]], nc_line, gain[wrong]
 
 
-def original_backwards(matcher: Matcher, block: Block, theirs: Reached) -> Found | None:
+def original_backwards(match: Match, theirs: Reached) -> Found | None:
     """Neighbouring original vertices that the text clearly passes in reverse: part of the path is missing.
 
     Returns
@@ -57,32 +66,32 @@ def original_backwards(matcher: Matcher, block: Block, theirs: Reached) -> Found
     falls = np.flatnonzero((np.diff(theirs.place) < 0) & (np.diff(theirs.vertex) == 1)) + 1
     if not len(falls):
         return None
-    six, trail = block.six, block.written.trail
+    six, trail = match.six, match.written.trail
     before, here = theirs.place[falls - 1], theirs.place[falls]
     length = np.concatenate(([0.0], np.cumsum(_distance(six[1:], six[:-1]))))
     way = _way(length, here, before)
-    straight = way <= _STRAIGHT * _distance(_on(six, before), _on(six, here)) + matcher.slack
+    straight = way <= _STRAIGHT * _distance(_on(six, before), _on(six, here)) + match.slack
     falls, before, here = falls[straight], before[straight], here[straight]
-    later = _cost(matcher, block, theirs.vertex[falls], here, before, forward=True)
-    earlier = _cost(matcher, block, theirs.vertex[falls - 1], before, here, forward=False)
+    later = _cost(match, theirs.vertex[falls], here, before, forward=True)
+    earlier = _cost(match, theirs.vertex[falls - 1], before, here, forward=False)
     gain = np.minimum(later, earlier)
-    wrong = np.flatnonzero(gain > matcher.slack)
+    wrong = np.flatnonzero(gain > match.slack)
     if not len(wrong):
         return None
-    original, vertex = matcher.original, theirs.vertex[falls[wrong]]
+    original, vertex = match.original, theirs.vertex[falls[wrong]]
     cl_line = original.program.line[original.pose[original.trail.owner[vertex]]]
-    nc_line = matcher.nc.line[trail.owner[np.minimum(before[wrong].astype(np.int64) + 1, len(trail) - 1)]]
+    nc_line = match.nc.line[trail.owner[np.minimum(before[wrong].astype(np.int64) + 1, len(trail) - 1)]]
     return vertex.astype(np.float64), cl_line, nc_line, gain[wrong]
 
 
-def _cost(matcher: Matcher, block: Block, vertex: Ints, free: Floats, bound: Floats, *, forward: bool) -> Floats:
+def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: bool) -> Floats:
     """How much farther the text is from original vertices when it may not pass them before, or behind, `bound`."""
-    own, six = matcher.track.six[vertex], block.six
+    own, six = match.path.six[vertex], match.six
     middle = np.minimum(bound.astype(np.int64), len(six) - 2)
-    ends = np.flatnonzero(np.append(np.diff(block.piece) != 0, True))
-    piece = np.searchsorted(ends, middle)
-    first = np.concatenate(([0], ends[:-1] + 1))[piece]
-    last = np.maximum(ends[piece] - 1, middle)
+    ends = np.flatnonzero(np.append(np.diff(match.stretch) != 0, True))
+    stretch = np.searchsorted(ends, middle)
+    first = np.concatenate(([0], ends[:-1] + 1))[stretch]
+    last = np.maximum(ends[stretch] - 1, middle)
     # the segment that the bound lies on counts in part, those beyond it whole
     segment, at = nearest_segments(own, six, middle, 0, middle, middle)
     limited = np.maximum(at, bound - middle) if forward else np.minimum(at, bound - middle)

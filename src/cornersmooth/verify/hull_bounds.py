@@ -9,22 +9,22 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.curves import CurveGroup
+from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import gap_between, nearest_segments
-from cornersmooth.verify.trails import directions, unit, written_at
+from cornersmooth.verify.polyline import directions, unit, written_at
 
 #: samples between two knots where the hull alone does not settle it
 _SAMPLES = 32
 
-#: curves searched in one block at most
+#: curves searched in one batch at most
 _MOST_CURVES = 20000
 
 #: part of the largest deviation of a curve's ends by which its hull may exceed it unsearched
 _HULL_SLACK = 1e-3
 
 
-def hull_gaps(matcher: Matcher, block: Block, limit: float) -> tuple[Floats, Ints, Floats, Floats] | None:
+def hull_gaps(match: Match, limit: float) -> tuple[Floats, Ints, Floats, Floats] | None:
     """Deviations from the original of those curves whose hull reaches beyond the tolerance between two knots.
 
     Returns
@@ -35,45 +35,45 @@ def hull_gaps(matcher: Matcher, block: Block, limit: float) -> tuple[Floats, Int
     tip, axis_point : (k,) float64, mm
         None where there is no such curve.
     """
-    suspects = [_suspects(matcher, block, group, limit) for group in block.written.curves]
+    suspects = [_suspects(match, group, limit) for group in match.written.curves]
     element = np.concatenate([np.zeros(0, np.int64), *suspects])[:_MOST_CURVES]
     if not len(element):
         return None
     grid = np.linspace(0.0, 1.0, 2 * _SAMPLES + 1)
     owner = np.repeat(element, len(grid))
-    tip, axis = written_at(matcher.nc, owner, np.tile(grid, len(element)))
-    six = np.hstack((tip, tip + matcher.axis_length * axis))
-    trail = block.written.trail
-    middle = np.repeat(block.segment[trail.last[element - block.written.first] - 1], len(grid))
-    vertex = np.repeat(trail.last[element - block.written.first], len(grid))
+    tip, axis = written_at(match.nc, owner, np.tile(grid, len(element)))
+    six = np.hstack((tip, tip + match.axis_length * axis))
+    trail = match.written.trail
+    middle = np.repeat(match.segment[trail.last[element - match.written.first] - 1], len(grid))
+    vertex = np.repeat(trail.last[element - match.written.first], len(grid))
     result = []
     for metric in ("tip", "axis point"):
         segment, at = nearest_segments(
             six,
-            matcher.track.six,
+            match.path.six,
             middle,
             3,
-            block.low[vertex],
-            block.high[vertex],
+            match.low[vertex],
+            match.high[vertex],
             metric,
         )
-        theirs = matcher.original.trail
+        theirs = match.original.trail
         their_tip = theirs.tip[segment] + at[:, None] * (theirs.tip[segment + 1] - theirs.tip[segment])
         their_axis = unit(theirs.axis[segment] + at[:, None] * (theirs.axis[segment + 1] - theirs.axis[segment]))
-        gap = gap_between(tip, axis, their_tip, their_axis, matcher.axis_length)
+        gap = gap_between(tip, axis, their_tip, their_axis, match.axis_length)
         result.append((gap.tip if metric == "tip" else gap.axis_point).reshape(len(element), len(grid)))
-    place = block.place[trail.last[element - block.written.first] - 1]
+    place = match.place[trail.last[element - match.written.first] - 1]
     return place, element, result[0].max(axis=1), result[1].max(axis=1)
 
 
-def _suspects(matcher: Matcher, block: Block, group: CurveGroup, limit: float) -> Ints:
+def _suspects(match: Match, group: CurveGroup, limit: float) -> Ints:
     """Elements of curves with a control point between knots farther than the tolerance and than the knots."""
-    trail, first = block.written.trail, block.written.first
-    element = matcher.nc.curves.element[group.index]
+    trail, first = match.written.trail, match.written.first
+    element = match.nc.curves.element[group.index]
     end = trail.last[element - first]
-    keep = block.on[end].copy()
+    keep = match.on[end].copy()
     if len(group.spans) == 3 and group.points.shape[1] == 5:
-        keep &= ~_plain_corners(matcher, block, group, end)
+        keep &= ~_plain_corners(match, group, end)
     if not keep.any():
         return element[:0]
     group, element, end = group.only(keep), element[keep], end[keep]
@@ -82,30 +82,28 @@ def _suspects(matcher: Matcher, block: Block, group: CurveGroup, limit: float) -
     for k in range(spans):
         inner, _ = group.bezier(k)
         before, after = end - (spans - k), end - (spans - k) + 1
-        ends = np.maximum(
-            _off(matcher, block, block.six[before], before), _off(matcher, block, block.six[after], before)
-        )
+        ends = np.maximum(_off(match, match.six[before], before), _off(match, match.six[after], before))
         for point in range(1, inner.shape[1] - 1):
             tip = inner[:, point, :3]
-            axis = directions(matcher.nc, tip, inner[:, point, 3:])
-            six = np.hstack((tip, tip + matcher.axis_length * axis))
-            off = np.minimum(_off(matcher, block, six, before), _off(matcher, block, six, after))
+            axis = directions(match.nc, tip, inner[:, point, 3:])
+            six = np.hstack((tip, tip + match.axis_length * axis))
+            off = np.minimum(_off(match, six, before), _off(match, six, after))
             doubtful |= (off > limit) & (off > ends * (1 + _HULL_SLACK))
     return element[doubtful]
 
 
-def _plain_corners(matcher: Matcher, block: Block, group: CurveGroup, end: Ints) -> Bools:
+def _plain_corners(match: Match, group: CurveGroup, end: Ints) -> Bools:
     """(k,) whether a five-point curve has its middle point on an original vertex and the others on lines to it.
 
     Then each half is farthest from its leg at the middle knot, whatever the weights: its hull has no other point off
     the leg.
     """
-    nc, points = matcher.nc, group.points
+    nc, points = match.nc, group.points
     if nc.second_is != "point":
         return np.zeros(len(points), np.bool_)
-    corner = np.minimum(block.segment[end - 2] + 1, len(matcher.track.six) - 1)
-    off = points[:, 2] - matcher.track.six.take(corner, axis=0)
-    room = matcher.margin**2
+    corner = np.minimum(match.segment[end - 2] + 1, len(match.path.six) - 1)
+    off = points[:, 2] - match.path.six.take(corner, axis=0)
+    room = match.margin**2
     plain: Bools = np.einsum("ij,ij->i", off, off) <= room
     for outer, inner in ((0, 1), (4, 3)):
         leg = points[:, outer] - points[:, 2]
@@ -117,12 +115,17 @@ def _plain_corners(matcher: Matcher, block: Block, group: CurveGroup, end: Ints)
     return plain
 
 
-def _off(matcher: Matcher, block: Block, six: Floats, vertex: Ints) -> Floats:
+def _off(match: Match, six: Floats, vertex: Ints) -> Floats:
     """Larger distance, of tip or axis point, from the original segment that a vertex lies on."""
-    row = matcher.track.row.take(block.segment[vertex], axis=0)
-    away = six - row[:, :6]
-    t = np.clip(np.einsum("ij,ij->i", away, row[:, 6:12]) * row[:, 12], 0.0, 1.0)
-    away -= t[:, None] * row[:, 6:12]
+    segment = match.segment[vertex]
+    start = match.path.six.take(segment, axis=0)
+    way = match.path.six.take(segment + 1, axis=0)
+    way -= start
+    away = six - start
+    size = np.einsum("ij,ij->i", way, way)
+    t = np.einsum("ij,ij->i", away, way)
+    t = np.clip(np.divide(t, size, out=np.zeros_like(t), where=size > 0), 0.0, 1.0)
+    away -= t[:, None] * way
     off: Floats = np.sqrt(
         np.maximum(np.einsum("ij,ij->i", away[:, :3], away[:, :3]), np.einsum("ij,ij->i", away[:, 3:], away[:, 3:]))
     )

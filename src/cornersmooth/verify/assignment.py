@@ -1,4 +1,4 @@
-"""The best monotone correspondence of two short trails, for places where the walker may have gone astray.
+"""The best monotone correspondence of two short polylines, for places that are in doubt.
 
 Every written vertex gets a segment of the original, never an earlier one than the vertex before; every original vertex
 that is passed on the way counts with its distance from the written segment on which it is passed. Among all such
@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.walking import Track
 
 #: of the squared distance, in tolerances
 _POWER = 3
@@ -25,13 +24,13 @@ _FARTHEST = 400.0
 ROUNDS = ((60, 4_000_000, 40), (500, 1_000_000, 16), (3000, 2_000_000, 4))
 
 
-def doubtful_windows(doubtful: Bools, piece: Ints, around: int, most: int) -> list[tuple[int, int]]:
+def doubtful_windows(doubtful: Bools, stretch: Ints, around: int, most: int) -> list[tuple[int, int]]:
     """First and last vertex of the windows to assign anew, `most` of them; both ends are taken to be right."""
     rows = np.flatnonzero(doubtful)
     if not len(rows):
         return []
-    edges = np.flatnonzero(np.append(True, np.diff(piece) != 0))
-    ends = np.append(edges[1:], len(piece)) - 1
+    edges = np.flatnonzero(np.append(True, np.diff(stretch) != 0))
+    ends = np.append(edges[1:], len(stretch)) - 1
     number = np.searchsorted(edges, rows, side="right") - 1
     first = np.maximum(rows - around, edges[number])
     last = np.minimum(rows + around, ends[number])
@@ -42,7 +41,7 @@ def doubtful_windows(doubtful: Bools, piece: Ints, around: int, most: int) -> li
 
 
 def assign(
-    six: Floats, track: Track, start: float, stop: float, tolerance: float, most_pairs: int
+    six: Floats, path: Floats, start: float, stop: float, tolerance: float, most_pairs: int
 ) -> tuple[Ints, Floats, Bools] | None:
     """Assign the vertices of a window whose ends are at known places.
 
@@ -50,7 +49,8 @@ def assign(
     ----------
     six : (v, 6) float64
         Written vertices.
-    track : Track
+    path : (n, 6) float64
+        Vertices of the original.
     start, stop : float
         Places (segment plus fraction) of the first and the last vertex.
     tolerance : float, mm
@@ -69,20 +69,21 @@ def assign(
     count = high - low + 1
     if len(six) < 3 or len(six) * count > most_pairs:
         return None
-    row = track.row[low : high + 1]
-    fraction, square = _project(six, row[:, :6], row[:, 6:12], row[:, 12])
+    begin = path[low : high + 1]
+    ways = path[low + 1 : high + 2] - begin
+    sizes = np.einsum("ij,ij->i", ways, ways)
+    fraction, square = _project(six, begin, ways, np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0))
     cost = np.minimum(square / tolerance**2, _FARTHEST) ** _POWER
     # original vertices between the segments, against written segments
     way = six[1:] - six[:-1]
     size = np.einsum("ij,ij->i", way, way)
     inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
-    _, passed = _project(row[1:, :6], six[:-1], way, inverse)
+    _, passed = _project(begin[1:], six[:-1], way, inverse)
     passing = np.concatenate(
         ([np.zeros(len(way))], np.cumsum(np.minimum(passed / tolerance**2, _FARTHEST) ** _POWER, axis=0))
     ).T
     # going back on one segment counts like being so far off: else a path that runs to and fro is all on its first line
-    size = np.einsum("ij,ij->i", row[:, 6:12], row[:, 6:12])
-    back = np.maximum(fraction[:-1] - fraction[1:], 0.0) ** 2 * size
+    back = np.maximum(fraction[:-1] - fraction[1:], 0.0) ** 2 * sizes
     back = np.minimum(back / tolerance**2, _FARTHEST) ** _POWER
     columns = np.arange(count)
     best = np.where(columns == 0, 0.0, np.inf)

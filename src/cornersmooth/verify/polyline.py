@@ -14,7 +14,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.verify.arcs import arc_points
 from cornersmooth.verify.curves import CurveGroup, groups
-from cornersmooth.verify.ncprogram import Element, NcProgram
+from cornersmooth.verify.ncprogram import Element, Elements
 
 #: how far, relative to the tolerance, a trail may stay off the motion it stands for
 CHORD_SHARE = 0.1
@@ -52,17 +52,53 @@ class Trail:
         """(v, 6) tip and axis point side by side, mm."""
         return np.hstack((self.tip, self.tip + axis_length * self.axis))
 
-    def lengths(self, axis_length: float) -> Floats:
-        """(v,) path length up to every vertex, of tip and axis point together, mm."""
-        step = np.diff(self.tip, axis=0)
-        square = np.einsum("ij,ij->i", step, step)
-        turn = np.diff(self.axis, axis=0)
-        turn *= axis_length
-        step += turn
-        square += np.einsum("ij,ij->i", step, step)
-        length = np.zeros(len(self))
-        np.cumsum(np.sqrt(square, out=square), out=length[1:])
+
+@dataclass(frozen=True)
+class Polyline:
+    """Vertices of a trail as points, with path lengths; segment k runs from vertex k to vertex k + 1.
+
+    A *place* on it is a segment and a fraction of it.
+
+    Parameters
+    ----------
+    six : (v, 6) float64, mm
+        Tip and axis point.
+    length : (v,) float64, mm
+        Path length up to every vertex, of tip and axis point together.
+    """
+
+    six: Floats
+    length: Floats
+
+    @classmethod
+    def of(cls, six: Floats) -> Polyline:
+        """Make it from vertices (v, 6)."""
+        step = six[1:] - six[:-1]
+        length = np.zeros(len(six))
+        np.cumsum(np.sqrt(np.einsum("ij,ij->i", step, step)), out=length[1:])
+        return cls(six, length)
+
+    def length_at(self, segment: Ints, fraction: Floats) -> Floats:
+        """(k,) path length up to places, mm."""
+        start = self.length.take(segment)
+        length: Floats = start + fraction * (self.length.take(segment + 1) - start)
         return length
+
+    def point_at(self, segment: Ints, fraction: Floats) -> Floats:
+        """(k, 6) points at places."""
+        start = self.six.take(segment, axis=0)
+        point: Floats = self.six.take(segment + 1, axis=0)
+        point -= start
+        point *= fraction[:, None]
+        point += start
+        return point
+
+    def place_at(self, length: float) -> tuple[int, float]:
+        """Return segment and fraction at a path length."""
+        last = max(len(self.length) - 2, 0)
+        segment = min(max(int(np.searchsorted(self.length, length, side="right")) - 1, 0), last)
+        start, end = self.length[segment : segment + 2]
+        return segment, float(np.clip((length - start) / (end - start), 0.0, 1.0)) if end > start else 0.0
 
 
 @dataclass(frozen=True)
@@ -84,19 +120,6 @@ class Original:
     pose: Ints
     trail: Trail
     arc: Ints
-
-    def part(self, first: int, last: int) -> Original:
-        """Moves from the end of `first` to the end of `last`."""
-        trail = self.trail
-        begin, end = int(trail.last[first]), int(trail.last[last]) + 1
-        own = Trail(
-            trail.tip[begin:end],
-            trail.axis[begin:end],
-            trail.owner[begin:end] - first,
-            trail.fraction[begin:end],
-            trail.last[first : last + 1] - begin,
-        )
-        return Original(self.program, self.pose[first : last + 1], own, self.arc[first : last + 1])
 
     def at(self, owner: Ints, fraction: Floats) -> tuple[Floats, Floats]:
         """Tip and unit axis (k, 3) at a fraction of moves: the ruled motion, or the true arc."""
@@ -206,7 +229,7 @@ class Written:
 
     Parameters
     ----------
-    nc : NcProgram
+    nc : Elements
     first : int
         The trail starts with the end of this element.
     trail : Trail
@@ -217,19 +240,19 @@ class Written:
         Whether each element is a line.
     """
 
-    nc: NcProgram
+    nc: Elements
     first: int
     trail: Trail
     curves: tuple[CurveGroup, ...]
     straight: Bools
 
 
-def directions(nc: NcProgram, tip: Floats, second: Floats) -> Floats:
+def directions(nc: Elements, tip: Floats, second: Floats) -> Floats:
     """Unit tool vectors (k, 3) of written poses."""
     return unit(second - tip if nc.second_is == "point" else second)
 
 
-def written_motion(nc: NcProgram, first: int, last: int, tolerance: float, axis_length: float) -> Written:
+def written_motion(nc: Elements, first: int, last: int, tolerance: float, axis_length: float) -> Written:
     """Make the trail of a stretch of the written motion."""
     part = slice(first, last + 1)
     tip, second, kind = nc.tip[part], nc.second[part], nc.kind[part]
@@ -280,7 +303,7 @@ def written_motion(nc: NcProgram, first: int, last: int, tolerance: float, axis_
     return Written(nc, first, trail, curve_groups, straight)
 
 
-def written_at(nc: NcProgram, element: Ints, fraction: Floats) -> tuple[Floats, Floats]:
+def written_at(nc: Elements, element: Ints, fraction: Floats) -> tuple[Floats, Floats]:
     """Tip and unit axis (k, 3) on path elements, at a fraction of each (curves: of the parameter range)."""
     before = np.maximum(element - 1, 0)
     tip = between(nc.tip, before, element, fraction)

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.comparison import Compared
-from cornersmooth.verify.deviation import Poses, Worst
+from cornersmooth.verify.findings import Findings, Poses, Worst
 from cornersmooth.verify.ncprogram import Problem
 
 #: problems of one code that are kept
@@ -146,7 +145,8 @@ class Verification:
     @classmethod
     def of(
         cls,
-        compared: Compared,
+        found: Findings,
+        passed: Poses,
         problems: list[Problem],
         *,
         tolerance: float,
@@ -156,7 +156,7 @@ class Verification:
         elements: int,
         curves: int,
     ) -> Verification:
-        """Make it of what was compared and of all problems."""
+        """Make it of what was found, of the poses that were passed, and of all problems."""
         problems = sorted(problems, key=lambda problem: (problem.nc_line, problem.cl_line))
         kept: list[Problem] = []
         count: dict[str, int] = {}
@@ -164,9 +164,8 @@ class Verification:
             count[problem.code] = count.get(problem.code, 0) + 1
             if count[problem.code] <= MOST_PROBLEMS:
                 kept.append(problem)
-        joints, largest = compared.joints, compared.largest
-        tangent = float(np.degrees(np.arccos(np.clip(-joints.tangent.value, -1.0, 1.0))))
-        passed = Poses.of_all(compared.poses, poses)
+        continuity, largest = found.continuity, found.largest
+        tangent = float(np.degrees(np.arccos(np.clip(-continuity.tangent.value, -1.0, 1.0))))
         return cls(
             passed=not problems,
             tolerance=tolerance,
@@ -182,9 +181,9 @@ class Verification:
             elements=elements,
             curves=curves,
             poses=poses,
-            shortest=_where(joints.shortest, -joints.shortest.value),
-            tangent_jump=_where(joints.tangent, tangent),
-            curvature_jump=_where(joints.curvature),
+            shortest=_where(continuity.shortest, -continuity.shortest.value),
+            tangent_jump=_where(continuity.tangent, tangent),
+            curvature_jump=_where(continuity.curvature),
             pose_tip=passed.tip,
             pose_axis_point=passed.axis_point,
             pose_angle=np.degrees(passed.angle),

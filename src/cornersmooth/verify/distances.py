@@ -1,4 +1,4 @@
-"""Deviations of one block, in both directions: written vertices from the original, original vertices from the written.
+"""Deviations of one batch, in both directions: written vertices from the original, original vertices from the written.
 
 Where both motions run straight between neighbouring vertices of either, their distance is largest at a vertex; so the
 vertices of both are all that needs to be looked at. Curves are looked at where they come nearest to a vertex, and
@@ -8,16 +8,17 @@ between their knots by `hull_gaps`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.blocks import Block, Matcher
 from cornersmooth.verify.curves import CurveGroup
-from cornersmooth.verify.farther import look_farther
+from cornersmooth.verify.match import Match
 from cornersmooth.verify.ncprogram import Element
 from cornersmooth.verify.nearest import Gap, Metric, climb, gap_between, nearest_segments
-from cornersmooth.verify.trails import directions, written_at
+from cornersmooth.verify.polyline import directions, written_at
+from cornersmooth.verify.wide_search import look_farther
 
 #: a Newton step from a knot longer than this part of the parameter range is followed up
 _SHORT_STEP = 0.02
@@ -52,74 +53,105 @@ def owner_fraction(trail_owner: Ints, trail_fraction: Floats, segment: Ints, at:
     return owner, start + at * (end - start)
 
 
-def from_written(matcher: Matcher, block: Block) -> Reached:
+@dataclass(frozen=True)
+class Distances:
+    """How far the vertices of each motion are from the other.
+
+    Parameters
+    ----------
+    match : Match
+    """
+
+    match: Match
+
+    @cached_property
+    def written(self) -> Reached:
+        """Of every written vertex, from the pose of the original where its place is."""
+        return from_written(self.match)
+
+    @cached_property
+    def original(self) -> Reached:
+        """Of every vertex of the original in this batch, from the written motion."""
+        return from_original(self.match)
+
+    @cached_property
+    def off(self) -> Floats:
+        """(v,) the larger distance, mm, of every written vertex; 0 for those that belong to no stretch."""
+        off = np.zeros(len(self.match.six))
+        off[self.written.vertex] = self.written.gap.larger
+        return off
+
+
+def from_written(match: Match) -> Reached:
     """Deviation of every written vertex from the pose of the original it was assigned to."""
-    vertex = np.flatnonzero(block.on)
-    segment, at = block.segment[vertex], block.fraction[vertex]
-    # measured in full where it may matter: the walker's own distance is a bound, and it is of use for the rest
-    bound = block.distance[vertex]
+    vertex = np.flatnonzero(match.on)
+    segment, at = match.segment[vertex], match.fraction[vertex]
+    # measured in full where it may matter: the distance in six dimensions is a bound, and of use for the rest
+    bound = match.distance[vertex]
     known = bound[np.isfinite(bound)]
     gap = Gap(bound.copy(), bound.copy(), np.zeros(len(vertex)))
-    loose = np.flatnonzero(bound > min(matcher.margin, known.max(initial=0.0) / 2))
+    loose = np.flatnonzero(bound > min(match.margin, known.max(initial=0.0) / 2))
     rows = vertex[loose]
-    if not block.nearest:  # the walker stays on a segment until the next is nearer by a margin
-        segment[loose], at[loose] = nearest_segments(
-            block.six.take(rows, axis=0), matcher.track.six, segment[loose], 1, block.low[rows], block.high[rows]
+    again = loose[~match.nearest[rows]]
+    if len(again):
+        own = vertex[again]
+        segment[again], at[again] = nearest_segments(
+            match.six.take(own, axis=0), match.path.six, segment[again], 1, match.low[own], match.high[own]
         )
-    better = _gap_to_original(matcher, block, rows, segment[loose], at[loose])
-    # nor does it go on where the next is a tiny one: from there another may be nearer
-    over = np.flatnonzero(better.larger > matcher.tolerance)
+    better = _gap_to_original(match, rows, segment[loose], at[loose])
+    # where the next is a tiny one, another may be nearer beyond it
+    over = np.flatnonzero(better.larger > match.tolerance)
     if len(over):
         own = rows[over]
         segment[loose[over]], at[loose[over]] = nearest_segments(
-            block.six[own], matcher.track.six, segment[loose[over]], _REACH, block.low[own], block.high[own]
+            match.six[own], match.path.six, segment[loose[over]], _REACH, match.low[own], match.high[own]
         )
-        again = _gap_to_original(matcher, block, own, segment[loose[over]], at[loose[over]])
-        better.tip[over], better.axis_point[over], better.angle[over] = again.tip, again.axis_point, again.angle
+        wider = _gap_to_original(match, own, segment[loose[over]], at[loose[over]])
+        better.tip[over], better.axis_point[over], better.angle[over] = wider.tip, wider.axis_point, wider.angle
     gap.tip[loose], gap.axis_point[loose], gap.angle[loose] = better.tip, better.axis_point, better.angle
     return Reached(vertex, gap, segment + at)
 
 
-def _gap_to_original(matcher: Matcher, block: Block, vertex: Ints, segment: Ints, at: Floats) -> Gap:
-    original, trail = matcher.original, block.written.trail
+def _gap_to_original(match: Match, vertex: Ints, segment: Ints, at: Floats) -> Gap:
+    original, trail = match.original, match.written.trail
     tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, segment, at))
     own = trail.tip.take(vertex, axis=0), trail.axis.take(vertex, axis=0)
-    return gap_between(*own, tip, axis, matcher.axis_length)
+    return gap_between(*own, tip, axis, match.axis_length)
 
 
-def from_original(matcher: Matcher, block: Block) -> Reached:
-    """Deviation of every vertex of the original in this block from the written motion."""
-    vertex, middle, low, high = _brackets(block)
-    trail, six = matcher.original.trail, matcher.track.six
+def from_original(match: Match) -> Reached:
+    """Deviation of every vertex of the original in this batch from the written motion."""
+    vertex, middle, low, high = _brackets(match)
+    trail, six = match.original.trail, match.path.six
     point = six.take(vertex, axis=0)
-    segment, at = nearest_segments(point, block.six, middle, 1, low, high)
-    climb(point, block.six, middle, low, high, segment, at)
-    look_farther(matcher, block, vertex, low, high, segment, at)
-    tip = _on(block.written.trail.tip, segment, at)
-    axis = _unit_on(block.written.trail.axis, segment, at)
-    owner = block.written.trail.owner[segment + 1]
-    bent = np.flatnonzero(~block.written.straight[owner - block.written.first])
+    segment, at = nearest_segments(point, match.six, middle, 1, low, high)
+    climb(point, match.six, middle, low, high, segment, at)
+    look_farther(match, vertex, low, high, segment, at)
+    tip = _on(match.written.trail.tip, segment, at)
+    axis = _unit_on(match.written.trail.axis, segment, at)
+    owner = match.written.trail.owner[segment + 1]
+    bent = np.flatnonzero(~match.written.straight[owner - match.written.first])
     if len(bent):
-        tip[bent], axis[bent], at[bent] = _on_bent(matcher, block, point.take(bent, axis=0), segment[bent], at[bent])
+        tip[bent], axis[bent], at[bent] = _on_bent(match, point.take(bent, axis=0), segment[bent], at[bent])
     own = trail.tip.take(vertex, axis=0), trail.axis.take(vertex, axis=0)
-    gap = gap_between(tip, axis, *own, matcher.axis_length)
+    gap = gap_between(tip, axis, *own, match.axis_length)
     return Reached(vertex, gap, segment + at)
 
 
-def _brackets(block: Block) -> tuple[Ints, Ints, Ints, Ints]:
-    """Original vertices of the block's stretches, the written segment each lies at, and the segments allowed."""
-    on = np.flatnonzero(block.on)
-    place, piece = block.place[on], block.piece[on]
-    first = np.flatnonzero(np.diff(piece, prepend=-1))
+def _brackets(match: Match) -> tuple[Ints, Ints, Ints, Ints]:
+    """Original vertices of a batch's stretches, the written segment each lies at, and the segments allowed."""
+    on = np.flatnonzero(match.on)
+    place, stretch = match.place[on], match.stretch[on]
+    first = np.flatnonzero(np.diff(stretch, prepend=-1))
     last = np.append(first[1:], len(on)) - 1
     start = np.ceil(place[first]).astype(np.int64)
-    stop = np.where(np.arange(len(last)) < len(last) - 1, block.high[on[last]] + 1, np.floor(place[last])).astype(
+    stop = np.where(np.arange(len(last)) < len(last) - 1, match.high[on[last]] + 1, np.floor(place[last])).astype(
         np.int64
     )
-    if np.isinf(block.until):
-        stop[-1] = block.high[on[last[-1]]] + 1
-    else:  # up to where the next block begins, wherever the walk has ended
-        stop[-1] = max(stop[-1], int(block.until))
+    if np.isinf(match.until):
+        stop[-1] = match.high[on[last[-1]]] + 1
+    else:  # up to where the next batch begins, wherever the search has ended
+        stop[-1] = max(stop[-1], int(match.until))
     count = np.maximum(stop - start + 1, 0)
     number = np.repeat(np.arange(len(first)), count)
     vertex = np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count) + start[number]
@@ -148,14 +180,14 @@ def _unit_on(values: Floats, segment: Ints, at: Floats) -> Floats:
     return between
 
 
-def _on_bent(matcher: Matcher, block: Block, point: Floats, segment: Ints, at: Floats) -> tuple[Floats, Floats, Floats]:
+def _on_bent(match: Match, point: Floats, segment: Ints, at: Floats) -> tuple[Floats, Floats, Floats]:
     """Nearest poses (k, 3) and (k, 3) on curves and arcs, from the nearest place on the trail, and that place."""
-    nc, trail = matcher.nc, block.written.trail
+    nc, trail = match.nc, match.written.trail
     owner = trail.owner[segment + 1]
     vertex = segment + (at > 0.5)
     tip, axis, place = np.empty((len(point), 3)), np.empty((len(point), 3)), at.copy()
     open_rows = np.ones(len(point), np.bool_)
-    for group in block.written.curves:
+    for group in match.written.curves:
         element = nc.curves.element[group.index]
         for u in group.spans[1:]:
             rows = np.flatnonzero(
@@ -164,19 +196,19 @@ def _on_bent(matcher: Matcher, block: Block, point: Floats, segment: Ints, at: F
             if not len(rows):
                 continue
             curve = np.searchsorted(element, owner[rows])
-            found, good = _newton_from_knot(matcher, group, float(u), curve, point[rows])
+            found, good = _newton_from_knot(match, group, float(u), curve, point[rows])
             rows = rows[good]
             tip[rows] = found[good, :3]
             axis[rows] = directions(nc, found[good, :3], found[good, 3:])
             open_rows[rows] = False
     rest = np.flatnonzero(open_rows)
     if len(rest):
-        tip[rest], axis[rest], _ = search_elements(matcher, owner[rest][:, None], point[rest])
+        tip[rest], axis[rest], _ = search_elements(match, owner[rest][:, None], point[rest])
     return tip, axis, place
 
 
 def _newton_from_knot(
-    matcher: Matcher, group: CurveGroup, u: float, curve: Ints, point: Floats
+    match: Match, group: CurveGroup, u: float, curve: Ints, point: Floats
 ) -> tuple[Floats, np.ndarray]:
     """Nearest points (k, 6) of curves to poses near the knot u, by one step; and whether the step was short enough.
 
@@ -187,11 +219,11 @@ def _newton_from_knot(
     else:
         value, slope, bend = (part.take(curve, axis=0) for part in group.jet(u))
     target = point.copy()
-    vectors = matcher.nc.second_is == "vector"
+    vectors = match.nc.second_is == "vector"
     if vectors:  # of length one
-        value, slope, bend = (_with_axis_point(part, matcher.axis_length) for part in (value, slope, bend))
+        value, slope, bend = (_with_axis_point(part, match.axis_length) for part in (value, slope, bend))
     else:
-        reach = np.linalg.norm(value[:, 3:] - value[:, :3], axis=1) / matcher.axis_length
+        reach = np.linalg.norm(value[:, 3:] - value[:, :3], axis=1) / match.axis_length
         target[:, 3:] = target[:, :3] + reach[:, None] * (target[:, 3:] - target[:, :3])
     rest = target - value
     size = np.einsum("ij,ij->i", slope, slope) - np.einsum("ij,ij->i", rest, bend)
@@ -210,13 +242,12 @@ def _with_axis_point(six: Floats, axis_length: float) -> Floats:
 
 
 def search_elements(
-    matcher: Matcher, elements: Ints, point: Floats, column: slice = slice(0, 6)
+    match: Match, elements: Ints, point: Floats, column: slice = slice(0, 6)
 ) -> tuple[Floats, Floats, Floats]:
     """Nearest poses on single path elements by sampling and zooming in; for few rows.
 
     Parameters
     ----------
-    matcher : Matcher
     elements : (k, e) int64
         Elements to look at for each row.
     point : (k, 6) float64
@@ -228,7 +259,7 @@ def search_elements(
     tip, axis : (k, 3) float64
     distance : (k,) float64
     """
-    nc, length = matcher.nc, matcher.axis_length
+    nc, length = match.nc, match.axis_length
     rows, width = elements.shape
     here = np.arange(rows)
 
@@ -267,19 +298,19 @@ def search_elements(
     return tip[here, best], axis[here, best], distance[here, best]
 
 
-def own_gaps_of_written(matcher: Matcher, block: Block, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
+def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
     """Distance of chosen written vertices from the original tip path, and from its axis-point path, each on its own."""
     vertex = reached.vertex[rows]
-    trail, original, length = block.written.trail, matcher.original, matcher.axis_length
+    trail, original, length = match.written.trail, match.original, match.axis_length
     result = []
     for metric in ("tip", "axis point"):
         segment, at = nearest_segments(
-            block.six[vertex],
-            matcher.track.six,
-            block.segment[vertex],
+            match.six[vertex],
+            match.path.six,
+            match.segment[vertex],
             _REACH,
-            block.low[vertex],
-            block.high[vertex],
+            match.low[vertex],
+            match.high[vertex],
             metric,
         )
         tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, segment, at))
@@ -300,15 +331,15 @@ def own_gaps_of_written(matcher: Matcher, block: Block, reached: Reached, rows: 
 _REACH = 4
 
 
-def own_gaps_of_original(matcher: Matcher, block: Block, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
+def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
     """Distance of chosen original vertices from the written tip path and axis-point path, each on its own."""
-    nc, written = matcher.nc, block.written
-    segment = np.minimum(reached.place[rows].astype(np.int64), len(block.six) - 2)
-    ends = np.flatnonzero(np.append(np.diff(block.piece) != 0, True))
-    piece = np.searchsorted(ends, segment)
-    low = np.concatenate(([0], ends[:-1] + 1))[piece]
-    high = np.maximum(ends[piece] - 1, segment)
-    point = matcher.track.six[reached.vertex[rows]]
+    nc, written = match.nc, match.written
+    segment = np.minimum(reached.place[rows].astype(np.int64), len(match.six) - 2)
+    ends = np.flatnonzero(np.append(np.diff(match.stretch) != 0, True))
+    stretch = np.searchsorted(ends, segment)
+    low = np.concatenate(([0], ends[:-1] + 1))[stretch]
+    high = np.maximum(ends[stretch] - 1, segment)
+    point = match.path.six[reached.vertex[rows]]
     first, last = written.first + 1, written.first + len(written.trail.last) - 1
     result = []
     ways: tuple[tuple[Metric, slice, Floats], ...] = (
@@ -316,10 +347,10 @@ def own_gaps_of_original(matcher: Matcher, block: Block, reached: Reached, rows:
         ("axis point", slice(3, 6), reached.gap.axis_point[rows]),
     )
     for metric, column, known in ways:
-        near, at = nearest_segments(point, block.six, segment, _REACH * matcher.parts, low, high, metric)
-        climb(point, block.six, segment, low, high, near, at, metric)
+        near, at = nearest_segments(point, match.six, segment, _REACH * match.parts, low, high, metric)
+        climb(point, match.six, segment, low, high, near, at, metric)
         owner = written.trail.owner[near + 1]
         elements = np.clip(owner[:, None] + np.arange(-_REACH, _REACH + 1), first, last)
         elements = np.where(nc.kind[elements] == Element.RAPID, owner[:, None], elements)
-        result.append(np.minimum(search_elements(matcher, elements, point, column=column)[2], known))
+        result.append(np.minimum(search_elements(match, elements, point, column=column)[2], known))
     return result[0], result[1]

@@ -1,0 +1,339 @@
+"""The written motion in batches, each with its stretches and where both of their ends are on the CL path.
+
+A *stretch* is the run of feed moves between two stops (see `rapids`). Many short stretches make a batch; a long one is
+cut where there is no doubt about the place of a vertex (see `guide`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.model import Floats, Ints, Move
+from cornersmooth.verify.guide import STRIDE, cut, guide
+from cornersmooth.verify.holes import HoleRuns, divide_at_holes
+from cornersmooth.verify.ncprogram import Element, Elements, Problem
+from cornersmooth.verify.polyline import Polyline, directions
+from cornersmooth.verify.rapids import Rapids, fraction_along, moving_rapids
+from cornersmooth.verify.task import Task
+
+#: elements in a batch
+BATCH: Final = 1 << 16
+
+#: batches that are held back while stops of the text fit nothing
+_HELD: Final = 4
+
+#: a stretch in a batch: it begins at the end of one element and ends with another; where it begins on the CL path
+#: (segment and fraction), and its last segment plus one
+STRETCH: Final = np.dtype(
+    [("first", np.int64), ("last", np.int64), ("start", np.int64), ("stop", np.int64), ("fraction", np.float64)]
+)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Elements that are matched and measured at once.
+
+    Parameters
+    ----------
+    elements : Elements
+    offset : int
+        Number of the first of them in the whole text.
+    stretches : (k,) STRETCH
+        Elements are counted in this batch.
+    until : float
+        Place on the CL path where the last stretch goes on in the next batch; inf where it ends in this one.
+    continued : bool
+        Whether the first stretch begins in the batch before: one more element stands in front of it.
+    """
+
+    elements: Elements
+    offset: int
+    stretches: NDArray[Any]
+    until: float = np.inf
+    continued: bool = False
+
+    @property
+    def first(self) -> int:
+        """Element at the end of which it begins."""
+        return int(self.stretches["first"][0])
+
+    @property
+    def last(self) -> int:
+        """Its last element."""
+        return int(self.stretches["last"][-1])
+
+
+@dataclass
+class Stops:
+    """What is known of stops: elements of the text, and the CL path length where they are."""
+
+    element: list[int] = field(default_factory=list)
+    length: list[float] = field(default_factory=list)
+
+    @property
+    def first(self) -> int:
+        """The first of them; 0 where there is none."""
+        return self.element[0] if self.element else 0
+
+    def lengths(self) -> dict[int, float]:
+        """CL path lengths by elements."""
+        return dict(zip(self.element, self.length, strict=True))
+
+
+class Batches:
+    """Makes batches of the elements of a text, as they come.
+
+    Parameters
+    ----------
+    task : Task
+    """
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+        self.problems: list[Problem] = []
+        self.stops = Stops()
+        #: move of the hole that an element belongs to
+        self.holes: dict[int, int] = {}
+        self.elements = 0
+
+    def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
+        """Give out all batches of a text."""
+        original = self.task.original
+        moves = len(original.pose)
+        if (original.program.kind[original.pose] == Move.HOLE).any():
+            yield from self._between_holes(chunks)
+            return
+        part: _Part | None = None
+        for nc in chunks:
+            if not len(nc):
+                continue
+            self.elements += len(nc)
+            if part is None:
+                if not moves:
+                    self._lacking(0, -1, nc, 0)
+                    return
+                part = _Part(self, nc, 0, moves - 1, 0)
+            yield from part.take(nc)
+        if part is not None:
+            yield from part.end()
+        elif moves:
+            self._lacking(0, moves - 1, None, 0)
+
+    def _between_holes(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
+        """Give out the batches of what lies between the holes."""
+        task = self.task
+        held = [nc for nc in chunks if len(nc)]
+        if not held:
+            self._lacking(0, len(task.original.pose) - 1, None, 0)
+            return
+        nc = Elements.joined(held)
+        self.elements = len(nc)
+        holes: HoleRuns = divide_at_holes(task.original, nc, task.axis_length)
+        self.problems += holes.problems
+        self.holes.update(holes.element_move)
+        for move_first, move_last, first, last in holes.parts:
+            if move_last < move_first and last < first:
+                continue
+            if move_last < move_first or last < first:
+                self._lacking(move_first, move_last, nc, first)
+                continue
+            part = _Part(self, nc, move_first, move_last, first)
+            yield from part.take(nc.part(first, last + 1))
+            yield from part.end()
+
+    def _lacking(self, move_first: int, move_last: int, nc: Elements | None, first: int) -> None:
+        """Say that only one of the two motions has anything."""
+        original = self.task.original
+        ours = move_last < move_first
+        line = 0 if ours else int(original.program.line[original.pose[move_first]])
+        text = "motion that the CL file does not have" if ours else "the NC text lacks motion of the CL file"
+        self.problems.append(Problem("CS534", line, int(nc.line[first]) if ours and nc is not None else 0, text))
+
+
+class _Part:
+    """A part of both motions without holes, as it is read.
+
+    Element numbers are those of the whole text; `self.held` begins with number `self.base`.
+    """
+
+    def __init__(self, batches: Batches, nc: Elements, move_first: int, move_last: int, first: int) -> None:
+        self.batches, self.task = batches, batches.task
+        self.move_last = move_last
+        original = self.task.original
+        self.rapids = Rapids(original, self.task.axis_length, nc, move_first, move_last)
+        self.held, self.base = nc.part(0, 0), first
+        self.waiting = np.zeros(0, np.int64)
+        self.looked = first
+        #: the stretch that has no end yet: where it begins, as a move and in the text, and on the CL path
+        self.move, self.element = -1, first
+        self.start, self.fraction, self.share = 0, 0.0, 0.0
+        self.continued = False
+        self.pending: list[tuple[int, int, int, int, float]] = []
+
+    def take(self, nc: Elements) -> Iterator[Batch]:
+        """Take more elements."""
+        self.held = Elements.joined([self.held, nc])
+        yield from self._go_on(final=False)
+
+    def end(self) -> Iterator[Batch]:
+        """Give out the rest."""
+        yield from self._go_on(final=True)
+        self.batches.problems += self.rapids.problems
+
+    def _go_on(self, *, final: bool) -> Iterator[Batch]:
+        held, base = self.held, self.base
+        stop = base + len(held)
+        begin = [self.looked] if self.move < 0 and self.looked == self.element and not len(self.waiting) else []
+        found = moving_rapids(held, max(self.looked - base, 1), len(held)) + base
+        self.waiting = np.concatenate((self.waiting, np.array(begin, np.int64), found))
+        self.looked = stop
+        urgent = len(held) > _HELD * BATCH
+        moves, elements = self.rapids.pair(held, self.waiting - base, final=final, urgent=urgent)
+        elements = elements + base
+        settled = self.rapids.settled
+        self.waiting = self.waiting[settled:]
+        for move, element in zip(moves.tolist(), elements.tolist(), strict=True):
+            yield from self._close(move - 1, element - 1)
+            self._open(move, element)
+        if final:
+            yield from self._close(self.move_last, stop - 1)
+            yield from self._flush()
+        elif not len(self.waiting) and stop - 1 - self.element > BATCH + BATCH // 2:
+            yield from self._flush()
+            yield from self._cut_long(stop - 1, int(self.task.original.trail.last[self.move_last]), open_end=True)
+        first = min(self.pending[0][0] if self.pending else self.element, self.element) - 1
+        if first > self.base:
+            self.held, self.base = self.held.part(first - self.base, len(self.held)), first
+
+    def _open(self, move: int, element: int) -> None:
+        """Begin a stretch at a stop."""
+        task, first = self.task, self.move < 0
+        original = task.original
+        kind = original.program.kind[original.pose[move]]
+        share = 0.0
+        if first:
+            at = element - self.base
+            if kind == Move.RAPID and self.held.kind[at] != Element.RAPID:
+                text = "the first rapid is written as a feed move"
+                line = int(original.program.line[original.pose[move]])
+                self.batches.problems.append(Problem("CS532", line, int(self.held.line[at]), text))
+            if kind == Move.HOLE:
+                share = fraction_along(original, self.held, move, at, task.axis_length)
+        self.move, self.element, self.share, self.continued = move, element, share, False
+        last_vertex = original.trail.last
+        start = int(last_vertex[move])
+        if share == 0:
+            self.batches.stops.element.append(element)
+            self.batches.stops.length.append(float(task.path.length[start]))
+            self.start, self.fraction = start, 0.0
+        else:  # in vertices; the search finds the rest
+            along = share * (int(last_vertex[move + 1]) - start)
+            self.start, self.fraction = start + int(along), float(along - int(along))
+
+    def _close(self, move_last: int, element_last: int) -> Iterator[Batch]:
+        """End the stretch."""
+        if self.move < 0:
+            return
+        theirs, ours = move_last > self.move, element_last > self.element
+        if theirs != ours and not self.continued:
+            self._lost(move_last, element_last, theirs=theirs)
+        if not (theirs and ours):
+            return
+        stop = int(self.task.original.trail.last[move_last])
+        if element_last - self.element > BATCH + BATCH // 2:
+            yield from self._flush()
+            while element_last - self.element > BATCH + BATCH // 2:
+                yield from self._cut_long(element_last, stop, open_end=False)
+        start, fraction = self.start, self.fraction
+        if start >= stop:
+            start, fraction = stop - 1, 1.0
+        if self.pending and element_last - self.pending[0][0] > BATCH:
+            yield from self._flush()
+        self.pending.append((self.element, element_last, start, stop, fraction))
+
+    def _flush(self) -> Iterator[Batch]:
+        """Give out what waits."""
+        if self.pending:
+            yield self._batch(self.pending, np.inf)
+            self.pending = []
+
+    def _batch(self, rows: list[tuple[int, int, int, int, float]], until: float) -> Batch:
+        lead = int(self.continued and rows[0][0] == self.element)
+        begin = rows[0][0] - lead
+        table = np.array(rows, STRETCH)
+        table["first"] -= begin
+        table["last"] -= begin
+        elements = self.held.part(begin - self.base, rows[-1][1] + 1 - self.base)
+        return Batch(elements, begin, table, until, bool(lead))
+
+    def _cut_long(self, element_last: int, stop: int, *, open_end: bool) -> Iterator[Batch]:
+        """Cut off the beginning of a long stretch."""
+        task, path = self.task, self.task.path
+        begin = self.element - self.base
+        size = min(element_last - self.element, BATCH + BATCH // 2)
+        part = slice(begin, begin + size + 1)
+        nc = self.held
+        tip = nc.tip[part]
+        six = np.hstack((tip, tip + task.axis_length * directions(nc, tip, nc.second[part])))
+        length = Polyline.of(six).length
+        margin = task.margin(nc)
+        far = float(np.sqrt(2) * task.tolerance + margin)
+        origin = float(path.length_at(np.array([self.start]), np.array([self.fraction]))[0])
+        limits = self.start, max(stop - 1, self.start)
+        found = guide(six, length, path, origin, limits, far)
+        ends = np.append(np.diff(nc.line[part]) != 0, True)
+        chosen = cut(six, found, path, ends, BATCH, 2.0 * task.tolerance + margin)
+        if chosen is None:  # the text is off its way: as far as the last vertex that was on it tells
+            vertex = BATCH
+            known = int(np.searchsorted(found[0], vertex, side="right")) - 1
+            away = length[vertex] - length[found[0][known]]
+            chosen = vertex, min(float(found[1][known] + away), float(path.length[limits[1] + 1]))
+        vertex, place = chosen
+        segment, fraction = path.place_at(place)
+        element = self.element + vertex
+        yield self._batch([(self.element, element, self.start, segment + 1, self.fraction)], segment + fraction)
+        self.element, self.start, self.fraction, self.continued = element, segment, fraction, True
+        if open_end:
+            self._pass_by(place, begin + found[0], found[1])
+
+    def _pass_by(self, place: float, elements: Ints, places: Floats) -> None:
+        """Say which stops of the CL file the text has passed without stopping; elements are of what is held."""
+        rapids, task = self.rapids, self.task
+        last_vertex = task.original.trail.last
+        near = 2.0 * task.tolerance + task.margin(self.held)
+        while rapids.next < len(rapids.stops):
+            vertex = int(last_vertex[rapids.stops[rapids.next]])
+            if task.path.length[vertex] > place - near:
+                return
+            about = int(np.interp(task.path.length[vertex], places, elements))
+            last = len(self.held) - 1
+            rapids.missing(self.held, rapids.next, max(about - STRIDE, 0), min(about + STRIDE, last))
+            rapids.next += 1
+
+    def _lost(self, move_last: int, element_last: int, *, theirs: bool) -> None:
+        """Say that only one of the two motions moves between two stops."""
+        task, nc = self.task, self.held
+        original = task.original
+        program = original.program
+        if theirs:
+            poses = original.pose[self.move : move_last + 1]
+            tip, other, scale = program.tip[poses], program.axis[poses], task.axis_length
+            text, code = "feed moves of the CL file are missing", "CS535"
+        else:
+            part = slice(self.element - self.base, element_last + 1 - self.base)
+            tip, other = nc.tip[part], nc.second[part]
+            scale = task.axis_length if nc.second_is == "vector" else 1.0
+            text, code = "feed moves that the CL file does not have", "CS536"
+        extent = np.abs(tip - tip[0]).max() + scale * np.abs(other - other[0]).max()
+        if theirs and len(tip) == 2:
+            extent *= 1.0 - self.share
+        if extent > task.margin(nc):
+            move = min(self.move + 1, len(original.pose) - 1)
+            element = min(self.element + 1 - self.base, len(nc) - 1)
+            line = int(program.line[original.pose[move]])
+            self.batches.problems.append(Problem(code, line, int(nc.line[element]), text, float(extent)))

@@ -1,0 +1,79 @@
+"""The checks of a batch, one after another; each looks at the same distances and adds to the same findings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.backtracking import check_backtracking
+from cornersmooth.verify.batches import Batch
+from cornersmooth.verify.continuity import measure_continuity
+from cornersmooth.verify.deviation import check_curves, check_exact_poses, check_original, check_written
+from cornersmooth.verify.distances import Distances
+from cornersmooth.verify.feeds import check_feeds
+from cornersmooth.verify.findings import Findings, Largest
+from cornersmooth.verify.match import Match, match
+from cornersmooth.verify.task import Task
+
+#: what every batch goes through, in this order
+CHECKS: Final[tuple[Callable[[Distances, Findings], None], ...]] = (
+    check_written,
+    check_curves,
+    check_original,
+    check_exact_poses,
+    check_backtracking,
+    check_feeds,
+    measure_continuity,
+)
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What a batch shows.
+
+    Parameters
+    ----------
+    findings : Findings
+    elements : (e,) int64
+        Elements of the whole text at whose ends words stand, as far as they are known to be in this batch.
+    lengths : (e,) float64, mm
+        CL path length at their places.
+    """
+
+    findings: Findings
+    elements: Ints
+    lengths: Floats
+
+
+def examine(task: Task, batch: Batch, asked: Ints, so_far: Largest) -> Examined:
+    """Match a batch and run all checks.
+
+    Parameters
+    ----------
+    task : Task
+    batch : Batch
+    asked : (k,) int64
+        Elements of the whole text whose places are asked for; ascending.
+    so_far : Largest
+        What was met before: places with less are not looked at closely.
+    """
+    matched = match(task, batch)
+    found = Findings(largest=so_far)
+    distances = Distances(matched)
+    for check in CHECKS:
+        check(distances, found)
+    return Examined(found, *_places(matched, asked, batch.offset))
+
+
+def _places(matched: Match, asked: Ints, offset: int) -> tuple[Ints, Floats]:
+    first = matched.written.first + offset
+    last_vertex = matched.written.trail.last
+    own = asked[slice(*np.searchsorted(asked, (first, first + len(last_vertex))).tolist())]
+    vertex = last_vertex[own - first]
+    on = matched.on[vertex]
+    length = matched.path.length_at(matched.segment[vertex[on]], matched.fraction[vertex[on]])
+    return own[on], length

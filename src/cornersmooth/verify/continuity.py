@@ -1,0 +1,133 @@
+"""How smoothly the written elements follow one another: jumps of tangent and curvature, and the shortest element."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.verify.curves import CurveGroup, groups
+from cornersmooth.verify.distances import Distances
+from cornersmooth.verify.findings import Findings
+from cornersmooth.verify.match import Match
+from cornersmooth.verify.ncprogram import Element, Elements
+
+
+def measure_continuity(distances: Distances, found: Findings) -> None:
+    """Take down the largest jumps and the shortest element."""
+    match = distances.match
+    element, cosine, curved, jump = _jumps(match)
+    worst = found.continuity
+    for largest, values, where in ((worst.tangent, -cosine, element), (worst.curvature, jump, curved)):
+        if len(values):
+            k = int(np.argmax(values))
+            largest.update(values[k : k + 1], _cl_lines(match, where[k : k + 1]), match.nc.line[where[k : k + 1]])
+    # a block in rotary words may have become several elements: its length is from its start to its end
+    trail, first = match.written.trail, match.written.first
+    lines = match.nc.line[first : first + len(trail.last)]
+    chosen = np.flatnonzero(np.append(lines[1:] != lines[:-1], True))
+    ends = trail.last[chosen]
+    six = match.six[ends] if len(ends) < len(match.six) else match.six
+    step = six[1:] - six[:-1]
+    square = np.maximum(
+        np.einsum("ij,ij->i", step[:, :3], step[:, :3]), np.einsum("ij,ij->i", step[:, 3:], step[:, 3:])
+    )
+    square[(square == 0) | ~match.on[ends[1:]] | ~match.on[ends[:-1]]] = np.inf
+    square[match.stretch[ends[1:]] != match.stretch[ends[:-1]]] = np.inf
+    if len(square):
+        k = int(np.argmin(square))
+        own = chosen[k + 1 : k + 2] + first
+        worst.shortest.update(-np.sqrt(square[k : k + 1]), _cl_lines(match, own), match.nc.line[own])
+
+
+def _cl_lines(match: Match, elements: Ints) -> Ints:
+    original = match.original
+    vertex = match.written.trail.last[elements - match.written.first]
+    lines: Ints = original.program.line[original.pose[original.trail.owner[match.segment[vertex] + 1]]]
+    return lines
+
+
+def _jumps(match: Match) -> tuple[Ints, Floats, Ints, Floats]:
+    """Jumps between neighbouring feed elements of a batch.
+
+    Returns
+    -------
+    element : (k,) int64
+        Elements behind the joints.
+    cosine : (k,) float64
+        Of the angle between the tangents.
+    curved : (c,) int64
+        Elements behind joints of which at least one side is a curve or an arc.
+    curvature : (c,) float64, 1/mm
+        Difference of the curvatures there.
+    """
+    nc, lead = match.nc, int(match.continued)  # an element in front, if the batch begins in a stretch
+    first = match.written.first - lead
+    last = match.written.first + len(match.written.trail.last) - 1
+    part = slice(first, last + 1)
+    tip, kind = nc.tip[part], nc.kind[part]
+    count = len(tip)
+    leave = np.zeros((count, 3))
+    leave[1:] = tip[1:] - tip[:-1]
+    arrive = leave
+    bend_in = bend_out = np.zeros(count)
+    bent: Bools = (kind == Element.ARC) | (kind == Element.CURVE)
+    if bent.any():
+        arrive, bend_in, bend_out = leave.copy(), np.zeros(count), np.zeros(count)
+        curves = match.written.curves
+        if lead and kind[lead] == Element.CURVE:
+            curves = (*curves, *groups(nc.curves, np.flatnonzero(nc.curves.element == first + lead)))
+        for group in curves:
+            _add_curves(nc, group, first, (leave, bend_out), (arrive, bend_in))
+        _add_arcs(nc, first, last, leave, arrive, bend_in, bend_out)
+    end = match.written.trail.last
+    feeding = np.zeros(count, np.bool_)
+    on, stretch = match.on[end], match.stretch[end]
+    feeding[lead + 1 :] = on[1:] & on[:-1] & (stretch[1:] == stretch[:-1])
+    stretch = np.concatenate((stretch[:lead], stretch))
+    if lead:
+        feeding[lead] = True
+    size_in = np.sqrt(np.einsum("ij,ij->i", arrive, arrive))
+    size_out = size_in if arrive is leave else np.sqrt(np.einsum("ij,ij->i", leave, leave))
+    moving = np.flatnonzero(feeding & (size_in > 0) & (size_out > 0))
+    joined = stretch[moving[1:]] == stretch[moving[:-1]]
+    before, behind = moving[:-1][joined], moving[1:][joined]
+    cosine = np.einsum("ij,ij->i", arrive.take(before, axis=0), leave.take(behind, axis=0)) / (
+        size_in[before] * size_out[behind]
+    )
+    curved = bent[before] | bent[behind]
+    jump = np.abs(bend_in[before[curved]] - bend_out[behind[curved]])
+    return behind + first, np.clip(cosine, -1.0, 1.0), behind[curved] + first, jump
+
+
+def _curvature(slope: Floats, bend: Floats) -> Floats:
+    speed = np.sqrt(np.einsum("ij,ij->i", slope, slope))
+    cross = np.cross(slope, bend)
+    size = np.sqrt(np.einsum("ij,ij->i", cross, cross))
+    curvature: Floats = np.divide(size, speed**3, out=np.zeros_like(speed), where=speed > 0)
+    return curvature
+
+
+def _add_curves(
+    nc: Elements, group: CurveGroup, first: int, leave: tuple[Floats, Floats], arrive: tuple[Floats, Floats]
+) -> None:
+    """Put tangents and curvatures at both ends of curves in their places."""
+    at = nc.curves.element[group.index] - first
+    for u, (tangent, bend) in ((group.spans[0], leave), (group.spans[-1], arrive)):
+        _, slope, second = group.jet(float(u), slice(0, 3))
+        tangent[at] = slope
+        bend[at] = _curvature(slope, second)
+
+
+def _add_arcs(
+    nc: Elements, first: int, last: int, leave: Floats, arrive: Floats, bend_in: Floats, bend_out: Floats
+) -> None:
+    rows = np.flatnonzero((nc.arcs.element > first) & (nc.arcs.element <= last))
+    element = nc.arcs.element[rows]
+    centre, normal, sweep = nc.arcs.centre[rows], nc.arcs.normal[rows], nc.arcs.sweep[rows][:, None]
+    height = np.einsum("ij,ij->i", nc.tip[element] - nc.tip[element - 1], normal)[:, None] * normal
+    for end, tangent, bend in ((nc.tip[element - 1], leave, bend_out), (nc.tip[element], arrive, bend_in)):
+        radius = end - centre
+        radius -= np.einsum("ij,ij->i", radius, normal)[:, None] * normal
+        slope = np.cross(normal, radius) * sweep + height
+        tangent[element - first] = slope
+        bend[element - first] = _curvature(slope, -radius * sweep**2)

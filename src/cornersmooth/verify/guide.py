@@ -1,0 +1,200 @@
+"""Places of few vertices of a long stretch, one group after another: a guide to the places of all, and where to cut.
+
+How far a vertex is along the CL path is known from the last vertex whose place is known, by the path length between
+the two; so an error never adds up. Where nothing is found there, the text has left its way: then it is looked for
+farther on.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.verify.nearest import nearest_from
+from cornersmooth.verify.polyline import Polyline
+
+#: of so many vertices the place of one is found first
+STRIDE: Final = 32
+
+#: vertices from which on a stretch is long: shorter ones are gone through evenly from end to end
+LONG: Final = 1024
+
+#: vertices in a group, at most
+_GROUP: Final = 64
+
+#: how much longer one motion may be than the other, where the last group tells nothing else
+_LOW, _HIGH = 0.8, 1.25
+
+#: places that are lost in a row before one is looked for farther on
+_LOST: Final = 4
+
+#: how much longer than the written path the original may be where the way is lost, and segments looked at
+_REACH, _MOST_SEGMENTS = 2.5, 1 << 17
+
+#: a vertex is in doubt where the path comes back to it after so many times its distances, and this part of `near`
+_FOLD, _SLACK = 4.0, 0.05
+
+#: a cut lies no nearer to the ends of its segment than this part of it: so it is clear to which side vertices belong
+_INNER: Final = 0.2
+
+
+def guide(
+    six: Floats, length: Floats, path: Polyline, begin: float, limits: tuple[int, int], far: float
+) -> tuple[Ints, Floats, Floats]:
+    """Find the places of every `STRIDE`-th vertex of a stretch as far as they are without doubt.
+
+    Parameters
+    ----------
+    six : (v, 6) float64
+        Written vertices.
+    length : (v,) float64, mm
+        Path length up to them.
+    path : Polyline
+        The CL path.
+    begin : float, mm
+        Path length at the place of the first vertex.
+    limits : tuple of int
+        First and last segment allowed.
+    far : float, mm
+        From this distance on a place is doubtful.
+
+    Returns
+    -------
+    vertex : (k,) int64
+        The first vertex, and others.
+    place : (k,) float64, mm
+        Path length at their places, ascending.
+    distance : (k,) float64, mm
+    """
+    rows = np.arange(STRIDE, len(six), STRIDE)
+    vertices, places, distances = [np.zeros(1, np.int64)], [np.array([begin])], [np.zeros(1)]
+    here, gone, ratio = float(begin), float(length[0]), 1.0
+    k, size, lost = 0, 1, 0
+    while k < len(rows):
+        group = rows[k : k + size]
+        point = six.take(group, axis=0)
+        way = length[group] - gone
+        low, high = (np.full(len(group), limit) for limit in limits)
+        segment, fraction, square = nearest_from(point, path, here + ratio * way, low, high)
+        found = path.length_at(segment, fraction)
+        good = square <= far * far
+        step = np.diff(found, prepend=here)
+        own = np.diff(way, prepend=0.0)
+        good &= (step >= own - 2 * far) & (step >= 0) & (step <= _HIGH * own + 2 * STRIDE * far)
+        count = len(good) if good.all() else int(np.argmin(good))
+        if not count and len(good) > 1:
+            size = 1
+            continue
+        if not count:
+            lost += 1
+            k += 1
+            ratio = 1.0
+            if lost < _LOST or lost & (lost - 1):
+                continue
+            ahead = _farther_on(point[0], path, here, float(way[0]), limits, far)
+            if ahead is None:
+                continue
+            found, square, count = np.array([ahead[0]]), np.array([ahead[1]]), 1
+        else:
+            k += count
+            ratio = float(np.clip((found[count - 1] - here) / max(way[count - 1], 1e-9), _LOW, _HIGH))
+        vertices.append(group[:count])
+        places.append(found[:count])
+        distances.append(np.sqrt(square[:count]))
+        here, gone, lost = float(found[count - 1]), float(length[group[count - 1]]), 0
+        size = min(2 * size, _GROUP) if count == len(good) else 1
+    return np.concatenate(vertices), np.concatenate(places), np.concatenate(distances)
+
+
+def _farther_on(
+    point: Floats, path: Polyline, here: float, way: float, limits: tuple[int, int], far: float
+) -> tuple[float, float] | None:
+    """Path length and squared distance of the only place near a vertex beyond one already found; None if there is none.
+
+    The vertex is `way` farther along the written path.
+    """
+    low, high = np.searchsorted(path.length, (here - far, here + _REACH * way + 2 * far)).tolist()
+    low = max(low - 1, limits[0])
+    high = min(high, limits[1], low + _MOST_SEGMENTS)
+    if high < low:
+        return None
+    place, square = _places(point, path, low, high)
+    best = int(np.argmin(square))
+    close = place[square <= 4 * far * far]
+    if square[best] > far * far or place[best] < here or close.max() - close.min() > 8 * far:
+        return None
+    return float(place[best]), float(square[best])
+
+
+def _places(point: Floats, path: Polyline, low: int, high: int) -> tuple[Floats, Floats]:
+    """Path lengths of the nearest places on each of some segments, and the squared distances."""
+    start = path.six[low : high + 1]
+    way = path.six[low + 1 : high + 2] - start
+    size = np.einsum("ij,ij->i", way, way)
+    away = point - start
+    share = np.einsum("ij,ij->i", away, way)
+    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+    away -= share[:, None] * way
+    begin = path.length[low : high + 1]
+    place = begin + share * (path.length[low + 1 : high + 2] - begin)
+    return place, np.einsum("ij,ij->i", away, away)
+
+
+def cut(
+    six: Floats,
+    found: tuple[Ints, Floats, Floats],
+    path: Polyline,
+    allowed: Bools,
+    wanted: int,
+    near: float,
+) -> tuple[int, float] | None:
+    """Choose where to cut a long stretch: the vertex, not far before `wanted`, and the path length at its place.
+
+    There must be no doubt about the place: its neighbours follow one another as they should, and the path does not
+    come back to it.
+
+    Parameters
+    ----------
+    six : (v, 6) float64
+        Written vertices.
+    found : as of `guide`
+    path : Polyline
+    allowed : (v,) bool
+        Vertices where it may be cut.
+    wanted : int
+    near : float, mm
+
+    Returns
+    -------
+    vertex, place or None
+        None where there is none.
+    """
+    vertex, place, distance = found
+    inner = np.flatnonzero((vertex > 0) & (vertex <= wanted) & allowed[vertex])
+    known = np.diff(vertex, prepend=-STRIDE, append=vertex[-1] + 2 * STRIDE) == STRIDE
+    inner = inner[known[inner] & known[inner + 1] & (distance[inner] <= near)]
+    segment = np.searchsorted(path.length, place[inner], side="right") - 1
+    segment = np.clip(segment, 0, len(path.length) - 2)
+    size = path.length[segment + 1] - path.length[segment]
+    share = np.divide(place[inner] - path.length[segment], size, out=np.zeros(len(inner)), where=size > 0)
+    inside = (share >= _INNER) & (share <= 1 - _INNER)
+    for k in inner[inside][::-1].tolist():
+        if vertex[k] < wanted // 2:
+            break
+        if _clear(six[vertex[k]], path, place[k - 1 : k + 2], float(distance[k]), near):
+            return int(vertex[k]), float(place[k])
+    later = inner[inside & (vertex[inner] >= wanted // 2)]
+    if len(later):
+        return int(vertex[later[-1]]), float(place[later[-1]])
+    return None
+
+
+def _clear(point: Floats, path: Polyline, places: Floats, distance: float, near: float) -> bool:
+    """Whether no other place between those of its neighbours could be that of a vertex as well."""
+    low, high = np.searchsorted(path.length, (places[0] - near, places[2] + near)).tolist()
+    place, square = _places(point, path, max(low - 1, 0), min(high, len(path.length) - 2))
+    close = square <= 4 * near * near
+    away = np.abs(place - places[1])[close]
+    return not (away > _FOLD * (np.sqrt(square[close]) + distance) + _SLACK * near).any()

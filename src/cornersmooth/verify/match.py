@@ -1,0 +1,329 @@
+"""Where on the CL path every vertex of a batch of written motion is: places in order, found by path length.
+
+Both motions are nearly equally long, so that the path length tells where about a vertex is, and the nearest segment is
+found from there: first for few vertices (`guide`), which tell more exactly where about those between them are. Places
+never go back. What is then in doubt is assigned anew, with its neighbours, by the best monotone correspondence
+(`assignment`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.verify.assignment import ROUNDS, assign, doubtful_windows
+from cornersmooth.verify.batches import Batch
+from cornersmooth.verify.guide import LONG, STRIDE, guide
+from cornersmooth.verify.ncprogram import Elements
+from cornersmooth.verify.nearest import nearest_from
+from cornersmooth.verify.polyline import CHORD_SHARE, Original, Polyline, Written, written_motion
+from cornersmooth.verify.task import Task
+
+#: how much longer one motion may be than the other between neighbouring vertices, in distances that are doubtful: a
+#: rounding is shorter than its corner by no more than twice its deviation
+_SHORTCUT = 2.0
+
+#: slack of arithmetic on lengths, mm
+_ARITHMETIC = 1e-9
+
+#: parts of NC blocks beyond which nothing is looked for
+_MOST_PARTS = 16
+
+
+@dataclass(frozen=True)
+class Match:
+    """A batch of elements, and where its vertices are on the CL path.
+
+    Parameters
+    ----------
+    task : Task
+    nc : Elements
+    written : Written
+    six : (v, 6) float64
+        Its vertices: tip and axis point.
+    on : (v,) bool
+        Whether a vertex belongs to a stretch of feed moves.
+    stretch : (v,) int64
+        Number of the stretch in this batch; -1 for none.
+    segment : (v,) int64
+        Segment of the CL path.
+    fraction : (v,) float64
+        On that segment.
+    backward : (v,) bool
+        Whether the vertex lies by more than the margin behind the one before it, as seen from its place.
+    distance : (v,) float64, mm
+        From its place, in six dimensions: neither tip nor axis point is farther; inf where a stretch begins.
+    nearest : (v,) bool
+        Whether no segment next to that of the vertex is nearer.
+    low, high : (v,) int64
+        First and last segment of the CL path in the stretch a vertex belongs to.
+    until : float
+        Place on the CL path where the next batch goes on with the last stretch; inf where that ends in this one.
+    continued : bool
+        See `Batch`.
+    """
+
+    task: Task
+    nc: Elements
+    written: Written
+    six: Floats
+    on: Bools
+    stretch: Ints
+    segment: Ints
+    fraction: Floats
+    backward: Bools
+    distance: Floats
+    nearest: Bools
+    low: Ints
+    high: Ints
+    until: float
+    continued: bool
+
+    @cached_property
+    def place(self) -> Floats:
+        """(v,) segment plus fraction, where `on`."""
+        where: Floats = self.segment + self.fraction
+        return where
+
+    @property
+    def original(self) -> Original:
+        """The CL motion."""
+        return self.task.original
+
+    @property
+    def path(self) -> Polyline:
+        """The CL path."""
+        return self.task.path
+
+    @property
+    def tolerance(self) -> float:
+        """ε, mm."""
+        return self.task.tolerance
+
+    @property
+    def axis_length(self) -> float:
+        """H, mm."""
+        return self.task.axis_length
+
+    @cached_property
+    def margin(self) -> float:
+        """Distance that printed digits may account for, mm."""
+        return self.task.margin(self.nc)
+
+    @cached_property
+    def slack(self) -> float:
+        """Distance by which places may be wrong, mm: more than `margin` where polylines cut curves short."""
+        trail, nc = self.original.trail, self.nc
+        bare = len(trail) == len(self.original.pose) and not len(nc.curves) and not len(nc.arcs)
+        if bare and not nc.rotary:
+            return self.margin
+        # rotary words may let the tool swing by as much
+        return self.margin + 2 * CHORD_SHARE * self.tolerance
+
+    @cached_property
+    def parts(self) -> int:
+        """Elements that an NC block has become at most, up to `_MOST_PARTS`: more than one in rotary words only."""
+        edges = np.flatnonzero(np.append(np.diff(self.nc.line) != 0, True))
+        return min(int(np.diff(edges, prepend=-1).max(initial=1)), _MOST_PARTS)
+
+    @property
+    def near(self) -> float:
+        """Distance within which a written vertex is taken to be on its way, mm."""
+        return 2.0 * self.tolerance + self.margin
+
+
+def match(task: Task, batch: Batch) -> Match:
+    """Find the place of every vertex of a batch."""
+    nc = batch.elements
+    written = written_motion(nc, batch.first, batch.last, task.tolerance, task.axis_length)
+    six = written.trail.six(task.axis_length)
+    last_vertex = written.trail.last
+    rows = batch.stretches.copy()
+    rows["first"], rows["last"] = (last_vertex[rows[name] - batch.first] for name in ("first", "last"))
+    search = _Search(task, six, rows, batch.until, task.margin(nc))
+    search.find()
+    search.look_again()
+    number = search.number
+    return Match(
+        task,
+        nc,
+        written,
+        six,
+        number >= 0,
+        number,
+        search.segment,
+        search.fraction,
+        search.backward,
+        search.distance,
+        search.nearest,
+        search.low,
+        search.high,
+        batch.until,
+        batch.continued,
+    )
+
+
+class _Search:
+    """The places of one batch while they are being found; the attributes are those of `Match`."""
+
+    def __init__(self, task: Task, six: Floats, rows: np.ndarray, until: float, margin: float) -> None:
+        self.task, self.path, self.six, self.rows, self.margin = task, task.path, six, rows, margin
+        #: distance of a vertex from its place, in six dimensions, from which on it is looked at with more care, mm
+        self.far = float(np.sqrt(2) * task.tolerance + margin)
+        count = len(six)
+        first, last = rows["first"], rows["last"]
+        size = last - first + 1
+        index = np.repeat(np.arange(len(rows)), size)
+        vertex = np.arange(len(index)) - np.repeat(np.cumsum(size) - size, size) + first[index]
+        self.number = np.full(count, -1, np.int64)
+        self.low, self.high = np.zeros(count, np.int64), np.zeros(count, np.int64)
+        self.number[vertex], self.low[vertex], self.high[vertex] = index, rows["start"][index], rows["stop"][index] - 1
+        self.vertex, self.owner = vertex, index
+        self.begin = self.path.length_at(rows["start"], rows["fraction"])
+        self.end = self.path.length[rows["stop"]]
+        #: where the last vertex of a stretch must be, NaN for all others
+        self.goal = np.full(count, np.nan)
+        self.goal[last] = rows["stop"]
+        if np.isfinite(until):
+            self.goal[last[-1]] = until
+            segment = np.array([int(until)])
+            self.end[-1] = self.path.length_at(segment, until - segment)[0]
+        self.segment, self.fraction = np.zeros(count, np.int64), np.full(count, -1.0)
+        self.backward = np.zeros(count, np.bool_)
+        self.distance, self.nearest = np.full(count, np.inf), np.zeros(count, np.bool_)
+        self.apart = np.zeros(count, np.bool_)
+
+    def find(self) -> None:
+        """Find all places in order."""
+        path, rows = self.path, self.rows
+        length = Polyline.of(self.six).length
+        about = self._about(length)
+        inner = np.flatnonzero(self.vertex != rows["first"][self.owner])
+        vertex = self.vertex[inner]
+        low, high = self.low[vertex], self.high[vertex]
+        segment, fraction, square = nearest_from(self.six.take(vertex, axis=0), path, about[inner], low, high)
+        self.segment[vertex], self.fraction[vertex] = segment, fraction
+        self.segment[rows["first"]], self.fraction[rows["first"]] = rows["start"], rows["fraction"]
+        self.nearest[vertex] = True
+        self.distance[vertex] = np.sqrt(square)
+        # never back: stretches follow one another on the path, so all of them are put in order at once
+        found = path.length_at(self.segment[self.vertex], self.fraction[self.vertex])
+        found = np.clip(found, self.begin[self.owner], None)
+        order = np.arange(len(found))
+        ahead = found > np.maximum.accumulate(np.append(-np.inf, found))[:-1]
+        begins = self.vertex == rows["first"][self.owner]
+        leader = np.maximum.accumulate(np.where(ahead | begins, order, 0))
+        held = np.flatnonzero(leader != order)
+        behind, leaders = self.vertex[held], self.vertex[leader[held]]
+        gone_back = found[leader[held]] - found[held]
+        held, behind, leaders, gone_back = (
+            values[gone_back > _ARITHMETIC] for values in (held, behind, leaders, gone_back)
+        )
+        self.segment[behind], self.fraction[behind] = self.segment[leaders], self.fraction[leaders]
+        away = self.six[behind] - path.point_at(self.segment[behind], self.fraction[behind])
+        self.distance[behind] = np.sqrt(np.einsum("ij,ij->i", away, away))
+        self.nearest[behind] = False
+        self.backward[behind] = gone_back > self.margin
+        place = found[leader]
+        step = np.diff(place, prepend=0.0)[inner] - np.diff(length, prepend=0.0)[vertex]
+        self.apart[vertex] = np.abs(step) > _SHORTCUT * self.far
+        tail = np.searchsorted(self.vertex, rows["last"])
+        self.apart[rows["last"]] |= np.abs(place[tail] - self.end) > _SHORTCUT * self.far
+
+    def _about(self, length: Floats) -> Floats:
+        """(k,) path length where about each of `self.vertex` is, from path lengths and the places of few."""
+        rows, path, owner = self.rows, self.path, self.owner
+        first, last = rows["first"], rows["last"]
+        way = length[last] - length[first]
+        scale = np.divide(self.end - self.begin, way, out=np.zeros(len(way)), where=way > 0)
+        about: Floats = self.begin[owner] + (length[self.vertex] - length[first][owner]) * scale[owner]
+        for k in np.flatnonzero(last - first > LONG).tolist():
+            part = slice(int(first[k]), int(last[k]) + 1)
+            at, found, _ = guide(
+                self.six[part], length[part], path, self.begin[k], (rows["start"][k], rows["stop"][k] - 1), self.far
+            )
+            known = np.append(at, last[k] - first[k])
+            off = np.append(found, self.end[k]) - length[part][known]
+            own = slice(*np.searchsorted(owner, (k, k + 1)).tolist())
+            about[own] = length[part] + np.interp(np.arange(len(length[part])), known, off)
+        few = np.arange(STRIDE - 1, len(owner), STRIDE)
+        chosen = self.vertex[few]
+        segment, fraction, square = nearest_from(
+            self.six.take(chosen, axis=0), path, about[few], self.low[chosen], self.high[chosen]
+        )
+        sure = square <= self.far**2
+        few = few[sure]
+        off = path.length_at(segment[sure], fraction[sure]) - about[few]
+        edges = np.flatnonzero(np.diff(owner, prepend=-1, append=len(rows)))
+        ends = np.append(edges[:-1], edges[1:] - 1)
+        known = np.append(few, ends)
+        order = np.argsort(known, kind="stable")
+        about += np.interp(np.arange(len(owner)), known[order], np.append(off, np.zeros(len(ends)))[order])
+        return about
+
+    def look_again(self) -> None:
+        """Assign anew, and with more care, what is too far away or in the wrong order."""
+        known = np.isfinite(self.distance)
+        limit = self.task.tolerance + self.margin
+        apart = self.apart
+        for around, most_pairs, most_windows in ROUNDS:
+            doubtful = (self.backward | apart | (known & (self.distance > self.far))) & (self.number >= 0)
+            # both together may be so far, but not one of them alone
+            rows = np.flatnonzero(known & ~doubtful & (self.distance > limit))
+            away = self.six[rows] - self.path.point_at(self.segment[rows], self.fraction[rows])
+            square = np.maximum(
+                np.einsum("ij,ij->i", away[:, :3], away[:, :3]), np.einsum("ij,ij->i", away[:, 3:], away[:, 3:])
+            )
+            doubtful[rows] = square > limit**2
+            apart = np.zeros_like(apart)  # looked at once
+            windows = doubtful_windows(doubtful, self.number, around, most_windows + 1)
+            if around > ROUNDS[0][0] and len(windows) > most_windows:
+                return  # no mishap of the search: the text is off everywhere
+            for first, last in windows[:most_windows]:
+                self._assign(first, last, most_pairs, doubtful, wide=around > ROUNDS[0][0])
+
+    def _assign(self, first: int, last: int, most_pairs: int, doubtful: Bools, *, wide: bool) -> None:
+        """Assign a window anew if that is no worse."""
+        part = slice(first, last + 1)
+        start, stop = (float(self.segment[k] + self.fraction[k]) for k in (first, last))
+        stop = stop if np.isnan(self.goal[last]) else float(self.goal[last])
+        found = assign(self.six[part], self.path.six, start, stop, self.task.tolerance, most_pairs)
+        if found is None:
+            return
+        segment, fraction, back = found
+        away = self.six[part] - self.path.point_at(segment, fraction)
+        off = np.sqrt(np.einsum("ij,ij->i", away, away))
+        begin, end = 1, len(off)
+        if wide:  # most of so wide a window has its place already
+            begin, end = self._moved(part, segment, fraction, doubtful[part])
+        new, at = slice(begin, end), slice(first + begin, first + end)
+        if end <= begin or off[new].max() > self.distance[at].max() + _ARITHMETIC:  # worse, not by the last bit only
+            return
+        self.segment[at], self.fraction[at], self.distance[at] = segment[new], fraction[new], off[new]
+        self.nearest[at] = False
+        start_point = self.path.six[segment]
+        way = self.path.six[segment + 1] - start_point
+        size = np.einsum("ij,ij->i", way, way)
+        free = np.einsum("ij,ij->i", self.six[part] - start_point, way)
+        free = np.clip(np.divide(free, size, out=np.zeros_like(size), where=size > 0), 0.0, 1.0)
+        self.backward[at] = (back & ((fraction - free) * np.sqrt(size) > self.margin))[new]
+
+    def _moved(self, part: slice, segment: Ints, fraction: Floats, doubtful: Bools) -> tuple[int, int]:
+        """First vertex of a window, and last plus one, that get another place with the doubtful ones; all in order."""
+        old = self.path.length_at(self.segment[part], self.fraction[part])
+        new = self.path.length_at(segment, fraction)
+        rows = np.flatnonzero(doubtful[1:]) + 1
+        if not len(rows):
+            return 0, 0
+        kept = np.flatnonzero(np.abs(new - old) <= self.margin)
+        before, behind = kept[kept < rows[0]], kept[kept > rows[-1]]
+        begin = int(before[-1]) + 1 if len(before) else 1
+        end = int(behind[0]) if len(behind) else len(new)
+        while begin > 1 and old[begin - 1] > new[begin]:
+            begin -= 1
+        while end < len(new) and new[end - 1] > old[end]:
+            end += 1
+        return begin, end
