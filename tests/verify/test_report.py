@@ -17,7 +17,7 @@ from cornersmooth.report.verification import (
     verification_json,
 )
 from cornersmooth.verify import deviation_along, read_nc, verify
-from cornersmooth.verify.trails import original_motion, written_at
+from cornersmooth.verify.polyline import original_motion, written_at
 
 from .writing import encode, job
 

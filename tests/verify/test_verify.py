@@ -189,17 +189,15 @@ def test_arc_against_arc_and_against_chords(as_arc):
 
 
 @pytest.mark.parametrize("form", ["g1", "g6.2"])
-@pytest.mark.parametrize("hop", [30, 1000])
-def test_one_long_chain_cut_at_anchors_is_the_same_as_whole(form, hop, monkeypatch):
-    from cornersmooth.verify import blocks
+@pytest.mark.parametrize("size", [70, 300])
+def test_one_long_chain_that_is_cut_is_the_same_as_whole(form, size, monkeypatch):
+    from cornersmooth.verify import batches
 
     tip, axis = corners(200, seed=4)
     program = Program.from_poses(tip, axis, feed=250.0)
     nc = read_nc(simple_text(tip, axis, 0.02, 10.0, form))
     whole = verify(program, nc, tolerance=0.02)
-    monkeypatch.setattr(blocks, "LANE", 20)
-    monkeypatch.setattr(blocks, "BLOCK", 100)
-    monkeypatch.setattr(blocks, "_HOP", hop)
+    monkeypatch.setattr(batches, "BATCH", size)
     cut = verify(program, nc, tolerance=0.02)
     assert whole.problems == cut.problems == ()
     assert cut.max_tip_deviation_mm == pytest.approx(whole.max_tip_deviation_mm, abs=1e-12)

@@ -6,6 +6,7 @@ import io
 import os
 import signal
 import sys
+import time
 from dataclasses import fields
 
 import numpy as np
@@ -15,22 +16,17 @@ from cornersmooth.model import Move, Program
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import blocks, read_nc, verify, workers
-from cornersmooth.verify import ring as ring_of
+from cornersmooth.verify import batches, read_nc, verify, workers
 
 from .writing import wavy
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks safely")
 
 
-def nowhere(_item):
-    return False
-
-
 @pytest.mark.parametrize("processes", [1, 2, 3])
 @pytest.mark.parametrize("count", [0, 1, 4, 5, 40])
 def test_results_come_in_order(processes, count):
-    found = list(workers.apart(lambda item: (item, os.getpid()), range(count), processes, nowhere))
+    found = list(workers.map_in_processes(lambda item: (item, os.getpid()), range(count), processes))
     assert [item for item, _ in found] == list(range(count))
     used = {process for _, process in found}
     if processes > 1 and count >= 5:
@@ -42,13 +38,8 @@ def test_results_come_in_order(processes, count):
 
 def test_large_items_and_results_do_not_stand_still():
     data = bytes(3_000_000)
-    found = list(workers.apart(lambda item: item[1] * 2, ((k, data) for k in range(12)), 2, nowhere))
+    found = list(workers.map_in_processes(lambda item: item[1] * 2, ((k, data) for k in range(12)), 2))
     assert [len(item) for item in found] == [6_000_000] * 12
-
-
-def test_some_items_stay_here():
-    found = list(workers.apart(lambda item: os.getpid(), range(20), 2, lambda item: item % 4 == 0))
-    assert [process == os.getpid() for process in found] == [k % 4 == 0 for k in range(20)]
 
 
 def test_items_are_taken_a_fixed_number_ahead():
@@ -61,7 +52,7 @@ def test_items_are_taken_a_fixed_number_ahead():
                 taken.append(len(given))
                 yield k
 
-        for found in workers.apart(lambda item: item, items(), processes, nowhere):
+        for found in workers.map_in_processes(lambda item: item, items(), processes):
             given += [found]
         seen.append(taken)
     assert seen[0] == seen[1] == seen[2]
@@ -74,7 +65,7 @@ def test_error_of_a_process_is_raised_here():
         return item
 
     with pytest.raises(ValueError, match="seventeen"):
-        list(workers.apart(work, range(30), 2, nowhere))
+        list(workers.map_in_processes(work, range(30), 2))
 
 
 def test_process_that_is_killed_is_want_of_memory():
@@ -84,13 +75,13 @@ def test_process_that_is_killed_is_want_of_memory():
         return item
 
     with pytest.raises(MemoryError):
-        list(workers.apart(work, range(30), 2, nowhere))
+        list(workers.map_in_processes(work, range(30), 2))
 
 
 def test_nobody_is_left_behind():
     from multiprocessing import active_children
 
-    found = workers.apart(lambda item: item, range(30), 2, nowhere)
+    found = workers.map_in_processes(lambda item: item, range(30), 2)
     assert next(found) == 0
     assert active_children()
     found.close()
@@ -98,7 +89,7 @@ def test_nobody_is_left_behind():
 
 
 def test_verification_is_the_same(monkeypatch):
-    monkeypatch.setattr(blocks, "BLOCK", 700)
+    monkeypatch.setattr(batches, "BATCH", 700)
     tip, axis = wavy(1500)
     kind = np.where(np.arange(1500) % 60, Move.LINEAR, Move.RAPID).astype(np.uint8)
     program = Program.from_poses(tip, axis, kind=kind, feed=np.full(1500, 250.0))
@@ -121,46 +112,56 @@ def _counted(start, used):
     return counted
 
 
-def test_ring_hands_on_in_turn():
-    def work(place):
-        said = []
-        for k in range(place.index, 10, place.count):
-            total = (place.take() if k else 0) + k
-            said.append((k, total))
-            place.give(total)
-        return said
-
-    for count in (1, 2, 3):
-        if count == 1:
-            found = [work(ring_of.Place())]
-        else:
-            ring = ring_of.Ring(work, count)
-            found = ring.results()
-            ring.end()
-        assert sorted(pair for part in found for pair in part) == [(k, k * (k + 1) // 2) for k in range(10)]
+def test_helper_works_meanwhile():
+    helper = workers.Helper(lambda: (os.getpid(), bytes(1_000_000)))
+    process, data = helper.result()
+    helper.end()
+    assert process != os.getpid()
+    assert len(data) == 1_000_000
 
 
-@pytest.mark.parametrize("who", [0, 1, 2])
-def test_ring_raises_what_one_of_it_has_raised(who):
-    def work(place):
-        if place.index == who:
-            raise ValueError(f"place {who}")
-        return place.take()
+def test_helper_raises_what_its_work_raises():
+    def work():
+        raise ValueError("helper")
 
-    ring = ring_of.Ring(work, 3)
-    with pytest.raises(ValueError, match=f"place {who}"):
-        ring.results()
-    ring.end()
+    helper = workers.Helper(work)
+    with pytest.raises(ValueError, match="helper"):
+        helper.result()
+    helper.end()
 
 
-def test_ring_with_a_killed_process_is_want_of_memory():
-    def work(place):
-        if place.index == 1:
-            os.kill(os.getpid(), signal.SIGKILL)
-        place.give(1)
-        return bytes(1_000_000)
-
-    ring = ring_of.Ring(work, 2)
+def test_helper_that_is_killed_is_want_of_memory():
+    helper = workers.Helper(lambda: os.kill(os.getpid(), signal.SIGKILL))
     with pytest.raises(MemoryError):
-        ring.results()
-    ring.end()
+        helper.result()
+    helper.end()
+
+
+def test_helper_that_is_sent_away_leaves_nobody_behind(tmp_path):
+    """The processes of a helper end with it."""
+    from multiprocessing import active_children
+
+    def work():
+        def item(k):
+            (tmp_path / f"{os.getpid()}").touch()
+            time.sleep(0.02)
+            return k
+
+        return list(workers.map_in_processes(item, range(10**6), 2))
+
+    helper = workers.Helper(work)
+    while len(list(tmp_path.iterdir())) < 2:
+        time.sleep(0.005)
+    used = [int(path.name) for path in tmp_path.iterdir()]
+    helper.end()
+    assert not active_children()
+    while any(_alive(process) for process in used):
+        time.sleep(0.005)
+
+
+def _alive(process):
+    try:
+        with open(f"/proc/{process}/stat", encoding="ascii") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False

@@ -65,7 +65,8 @@ def assign(
         Whether a vertex lies behind the one before it on its segment.
         None where the window is too large.
     """
-    low, high = int(start), max(int(np.ceil(stop)) - 1, int(start))
+    low = min(int(start), len(path) - 2)
+    high = max(int(np.ceil(stop)) - 1, low)
     count = high - low + 1
     if len(six) < 3 or len(six) * count > most_pairs:
         return None

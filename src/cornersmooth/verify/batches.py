@@ -227,9 +227,9 @@ class _Part:
         self.move, self.element, self.share, self.continued = move, element, share, False
         last_vertex = original.trail.last
         start = int(last_vertex[move])
+        self.batches.stops.element.append(element)
+        self.batches.stops.length.append(float(task.path.length[start]))
         if share == 0:
-            self.batches.stops.element.append(element)
-            self.batches.stops.length.append(float(task.path.length[start]))
             self.start, self.fraction = start, 0.0
         else:  # in vertices; the search finds the rest
             along = share * (int(last_vertex[move + 1]) - start)
@@ -272,24 +272,28 @@ class _Part:
         return Batch(elements, begin, table, until, bool(lead))
 
     def _cut_long(self, element_last: int, stop: int, *, open_end: bool) -> Iterator[Batch]:
-        """Cut off the beginning of a long stretch."""
+        """Cut off the beginning of a long stretch; nothing where it is better to wait for more of it."""
         task, path = self.task, self.task.path
-        begin = self.element - self.base
-        size = min(element_last - self.element, BATCH + BATCH // 2)
-        part = slice(begin, begin + size + 1)
-        nc = self.held
-        tip = nc.tip[part]
-        six = np.hstack((tip, tip + task.axis_length * directions(nc, tip, nc.second[part])))
-        length = Polyline.of(six).length
+        nc, begin = self.held, self.element - self.base
         margin = task.margin(nc)
         far = float(np.sqrt(2) * task.tolerance + margin)
         origin = float(path.length_at(np.array([self.start]), np.array([self.fraction]))[0])
         limits = self.start, max(stop - 1, self.start)
-        found = guide(six, length, path, origin, limits, far)
-        ends = np.append(np.diff(nc.line[part]) != 0, True)
-        chosen = cut(six, found, path, ends, BATCH, 2.0 * task.tolerance + margin)
+        for wanted in (BATCH, _HELD * BATCH):
+            size = min(element_last - self.element, wanted + BATCH // 2)
+            part = slice(begin, begin + size + 1)
+            tip = nc.tip[part]
+            six = np.hstack((tip, tip + task.axis_length * directions(nc, tip, nc.second[part])))
+            length = Polyline.of(six).length
+            found = guide(six, length, path, origin, limits, far)
+            ends = np.append(np.diff(nc.line[part]) != 0, True)
+            chosen = cut(six, found, path, ends, min(wanted, size - STRIDE), 2.0 * task.tolerance + margin)
+            if chosen is not None:
+                break
+            if open_end and size < wanted + BATCH // 2:
+                return
         if chosen is None:  # the text is off its way: as far as the last vertex that was on it tells
-            vertex = BATCH
+            vertex = size - BATCH // 2
             known = int(np.searchsorted(found[0], vertex, side="right")) - 1
             away = length[vertex] - length[found[0][known]]
             chosen = vertex, min(float(found[1][known] + away), float(path.length[limits[1] + 1]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.verify.distances import Distances
-from cornersmooth.verify.findings import Findings
+from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.ncprogram import Element, Elements, Problem
 from cornersmooth.verify.rapids import ARITHMETIC
@@ -63,7 +63,8 @@ def check_feeds(distances: Distances, found: Findings) -> None:
     wrong = np.flatnonzero(~good)
     if len(wrong):
         runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
-        found.problems += [_problem(program, nc, original.pose, element, low, int(run[0])) for run in runs]
+        problems = [_problem(program, nc, original.pose, element, low, int(run[0])) for run in runs]
+        found.feeds = Runs(problems, begins=not good[0], ends=not good[-1])
 
 
 def _touched(match: Match, start: Ints, end: Ints) -> tuple[Ints, Ints]:
@@ -109,7 +110,6 @@ def _alike(match: Match, element: int, start: int, end: int) -> Ints:
 
 
 def _inside_rounding(
-    matcher: Matcher,
     match: Match,
     off: Floats,
     start: int,

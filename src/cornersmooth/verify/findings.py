@@ -159,6 +159,28 @@ class Poses:
 
 
 @dataclass
+class Runs:
+    """Problems of runs of elements; a run that goes on in the next batch is one problem.
+
+    Parameters
+    ----------
+    problems : list of Problem
+        One for each run.
+    begins, ends : bool
+        Whether the first, and the last element that was looked at, belong to a run.
+    """
+
+    problems: list[Problem] = field(default_factory=list)
+    begins: bool = False
+    ends: bool = False
+
+    def follow(self, other: Runs) -> None:
+        """Add the runs of the next batch."""
+        self.problems += other.problems[int(self.ends and other.begins) :]
+        self.ends = other.ends
+
+
+@dataclass
 class Findings:
     """What the checks of a batch find, or those of all batches so far.
 
@@ -168,14 +190,15 @@ class Findings:
         At least what it started from.
     continuity : Continuity
     violations : Violations
-    problems : list of Problem
+    feeds : Runs
+        Of elements with a wrong feed.
     poses : list of Poses
     """
 
     largest: Largest = field(default_factory=Largest)
     continuity: Continuity = field(default_factory=Continuity)
     violations: Violations = field(default_factory=Violations)
-    problems: list[Problem] = field(default_factory=list)
+    feeds: Runs = field(default_factory=Runs)
     poses: list[Poses] = field(default_factory=list)
 
     def take(self, other: Findings) -> None:
@@ -183,5 +206,5 @@ class Findings:
         self.largest.take(other.largest)
         self.continuity.take(other.continuity)
         self.violations.extend(other.violations)
-        self.problems += other.problems
+        self.feeds.follow(other.feeds)
         self.poses += other.poses

@@ -27,9 +27,6 @@ _GROUP: Final = 64
 #: how much longer one motion may be than the other, where the last group tells nothing else
 _LOW, _HIGH = 0.8, 1.25
 
-#: places that are lost in a row before one is looked for farther on
-_LOST: Final = 4
-
 #: how much longer than the written path the original may be where the way is lost, and segments looked at
 _REACH, _MOST_SEGMENTS = 2.5, 1 << 17
 
@@ -91,7 +88,7 @@ def guide(
             lost += 1
             k += 1
             ratio = 1.0
-            if lost < _LOST or lost & (lost - 1):
+            if lost & (lost - 1):  # seldom, where the text is off everywhere
                 continue
             ahead = _farther_on(point[0], path, here, float(way[0]), limits, far)
             if ahead is None:

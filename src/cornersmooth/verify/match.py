@@ -26,6 +26,9 @@ from cornersmooth.verify.task import Task
 #: rounding is shorter than its corner by no more than twice its deviation
 _SHORTCUT = 2.0
 
+#: part of its length by which a stretch may be longer or shorter than the original and still be gone through evenly
+_UNEVEN = 0.05
+
 #: slack of arithmetic on lengths, mm
 _ARITHMETIC = 1e-9
 
@@ -189,7 +192,7 @@ class _Search:
         self.goal[last] = rows["stop"]
         if np.isfinite(until):
             self.goal[last[-1]] = until
-            segment = np.array([int(until)])
+            segment = np.array([min(int(until), len(self.path.six) - 2)])
             self.end[-1] = self.path.length_at(segment, until - segment)[0]
         self.segment, self.fraction = np.zeros(count, np.int64), np.full(count, -1.0)
         self.backward = np.zeros(count, np.bool_)
@@ -219,9 +222,8 @@ class _Search:
         held = np.flatnonzero(leader != order)
         behind, leaders = self.vertex[held], self.vertex[leader[held]]
         gone_back = found[leader[held]] - found[held]
-        held, behind, leaders, gone_back = (
-            values[gone_back > _ARITHMETIC] for values in (held, behind, leaders, gone_back)
-        )
+        some = gone_back > _ARITHMETIC
+        behind, leaders, gone_back = behind[some], leaders[some], gone_back[some]
         self.segment[behind], self.fraction[behind] = self.segment[leaders], self.fraction[leaders]
         away = self.six[behind] - path.point_at(self.segment[behind], self.fraction[behind])
         self.distance[behind] = np.sqrt(np.einsum("ij,ij->i", away, away))
@@ -240,7 +242,9 @@ class _Search:
         way = length[last] - length[first]
         scale = np.divide(self.end - self.begin, way, out=np.zeros(len(way)), where=way > 0)
         about: Floats = self.begin[owner] + (length[self.vertex] - length[first][owner]) * scale[owner]
-        for k in np.flatnonzero(last - first > LONG).tolist():
+        size = last - first
+        uneven = np.abs(way - (self.end - self.begin)) > _UNEVEN * way
+        for k in np.flatnonzero((size > LONG) | (uneven & (size > 2 * STRIDE))).tolist():
             part = slice(int(first[k]), int(last[k]) + 1)
             at, found, _ = guide(
                 self.six[part], length[part], path, self.begin[k], (rows["start"][k], rows["stop"][k] - 1), self.far

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -231,7 +231,7 @@ class Elements:
     def part(self, first: int, stop: int) -> Elements:
         """Elements from `first` to `stop`, the latter excluded, counted anew."""
         rows = slice(first, stop)
-        own = {name: getattr(self, name)[rows] for name in _COLUMNS}
+        own: dict[str, Any] = {name: getattr(self, name)[rows] for name in _COLUMNS}
         return replace(self, **own, curves=self.curves.part(first, stop), arcs=self.arcs.part(first, stop))
 
     @classmethod
@@ -240,7 +240,7 @@ class Elements:
         if len(parts) == 1:
             return parts[0]
         start = np.cumsum([0, *map(len, parts)]).tolist()
-        own = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS}
+        own: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS}
         curves = Curves.joined([part.curves for part in parts], start)
         return replace(parts[-1], **own, curves=curves, arcs=NcArcs.joined([part.arcs for part in parts], start))
 

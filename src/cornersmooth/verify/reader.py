@@ -211,7 +211,7 @@ class Reader:
 
     def _know_points(self, piece: Piece) -> None:
         """From here on U V W are a point on the axis: what was said before of the axis is no such point."""
-        if self.given_out:
+        if self.placed:
             self._refuse_unknown(int(piece.line[0]))
         for part in self.ready:
             part.second[:] = np.nan
@@ -266,9 +266,7 @@ class Reader:
             return
         whole = Elements.joined(self.ready)
         whole = replace(whole, tip=whole.tip.copy(), second=whole.second.copy())
-        line = settle(
-            {"kind": whole.kind, "line": whole.line, "tip": whole.tip, "second": whole.second}, ("tip", "second")
-        )
+        line = settle(whole)
         if line is not None:
             self._refuse_unknown(line)
         self.ready = [whole]

@@ -232,7 +232,7 @@ class _Measured:
         if units != program.units:
             text = f"the text is in {units}, the CL file in {program.units}"
             problems.append(Problem("CS505", 0, 1, text))
-        problems += self.batches.problems + self.findings.problems + self.findings.violations.problems()
+        problems += self.batches.problems + self.findings.feeds.problems + self.findings.violations.problems()
         if self.words and self.batches.elements:  # without any motion nothing has a place
             problems += self._statement_problems(unsaid)
         return Verification.of(
@@ -256,8 +256,9 @@ class _Measured:
         end = float(length[-1]) if moves else 0.0
         there = length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0
         theirs = asked(program, np.where(move >= 0, there, _BEFORE).tolist(), end)
-        known = self.lengths | self.batches.stops.lengths()
+        known = dict(self.lengths)
         known |= {element: float(length[original.trail.last[move]]) for element, move in self.batches.holes.items()}
+        known |= self.batches.stops.lengths()
         first = self.batches.stops.first
         places = [known.get(event.element - 1, _BEFORE if event.element - 1 < first else 0.0) for event in self.events]
         rooms = [self.rooms.get(event.element - 1, 0.0) for event in self.events]

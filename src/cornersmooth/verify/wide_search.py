@@ -1,7 +1,7 @@
 """A second, wider look for what an original vertex is near to, where the first one has found nothing near enough.
 
-Where many short blocks lie within a digit or two of a corner - the pole, and machines that know nothing of the tip, have
-such - the nearest blocks may be farther off than a look around a place goes.
+Where many short blocks lie within a digit or two of a corner - the pole, and machines that know nothing of the tip,
+have such - the nearest blocks may be farther off than a look around a place goes.
 """
 
 from __future__ import annotations
