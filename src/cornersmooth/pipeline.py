@@ -23,8 +23,7 @@ from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
 from cornersmooth.report import report
 from cornersmooth.settings import Settings
-from cornersmooth.verify import CONTROLS, Verification, Verifier
-from cornersmooth.verify import useful_processes
+from cornersmooth.verify import CONTROLS, Verification, Verifier, useful_processes
 
 #: called with the stage, what is done of it, and all of it
 Progress = Callable[[str, int, int], None]

@@ -14,10 +14,10 @@ import pytest
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import FeedMode, Move, Program, Statement
-from cornersmooth.nc import Frame, choose_form, write
+from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import Verifier, Where, batches, read_nc, reader, verify, verifying
+from cornersmooth.verify import Verifier, Where, batches, reader, verify, verifying
 
 from .writing import unit, wavy
 
@@ -70,8 +70,9 @@ def part(count=900, every=45, units="mm", seed=0, fixed=False):
 
 def text_of(program, control="fanuc", form="g1", frame=None, **settings):
     stream = io.BytesIO()
-    smoothed = smooth(program, Settings(tolerance=TOLERANCE, **settings))
-    write(smoothed, stream, form=choose_form(control, form), frame=frame or Frame())
+    chosen = choose_form(control, form)
+    smoothed = smooth(program, fit_settings(Settings(tolerance=TOLERANCE, **settings), chosen, program.units))
+    write(smoothed, stream, form=chosen, frame=frame or Frame())
     return stream.getvalue()
 
 

@@ -75,7 +75,7 @@ def test_guide_finds_its_way_again():
     """Behind what is left out, or inserted, places are found again."""
     original = trail(6000)
     path = Polyline.of(original)
-    off = original[2000:2300] + [0, 0, 5, 0, 0, 5]
+    off = original[2000:2300] + np.array([0, 0, 5, 0, 0, 5])
     for written, true in (
         (np.vstack((original[:2000], original[2600:])), np.append(np.arange(2000), np.arange(2600, 6000))),
         (np.vstack((original[:2000], off, original[2000:])), None),
@@ -94,9 +94,6 @@ def test_guide_finds_its_way_again():
 def test_cut_leaves_no_doubt():
     original = trail(6000)
     path = Polyline.of(original)
-    written = np.repeat(original, 3, axis=0)
-    written[1:-1:3] += np.diff(np.vstack((original, original[-1:])), axis=0)[: len(written[1:-1:3])] * 0.4
-    written = np.sort(np.vstack((path.six, path.point_at(np.arange(5999), np.full(5999, 0.5)))).view(), axis=0)[:0]
     halves = np.empty((11999, 6))
     halves[::2], halves[1::2] = original, path.point_at(np.arange(5999), np.full(5999, 0.5))
     own = Polyline.of(halves)

@@ -57,8 +57,7 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.cl import read
     from cornersmooth.kinematics import load_machine
     from cornersmooth.nc import load_control
-    from cornersmooth.verify import CONTROLS, deviation_along, verify
-    from cornersmooth.verify import useful_processes
+    from cornersmooth.verify import CONTROLS, deviation_along, useful_processes, verify
     from cornersmooth.verify.source import readable_twice
 
     if source == text == STANDARD:
