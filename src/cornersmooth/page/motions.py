@@ -11,7 +11,7 @@ from cornersmooth.smoothing.arcs import arc_points
 from cornersmooth.vectors import angle_between, dot, norm
 from cornersmooth.verify import NcProgram, deviation_along
 from cornersmooth.verify.ncprogram import Element
-from cornersmooth.verify.trails import written_at
+from cornersmooth.verify.polyline import written_at
 
 #: points on every curve or arc, and on every line of short texts and of long ones
 _ON_CURVES, _ON_LINES, _ON_MANY_LINES = 8, 2, 1
