@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
 from oracle.command import large, small
+from oracle.files import NO_CORPUS, corpus_folder
 
 __all__ = ["corpus", "large", "small"]
 
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 @pytest.fixture(scope="session")
 def corpus() -> Path:
     """Folder of real CL files; the test is skipped where CORNERSMOOTH_CORPUS does not name one."""
-    folder = os.environ.get("CORNERSMOOTH_CORPUS", "")
-    if not folder or not Path(folder).is_dir():
-        pytest.skip("CORNERSMOOTH_CORPUS does not name a folder of CL files")
-    return Path(folder)
+    folder = corpus_folder()
+    if folder is None:
+        pytest.skip(NO_CORPUS)
+    return folder

@@ -1,7 +1,7 @@
 """The promise of `-e`: the written numbers, measured by the oracle, stay within ε of the original motion.
 
-Through the whole command, both forms, over 2,000 random chains of every character for each tolerance and axis length,
-over the samples, and over the real files of the corpus.
+Through the whole command, both forms, over 1,000 random chains of every character for each tolerance and axis length,
+over the samples, the project's own files and the real files of the corpus.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from cornersmooth.model import Move
 from oracle.chains import Chain, cl_text, random_chains
 from oracle.command import run
 from oracle.distance import deviation
+from oracle.files import cl_file, of_corpus
 from oracle.judge import feeds_out_of_place, judge, not_passed, runs_of
 from oracle.library import exact_poses, original_motion, write
 from oracle.motion import Path as Motion
@@ -29,7 +30,7 @@ TOLERANCES = (0.001, 0.01, 0.04, 0.15)
 AXIS_LENGTHS = (10.0, 50.0)
 FORMS: tuple[Form, ...] = ("g1", "g6.2")
 #: for each tolerance and axis length; half of them in either form
-CHAINS = 2000
+CHAINS = 1000
 #: statuses of the report under which a pose need not be passed
 ROUNDED = "smoothed"
 REPEATED = "duplicate"
@@ -201,18 +202,45 @@ def test_samples(name: str, form: Form, tolerance: float, axis_length: float) ->
     whole_file(ROOT / "samples" / name, form, tolerance, axis_length)
 
 
-@pytest.mark.corpus
-@pytest.mark.parametrize("name", FIVE_AXIS)
-@pytest.mark.parametrize(("form", "tolerance", "axis_length"), CASES)
-def test_five_axis_files(corpus: Path, name: str, form: Form, tolerance: float, axis_length: float) -> None:
-    whole_file(corpus / name, form, tolerance, axis_length)
+#: of the project's own
+OWN_FIVE_AXIS = ("nx_blade.cls", "creo_vane.ncl", "points_zigzag.csv")
+OWN_OTHERS = (
+    "nx_pocket.cls",
+    "nx_spline.cls",
+    "nx_holes.cls",
+    "catia_contour.aptsource",
+    "catia_profile.aptsource",
+    "creo_plate.ncl",
+    "solidworks_bracket.apt",
+    "hsm_cover.apt",
+    "ncl_surface.as",
+    "makino_contour.cldata",
+    "plain_fan.apt",
+    "points_fan.txt",
+)
 
 
-@pytest.mark.corpus
-@pytest.mark.parametrize("name", FOUR_OR_LESS)
-@pytest.mark.parametrize("form", FORMS)
-def test_files_with_arcs_holes_and_fixed_axes(corpus: Path, name: str, form: Form) -> None:
-    whole_file(corpus / name, form, 0.04, 10.0)
+def _every(names: tuple[str, ...], cases: list[tuple[Form, float, float]]) -> list[tuple[str, Form, float, float]]:
+    return [(name, *case) for case in cases for name in names]
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "tolerance", "axis_length"),
+    [*_every(OWN_FIVE_AXIS, CASES), *of_corpus(_every(FIVE_AXIS, CASES))],
+)
+def test_five_axis_files(name: str, form: Form, tolerance: float, axis_length: float) -> None:
+    whole_file(cl_file(name), form, tolerance, axis_length)
+
+
+ONCE: list[tuple[Form, float, float]] = [(form, 0.04, 10.0) for form in FORMS]
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "tolerance", "axis_length"),
+    [*_every(OWN_OTHERS, ONCE), *of_corpus(_every(FOUR_OR_LESS, ONCE))],
+)
+def test_files_with_arcs_holes_and_fixed_axes(name: str, form: Form, tolerance: float, axis_length: float) -> None:
+    whole_file(cl_file(name), form, tolerance, axis_length)
 
 
 # ---------------------------------------------------------------- statements

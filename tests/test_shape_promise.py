@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from cornersmooth.nc import choose_form
 from oracle.chains import cl_text, random_chains
 from oracle.command import run
 from oracle.distance import deviation
+from oracle.files import cl_file, of_corpus
 from oracle.judge import feeds_out_of_place, judge, not_passed, runs_of
 from oracle.library import exact_poses, original_motion
 from oracle.motion import written_path
@@ -74,12 +76,16 @@ def test_samples(name: str, options: dict[str, Any], form: Form) -> None:
     keeps_the_promise(ROOT / "samples" / name, form, options)
 
 
-@pytest.mark.corpus
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
-@pytest.mark.parametrize("name", FILES)
-def test_real_files(corpus: Path, name: str, options: dict[str, Any], form: Form) -> None:
-    keeps_the_promise(corpus / name, form, options)
+@pytest.mark.parametrize("name", ["nx_blade.cls", "creo_vane.ncl", "points_fan.txt"])
+def test_own_files(name: str, options: dict[str, Any], form: Form) -> None:
+    keeps_the_promise(cl_file(name), form, options)
+
+
+@pytest.mark.parametrize(("name", "options", "form"), of_corpus(product(FILES, OPTIONS, FORMS)))
+def test_real_files(name: str, options: str, form: Form) -> None:
+    keeps_the_promise(cl_file(name), form, OPTIONS[options])
 
 
 def keeps_the_promise(path: Path, form: Form, options: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""Every real file is read, with the counts of the corpus's manifest.
+"""Every file is read: the project's own, and the real ones with the counts of the corpus's manifest.
 
 Where they differ: the manifest counts FROM and GOHOME as rapids; it counts the word CIRCLE only (catia_demo5 has three
 arcs on drive surfaces); one arc of the core mill is 0.1 um long and read as a line; NURBS become lines.
@@ -13,6 +13,8 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.model import Move, Program
+from oracle import files
+from oracle.files import cl_file, of_corpus
 
 #: file: dialect, units, poses, kinds (FROM, RAPID, LINEAR, ARC, HOLE), distinct feeds
 COUNTS = {
@@ -42,20 +44,58 @@ COUNTS = {
     "swcam_teste_metrologia.apt": ("solidworks", "mm", 454, (0, 92, 297, 65, 0), 3),
 }
 
+#: files of the project's own, one or more in the manner of each CAM system
+OWN = {
+    "catia_contour.aptsource": ("catia", "mm", 60, (0, 4, 56, 0, 0), 2),
+    "catia_profile.aptsource": ("catia", "mm", 9, (0, 2, 6, 1, 0), 2),
+    "creo_plate.ncl": ("creo", "inch", 22, (0, 3, 18, 1, 0), 2),
+    "creo_vane.ncl": ("creo", "inch", 24, (0, 2, 22, 0, 0), 1),
+    "hsm_cover.apt": ("hsm", "mm", 31, (0, 5, 26, 0, 0), 3),
+    "makino_contour.cldata": ("makino", "mm", 12, (1, 3, 6, 2, 0), 2),
+    "ncl_surface.as": ("ncl", "inch", 28, (0, 2, 26, 0, 0), 1),
+    "nx_blade.cls": ("nx", "mm", 56, (0, 6, 50, 0, 0), 2),
+    "nx_holes.cls": ("nx", "mm", 6, (0, 2, 0, 0, 4), 0),
+    "nx_pocket.cls": ("nx", "mm", 19, (1, 4, 8, 6, 0), 2),
+    "nx_spline.cls": ("nx", "mm", 222, (0, 2, 220, 0, 0), 1),
+    "plain_fan.apt": ("plain", "mm", 18, (0, 0, 18, 0, 0), 0),
+    "points_fan.txt": ("csv", "mm", 25, (0, 0, 25, 0, 0), 0),
+    "points_zigzag.csv": ("csv", "mm", 30, (0, 0, 30, 0, 0), 0),
+    "solidworks_bracket.apt": ("solidworks", "mm", 22, (0, 8, 10, 2, 2), 4),
+}
+
 
 def kinds(program: Program) -> tuple[int, ...]:
     return tuple(np.bincount(program.kind, minlength=len(Move)).tolist())
 
 
-@pytest.mark.parametrize("name", COUNTS)
-def test_counts(corpus: Path, name: str) -> None:
-    dialect, units, poses, kind, feeds = COUNTS[name]
-    program = read(corpus / name)
+@pytest.mark.parametrize(("name", "counts"), [*OWN.items(), *of_corpus(COUNTS.items())])
+def test_counts(name: str, counts: tuple[str, str, int, tuple[int, ...], int]) -> None:
+    dialect, units, poses, kind, feeds = counts
+    program = read(cl_file(name))
     assert (program.source.dialect, program.units, len(program)) == (dialect, units, poses)
     assert kinds(program) == kind
     assert len(np.unique(program.feed[~np.isnan(program.feed)])) == feeds
     assert program.source.name == name
     assert np.allclose(np.linalg.norm(program.axis, axis=1), 1, rtol=0, atol=1e-15)
+
+
+def test_every_own_file_is_counted() -> None:
+    assert sorted(OWN) == sorted(path.name for path in files.OWN.iterdir())
+
+
+def test_own_arcs_turn_as_their_systems_mean_them() -> None:
+    """Turned the other way they would leave the lines beside them by a kink."""
+    sweeps = {
+        "nx_pocket.cls": [4 * np.pi, *4 * [np.pi / 2], np.pi / 2],
+        "makino_contour.cldata": [np.pi / 2, np.pi / 2],
+        "creo_plate.ncl": [np.pi / 2],
+        "solidworks_bracket.apt": [np.pi / 2, np.pi / 2],
+        "catia_profile.aptsource": [np.pi / 2],
+    }
+    for name, wanted in sweeps.items():
+        program = read(cl_file(name))
+        assert np.abs(program.arcs.sweep) == pytest.approx(wanted), name
+        assert "CS142" not in [finding.code for finding in program.findings], name
 
 
 def tilt(program: Program, line: int) -> float:

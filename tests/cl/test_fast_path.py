@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
@@ -15,6 +14,7 @@ from cornersmooth.cl.apt import read_apt
 from cornersmooth.cl.source import clean
 from cornersmooth.errors import InputError
 from cornersmooth.model import Arcs, Program
+from oracle.files import OWN, corpus_folder, of_corpus
 
 ARRAYS = ("tip", "axis", "kind", "feed", "line", "feed_mode", "keep")
 
@@ -40,10 +40,11 @@ def assert_same(left: Program | str, right: Program | str) -> None:
     assert (left.units, left.source, left.findings) == (right.units, right.source, right.findings)
 
 
-def test_corpus(corpus: Path) -> None:
+@pytest.mark.parametrize(("own", "least"), [(True, 13), *of_corpus([(False, 20)])])
+def test_files(own: bool, least: int) -> None:
     """Also with blocks of a few lines, so that every kind of statement stands at an edge of one."""
     seen = 0
-    for path in sorted(corpus.iterdir()):
+    for path in sorted((OWN if own else corpus_folder() or OWN).iterdir()):
         if path.suffix not in {".cls", ".apt", ".aptsource", ".ncl", ".as", ".cldata"}:
             continue
         data = path.read_bytes()
@@ -53,7 +54,7 @@ def test_corpus(corpus: Path) -> None:
         with patch.object(bulk, "CHUNK", 300):
             assert_same(outcome(data, fast=True), careful)
         seen += 1
-    assert seen >= 20
+    assert seen >= least
 
 
 numbers = st.one_of(

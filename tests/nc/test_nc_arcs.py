@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Program
 from nc.writing import codes, one_arc, text_of, text_of_cl
+from oracle.files import cl_file, of_corpus
 
 Floats = NDArray[np.float64]
 
@@ -201,11 +202,25 @@ def test_arc_after_a_tool_change_is_approached() -> None:
     assert lines[arc - 1].startswith("G1 X10.0000 Y0.0000 Z0.0000 ")
 
 
-def test_arcs_in_every_file_are_on_their_circles(corpus) -> None:  # type: ignore[no-untyped-def]
-    for name in ("nx_clsf_coremill_steptools.cls", "swcam_teste_metrologia.apt", "steptools_plane_1.cldata"):
-        lines, written = text_of_cl((corpus / name).read_bytes().decode("cp1252"))
-        assert codes(written)["CS313"] > 20
-        path = walk(lines)
-        assert np.isfinite(path).all()
-        feeds = [line for line in lines if re.match("G[123] ", line)]
-        assert all(one != other for one, other in pairwise(feeds))
+@pytest.mark.parametrize(
+    ("name", "arcs"),
+    [
+        ("nx_pocket.cls", 6),
+        ("makino_contour.cldata", 2),
+        ("solidworks_bracket.apt", 2),
+        *of_corpus(
+            [
+                ("nx_clsf_coremill_steptools.cls", 21),
+                ("swcam_teste_metrologia.apt", 21),
+                ("steptools_plane_1.cldata", 21),
+            ]
+        ),
+    ],
+)
+def test_arcs_in_files_are_on_their_circles(name: str, arcs: int) -> None:
+    lines, written = text_of_cl(cl_file(name).read_bytes().decode("cp1252"))
+    assert codes(written)["CS313"] >= arcs
+    path = walk(lines)
+    assert np.isfinite(path).all()
+    feeds = [line for line in lines if re.match("G[123] ", line)]
+    assert all(one != other for one, other in pairwise(feeds))

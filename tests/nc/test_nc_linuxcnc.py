@@ -26,6 +26,7 @@ from nc.grammars import reader
 from nc.reading import Reading
 from nc.rotations import tool_direction
 from oracle.chains import cl_text, random_chains
+from oracle.files import OWN, of_corpus
 from oracle.judge import judge
 from oracle.motion import Path as Motion
 from oracle.motion import unit
@@ -178,8 +179,16 @@ def _normalised(match: re.Match[bytes]) -> bytes:
 MOST_POSES = 1000
 
 
-@pytest.mark.corpus
-@pytest.mark.parametrize(("machine", "tcp"), [("xyzac-trt", True), ("xyzbc-trt", True), ("xyzac-trt", False)])
+ARRANGED = [("xyzac-trt", True), ("xyzbc-trt", True), ("xyzac-trt", False)]
+
+
+@pytest.mark.parametrize(("machine", "tcp"), ARRANGED)
+def test_own_files_are_accepted(machine: str, tcp: bool, tmp_path: Path) -> None:
+    for path in sorted(OWN.iterdir()):
+        accepted(written(path.read_bytes(), machine, tcp=tcp, tolerance=0.02, endless=True), tmp_path)
+
+
+@pytest.mark.parametrize(("machine", "tcp"), of_corpus(ARRANGED))
 def test_real_files_are_accepted(machine: str, tcp: bool, corpus: Path, tmp_path: Path) -> None:
     taken = 0
     for path in sorted(corpus.iterdir()):

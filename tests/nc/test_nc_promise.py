@@ -17,6 +17,7 @@ from cornersmooth.settings import Settings
 from nc.cases import CHOSEN, Case
 from nc.promise import random_verdict, runs_of, verdict, without_holes
 from oracle.chains import Chain, cl_text
+from oracle.files import cl_file, of_corpus
 from oracle.motion import Original, unit
 
 SAMPLES = Path(__file__).parents[2] / "samples"
@@ -69,11 +70,15 @@ FILES = [
 ]
 
 
-@pytest.mark.corpus
-@pytest.mark.parametrize("name", FILES)
-def test_real_files_keep_the_tolerance(name: str, corpus: Path) -> None:
-    path = corpus / name
-    small = path.stat().st_size < 12_000  # without tool tip control every line becomes many: `nc.sweep` tries those
+#: of the project's own: changing axes, arcs, statements and inches too
+OWN = ["nx_blade.cls", "nx_pocket.cls", "creo_plate.ncl", "solidworks_bracket.apt", "hsm_cover.apt", "ncl_surface.as"]
+
+
+@pytest.mark.parametrize("name", [*OWN, *of_corpus([(name,) for name in FILES])])
+def test_files_keep_the_tolerance(name: str) -> None:
+    path = cl_file(name)
+    # without tool tip control every line becomes many: `nc.sweep` tries those
+    small = path.stat().st_size < 12_000 and name not in OWN
     cases = [case for case in CHOSEN if case.tcp or small]
     assert sum(keeps_the_tolerance(path, case) for case in cases) > len(cases) - 10
 
