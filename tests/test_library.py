@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import cornersmooth
-from cornersmooth import CornersmoothError, PromiseError, Settings
+from cornersmooth import CornersmoothError, PromiseError, Settings, pipeline
 from cornersmooth.cli import run
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "impeller.cls"
@@ -167,5 +167,65 @@ def test_a_broken_promise_is_an_error_and_the_old_file_stays(tmp_path):
         cornersmooth.postprocess(BREAKING, stream, settings)
     assert stream.getvalue() == b""
     result = cornersmooth.postprocess(BREAKING, stream, settings, verify=False)
-    assert (result.verification, result.unverified) == (None, "not asked for")
+    assert (result.verification, result.unverified) == (None, "it was not asked for")
     assert stream.getvalue()
+
+
+def test_a_file_that_appears_meanwhile_is_not_replaced(tmp_path):
+    out = tmp_path / "o.nc"
+
+    def appear(stage: str, done: int, total: int) -> None:
+        out.write_text("theirs")
+
+    with pytest.raises(CornersmoothError, match=r"o\.nc: error: has appeared while the text was made; use --force"):
+        cornersmooth.postprocess(SAMPLE, out, progress=appear)
+    assert out.read_text() == "theirs"
+    assert [path.name for path in tmp_path.iterdir()] == ["o.nc"]
+    cornersmooth.postprocess(SAMPLE, out, progress=appear, force=True)
+    assert out.read_text().endswith("M30\n%\n")
+
+
+def test_a_file_that_appears_meanwhile_is_not_replaced_where_there_are_no_links(tmp_path, monkeypatch):
+    def no_links(source: str, target: str) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr("os.link", no_links)
+    out = tmp_path / "o.nc"
+    cornersmooth.postprocess(SAMPLE, out)
+    assert out.read_text().endswith("M30\n%\n")
+    out.unlink()
+    with pytest.raises(CornersmoothError, match="has appeared"):
+        cornersmooth.postprocess(SAMPLE, out, progress=lambda stage, done, total: out.write_text("theirs"))
+    assert out.read_text() == "theirs"
+
+
+@pytest.mark.parametrize("stream", [True, False])
+def test_a_text_that_is_changed_behind_its_verification_is_not_used(tmp_path, monkeypatch, stream):
+    class Spoilt(pipeline.Verifier):
+        def result(self) -> cornersmooth.Verification:
+            found = super().result()
+            with open(self._name, "r+b") as text:
+                text.write(b"#")
+            return found
+
+    monkeypatch.setattr(pipeline, "Verifier", Spoilt)
+    out = io.BytesIO() if stream else tmp_path / "o.nc"
+    with pytest.raises(CornersmoothError, match="somebody changed the text before it took its place"):
+        cornersmooth.postprocess(SAMPLE, out)
+    assert not list(tmp_path.iterdir())
+    assert not stream or out.getvalue() == b""
+
+
+@pytest.mark.parametrize("args", [["--help"], ["smooth", "--help"], ["time", "--help"]])
+def test_help_loads_no_arrays(args):
+    loaded = "{'numpy', 'scipy', 'rich'} & set(sys.modules)"
+    code = f"import sys; from cornersmooth.cli import run; run({args}); print({loaded})"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert said.endswith("set()\n")
+
+
+def test_a_module_can_be_run():
+    done = subprocess.run(
+        [sys.executable, "-m", "cornersmooth", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.startswith("cornersmooth")

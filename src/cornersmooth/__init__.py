@@ -25,10 +25,11 @@ Nothing is imported before it is used, so that the command line answers at once.
 from __future__ import annotations
 
 import sys
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # typing takes longer to load than all the rest
 if TYPE_CHECKING:
+    from typing import Any
+
     from cornersmooth.cl import read
     from cornersmooth.errors import CornersmoothError, Finding, PromiseError
     from cornersmooth.feedrate import Limits, TimeLaw, compare, direct, plan
@@ -124,11 +125,11 @@ def __dir__() -> list[str]:
     return [*__all__, "__version__"]
 
 
-class _Package(ModuleType):
+class _Package(type(sys)):  # type: ignore[misc]  # the type of modules
     """The package, whose functions are not hidden by the packages of the same name that they come from."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _HOME and isinstance(value, ModuleType)):
+        if not (name in _HOME and isinstance(value, type(sys))):
             super().__setattr__(name, value)
 
 

@@ -1,12 +1,15 @@
 """Where text goes: refusals, and writing that loses nothing.
 
 A regular file is written beside its place and moved there when it is whole and on the disk; an error, an interruption,
-a full disk or a closed pipe leave the old file or none.
+a full disk or a closed pipe leave the old file or none. What is moved is what was written: it is read once more and
+compared by its hash, so that nobody's change in between goes unnoticed.
 """
 
 from __future__ import annotations
 
 import contextlib
+import glob
+import hashlib
 import os
 import secrets
 import shutil
@@ -25,13 +28,17 @@ Target = str | os.PathLike[str] | BinaryIO
 REJECTED = ".rejected"
 
 
+#: names of the files that are being written in this process, for whoever ends it from a signal handler
+_unfinished: set[str] = set()
+
+
 class ClosedPipe(Exception):  # noqa: N818 - no error of ours: whoever read the output has seen enough
     """The reader of the output has gone, as with ``| head``."""
 
 
 def check_output(
     target: Target, inputs: Iterable[str | os.PathLike[str] | int] = (), *, force: bool = False, ours: bytes = b""
-) -> None:
+) -> bool:
     """Refuse an output that would destroy something.
 
     Parameters
@@ -45,6 +52,11 @@ def check_output(
     ours : bytes
         How a file begins that an earlier run made; such a file is replaced without `force`.
 
+    Returns
+    -------
+    bool
+        Whether what stands at its place may be replaced.
+
     Raises
     ------
     SettingsError
@@ -54,7 +66,7 @@ def check_output(
     """
     path = path_of(target)
     if path is None:
-        return
+        return True
     if any(_same(source, path) for source in inputs):
         raise SettingsError("CS220", f"{path} is the input", "choose another name for the output")
     if os.path.isdir(path):
@@ -62,13 +74,50 @@ def check_output(
     folder = os.path.dirname(os.path.realpath(path))
     if not os.path.isdir(folder):
         raise OutputError("CS402", f"there is no folder {folder}", "make it first", file=path)
-    if os.path.isfile(path) and not force and not (ours and _begins_with(path, ours)):
+    if force or not os.path.isfile(path):
+        return force
+    if not (ours and _begins_with(path, ours)):
         raise OutputError("CS403", "exists already", "use --force to replace it", file=path)
+    return True
 
 
 def path_of(target: Target) -> str | None:
     """Path of an output; None for a stream."""
     return os.fspath(target) if isinstance(target, (str, os.PathLike)) else None
+
+
+class HashedStream:
+    """A stream that remembers the hash of all that was written to it.
+
+    Parameters
+    ----------
+    stream : binary stream
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._hash = hashlib.blake2b()
+
+    def write(self, data: bytes, /) -> int:
+        """Write the bytes."""
+        self._hash.update(data)
+        return self._stream.write(data)
+
+    def flush(self) -> None:
+        """Hand everything to the operating system."""
+        self._stream.flush()
+
+    def check(self, path: str) -> None:
+        """Compare what a file holds with what was written.
+
+        Raises
+        ------
+        OutputError
+            CS407: somebody else has changed it.
+        """
+        with open(path, "rb") as file:
+            if hashlib.file_digest(file, "blake2b").digest() != self._hash.digest():
+                raise OutputError("CS407", "somebody changed the text before it took its place", "try again", file=path)
 
 
 @dataclass
@@ -77,20 +126,20 @@ class Output:
 
     Parameters
     ----------
-    stream : binary stream
+    stream : HashedStream
     path : str
         Where the text is until then; empty where it goes straight to a stream or device.
     rejected : bool
         Set by the writer: the text must not take the place of the output.
     """
 
-    stream: BinaryIO
+    stream: HashedStream
     path: str = ""
     rejected: bool = False
 
 
 @contextlib.contextmanager
-def open_output(target: Target, *, hold: bool = False) -> Iterator[Output]:
+def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> Iterator[Output]:
     """Open an output; a regular file appears under its name only when the block ends without an error.
 
     A rejected file is moved to ``PATH.rejected`` instead, and nothing of it reaches a stream or device.
@@ -100,32 +149,52 @@ def open_output(target: Target, *, hold: bool = False) -> Iterator[Output]:
     target : path or binary stream
     hold : bool
         Keep the text in a file until the block ends, also for streams and devices, so that it can be looked at first.
+    replace : bool
+        Whether a file that stands at its place when the block ends may be replaced.
 
     Raises
     ------
     OutputError
-        CS404: anything the operating system refuses, a full disk included.
+        CS403: a file has appeared at its place that may not be replaced. CS404: anything the operating system refuses,
+        a full disk included. CS407: somebody changed the text.
     ClosedPipe
         The reader of a pipe has gone.
     """
     path = path_of(target)
     with _failing_as_output(path or str(getattr(target, "name", "<output>"))):
         if path is not None and not (os.path.exists(path) and not stat.S_ISREG(os.stat(path).st_mode)):
-            with _replacing(os.path.realpath(path)) as output:
+            with _moving(os.path.realpath(path), path, replace=replace) as output:
                 yield output
             return
         # a stream, a device or a pipe cannot be replaced, only written to
         with contextlib.nullcontext(cast(BinaryIO, target)) if path is None else open(path, "wb") as device:
             if hold:
-                with tempfile.NamedTemporaryFile(prefix="cornersmooth.") as file:
-                    output = Output(cast(BinaryIO, file), file.name)
+                with _temporary(tempfile.gettempdir(), "cornersmooth", mode=0o600) as (file, temporary):
+                    output = Output(HashedStream(file), temporary)
                     yield output
-                    file.seek(0)
+                    output.stream.flush()
+                    output.stream.check(temporary)
                     if not output.rejected:
-                        shutil.copyfileobj(file, device, 1 << 20)
+                        with open(temporary, "rb") as text:
+                            shutil.copyfileobj(text, device, 1 << 20)
             else:
-                yield Output(device)
+                yield Output(HashedStream(device))
             device.flush()
+
+
+def remove_unfinished() -> None:
+    """Remove what is being written in this process, which is about to end; for signal handlers."""
+    for path in list(_unfinished):
+        with contextlib.suppress(OSError):
+            os.unlink(path)
+
+
+def remove_leftovers(path: str, process: int) -> None:
+    """Remove what a process that was killed has left beside an output."""
+    folder, name = os.path.split(os.path.realpath(path))
+    for left in glob.glob(os.path.join(glob.escape(folder), glob.escape(f".{name}.{process}-") + "*.part")):
+        with contextlib.suppress(OSError):
+            os.unlink(left)
 
 
 def make_folder(path: str) -> None:
@@ -148,23 +217,55 @@ def reason(failure: OSError) -> str:
 
 
 @contextlib.contextmanager
-def _replacing(target: str) -> Iterator[Output]:
+def _moving(target: str, told: str, *, replace: bool) -> Iterator[Output]:
+    """Write beside the target, and move there at the end."""
     folder, name = os.path.split(target)
-    # named before it exists: a signal at any moment finds a name to remove
-    temporary = os.path.join(folder, f".{name}.{secrets.token_hex(4)}.part")
+    with _temporary(folder, name) as (file, temporary):
+        output = Output(HashedStream(file), temporary)
+        yield output
+        output.stream.flush()
+        if os.path.exists(target):
+            os.fchmod(file.fileno(), stat.S_IMODE(os.stat(target).st_mode))
+        os.fsync(file.fileno())
+        output.stream.check(temporary)
+        if output.rejected:
+            os.replace(temporary, target + REJECTED)
+        elif replace:
+            os.replace(temporary, target)
+        else:
+            _move_to_free_place(temporary, target, told)
+
+
+def _move_to_free_place(temporary: str, target: str, told: str) -> None:
+    """Move a file to a name that nobody else has taken meanwhile."""
     try:
-        with open(temporary, "xb") as stream:
-            output = Output(stream, temporary)
-            yield output
-            stream.flush()
-            if os.path.exists(target):
-                os.fchmod(stream.fileno(), stat.S_IMODE(os.stat(target).st_mode))
-            os.fsync(stream.fileno())
-        os.replace(temporary, target + REJECTED if output.rejected else target)
-    except BaseException:
-        with contextlib.suppress(OSError):
+        try:
+            os.link(temporary, target)
             os.unlink(temporary)
-        raise
+        except FileExistsError:
+            raise
+        except OSError:  # a file system without links: take the name with an empty file first
+            with open(target, "xb"):
+                pass
+            os.replace(temporary, target)
+    except FileExistsError:
+        raise OutputError(
+            "CS403", "has appeared while the text was made", "use --force to replace it", file=told
+        ) from None
+
+
+@contextlib.contextmanager
+def _temporary(folder: str, name: str, mode: int = 0o666) -> Iterator[tuple[BinaryIO, str]]:
+    """Yield a new file and its name; what is left of it is removed."""
+    path = os.path.join(folder, f".{name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+    _unfinished.add(path)  # before it exists: a signal at any moment finds a name to remove
+    try:
+        with open(path, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
+            yield file, path
+    finally:
+        with contextlib.suppress(OSError):
+            os.unlink(path)
+        _unfinished.discard(path)
 
 
 @contextlib.contextmanager

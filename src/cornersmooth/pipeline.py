@@ -18,7 +18,7 @@ import numpy as np
 from cornersmooth import nc, smoothing
 from cornersmooth.cl import read
 from cornersmooth.errors import Finding, InputError, PromiseError
-from cornersmooth.model import Program, SmoothProgram
+from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
 from cornersmooth.report import report
@@ -42,7 +42,7 @@ class Result:
     verification : Verification or None
         None where the text was not read back.
     unverified : str
-        Why not; empty where it was.
+        What of the text was not verified, and why; empty where all of it was.
     findings : tuple of Finding
         Everything that was noticed on the way.
     seconds : mapping of str to float
@@ -71,6 +71,7 @@ class Result:
             seconds=self.seconds,
             findings=self.findings[own:],
             verification=None if self.verification is None else self.verification.to_dict(),
+            unverified=self.unverified,
         )
 
 
@@ -125,6 +126,7 @@ def postprocess(
     reading: Mapping[str, Any] | None = None,
     feed: float | None = None,
     verify: bool = True,
+    require_verified: bool = False,
     force: bool = False,
     processes: int | None = None,
     progress: Progress | None = None,
@@ -149,6 +151,8 @@ def postprocess(
         For moves that have none.
     verify : bool
         Whether the text is read back and measured before it takes its place.
+    require_verified : bool
+        Whether a text that is not wholly verified is an error, too.
     force : bool
         Whether an existing file may be replaced.
     processes : int, optional
@@ -159,20 +163,17 @@ def postprocess(
     Raises
     ------
     PromiseError
-        The text breaks its promise. A file is kept as ``TARGET.rejected``, nothing reaches a stream; `result` of the
-        error says what was found.
+        The text breaks its promise, or could not be verified as required. A file is kept as ``TARGET.rejected``,
+        nothing reaches a stream; `result` of the error says what was found.
     InputError, SettingsError, OutputError
         As `read`, `choose_form`, `write` and `open_output` say it.
     """
     form = nc.choose_form() if form is None else form
-    if not isinstance(source, (Program, bytes)):
-        check_output(target, [source], force=force)
-    else:
-        check_output(target, force=force)
+    may_replace = check_output(target, [] if isinstance(source, (Program, bytes)) else [source], force=force)
     back = reading_back(form)
-    unverified = "" if verify else "not asked for"
+    unverified = "" if verify else "it was not asked for"
     if verify and not back["control"]:
-        unverified = "its table is like no control whose text is known"
+        unverified = "the control's table is like no control whose text is known"
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
         program = source if isinstance(source, Program) else read(source, **(reading or {}))
@@ -180,7 +181,10 @@ def postprocess(
             program = replace(program, feed=np.where(np.isnan(program.feed), feed, program.feed))
     with _timed(seconds, "smooth"):
         smoothed = smooth(program, settings, form=form, progress=_stage(progress, "smoothing"))
-    with open_output(target, hold=not unverified) as output, ExitStack() as stack:
+    with (
+        open_output(target, hold=not unverified or require_verified, replace=may_replace) as output,
+        ExitStack() as stack,
+    ):
         verifier = None
         if not unverified:
             verifier = Verifier(
@@ -200,36 +204,49 @@ def postprocess(
         if verifier is not None:
             with _timed(seconds, "verify"):
                 verification, unverified = _verified(verifier, form, frame)
-        output.rejected = verification is not None and not verification.passed
-    findings = (*smoothed.findings, *written.findings)
-    if verify and unverified:
-        findings += (Finding("CS509", "note", 0, f"the text is not read back: {unverified}"),)
+        broken = verification is not None and not verification.passed
+        output.rejected = broken or bool(require_verified and unverified)
+    findings = (*smoothed.findings, *_remarks(program, smoothed.settings), *written.findings)
+    if unverified:
+        findings += (Finding("CS509", "warning", 0, f"NOT VERIFIED: {unverified}"),)
     path = path_of(target)
     if output.rejected and path is not None:
         path += REJECTED
     result = Result(program, smoothed, form, written, verification, unverified, findings, seconds, path)
     if output.rejected:
-        raise _broken(result)
+        raise _rejection(result, "breaks its promise" if broken else "is not verified")
     return result
+
+
+def _remarks(program: Program, settings: Settings) -> Iterator[Finding]:
+    """What is strange about what is asked for."""
+    cuts = np.isin(program.kind, (Move.LINEAR, Move.ARC, Move.HOLE))
+    cuts[:1] = False  # nothing to come from
+    if not cuts.any():
+        yield Finding("CS181", "warning", 0, "there is no feed move from one pose to another: nothing is cut")
+        return
+    extent = float(np.linalg.norm(np.ptp(program.tip[cuts | np.roll(cuts, -1)], axis=0)))
+    if settings.tolerance > extent and np.ptp(program.axis[cuts], axis=0).max() == 0.0:
+        yield Finding("CS182", "warning", 0, f"the tolerance {settings.tolerance:g} mm is larger than the whole path")
 
 
 def _verified(verifier: Verifier, form: Form, frame: Frame | None) -> tuple[Verification | None, str]:
     """What verification found, or why the text could not be read: the user's own words may be any."""
     try:
-        return verifier.result(), ""
+        found = verifier.result()
     except InputError as failure:
         own = form.table.own
         if not own and (frame is None or not (frame.header or frame.footer)):
             raise
-        where = "a table of your own" if own else "header and footer"
-        return None, f"{failure.what} in line {failure.line}; {where} may hold any words"
+        return None, f"{failure.what}, NC line {failure.line}"
+    return found, "words beside the motion, which a table of your own may define" if form.table.own else ""
 
 
-def _broken(result: Result) -> PromiseError:
+def _rejection(result: Result, why: str) -> PromiseError:
     kept = "nothing was written" if result.path is None else f"the text is in {result.path}"
-    broken = PromiseError("CS508", f"the written text breaks its promise; {kept}", file=result.program.source.name)
-    broken.result = result
-    return broken
+    rejection = PromiseError("CS508", f"the written text {why}; {kept}", file=result.program.source.name)
+    rejection.result = result
+    return rejection
 
 
 def _stage(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:

@@ -176,6 +176,8 @@ def _units(state: ReaderState, asked: Units | None) -> tuple[Units, list[Finding
         if other:
             text = {"stated": "inch" if asked == "mm" else "mm", "units": asked}
             return asked, [finding("CS133", other[0], len(other), **text)]
+        if not stated and state.feed_units and asked not in state.feed_units:
+            return asked, [finding("CS180", 0, feeds=state.feed_units[0], units=asked)]
         return asked, []
     if stated:
         return stated[-1][1], []

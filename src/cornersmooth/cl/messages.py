@@ -78,6 +78,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS147": ("warning", "the tool axis turns along an arc; how it turns is not defined"),
     "CS148": ("warning", "FEDRAT without a unit is read in the unit of the file"),
     "CS149": ("note", "GOHOME without coordinates is kept as a statement"),
+    "CS180": ("warning", "the feeds are in {feeds} per minute, the positions are read in {units} as asked for"),
 }
 
 

@@ -1,133 +1,34 @@
-"""The command line: `main` is the entry point; one module per command.
+"""The command line: `main` is the entry point; one module per command, `options` with every option once.
 
-Commands are imported when they are called, so that ``--help`` answers at once.
+Nothing is imported before the signals are in good hands: a Ctrl-C may come while Python is still loading.
 """
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
-from importlib import import_module
-from typing import Any, NoReturn
-
-import click
-
-from cornersmooth import __version__
-
-#: name of each command, its module and its line in the list of commands
-COMMANDS = {
-    "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC text."),
-    "verify": ("cornersmooth.cli.verify", "Measure NC text against the CL file it was made from."),
-    "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
-    "controls": ("cornersmooth.cli.controls", "List the controls that NC text can be written for, and their forms."),
-    "machines": ("cornersmooth.cli.machines", "List the machines whose rotary words can be written, or describe one."),
-    "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
-}
-
-EXIT_INTERRUPTED = 130
-
-
-class LazyGroup(click.Group):
-    """A group that knows its commands by name and imports them when they are asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names in the order of the table."""
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the module of the command."""
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = import_module(COMMANDS[cmd_name][0]).command
-        return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Say which command was probably meant where the name is unknown."""
-        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            from difflib import get_close_matches
-
-            close = get_close_matches(args[0], COMMANDS, n=1) or list(COMMANDS)
-            ctx.fail(f"no such command {args[0]!r}; did you mean {close[0]!r}?")
-        return super().resolve_command(ctx, args)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands without importing them."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
-
-
-@click.group(
-    cls=LazyGroup,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 1 done, but a promise is broken; 2 wrong usage or configuration; "
-    "3 input cannot be read or is not valid; 4 output cannot be written.",
-)
-@click.version_option(__version__, prog_name="cornersmooth")
-def cli() -> None:
-    """Round the corners of five-axis tool paths within a tolerance.
-
-    \b
-    Examples:
-      cornersmooth smooth part.cls -e 0.04 -o part.nc
-      cornersmooth smooth *.cls -e 0.04 -d out/ -j 2
-    """
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import NoReturn
 
 
 def main() -> NoReturn:
-    """Run the command line and leave with its exit code."""
-    try:
-        signal.signal(signal.SIGTERM, terminate)
-        if sys.stderr is None:  # closed by the caller; what is said to it must not end up in the NC text
-            sys.stderr = open(os.devnull, "w")  # noqa: SIM115
-        code = run()
-    except KeyboardInterrupt:
-        code = EXIT_INTERRUPTED
-    sys.exit(code)
+    """Run the command line as a process of its own and leave with its exit code."""
+    from cornersmooth.cli.ending import Ending
+
+    ending = Ending()
+    ending.install()
+    import os
+    import sys
+
+    from cornersmooth.cli import group
+
+    if sys.stderr is None:  # closed by the caller; what is said to it must not end up in the NC text
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+    sys.exit(group.run(None, ending))
 
 
-def run(args: list[str] | None = None) -> int:
-    """Run the command line with the given arguments; returns the exit code."""
-    from cornersmooth.cli.job import EXIT_INTERNAL, internal_error
-    from cornersmooth.errors import CornersmoothError
-    from cornersmooth.output import ClosedPipe
+def run(args: list[str]) -> int:
+    """Run the command line within another program, whose signals are its own; returns the exit code."""
+    from cornersmooth.cli import group
+    from cornersmooth.cli.ending import Ending
 
-    try:
-        result: Any = cli.main(args=args, standalone_mode=False)
-        return result if isinstance(result, int) else 0
-    except click.exceptions.Exit as leaving:
-        return leaving.exit_code
-    except click.exceptions.NoArgsIsHelpError as helping:
-        click.echo(helping.ctx.get_help() if helping.ctx else "", err=True)
-        return 2
-    except click.UsageError as wrong:
-        wrong.show()
-        return 2
-    except click.ClickException as wrong:
-        click.echo(f"error: {wrong.format_message()}", err=True)
-        return 2
-    except CornersmoothError as failure:
-        click.echo(str(failure), err=True)
-        return failure.exit_code
-    except (ClosedPipe, BrokenPipeError):
-        _close_quietly()
-        return 4
-    except (click.exceptions.Abort, KeyboardInterrupt):
-        return EXIT_INTERRUPTED
-    except Exception as failure:  # a fault of ours: said in a line, and never with the code of a broken promise
-        click.echo(internal_error(failure), err=True)
-        return EXIT_INTERNAL
-
-
-def terminate(number: int, frame: object) -> NoReturn:
-    """Leave by an exception, so that temporary files are removed."""
-    raise SystemExit(128 + number)
-
-
-def _close_quietly() -> None:
-    """Keep the interpreter from complaining about the closed pipe when it flushes at exit."""
-    if sys.stdout is None:
-        return
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return group.run(args, Ending())

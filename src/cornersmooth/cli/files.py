@@ -45,8 +45,9 @@ def target_of(path: str) -> output.Target:
     return sys.stdout.buffer
 
 
-def check_path(path: str, inputs: list[str], *, force: bool, ours: bytes = b"") -> None:
+def check_path(path: str, inputs: list[str], *, force: bool, ours: bytes = b"") -> bool:
     """Refuse an output that would destroy something, as `check_output`; standard streams are known by ``-``."""
-    if path != STANDARD:
-        sources = [0 if source == STANDARD else source for source in inputs]
-        output.check_output(path, sources, force=force, ours=ours)
+    if path == STANDARD:
+        return True
+    sources = [0 if source == STANDARD else source for source in inputs]
+    return output.check_output(path, sources, force=force, ours=ours)

@@ -43,6 +43,10 @@ class Job:
     frame : Frame
     feed : float or None, mm/min
         For moves without one.
+    verify : bool
+        Whether the text is read back.
+    require_verify : bool
+        Whether a text that is not wholly verified is set aside.
     alone : bool
         Whether no other job runs at the same time: verification may use all processors.
     """
@@ -57,6 +61,7 @@ class Job:
     feed: float | None
     force: bool
     verify: bool = True
+    require_verify: bool = False
     alone: bool = False
 
 
@@ -69,19 +74,32 @@ class Outcome:
     message: str = ""
     contents: dict[str, Any] = field(default_factory=dict)
 
+    @property
+    def unverified(self) -> str:
+        """What of the text is not verified; empty for nothing."""
+        return str(self.contents.get("not_verified", ""))
 
-def check(job: Job) -> None:
-    """Refuse what would fail later or destroy something; nothing is read or written."""
+
+def check(job: Job) -> dict[str, bool]:
+    """Refuse what would fail later or destroy something; nothing is read or written.
+
+    Returns
+    -------
+    dict
+        For each output, whether what stands at its place may be replaced.
+    """
     outputs = [job.target, *job.reports]
-    check_path(job.target, [job.source], force=job.force)
+    may_replace = {job.target: check_path(job.target, [job.source], force=job.force)}
     for path in job.reports:
         suffix = os.path.splitext(path)[1].lower()
         if suffix not in (".json", ".csv"):
             raise SettingsError("CS221", f"cannot tell the form of the report {path}", "let it end in .json or .csv")
-        check_path(path, [job.source], force=job.force, ours=_OUR_JSON if suffix == ".json" else _OUR_CSV)
+        ours = _OUR_JSON if suffix == ".json" else _OUR_CSV
+        may_replace[path] = check_path(path, [job.source], force=job.force, ours=ours)
     real = [os.path.realpath(path) for path in outputs if path != STANDARD]
     if len(set(real)) < len(real):
         raise SettingsError("CS222", "two outputs have the same name", "give each its own")
+    return may_replace
 
 
 def run_job(job: Job, progress: Progress | None = None) -> Outcome:
@@ -91,8 +109,7 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     """
     outcome = Outcome(job)
     try:
-        check(job)
-        outcome.contents = _smooth_file(job, outcome, progress)
+        outcome.contents = _smooth_file(job, check(job), outcome, progress)
     except CornersmoothError as failure:
         outcome.exit_code = failure.exit_code
         outcome.message = str(failure)
@@ -117,7 +134,7 @@ def internal_error(failure: Exception, source: str = "") -> str:
     )
 
 
-def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
+def _smooth_file(job: Job, may_replace: dict[str, bool], outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
     """Make text and reports; a broken promise goes to the outcome."""
     from cornersmooth.pipeline import postprocess
 
@@ -132,7 +149,8 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
             reading={"name": name, **job.reading},
             feed=job.feed,
             verify=job.verify,
-            force=True,  # `check` has looked
+            require_verified=job.require_verify,
+            force=may_replace[job.target],
             processes=None if job.alone else 1,
             progress=progress,
         )
@@ -142,29 +160,28 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         outcome.message = _say_rejected(name, result, broken)
     contents = result.report()
     for path in job.reports:
-        _write_report(path, result, contents)
+        _write_report(path, may_replace[path], result, contents)
     return contents
 
 
-def _write_report(path: str, result: Result, contents: dict[str, Any]) -> None:
+def _write_report(path: str, may_replace: bool, result: Result, contents: dict[str, Any]) -> None:
     from cornersmooth.report import corners_csv, report_json
 
     if path.lower().endswith(".json"):
         texts = iter([report_json(contents)])
     else:
         texts = corners_csv(result.smoothed, dense=not result.form.curve)
-    with open_output(target_of(path)) as output:
+    with open_output(target_of(path), replace=may_replace) as output:
         for text in texts:
             output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8
 
 
 def _say_rejected(name: str, result: Result, broken: PromiseError) -> str:
     """Say what verification found, and where the text is now."""
-    assert result.verification is not None
-    problems = result.verification.problems[:_PROBLEMS_SHOWN]
+    found = result.verification
+    problems = found.problems[:_PROBLEMS_SHOWN] if found is not None else ()
     lines = [f"{name}:{problem.cl_line}: error: {problem.text} (NC line {problem.nc_line})" for problem in problems]
-    more = result.verification.problem_count - len(lines)
-    if more > 0:
+    if found is not None and (more := found.problem_count - len(lines)) > 0:
         lines.append(f"{name}: {more} more; a JSON report lists them")
     lines.append(f"{name}: error: {broken.what}")
     return "\n".join(lines)

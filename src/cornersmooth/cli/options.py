@@ -217,6 +217,9 @@ reports = click.option(
 no_verify = click.option(
     "--no-verify", is_flag=True, help="Do not read the written text back and measure it before it takes its place."
 )
+require_verify = click.option(
+    "--require-verify", is_flag=True, help="Set a text aside that is not wholly verified, and end with 1."
+)
 force = click.option("--force", is_flag=True, help="Replace existing files.")
 quiet = click.option("-q", "--quiet", is_flag=True, help="Only errors.")
 verbose = click.option("-v", "--verbose", count=True, help="More: every finding, times of the stages.")

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from cornersmooth.cli.job import Outcome
     from cornersmooth.pipeline import Progress
 
+#: code of the finding that a text is not verified
+NOT_VERIFIED = "CS509"
+
 #: findings shown without -v
 _FINDINGS_SHOWN = 10
 
@@ -46,7 +49,8 @@ def progress_bar(quiet: bool) -> Iterator[Progress | None]:
 
 def show_findings(source: str, contents: dict[str, Any], verbose: int) -> None:
     """Print the findings of one file, warnings first, each on its line."""
-    ranked = sorted(contents["findings"], key=lambda finding: ("error", "warning", "note").index(finding["severity"]))
+    told = [finding for finding in contents["findings"] if finding["code"] != NOT_VERIFIED]  # has a line of its own
+    ranked = sorted(told, key=lambda finding: ("error", "warning", "note").index(finding["severity"]))
     if not verbose:
         ranked = [finding for finding in ranked if finding["severity"] != "note"]
     shown = ranked if verbose else ranked[:_FINDINGS_SHOWN]
@@ -88,6 +92,8 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
             f"{'passed' if found['passed'] else 'FAILED'}: tip {found['max_tip_deviation_mm']:.4f} mm, "
             f"axis point {found['max_axis_point_deviation_mm']:.4f} mm in the written text",
         )
+    if "not_verified" in contents:
+        table.add_row("NOT VERIFIED", contents["not_verified"])
     table.add_row("blocks", f"{summary['blocks_in']} in, {summary['blocks_out']} out")
     if verbose:
         times = ", ".join(f"{stage} {value:.3f}" for stage, value in summary["seconds"].items())
@@ -111,7 +117,9 @@ def show_batch(outcomes: list[Outcome]) -> None:
         summary = outcome.contents["summary"]
         table.add_row(
             name,
-            "done" if outcome.exit_code == 0 else f"exit {outcome.exit_code}",
+            ("not verified" if outcome.unverified else "done")
+            if outcome.exit_code == 0
+            else f"exit {outcome.exit_code}",
             str(summary["corners"]),
             str(summary["smoothed"]),
             f"{summary['max_tip_error_mm']:.4f}",
@@ -123,7 +131,9 @@ def show_batch(outcomes: list[Outcome]) -> None:
     if not out.is_terminal:  # in a file every name stands whole on its line
         out.width = max(out.width, 60 + max(len(outcome.job.source) for outcome in outcomes))
     out.print(table)
-    out.print(f"{len(outcomes)} files, {failed} failed" if failed else f"{len(outcomes)} files done")
+    unverified = sum(bool(outcome.unverified) for outcome in outcomes)
+    counts = [f"{len(outcomes)} files, {failed} failed" if failed else f"{len(outcomes)} files done"]
+    out.print(", ".join(counts + ([f"{unverified} NOT VERIFIED"] if unverified else [])))
 
 
 def print_line(text: str) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-import signal
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli import options, terminate
+from cornersmooth.cli import options
+from cornersmooth.cli.batch import Batch
+from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.files import STANDARD, check_path, read_input
 from cornersmooth.cli.job import Job, Outcome, check, run_job
 from cornersmooth.cli.show import print_line, progress_bar, show_batch, show_findings, show_summary
@@ -45,10 +46,12 @@ if TYPE_CHECKING:
 @options.feed
 @options.reading
 @options.no_verify
+@options.require_verify
 @options.force
 @options.quiet
 @options.verbose
-def command(inputs: tuple[str, ...], **given: Any) -> int:
+@click.pass_obj
+def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
     """Round the corners of the CL files IN and write NC text.
 
     IN is an APT/CL file (NX, CATIA, Creo, ...) or a table of points (x y z i j k, or two points); - is standard input.
@@ -75,7 +78,7 @@ def command(inputs: tuple[str, ...], **given: Any) -> int:
             show_summary(outcome.contents, verbose)
         return outcome.exit_code
     outcomes = []
-    for outcome in _run_all(jobs, given["jobs"]):
+    for outcome in Batch(jobs, given["jobs"]).run(ending):
         _tell(outcome, quiet, verbose)
         outcomes.append(outcome)
     if not quiet:
@@ -87,33 +90,10 @@ def command(inputs: tuple[str, ...], **given: Any) -> int:
 def _tell(outcome: Outcome, quiet: bool, verbose: int) -> None:
     if outcome.message:
         print_line(outcome.message)
+    if outcome.unverified and (quiet or not outcome.job.alone):  # never in silence; the summary says it, too
+        print_line(f"{outcome.job.source}: NOT VERIFIED: {outcome.unverified}")
     if outcome.contents and not quiet:
         show_findings(outcome.job.source, outcome.contents, verbose)
-
-
-def _run_all(jobs: list[Job], processes: int) -> Any:
-    """Outcomes in the order of the inputs; a failed file does not stop the others."""
-    processes = min(processes or os.cpu_count() or 1, len(jobs))
-    if processes == 1:
-        yield from map(run_job, jobs)
-        return
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import active_children, get_context
-
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_leave_when_told) as pool:
-        try:
-            yield from pool.map(run_job, jobs)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in active_children():
-                worker.terminate()
-            raise
-
-
-def _leave_when_told() -> None:
-    """Let a worker leave by an exception, so that it removes its temporary file, and without a word."""
-    signal.signal(signal.SIGTERM, terminate)
-    signal.signal(signal.SIGINT, terminate)
 
 
 def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
@@ -123,6 +103,8 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     folder, output = given["directory"], given["output"]
     if given["quiet"] and given["verbose"]:
         raise click.UsageError("-q and -v exclude each other")
+    if given["no_verify"] and given["require_verify"]:
+        raise click.UsageError("--no-verify and --require-verify exclude each other")
     if folder and output:
         raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
     if len(inputs) > 1 and not folder:
@@ -152,6 +134,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 feed=given["feed"],
                 force=given["force"],
                 verify=not given["no_verify"],
+                require_verify=given["require_verify"],
                 alone=len(inputs) == 1,
             )
         )

@@ -29,6 +29,7 @@ def report(
     seconds: Mapping[str, float] | None = None,
     findings: tuple[Finding, ...] = (),
     verification: Mapping[str, Any] | None = None,
+    unverified: str = "",
 ) -> dict[str, Any]:
     """Everything the JSON report says (design section 7); keys carry their unit.
 
@@ -44,6 +45,8 @@ def report(
         Those of the writer, besides those of the program.
     verification : mapping, optional
         What `cornersmooth.verify` measured in the written text.
+    unverified : str
+        What of the text was not verified, and why; empty for nothing.
     """
     from cornersmooth import __version__
 
@@ -100,6 +103,8 @@ def report(
     }
     if verification is not None:
         contents["verification"] = dict(verification)
+    if unverified:
+        contents["not_verified"] = unverified
     return contents
 
 

@@ -1,0 +1,5 @@
+"""``python -m cornersmooth``."""
+
+from cornersmooth.cli import main
+
+main()

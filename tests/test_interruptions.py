@@ -1,0 +1,28 @@
+"""Interruptions at random moments; `python tests/interruptions.py 100` makes more of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from interruptions import Bench, Try, tries
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    return Bench(tmp_path_factory.mktemp("bench"), single=31_000, several=2_000)
+
+
+@pytest.mark.parametrize("one", tries(16, seed=7), ids=lambda one: f"{'batch' if one.batch else 'single'}-{one.how}")
+def test_nothing_is_left_of_an_interrupted_run(bench: Bench, one: Try) -> None:
+    found = bench.interrupt(one)
+    assert found.wrong == [], found.said
+
+
+def test_signals_that_a_run_was_started_to_ignore_stay_ignored(bench: Bench) -> None:
+    found = bench.interrupt(Try(batch=True, how="nohup", moment=0.5, old=False))
+    assert (found.code, found.wrong) == (0, [])
+
+
+def test_a_batch_whose_parent_is_killed_leaves_no_process(bench: Bench) -> None:
+    found = bench.interrupt(Try(batch=True, how="parent", moment=0.5, old=True))
+    assert found.wrong == [], found.said
