@@ -69,7 +69,7 @@ class Module:
                 texts = [list(self._texts(sibling)) for sibling in siblings]
                 kind = next((text for several in texts for text in several if text in SEVERITIES), "")
                 kind = kind or self._kind(around, code)
-                said = ([text for text in several if re.search("[a-z]", text)] for several in texts)
+                said = ([text for text in several if re.search("[A-Za-z]", text)] for several in texts)
                 for text in next((several for several in said if several and several != [kind]), []):
                     if text != kind:
                         yield Entry(code, text, kind, self.package)
