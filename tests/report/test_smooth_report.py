@@ -36,7 +36,7 @@ def test_json_has_the_agreed_keys_and_counts(program):
     finding = Finding("CS310", "warning", 7, "X is not translated", 3)
     contents = json.loads(report_json(report(smoothed, blocks_out=40, seconds={"read": 0.5}, findings=(finding,))))
     assert contents["schema"] == "cornersmooth-report/1"
-    assert set(contents) == {"schema", "tool", "input", "settings", "summary", "findings", "worst"}
+    assert set(contents) == {"schema", "tool", "input", "settings", "summary", "findings", "worst", "sharp"}
     given = contents["input"]
     assert (given["poses"], given["chains"], given["feed_moves"], given["units"]) == (6, 1, 6, "mm")
     summary = contents["summary"]

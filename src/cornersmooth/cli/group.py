@@ -16,6 +16,7 @@ from cornersmooth.cli.ending import Ending
 COMMANDS = {
     "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC text."),
     "verify": ("cornersmooth.cli.verify", "Measure NC text against the CL file it was made from."),
+    "surface": ("cornersmooth.cli.surface", "Measure what the NC text leaves of the surface of the CL file."),
     "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
     "controls": ("cornersmooth.cli.controls", "List the controls that NC text can be written for, and their forms."),
     "machines": ("cornersmooth.cli.machines", "List the machines whose rotary words can be written, or describe one."),

@@ -15,10 +15,14 @@ if TYPE_CHECKING:
     from cornersmooth.nc import Form, Frame
     from cornersmooth.pipeline import Progress, Result
     from cornersmooth.settings import Settings
+    from cornersmooth.surface.tool import Tool
 
 #: how the reports of earlier runs begin; such files are replaced without being asked
-_OUR_JSON = b'{\n "schema": "cornersmooth-report/'
-_OUR_CSV = b"corner,line,x,y,z,tip_angle_deg,"
+_OURS = {
+    ".json": b'{\n "schema": "cornersmooth-report/',
+    ".csv": b"corner,line,x,y,z,tip_angle_deg,",
+    ".html": b"<!doctype html>\n<!-- cornersmooth page -->\n",
+}
 
 #: exit code for a fault of the program itself
 EXIT_INTERNAL = 70
@@ -49,6 +53,10 @@ class Job:
         Whether a text that is not wholly verified is set aside.
     alone : bool
         Whether no other job runs at the same time: verification may use all processors.
+    plot : str
+        Picture of the path; empty for none.
+    tool : Tool or None
+        For pages, instead of that of the file.
     """
 
     source: str
@@ -63,6 +71,8 @@ class Job:
     verify: bool = True
     require_verify: bool = False
     alone: bool = False
+    plot: str = ""
+    tool: Tool | None = None
 
 
 @dataclass
@@ -88,14 +98,16 @@ def check(job: Job) -> dict[str, bool]:
     dict
         For each output, whether what stands at its place may be replaced.
     """
-    outputs = [job.target, *job.reports]
+    outputs = [job.target, *job.reports, *([job.plot] if job.plot else [])]
     may_replace = {job.target: check_path(job.target, [job.source], force=job.force)}
     for path in job.reports:
         suffix = os.path.splitext(path)[1].lower()
-        if suffix not in (".json", ".csv"):
-            raise SettingsError("CS221", f"cannot tell the form of the report {path}", "let it end in .json or .csv")
-        ours = _OUR_JSON if suffix == ".json" else _OUR_CSV
-        may_replace[path] = check_path(path, [job.source], force=job.force, ours=ours)
+        if suffix not in _OURS:
+            what = f"cannot tell the form of the report {path}"
+            raise SettingsError("CS221", what, "let it end in .json, .csv or .html")
+        may_replace[path] = check_path(path, [job.source], force=job.force, ours=_OURS[suffix])
+    if job.plot:
+        may_replace[job.plot] = check_path(job.plot, [job.source], force=job.force)
     real = [os.path.realpath(path) for path in outputs if path != STANDARD]
     if len(set(real)) < len(real):
         raise SettingsError("CS222", "two outputs have the same name", "give each its own")
@@ -160,17 +172,42 @@ def _smooth_file(job: Job, may_replace: dict[str, bool], outcome: Outcome, progr
         outcome.message = _say_rejected(name, result, broken)
     contents = result.report()
     for path in job.reports:
-        _write_report(path, may_replace[path], result, contents)
+        _write_report(path, job, may_replace[path], source, result, contents)
+    if job.plot:
+        picture = _picture(job, result, contents)
+        with open_output(target_of(job.plot), replace=may_replace[job.plot]) as output:
+            output.stream.write(picture)
     return contents
 
 
-def _write_report(path: str, may_replace: bool, result: Result, contents: dict[str, Any]) -> None:
+def _picture(job: Job, result: Result, contents: dict[str, Any]) -> bytes:
+    from cornersmooth.page.pages import read_written
+    from cornersmooth.report.pathplot import draw_path
+    from cornersmooth.report.verdict import verdict
+
+    title = f"{os.path.basename(result.program.source.name)}\n{verdict(contents)}"
+    tolerance = result.smoothed.settings.verified_tolerance
+    form = os.path.splitext(job.plot)[1].lower().lstrip(".")
+    nc = read_written(result, job.frame)
+    return draw_path(result.program, nc, result.smoothed, title, form, tolerance=tolerance)
+
+
+def _write_report(
+    path: str, job: Job, may_replace: bool, source: bytes, result: Result, contents: dict[str, Any]
+) -> None:
     from cornersmooth.report import corners_csv, report_json
 
-    if path.lower().endswith(".json"):
+    suffix = os.path.splitext(path)[1].lower()
+    if suffix == ".json":
         texts = iter([report_json(contents)])
-    else:
+    elif suffix == ".csv":
         texts = corners_csv(result.smoothed, dense=not result.form.curve)
+    else:
+        from cornersmooth.feedrate import Limits
+        from cornersmooth.page import result_page
+
+        limits = Limits() if job.feed is None else Limits(feed=job.feed)
+        texts = iter([result_page(result, source=source, frame=job.frame, limits=limits, tool=job.tool)])
     with open_output(target_of(path), replace=may_replace) as output:
         for text in texts:
             output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8

@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from cornersmooth.errors import SettingsError
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
 
 if TYPE_CHECKING:
@@ -85,6 +86,18 @@ class Jobs(click.ParamType[int]):
         if number < 0:
             self.fail("the number of processes cannot be negative", param, ctx)
         return number
+
+
+class ToolShape(click.ParamType[Any]):
+    """The shape of a tool: numbers with commas between."""
+
+    name = "tool"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Text to a `Tool`."""
+        from cornersmooth.surface.tool import parse_tool
+
+        return parse_tool(value) if isinstance(value, str) else value
 
 
 LENGTH = Length()
@@ -212,7 +225,8 @@ reports = click.option(
     "reports",
     type=click.Path(),
     multiple=True,
-    help="Write a report; .json or .csv decides the form. May be repeated; {stem} stands for the input's name.",
+    help="Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} stands "
+    "for the input's name.",
 )
 no_verify = click.option(
     "--no-verify", is_flag=True, help="Do not read the written text back and measure it before it takes its place."
@@ -243,7 +257,33 @@ found_reports = click.option(
     "reports",
     type=click.Path(),
     multiple=True,
-    help="Write what was found: .json for the results, .csv for a row per pose. May be repeated.",
+    help="Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
+    "repeated.",
+)
+page_reports = click.option(
+    "--report", "reports", type=click.Path(), multiple=True, help="Write a page to look at: .html. May be repeated."
+)
+surface_reports = click.option(
+    "--report",
+    "reports",
+    type=click.Path(),
+    multiple=True,
+    help="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be repeated.",
+)
+tool = click.option(
+    "--tool",
+    type=ToolShape(),
+    metavar="D[,R[,TAPER[,LENGTH]]]",
+    help="Shape of the tool: diameter, corner radius, taper in degrees, length. [default: that of the file]",
+)
+stations = click.option(
+    "--stations", type=click.IntRange(1, 1_000_000), default=2000, show_default=True, help="Places along the path."
+)
+levels = click.option(
+    "--levels", type=click.IntRange(1, 60), default=7, show_default=True, help="Points along the cutting edge."
+)
+plot_path = click.option(
+    "--plot", type=click.Path(), help="Draw the path, its corners and its deviation: .png, .svg or .pdf."
 )
 plot_deviation = click.option(
     "--plot",
@@ -385,6 +425,27 @@ def settings_of(given: dict[str, Any]) -> Settings:
     from cornersmooth.settings import Settings
 
     return Settings(**{name: given[name] for name in _SETTINGS if name in given})
+
+
+def reading_back_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Keyword arguments of `cornersmooth.verify.read_nc` for a text that somebody wrote.
+
+    Raises
+    ------
+    SettingsError
+        CS204: nobody knows how the control's text is read; or the control or the machine is unknown.
+    """
+    from cornersmooth.kinematics import load_machine
+    from cornersmooth.nc import load_control
+    from cornersmooth.verify import CONTROLS
+
+    control = load_control(given["control"])
+    if control.dialect not in CONTROLS:
+        raise SettingsError(
+            "CS204", f"{given['control']} is like no control that can be read", 'say like = "fanuc" or another in it'
+        )
+    machine = load_machine(given["machine"]) if given["machine"] else None
+    return {"control": control.dialect, "machine": machine, "tcp": not given["no_tcp"]}
 
 
 def picture_form(path: str | None) -> str:

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 #: code of the finding that a text is not verified
 NOT_VERIFIED = "CS509"
 
-#: findings shown without -v
+#: findings and sharp corners shown without -v
 _FINDINGS_SHOWN = 10
+_SHARP_SHOWN = 10
 
 
 def console() -> Console:
@@ -63,26 +64,31 @@ def show_findings(source: str, contents: dict[str, Any], verbose: int) -> None:
 
 
 def show_summary(contents: dict[str, Any], verbose: int) -> None:
-    """Print the small table of one file."""
+    """Print the verdict, the small table of one file, and its sharp corners."""
     from rich.table import Table
 
+    from cornersmooth.report.verdict import sharp_text, verdict
     from cornersmooth.smoothing.construction import construction_of
 
     summary, settings = contents["summary"], contents["settings"]
+    given = contents["input"]
+    console().print(verdict(contents), style="bold")
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold")
     table.add_column()
-    given = contents["input"]
     table.add_row("input", f"{given['name']}: {given['dialect']}, {given['poses']} poses, {given['units']}")
     kept = ", ".join(f"{count} {reason}" for reason, count in summary["not_smoothed"].items())
     table.add_row("corners", f"{summary['smoothed']} of {summary['corners']} rounded" + (f" ({kept})" if kept else ""))
-    table.add_row("limited by", f"tolerance {summary['limited_by_tolerance']}, segment {summary['limited_by_segment']}")
+    table.add_row(
+        "limited by",
+        f"tolerance at {summary['limited_by_tolerance']} corners, segment length at {summary['limited_by_segment']}",
+    )
     table.add_row(
         "error",
         f"tip {summary['max_tip_error_mm']:.4f} mm, axis point {summary['max_axis_error_mm']:.4f} mm "
         f"(H {settings['axis_length']:g} mm), tolerance {settings['tolerance']:g} mm",
     )
-    table.add_row("tool axis", f"{summary['max_orientation_error_deg']:.4f} deg")
+    table.add_row("tool axis", f"turned by up to {summary['max_orientation_error_deg']:.4f}° from the original")
     if text := construction_of(settings["method"]).summary_text(summary):
         table.add_row(settings["method"], text)
     if "verification" in contents:
@@ -99,6 +105,11 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
         times = ", ".join(f"{stage} {value:.3f}" for stage, value in summary["seconds"].items())
         table.add_row("seconds", times)
     console().print(table)
+    shown = contents["sharp"] if verbose else contents["sharp"][:_SHARP_SHOWN]
+    for corner in shown:
+        print_line(f"{given['name']}{sharp_text(corner)}, stays sharp")
+    if summary["sharp"] > len(shown):
+        print_line(f"{given['name']}: {summary['sharp'] - len(shown)} more stay sharp; --report part.html lists them")
 
 
 def show_batch(outcomes: list[Outcome]) -> None:

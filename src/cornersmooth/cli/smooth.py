@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 @options.directory
 @options.jobs
 @options.reports
+@options.plot_path
+@options.tool
 @options.writing
 @options.method
 @options.shape
@@ -60,6 +62,7 @@ def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
     \b
     Examples:
       cornersmooth smooth part.cls -e 0.04 -o part.nc
+      cornersmooth smooth part.cls -e 0.04 -o part.nc --report part.html
       cornersmooth smooth part.cls -e 0.04 -f g6.2 -o part.nc --report part.json --report part.csv
       cornersmooth smooth part.cls -e 0.04 --control siemens -f bspline -o part.mpf
       cornersmooth smooth part.cls -e 0.04 --control linuxcnc --machine xyzac-trt -o part.ngc
@@ -112,6 +115,10 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     if len(inputs) > 1 and STANDARD in inputs:
         raise click.UsageError("standard input goes with no other input")
     reports = given["reports"]
+    if given["plot"]:
+        options.picture_form(given["plot"])
+        if len(inputs) > 1:
+            raise click.UsageError("--plot is for a single input; --report out/{stem}.html goes with several")
     if len(inputs) > 1 and any("{stem}" not in path for path in reports):
         raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
     settings, form, frame = options.settings_of(given), _form(given), _frame(given)
@@ -136,6 +143,8 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 verify=not given["no_verify"],
                 require_verify=given["require_verify"],
                 alone=len(inputs) == 1,
+                plot=given["plot"] or "",
+                tool=given["tool"],
             )
         )
     by_target: dict[str, str] = {}

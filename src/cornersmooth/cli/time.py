@@ -45,6 +45,8 @@ LAWS = tuple(_TITLES)
 @options.law
 @options.motion_csv
 @options.plot_motion
+@options.page_reports
+@options.tool
 @options.force
 @options.quiet
 def command(source: str, **given: Any) -> int:
@@ -61,12 +63,24 @@ def command(source: str, **given: Any) -> int:
       cornersmooth time part.cls -e 0.04 --feed 1800 --accel 1000 --jerk 5000 --period 2ms --json
       cornersmooth time part.cls -e 0.04 --csv motion.csv --plot motion.svg
       cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
+      cornersmooth time part.cls -e 0.04 --report times.html
     """
     form = options.picture_form(given["plot"])
-    for path in (given["csv"], given["plot"]):
+    for path in given["reports"]:
+        if not path.lower().endswith(".html"):
+            raise click.UsageError(f"--report {path}: let the name end in .html")
+    for path in (given["csv"], given["plot"], *given["reports"]):
         if path:
             check_path(path, [source], force=given["force"])
-    compared = _compare(source, given)
+    data, name = read_input(source)
+    compared = _compare(data, name, given)
+    if given["reports"]:
+        from cornersmooth.page import times_page
+
+        page = times_page(compared, source=data, tool=given["tool"]).encode("utf-8")
+        for path in given["reports"]:
+            with open_output(target_of(path)) as output:
+                output.stream.write(page)
     if given["csv"]:
         from cornersmooth.report.timelaw import timelaw_csv
 
@@ -89,16 +103,14 @@ def command(source: str, **given: Any) -> int:
     return 0
 
 
-def _compare(source: str, given: dict[str, Any]) -> Comparison:
+def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
     from cornersmooth.cl import read
     from cornersmooth.feedrate import compare
     from cornersmooth.kinematics import load_machine
 
     machine = load_machine(given["machine"]) if given["machine"] else None
     limits, settings = options.limits_of(given), options.settings_of(given)
-    data, name = read_input(source)
     program = read(data, name=name, **options.reading_of(given))
-    del data
     with progress_bar(given["quiet"]) as progress:
         return compare(program, settings, limits, machine=machine, progress=progress)
 
@@ -106,8 +118,10 @@ def _compare(source: str, given: dict[str, Any]) -> Comparison:
 def _tables(compared: Comparison) -> Iterator[str]:
     """Times and savings, then what was reached, then the places that lose most."""
     from cornersmooth.feedrate.compare import peaks, slowest, stops, turning_seconds
+    from cornersmooth.report.verdict import times_text
 
     settings, saving = compared.settings, compared.saving_percent
+    yield times_text(compared.seconds, [name for name in compared.laws if name not in LAWS[:2]])
     yield f"tolerance {settings.tolerance:g} mm, axis point at {settings.axis_length:g} mm"
     yield f"{'':<24}{'time s':>12}{'saved %':>20}{'stops':>10}{'turning s':>12}{'length mm':>14}"
     yield f"{'':<24}{'':>12}{'of stops':>10}{'of jumps':>10}"

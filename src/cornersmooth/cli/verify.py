@@ -10,7 +10,6 @@ import click
 
 from cornersmooth.cli import options
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
-from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
@@ -36,6 +35,7 @@ _PROBLEMS_SHOWN = 20
 @options.no_tcp
 @options.reading
 @options.found_reports
+@options.tool
 @options.plot_deviation
 @options.force
 @options.quiet
@@ -53,36 +53,37 @@ def command(source: str, text: str, **given: Any) -> int:
       cornersmooth verify part.cls part.mpf -e 0.04 --control siemens
       cornersmooth verify part.cls part.ngc -e 0.04 --control linuxcnc --machine xyzac-trt
       cornersmooth verify part.cls part.nc -e 0.04 -v --plot deviation.png
+      cornersmooth verify part.cls part.nc -e 0.04 --report found.html
     """
     from cornersmooth.cl import read
-    from cornersmooth.kinematics import load_machine
     from cornersmooth.nc import load_control
-    from cornersmooth.verify import CONTROLS, deviation_along, useful_processes, verify
+    from cornersmooth.verify import deviation_along, useful_processes, verify
     from cornersmooth.verify.source import readable_twice
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     form = _check_outputs(source, text, given)
-    control = load_control(given["control"])
-    if control.dialect not in CONTROLS:
-        raise SettingsError(
-            "CS204", f"{given['control']} is like no control that can be read", 'say like = "fanuc" or another in it'
-        )
-    how = {
-        "tolerance": given["tolerance"],
-        "axis_length": given["axis_length"],
-        "control": control.dialect,
-        "machine": load_machine(given["machine"]) if given["machine"] else None,
-        "tcp": not given["no_tcp"],
-    }
+    own = load_control(given["control"]).own
+    measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
+    how = {**measures, **options.reading_back_of(given)}
     data, name = read_input(source)
     program = read(data, name=name, **options.reading_of(given))
-    del data
+    pages = [path for path in given["reports"] if path.lower().endswith(".html")]
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
-    if given["plot"] or given["verbose"]:  # it is looked at more than once
+    if given["plot"] or given["verbose"] or pages:  # it is looked at more than once
         nc = readable_twice(nc)
-    found = verify(program, nc, **how, words=not control.own, processes=useful_processes())
-    _write_reports(program, found, given["reports"])
+    found = verify(program, nc, **how, words=not own, processes=useful_processes())
+    _write_reports(program, found, [path for path in given["reports"] if path not in pages])
+    if pages:
+        from cornersmooth.page import verified_page
+        from cornersmooth.verify import read_nc
+
+        page = verified_page(
+            program, read_nc(nc, **how), found, source=data, machine=how["machine"], tool=given["tool"]
+        ).encode("utf-8")
+        for path in pages:
+            with open_output(target_of(path)) as output:
+                output.stream.write(page)
     if given["plot"]:
         from cornersmooth.report.deviationplot import draw_deviation
 
@@ -103,8 +104,8 @@ def command(source: str, text: str, **given: Any) -> int:
 def _check_outputs(source: str, text: str, given: dict[str, Any]) -> str:
     """Refuse wrong names before anything is read; return the form of the picture."""
     for path in given["reports"]:
-        if os.path.splitext(path)[1].lower() not in (".json", ".csv"):
-            raise click.UsageError(f"--report {path}: let the name end in .json or .csv")
+        if os.path.splitext(path)[1].lower() not in (".json", ".csv", ".html"):
+            raise click.UsageError(f"--report {path}: let the name end in .json, .csv or .html")
     form = options.picture_form(given["plot"])
     for path in (*given["reports"], given["plot"]):
         if path:
@@ -112,7 +113,7 @@ def _check_outputs(source: str, text: str, given: dict[str, Any]) -> str:
     return form
 
 
-def _write_reports(program: Program, found: Verification, paths: tuple[str, ...]) -> None:
+def _write_reports(program: Program, found: Verification, paths: list[str]) -> None:
     from cornersmooth.report.verification import verification_csv, verification_json
 
     for path in paths:
@@ -134,6 +135,9 @@ def _problems(found: Verification, name: str, verbose: int) -> Iterator[str]:
 
 def _summary(found: Verification) -> Iterator[str]:
     """Label and text of everything measured."""
+    from cornersmooth.report.verdict import kept_text
+
+    yield kept_text(found.to_dict())
     yield f"{'result':<18}{'passed' if found.passed else f'FAILED: {found.problem_count} problems'}"
     yield f"{'tolerance':<18}{found.tolerance:g} mm, axis point at {found.axis_length:g} mm"
     yield f"{'tip':<18}{_place(found.tip, 'mm')}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cornersmooth.page.document import page
+from cornersmooth.page.pages import BEGINNING, result_page, surface_text, times_page, verified_page
 from cornersmooth.page.scene import Story, Subject
 
-__all__ = ["Story", "Subject", "page"]
+__all__ = ["BEGINNING", "Story", "Subject", "page", "result_page", "surface_text", "times_page", "verified_page"]

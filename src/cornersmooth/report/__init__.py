@@ -11,6 +11,7 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status
 from cornersmooth.report.corners import STATUS_NAMES, corner_table, worst_corners
+from cornersmooth.report.verdict import sharp_corners, sharp_count
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import dot, norm
 
@@ -65,6 +66,7 @@ def report(
             for status in Status
             if status != Status.SMOOTHED and (count := int((corners.status == status).sum()))
         },
+        "sharp": sharp_count(corners),
         "max_tip_error_mm": worst.tip_error,
         "max_axis_error_mm": worst.axis_error,
         "max_orientation_error_deg": float(np.degrees(_largest(corners.orientation_error))),
@@ -100,6 +102,7 @@ def report(
             for finding in (*smoothed.findings, *findings)
         ],
         "worst": _records(smoothed, worst.rows, dense=dense),
+        "sharp": sharp_corners(smoothed),
     }
     if verification is not None:
         contents["verification"] = dict(verification)

@@ -61,6 +61,11 @@ class SurfaceMap:
         found: Bools = np.isfinite(self.off)
         return found
 
+    @property
+    def kept(self) -> bool:
+        """Whether every point is known to be within the tolerance, give or take 1e-9 mm of arithmetic."""
+        return bool((np.abs(self.off) <= self.tolerance + 1e-9).all())
+
     def histogram(self) -> tuple[Floats, Floats]:
         """Edges of equal classes, mm, and how many points are in each."""
         off = self.off[self.known]

@@ -80,7 +80,7 @@ class Corners {
     dot.style.background = KIND_COLOURS[kind[i]];
     name.append(dot, this.title(i));
     const larger = Math.max(Number.isFinite(off[i]) ? off[i] : 0, Number.isFinite(axis[i]) ? axis[i] : 0);
-    node.append(name, made("span", String(line[i])), made("span", degrees(Math.max(tip[i], top[i]))), made("span", offset(larger)));
+    node.append(name, made("span", String(line[i])), made("span", degrees(tip[i] < 1 ? top[i] : tip[i])), made("span", offset(larger)));
     node.addEventListener("click", () => this.select(i));
     return node;
   }

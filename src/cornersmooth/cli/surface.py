@@ -1,0 +1,130 @@
+"""``cornersmooth surface``: what smoothing does to the metal."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cornersmooth.cli import options
+from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.errors import SettingsError
+from cornersmooth.output import open_output
+
+if TYPE_CHECKING:
+    from cornersmooth.model import Program
+    from cornersmooth.surface import SurfaceMap, Tool
+
+_SUFFIXES = (".json", ".csv", ".html", ".png", ".svg", ".pdf")
+
+
+@click.command(
+    "surface",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
+    "cannot be read or is not valid; 4 output cannot be written.",
+)
+@click.argument("source", metavar="IN")
+@click.argument("text", metavar="NC")
+@options.tolerance
+@options.axis_length
+@options.tool
+@options.stations
+@options.levels
+@options.control
+@options.machine
+@options.no_tcp
+@options.reading
+@options.surface_reports
+@options.force
+@options.quiet
+def command(source: str, text: str, **given: Any) -> int:
+    """Measure the surface that the NC text NC leaves against that of the CL file IN.
+
+    Points are taken on the envelope of the original motion of the tool, up to the length of its cutting edge (-H). At
+    each the distance to the volume that the written motion sweeps says whether metal is cut below the surface (overcut)
+    or left on it (undercut). The tool is that of the file (CUTTER, TLDATA) or of --tool.
+
+    \b
+    Examples:
+      cornersmooth surface part.cls part.nc -e 0.04 -H 12
+      cornersmooth surface part.cls part.nc --tool 10,5 --report map.html --report map.png
+      cornersmooth surface part.cls part.nc --tool 12,0,3 --report points.csv
+    """
+    from cornersmooth.cl import read
+    from cornersmooth.report.surface import surface_lines
+    from cornersmooth.surface import measure_surface
+    from cornersmooth.verify import read_nc
+
+    if source == text == STANDARD:
+        raise click.UsageError("only one of the inputs can be standard input")
+    for path in given["reports"]:
+        if os.path.splitext(path)[1].lower() not in _SUFFIXES:
+            raise click.UsageError(f"--report {path}: let the name end in {', '.join(_SUFFIXES)}")
+        check_path(path, [source, text], force=given["force"])
+    how = options.reading_back_of(given)
+    data, name = read_input(source)
+    program = read(data, name=name, **options.reading_of(given))
+    tool = _tool(program, given["tool"])
+    nc = read_nc(
+        read_input(text)[0] if text == STANDARD else text,
+        tolerance=given["tolerance"],
+        axis_length=given["axis_length"],
+        **how,
+    )
+    found = measure_surface(
+        program,
+        nc,
+        tool,
+        tolerance=given["tolerance"],
+        edge=given["axis_length"],
+        levels=given["levels"],
+        stations=given["stations"],
+    )
+    for path in given["reports"]:
+        with open_output(target_of(path)) as output:
+            for part in _report(path, program, data, nc, found, given):
+                output.stream.write(part)
+    if not given["quiet"]:
+        for line in surface_lines(found):
+            click.echo(line)
+    return 0 if found.kept else 1
+
+
+def _tool(program: Program, asked: Tool | None) -> Tool:
+    """The tool of the option, or the only one of the file."""
+    from cornersmooth.surface import tools_of
+
+    if asked is not None:
+        return asked
+    tools = tools_of(program)
+    distinct = list({tool: line for _, tool, line in tools}.items())
+    if len(distinct) == 1:
+        return distinct[0][0]
+    what = "the file describes no tool"
+    if distinct:
+        what = "the file has tools of several shapes: " + ", ".join(
+            f"{tool.describe()} (line {line})" for tool, line in distinct[:4]
+        )
+    raise SettingsError("CS272", what, "say the tool's shape, as in --tool 10,5", file=program.source.name)
+
+
+def _report(path: str, program: Program, source: bytes, nc: Any, found: SurfaceMap, given: dict[str, Any]) -> Any:
+    """Parts of a report, as bytes."""
+    from cornersmooth.report.surface import draw_surface, surface_csv, surface_json
+
+    suffix = os.path.splitext(path)[1].lower()
+    if suffix == ".json":
+        yield surface_json(found).encode("utf-8")
+    elif suffix == ".csv":
+        for part in surface_csv(found):
+            yield part.encode("utf-8")
+    elif suffix == ".html":
+        from cornersmooth.page import verified_page
+        from cornersmooth.verify import verify
+
+        checked = verify(program, nc, tolerance=given["tolerance"], axis_length=given["axis_length"])
+        yield verified_page(program, nc, checked, source=source, surface=found).encode("utf-8")
+    else:
+        yield draw_surface(found, suffix[1:])

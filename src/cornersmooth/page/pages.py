@@ -1,0 +1,239 @@
+"""Pages of what the commands make: of a run of `postprocess`, of a verified text, of planned times, of a surface."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+from cornersmooth.feedrate import Comparison, Limits
+from cornersmooth.kinematics import Machine
+from cornersmooth.model import Program
+from cornersmooth.nc import Frame, choose_form, write
+from cornersmooth.page.document import document
+from cornersmooth.page.scene import Story, Subject, scene
+from cornersmooth.report.verdict import kept_text, saving_text, times_text, verdict
+from cornersmooth.settings import Settings
+from cornersmooth.surface.tool import Tool
+from cornersmooth.verify import NcProgram, Verification, read_nc, verify
+
+if TYPE_CHECKING:
+    from cornersmooth.pipeline import Result
+    from cornersmooth.surface import SurfaceMap
+
+#: how every page begins
+BEGINNING = b"<!doctype html>\n<!-- cornersmooth page -->\n"
+
+
+def result_page(
+    result: Result,
+    *,
+    source: bytes = b"",
+    frame: Frame | None = None,
+    limits: Limits | None = None,
+    tool: Tool | None = None,
+) -> str:
+    """Page of a file that was smoothed, written and verified.
+
+    Parameters
+    ----------
+    result : Result
+    source : bytes
+        The CL file, for its hash.
+    frame : Frame, optional
+        As in `postprocess`: a text that went to a stream is written once more for the page.
+    limits : Limits, optional
+        Of the planned speeds.
+    tool : Tool, optional
+        Instead of that of the file.
+    """
+    smoothed, form, settings = result.smoothed, result.form, result.smoothed.settings
+    nc = read_written(result, frame)
+    limits = Limits() if limits is None else limits
+    subject = Subject(
+        program=result.program,
+        nc=nc,
+        settings=settings,
+        verification=result.verification,
+        smoothed=smoothed,
+        dense=not form.curve,
+        limits=limits,
+        machine=form.machine,
+        tool=tool,
+    )
+    contents = result.report()
+    facts = [
+        *_input_facts(result.program, source),
+        ("control and form", f"{form.table.name}, {form.name}" + (f", {form.machine.name}" if form.machine else "")),
+        *_settings_facts(settings),
+        *_limit_facts(limits, form.machine),
+    ]
+    notes = [f"{finding.severity}, line {finding.line}: {finding.text}" for finding in result.findings[:_MOST_NOTES]]
+
+    def sentence(seconds: Mapping[str, float]) -> str:
+        both = (seconds["direct"], seconds["written"]) if {"direct", "written"} <= set(seconds) else None
+        return verdict(contents, both)
+
+    kept = None if result.verification is None else result.verification.passed
+    return _page(subject, Story(result.program.source.name, "", kept, facts, notes), sentence)
+
+
+def read_written(result: Result, frame: Frame | None = None) -> NcProgram:
+    """Read the text of a run of `postprocess`; one that went to a stream is made once more, with the same frame."""
+    form, settings = result.form, result.smoothed.settings
+    text: bytes | str
+    if result.path is None:
+        stream = io.BytesIO()
+        write(result.smoothed, stream, form=form, frame=frame)
+        text = stream.getvalue()
+    else:
+        text = result.path
+    return read_nc(
+        text,
+        control=form.table.dialect,
+        machine=form.machine if form.rotary else None,
+        tcp=form.orientation != "machine",
+        tolerance=settings.verified_tolerance,
+        axis_length=settings.axis_length,
+    )
+
+
+def verified_page(
+    program: Program,
+    nc: NcProgram,
+    found: Verification,
+    *,
+    source: bytes = b"",
+    limits: Limits | None = None,
+    machine: Machine | None = None,
+    tool: Tool | None = None,
+    surface: SurfaceMap | None = None,
+) -> str:
+    """Page of a text that somebody wrote, measured against its CL file; with a map of the surface if there is one."""
+    settings = Settings(tolerance=found.tolerance, axis_length=found.axis_length)
+    limits = Limits() if limits is None else limits
+    subject = Subject(
+        program=program,
+        nc=nc,
+        settings=settings,
+        verification=found,
+        limits=limits,
+        machine=machine,
+        tool=tool if surface is None else surface.tool,
+        surface=surface,
+    )
+    facts = [
+        *_input_facts(program, source),
+        ("tolerance ε", f"{found.tolerance:g} mm"),
+        ("axis length H", f"{found.axis_length:g} mm"),
+        *_measured_facts(found),
+        *_limit_facts(limits, machine),
+    ]
+    text = kept_text(found.to_dict())
+    if surface is not None:
+        text += "; " + surface_text(surface)
+        facts[-1:-1] = [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]
+    notes = [f"CL line {item.cl_line}, NC line {item.nc_line}: {item.text}" for item in found.problems[:_MOST_NOTES]]
+
+    def sentence(seconds: Mapping[str, float]) -> str:
+        timed = {"direct", "written"} <= set(seconds) and surface is None
+        return text + (f"; {saving_text(seconds['direct'], seconds['written'])}" if timed else "")
+
+    return _page(subject, Story(program.source.name, "", found.passed, facts, notes), sentence)
+
+
+def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None = None) -> str:
+    """Page of planned times; the written path is that of dense lines for FANUC."""
+    from cornersmooth.pipeline import smooth
+
+    program, form = compared.program, choose_form()
+    smoothed = smooth(program, compared.settings, form=form)
+    stream = io.BytesIO()
+    write(smoothed, stream, form=form)
+    settings = smoothed.settings
+    tolerance, height = settings.verified_tolerance, settings.axis_length
+    nc = read_nc(stream.getvalue(), tolerance=tolerance, axis_length=height)
+    method = settings.method
+    laws = {"direct": compared.laws["direct_velocity_jump"], "local": compared.laws[method]}
+    subject = Subject(
+        program=program,
+        nc=nc,
+        settings=settings,
+        verification=verify(program, nc, tolerance=tolerance, axis_length=height),
+        smoothed=smoothed,
+        laws=laws,
+        limits=compared.limits,
+        machine=compared.machine,
+        tool=tool,
+    )
+    facts = [
+        *_input_facts(program, source),
+        *_settings_facts(settings),
+        *((f"time, {name.replace('_', ' ')}", f"{law.total:.3f} s") for name, law in compared.laws.items()),
+        *_limit_facts(compared.limits, compared.machine),
+    ]
+    methods = [name for name in compared.laws if not name.startswith("direct")]
+    text = times_text(compared.seconds, methods)
+    kept = None if subject.verification is None else subject.verification.passed
+    return _page(subject, Story(program.source.name, text, kept, facts), lambda seconds: text)
+
+
+#: findings or problems that are told as notes
+_MOST_NOTES = 50
+
+
+def surface_text(surface: SurfaceMap) -> str:
+    """What is cut too much and what is left, in words."""
+    told = surface.as_dict()
+    over, under = told["overcut"]["max_mm"], told["undercut"]["max_mm"]
+    within = told["within_tolerance_percent"]
+    share = "" if within is None else f"; {within:.4g} % of {told['points']:,} points within {surface.tolerance:g} mm"
+    return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}"
+
+
+def _page(subject: Subject, story: Story, sentence: Any) -> str:
+    meta, pack = scene(subject, story)
+    meta["verdict"] = sentence(meta["totals"])
+    return document(meta, pack)
+
+
+def _input_facts(program: Program, source: bytes) -> list[tuple[str, str]]:
+    given = program.source
+    facts = [("CL file", f"{given.name}: {given.dialect}, {len(program):,} poses, {program.units}")]
+    return facts + ([("SHA-256 of the CL file", hashlib.sha256(source).hexdigest())] if source else [])
+
+
+def _settings_facts(settings: Settings) -> list[tuple[str, str]]:
+    return [
+        ("tolerance ε", f"{settings.tolerance:g} mm"),
+        ("axis length H", f"{settings.axis_length:g} mm"),
+        ("method", f"{settings.method}, shape {settings.shape}, allocation {settings.allocation}"),
+        ("reversals", f"sharp above {settings.reversal_angle:g}°"),
+    ]
+
+
+def _measured_facts(found: Verification) -> list[tuple[str, str]]:
+    return [
+        ("tip, largest", f"{found.tip.value:.6g} mm at CL line {found.tip.cl_line}"),
+        ("axis point, largest", f"{found.axis_point.value:.6g} mm at CL line {found.axis_point.cl_line}"),
+        ("tool axis, largest", f"{found.orientation.value:.4g}° at CL line {found.orientation.cl_line}"),
+        ("blocks", f"{found.blocks:,}"),
+    ]
+
+
+def _limit_facts(limits: Limits, machine: Machine | None) -> list[tuple[str, str]]:
+    from cornersmooth import __version__
+
+    feed = "as programmed" if limits.feed is None else f"{limits.feed:g} mm/min"
+    bundled = json.loads((files("cornersmooth.page") / "assets/vendor/versions.json").read_text(encoding="utf-8"))
+    return [
+        (
+            "planned with",
+            f"feed {feed}, {limits.accel:g} mm/s², {limits.jerk:g} mm/s³, period {1000.0 * limits.period:g} ms"
+            + (f", axes of {machine.name}" if machine is not None and machine.dynamics else ""),
+        ),
+        ("made by", f"cornersmooth {__version__}, three.js {bundled['three']}, uPlot {bundled['uplot']}"),
+    ]

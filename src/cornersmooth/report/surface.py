@@ -1,0 +1,120 @@
+"""The machined surface as text, JSON, CSV and picture."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from cornersmooth.page.thinning import thinned
+from cornersmooth.report.picture import new_figure, saved
+from cornersmooth.surface import SurfaceMap
+
+CSV_COLUMNS = ("cl_line", "station", "level", "side", "x", "y", "z", "nx", "ny", "nz", "off_mm")
+
+#: rows of CSV text made at a time
+_BLOCK = 10_000
+
+#: width of the longest bar of the histogram on a terminal, and its classes
+_BAR, _CLASSES = 40, 20
+
+#: from overcut to undercut, as on the page; grey between, so that the surface shows on white
+_COLOURS = ("#a63603", "#d9540d", "#f08a3c", "#eebb88", "#c9c9c9", "#9ecae1", "#5fa8d3", "#2f7fbb", "#08519c")
+
+#: points drawn
+_POINTS = 30_000
+
+
+def surface_json(surface: SurfaceMap) -> str:
+    """One JSON object with a final line end."""
+    return json.dumps(surface.as_dict(), indent=1, allow_nan=False) + "\n"
+
+
+def surface_csv(surface: SurfaceMap) -> Iterator[str]:
+    """Header, then a row for every point, in blocks of text. Lengths are mm; overcut is negative, unknown is empty."""
+    yield ",".join(CSV_COLUMNS) + "\n"
+    points = surface.points
+    for begin in range(0, len(surface), _BLOCK):
+        part = slice(begin, begin + _BLOCK)
+        columns = (
+            *(points.line[part].tolist(), points.station[part].tolist(), points.level[part].tolist()),
+            np.where(points.side[part] == 0, "left", "right").tolist(),
+            *points.point[part].T.tolist(),
+            *points.normal[part].T.tolist(),
+            surface.off[part].tolist(),
+        )
+        yield "".join(
+            f"{line},{station},{level},{side},{x:.6f},{y:.6f},{z:.6f},{i:.7f},{j:.7f},{k:.7f},"
+            + ("" if off != off else f"{off:.7f}")
+            + "\n"
+            for line, station, level, side, x, y, z, i, j, k, off in zip(*columns, strict=True)
+        )
+
+
+def surface_lines(surface: SurfaceMap) -> Iterator[str]:
+    """Table and histogram to read."""
+    told = surface.as_dict()
+    yield f"{'tool':<18}{surface.tool.describe()}, cutting edge {surface.edge:g} mm"
+    yield f"{'points':<18}{told['points']:,}; {told['points_cut_away_elsewhere']:,} more are cut away by other moves"
+    if told["points_beyond_reach"]:
+        yield f"{'not reached':<18}{told['points_beyond_reach']:,} points, farther off than {surface.reach:g} mm"
+    for name in ("overcut", "undercut"):
+        own = told[name]
+        where = f" at CL line {own['cl_line']}" if own["cl_line"] else ""
+        yield (
+            f"{name:<18}largest {own['max_mm']:.6f} mm{where}, 95 % within {own['percentile_95_mm']:.6f} mm, "
+            f"mean {own['mean_mm']:.6f} mm, {own['points']:,} points"
+        )
+    if told["rms_mm"] is not None:
+        yield f"{'all':<18}mean {told['mean_mm']:.6f} mm, root mean square {told['rms_mm']:.6f} mm"
+        yield f"{'within':<18}{told['within_tolerance_percent']:.4g} % within the tolerance of {surface.tolerance:g} mm"
+        yield ""
+        yield from _histogram(surface)
+
+
+def _histogram(surface: SurfaceMap) -> Iterator[str]:
+    off = surface.off[surface.known]
+    span = float(np.abs(off).max(initial=0.0)) or surface.tolerance
+    counts, edges = np.histogram(off, bins=_CLASSES, range=(-span, span))
+    most = max(int(counts.max(initial=0)), 1)
+    for count, low, high in zip(counts.tolist(), edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        bar = "#" * -(-count * _BAR // most)
+        yield f"{low:>10.5f} to {high:>9.5f} mm {count:>8}  {bar}".rstrip()
+
+
+def draw_surface(surface: SurfaceMap, form: str) -> bytes:
+    """Picture: map of the surface above, histogram below, overcut in orange and undercut in blue.
+
+    Raises
+    ------
+    SettingsError
+        CS262: matplotlib is not installed.
+    """
+    figure = new_figure(8.0, 9.0)
+    from matplotlib.colors import LinearSegmentedColormap
+
+    known = np.flatnonzero(surface.known)
+    off, point = surface.off[known], surface.points.point[known]
+    span = float(np.abs(off).max(initial=0.0)) or surface.tolerance
+    rows = thinned(point, np.abs(off), np.zeros(len(off), np.bool_), _POINTS)
+    colours = LinearSegmentedColormap.from_list("overcut", _COLOURS)
+    above, below = figure.subfigures(2, 1, height_ratios=(2.0, 1.0))
+    view: Any = above.add_subplot(projection="3d")
+    drawn = view.scatter(*point[rows].T, c=off[rows], s=3.0, cmap=colours, vmin=-span, vmax=span)
+    view.set_aspect("equal")
+    for name in "xyz":
+        getattr(view, f"set_{name}label")(f"{name}, mm")
+    above.colorbar(drawn, ax=view, shrink=0.6, label="overcut (−) and undercut (+), mm")
+    graph: Any = below.subplots()
+    edges, counts = surface.histogram()
+    sides = np.where(edges[:-1] + edges[1:] < 0.0, _COLOURS[1], _COLOURS[-2])
+    graph.bar(edges[:-1], counts, width=np.diff(edges), align="edge", color=sides.tolist())
+    for limit in (-surface.tolerance, surface.tolerance):
+        graph.axvline(limit, color="black", linestyle="--", linewidth=0.8)
+    graph.set_xlabel("overcut (−) and undercut (+), mm")
+    graph.set_ylabel("points")
+    graph.set_yscale("log")
+    graph.grid(visible=True, linewidth=0.3)
+    return saved(figure, form)

@@ -1,0 +1,102 @@
+"""The outcome in one sentence, in the same words on the terminal and on the page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cornersmooth.model import Corners, SmoothProgram, Status
+from cornersmooth.report.corners import corner_table
+
+#: sharp corners that a report lists
+_LISTED = 100
+
+#: degrees below which the tip goes straight on
+_STRAIGHT_ON = 1.0
+
+#: what is no corner of the path: it turns by less than shows, or repeats a pose
+_IDLE = (Status.STRAIGHT, Status.DUPLICATE)
+
+
+def sharp_count(corners: Corners) -> int:
+    """Number of corners that stay as they are although the path turns."""
+    return int(np.count_nonzero(~corners.smoothed & ~np.isin(corners.status, _IDLE)))
+
+
+def sharp_corners(smoothed: SmoothProgram) -> list[dict[str, Any]]:
+    """The first of the corners that stay sharp, in path order: CL line, reason, turn.
+
+    The turn is that of the tip path, or of the axis-point path where the tip goes straight on.
+    """
+    corners = smoothed.corners
+    rows = np.flatnonzero(~corners.smoothed & ~np.isin(corners.status, _IDLE))[:_LISTED]
+    table = corner_table(smoothed, rows)
+    tip, axis = np.asarray(table["tip_angle_deg"], np.float64), np.asarray(table["axis_angle_deg"], np.float64)
+    turn = np.where(tip < _STRAIGHT_ON, axis, tip)
+    columns = table["line"].tolist(), table["status"].tolist(), turn.tolist()
+    return [
+        {"line": line, "status": status, "turn_deg": degrees} for line, status, degrees in zip(*columns, strict=True)
+    ]
+
+
+def sharp_text(corner: Mapping[str, Any]) -> str:
+    """One sharp corner in words: ``:387 reversal 176°``."""
+    return f":{corner['line']} {corner['status'].replace('_', ' ')} {corner['turn_deg']:.0f}°"
+
+
+def verdict(contents: Mapping[str, Any], seconds: tuple[float, float] | None = None) -> str:
+    """Say how it went.
+
+    Parameters
+    ----------
+    contents : mapping
+        The report.
+    seconds : (float, float), optional
+        Planned times of the direct path and of the written one.
+    """
+    found, unverified = contents.get("verification"), contents.get("not_verified", "")
+    parts = ["NOT VERIFIED" + (f": {unverified}" if unverified else "")] if found is None else [kept_text(found)]
+    if found is not None and unverified:
+        parts.append(f"not verified: {unverified}")
+    count = contents["summary"]["sharp"]
+    if count:
+        stay = "corner stays" if count == 1 else "corners stay"
+        parts.append(f"{count:,} {stay} sharp, first {sharp_text(contents['sharp'][0])}")
+    else:
+        parts.append("no corner stays sharp")
+    if seconds is not None:
+        parts.append(saving_text(*seconds))
+    return "; ".join(parts)
+
+
+def kept_text(found: Mapping[str, Any]) -> str:
+    """Say whether the promise is kept, from what verification found (`Verification.to_dict`)."""
+    if found["passed"]:
+        return f"OK: within {found['tolerance_mm']:g} mm everywhere"
+    count, problems = found["problem_count"], found["problems"]
+    text = f"BROKEN: {count:,} {'problem' if count == 1 else 'problems'}"
+    if problems:
+        first = problems[0]
+        line = f" in NC line {first['nc_line']}" if first["nc_line"] else ""
+        text += f", first{line}: {first['text']}"
+    return text
+
+
+def saving_text(direct: float, written: float) -> str:
+    """Say what smoothing saves of the time of the direct path, s."""
+    saved = direct - written
+    if abs(saved) < 0.05:
+        return f"takes {written:.1f} s as the direct path does"
+    return f"saves {saved:.1f} s of {direct:.1f} s" if saved > 0.0 else f"takes {-saved:.1f} s more than {direct:.1f} s"
+
+
+def times_text(seconds: Mapping[str, float], names: Sequence[str]) -> str:
+    """Say what the methods save, from the planned times of `feedrate.Comparison`; methods are `names`."""
+    stops, jumps = seconds["direct_exact_stop"], seconds["direct_velocity_jump"]
+    best = min(names, key=lambda name: seconds[name])
+    return (
+        f"{best} takes {seconds[best]:.1f} s; the direct path {jumps:.1f} s with jumps of velocity at its corners, "
+        f"{stops:.1f} s with stops"
+    )
