@@ -19,7 +19,7 @@ NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 #: bytes at the end of a chunk in which the begin of a block is looked for first
 _TAIL: Final = 1 << 16
 
-_HEAD: Final = re.compile(r"\s*(/\d?)?\s*")
+_HEAD: Final = re.compile(r"[ \t]*(/\d?)?[ \t]*")
 
 
 class Lexer:
@@ -30,7 +30,7 @@ class Lexer:
     #: what the machine does not read
     comment: re.Pattern[str]
     #: the number of a block, before its words
-    block_number = re.compile(r"N\s*(\d+)\s*")
+    block_number = re.compile(r"N[ \t]*(\d+)[ \t]*")
     #: numbers that differ from block to block: those with a point
     measure = re.compile(rb"(?<![G.\d])[-+]?(?:\d+\.\d*|\.\d+)")
     #: what a line begins with that can begin a curve, behind a line end
@@ -46,17 +46,19 @@ class Lexer:
         InputError
             CS501 where it is not made of words.
         """
+        text = text.removesuffix(b"\n").removesuffix(b"\r")
         line = text.decode("latin-1")
-        comments = tuple(next(filter(None, match.groups()), "").strip() for match in self.comment.finditer(line))
-        rest = self.comment.sub(lambda match: " " * len(match[0]), text.upper().decode("latin-1")).rstrip()
+        comments = tuple(next(filter(None, match.groups()), "").strip(" \t") for match in self.comment.finditer(line))
+        rest = self.comment.sub(lambda match: " " * len(match[0]), text.upper().decode("latin-1")).rstrip(" \t")
         head = _HEAD.match(rest)
         place = head.end() if head else 0
         block_number = None
         if found := self.block_number.match(rest, place):
             block_number = Word("N", float(found[1]), found[0].strip(), *found.span(1))
             place = found.end()
-        words = self.words(rest, place, number, name)
-        return Line(number, tuple(words), comments, block_number, bool(head and head[1]))
+        tape = rest[place:] == "%"
+        words = [] if tape else self.words(rest, place, number, name)
+        return Line(number, tuple(words), comments, block_number, bool(head and head[1]), tape)
 
     def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
         """Words of a line from a place on; raises CS501."""

@@ -98,6 +98,8 @@ class Line:
     block_number : Word or None
     skipped : bool
         Whether a slash stands before the block: the operator chooses whether it is executed.
+    tape : bool
+        Whether it is a bare ``%``.
     """
 
     number: int
@@ -105,6 +107,7 @@ class Line:
     comments: tuple[str, ...] = ()
     block_number: Word | None = None
     skipped: bool = False
+    tape: bool = False
 
 
 def table_of(rows: list[tuple[int, dict[str, float]]]) -> Table:

@@ -135,7 +135,7 @@ class _KlartextLexer(Lexer):
         rf"|(?P<rapid>F ?MAX\b)|(?P<turn>DR[-+])|(?P<side>R[0LR])(?!\w)|(?P<letter>[A-Z])(?P<value>{NUMBER})"
     )
     comment = re.compile(r";(.*)$")
-    block_number = re.compile(r"(\d+)(?:\s+|$)")
+    block_number = re.compile(r"(\d+)(?:[ \t]+|$)")
     measure = re.compile(rb"(?<=K\d[A-Z])[-+]?(?:\d+\.\d*|\.\d+)E[-+]?\d+|(?<![.\d])[-+]?(?:\d+\.\d*|\.\d+)(?![.\dE])")
 
     def __init__(self, rotary: str) -> None:
@@ -146,16 +146,15 @@ class _KlartextLexer(Lexer):
 
     def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
         """Words of a line from a place on, or the whole block as one; raises CS501."""
-        rest = rest.rstrip()
         head = rest[place:].partition(" ")[0]
-        if head in ("", "%"):
+        if not head:
             return []
         heads = {"C": "circle", "CC": "centre"} | dict(zip(_PATHS, _PATHS, strict=True))
         if head in heads:
             tail = place + len(head)
             tail += len(rest[tail:]) - len(rest[tail:].lstrip())
             return [Word(heads[head], 0.0, head), *super().words(rest, tail, number, name)]
-        if not re.match(rf"[A-Z]{NUMBER}(?:\s|$)", rest[place:]):
+        if not re.match(rf"[A-Z]{NUMBER}(?:[ \t]|$)", rest[place:]):
             return [Word("block", 0.0, " ".join(rest[place:].split()))]
         return super().words(rest, place, number, name)
 

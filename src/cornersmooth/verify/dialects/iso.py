@@ -152,7 +152,7 @@ class _IsoLexer(Lexer):
         Addresses of the rotary axes; empty without a machine.
     """
 
-    word = re.compile(rf"([A-Z])\s*({NUMBER})|(<[^>]*>)")
+    word = re.compile(rf"([A-Z])[ \t]*({NUMBER})|(<[^>]*>)")
     comment = re.compile(r"\(([^)]*)\)|;(.*)$")
     begins = re.compile(rb"\n[ /]*(?:N\d+ *)?G")
 
@@ -161,10 +161,6 @@ class _IsoLexer(Lexer):
         # beside rotary words K is a knot, and I J stand on arcs only
         self.letters = frozenset("GXYZFRPIJK" + (rotary or "UVW"))
         self.places = frozenset("XYZK" + (rotary or "IJUVW"))
-
-    def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
-        """Words of a line from a place on; raises CS501."""
-        return [] if rest[place:] == "%" else super().words(rest, place, number, name)
 
     def named(self, match: re.Match[str]) -> list[Word]:
         """Word of one letter."""

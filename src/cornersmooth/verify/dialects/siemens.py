@@ -34,8 +34,8 @@ _SILENT_CODES |= frozenset(map(float, (153, 601, 602, 641, 642, 643, 644, 645)))
 _ORIENTATIONS = ("ORIVECT", "ORIPLANE", "ORICURVE", "ORIAXES")
 _CODES = (0.0, 1.0, 2.0, 3.0)
 
-#: degree of a BSPLINE
-SPLINE_DEGREE: Final = 3.0
+#: a BSPLINE says its degree, which is 3
+_DEGREES: Final = ((None, False), (3.0, True))
 
 #: words that say what kind a block is, with the code that stands for it
 _KINDS: Final = {"POLY": POLY, "BSPLINE": BSPLINE, "SD": None}
@@ -124,10 +124,10 @@ class _SiemensLexer(Lexer):
     """
 
     word = re.compile(
-        r"PO\[(?P<po>\w+)\]=\((?P<factors>[-+.\d,\s]+)\)"
-        rf"|(?P<name>[A-Z][A-Z]?\d?|SPOS)\s*=\s*(?P<given>{NUMBER})"
-        rf"|(?P<letter>[A-Z])\s*(?P<value>{NUMBER})(?!=)"
-        r"|(?P<call>[A-Z_][A-Z_0-9]*)\s*(?:\([^()]*\))?"
+        r"PO\[(?P<po>\w+)\]=\((?P<factors>[-+.\d, \t]+)\)"
+        rf"|(?P<name>[A-Z][A-Z]?\d?|SPOS)[ \t]*=[ \t]*(?P<given>{NUMBER})"
+        rf"|(?P<letter>[A-Z])[ \t]*(?P<value>{NUMBER})(?!=)"
+        r"|(?P<call>[A-Z_][A-Z_0-9]*)[ \t]*(?:\([^()]*\))?"
     )
     comment = re.compile(r";(.*)$")
     begins = re.compile(rb"\n[ /]*(?:N\d+ *)?(?:G|BSPLINE|POLY)")
@@ -162,7 +162,8 @@ class _SiemensLexer(Lexer):
         if not given.keys() <= self._names | second or not given.keys() & self.places:
             return None
         kinds = given.keys() & {"G", "POLY", "BSPLINE"}
-        if code not in (None, *_CODES) or len(kinds) > 1 or ("SD" in given and given["SD"].value != SPLINE_DEGREE):
+        degree = given["SD"].value if "SD" in given else None
+        if code not in (None, *_CODES) or len(kinds) > 1 or (degree, "BSPLINE" in given) not in _DEGREES:
             return None
         if "POLY" not in given and any(name[-1] in "23" for name in given):
             return None

@@ -1,0 +1,353 @@
+"""Words that are not on the control's list, or not in their place; states that the program never establishes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.errors import InputError
+from cornersmooth.verify.lexer import Lexer
+from cornersmooth.verify.ncprogram import Problem
+from cornersmooth.verify.word_list import WordList, WordRule, word_list
+from cornersmooth.verify.words import Line, Table, Word
+
+#: code of words that are not on the list or not in their place, and of what is not established
+NOT_LISTED: Final = "CS561"
+NOT_ESTABLISHED: Final = "CS562"
+
+#: words of positions along the linear axes: with them a block is a motion that the states count for
+_LINEAR: Final = frozenset("XYZ")
+
+#: words of which a block may have one
+_MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "BSPLINE", "POLY"))
+
+#: a weight that fewer than so many of all have is a mistake: a construction gives all its curves the same
+_SELDOM: Final = 0.15
+
+_WEIGHTS: Final = ("PW", "R")
+_CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
+
+
+class WordCheck:
+    """Looks at all blocks of a text in order.
+
+    Parameters
+    ----------
+    control : str
+    lexer : Lexer
+    tolerance : float
+        ε in units of the text.
+    trusted : iterable of str
+        Blocks that belong where they stand because the user says so.
+    """
+
+    def __init__(self, control: str, lexer: Lexer, tolerance: float, trusted: Iterable[str] = ()) -> None:
+        self.list: WordList = word_list(control)
+        self.lexer, self.tolerance = lexer, tolerance
+        self.problems: list[Problem] = []
+        #: blocks taken on trust: line and text
+        self.trusted: list[tuple[int, str]] = []
+        self._own = {_text(words) for words in map(self._words_of, trusted) if words}
+        self._blocks = 0
+        self._begun = 0
+        self._tail: list[tuple[int, str]] = []
+        self._state: dict[str, tuple[str, int]] = {}
+        self._first: dict[str, str] | None = None
+        self._complained: set[tuple[str, int]] = set()
+        self._changed = True
+        self._said: set[str] = set()
+        self._before = ""
+        self._then: tuple[WordRule, int] | None = None
+        self._retract = 0
+        self._arc: tuple[str, int] | None = None
+        self._code = -1.0
+        self._weights: dict[float, tuple[int, int]] = {}
+        self._line = 0
+
+    def watch(self, items: Iterable[Table | Line]) -> Iterator[Table | Line]:
+        """Give on what the lines say, looked at; what is wrong stands in `problems` when all is read."""
+        for item in items:
+            if isinstance(item, Table):
+                self._table(item)
+            else:
+                self._block(item)
+            yield item
+        self._end()
+
+    def _words_of(self, text: str) -> list[str]:
+        try:
+            line = self.lexer.line(text.encode("latin-1", "replace"), 0, None)
+        except InputError:  # no words: the reader will say so where it meets them
+            return []
+        return [said(word) for word in line.words]
+
+    def _wrong(self, line: int, text: str, code: str = NOT_LISTED) -> None:
+        self.problems.append(Problem(code, 0, line, text))
+
+    def _table(self, table: Table) -> None:
+        """Look at a run of motion blocks: its words are those of motion, and no others."""
+        self._start(int(table.line[0]), "")
+        self._blocks += len(table)
+        self._line = int(table.line[-1])
+        self._next_block("", int(table.line[0]))
+        codes = table.column("G")
+        known = np.flatnonzero(~np.isnan(codes))
+        for name in _WEIGHTS:
+            if name in table.columns:
+                self._count_weights(table, name, codes)
+        linear = ~np.all([np.isnan(table.column(name)) for name in sorted(_LINEAR)], axis=0)
+        if (self._changed or self._retract or self._arc) and linear.any():
+            row = int(np.argmax(linear))
+            given = known[known <= row]
+            self._moved(int(table.line[row]), float(codes[given[-1]]) if len(given) else self._code)
+        if len(known):
+            self._code = float(codes[known[-1]])
+
+    def _count_weights(self, table: Table, name: str, codes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+        column = table.columns[name]
+        rows = np.flatnonzero(~np.isnan(column) & ~np.isin(codes, (2.0, 3.0)))
+        values, first, count = np.unique(column[rows], return_index=True, return_counts=True)
+        for value, row, many in zip(values.tolist(), first.tolist(), count.tolist(), strict=True):
+            before, line = self._weights.get(value, (0, int(table.line[rows[row]])))
+            self._weights[value] = (before + many, line)
+
+    def _block(self, line: Line) -> None:
+        """Look at a line on its own."""
+        for comment in line.comments:
+            if self.list.orders is not None and self.list.orders.match(comment):
+                self._wrong(line.number, f"a comment that the control obeys: {comment[:40]}")
+            if _CONTROL_CHARACTERS.search(comment):
+                self._wrong(line.number, "a comment with a character that ends a block or is none")
+        if not line.words and not line.tape:
+            if line.skipped:
+                self._wrong(line.number, "block skip: what the control does depends on a switch")
+            return
+        words = [said(word) for word in line.words] or ["%"]
+        text = _text(words)
+        self._line = line.number
+        if text in self._own:
+            self.trusted.append((line.number, text))
+            self._note(line, words)
+            return
+        if line.skipped:
+            self._wrong(line.number, "block skip: what the control does depends on a switch")
+        if not self._start(line.number, text):
+            rules = self._rules(line.number, words, text)
+            before = self._next_block(text, line.number)
+            self._places(line, words, rules, before)
+            self._states(line.number, words, rules)
+            self._said |= set(words)
+        self._blocks += 1
+        self._note(line, words)
+
+    def _note(self, line: Line, words: list[str]) -> None:
+        """Keep the motion of a block on its own."""
+        codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
+        self._code = codes[-1] if codes else self._code
+        retract = any(rule.retract and rule.pattern.fullmatch(_text(words)) for rule in self.list.blocks)
+        if not retract and any(word.name in _LINEAR for word in line.words):
+            self._moved(line.number, self._code)
+
+    # the frame of the program
+
+    def _start(self, number: int, text: str) -> bool:
+        """Whether a block is one that begins or ends the program, where it belongs."""
+        if self._begun < len(self.list.begin):
+            wanted = self.list.begin[self._begun :]
+            place = next((k for k, pattern in enumerate(wanted) if pattern.fullmatch(text)), None)
+            if place != 0:
+                self._wrong(number, f"the program must begin with {_shown(wanted[0])}")
+            if place is None:
+                self._begun = len(self.list.begin)
+            else:
+                self._begun += place + 1
+                return True
+        if any(pattern.fullmatch(text) for pattern in self.list.end):
+            self._tail.append((number, text))
+            return True
+        for line, ending in self._tail:
+            self._wrong(line, f"{ending} ends the program, and more follows")
+        self._tail = []
+        return False
+
+    def _end(self) -> None:
+        """Look at what holds when all is read."""
+        texts = [text for _, text in self._tail]
+        whole = len(texts) == len(self.list.end) and all(
+            pattern.fullmatch(text) for pattern, text in zip(self.list.end, texts, strict=True)
+        )
+        if not whole:
+            wanted = ", ".join(map(_shown, self.list.end))
+            self._wrong(self._tail[0][0] if self._tail else self._line, f"the program must end with {wanted}, once")
+        last = self._tail[0][0] if self._tail else self._line
+        off = {rule.state for rule in self.list.words if rule.off}
+        for state in sorted(off & self._state.keys()):
+            word, _ = self._state[state]
+            if not self._is_off(state, word):
+                self._wrong(last, f"{state}: {word} still holds at the end", NOT_ESTABLISHED)
+        total = sum(count for count, _ in self._weights.values())
+        for value, (count, line) in self._weights.items():
+            if count < _SELDOM * total:
+                self._wrong(line, f"a weight of {value:g} on a curve, where all others have other weights")
+
+    def _is_off(self, state: str, word: str) -> bool:
+        return any(rule.state == state and rule.off and rule.pattern.fullmatch(word) for rule in self.list.words)
+
+    # the words of a block
+
+    def _rules(self, number: int, words: list[str], text: str) -> list[WordRule | None]:
+        """Rule of every word; complains of words that are not on the list."""
+        whole = next((rule for rule in self.list.blocks if rule.pattern.fullmatch(text)), None)
+        if whole is not None:
+            return [whole]
+        rules: list[WordRule | None] = []
+        for k, word in enumerate(words):
+            others = [*words[:k], *words[k + 1 :]]
+            fitting = [rule for rule in self.list.words if rule.pattern.fullmatch(word)]
+            never = bool(fitting) and fitting[0].never
+            beside = [rule for rule in fitting if rule.needs is not None and _any(rule.needs, others)]
+            plain = [rule for rule in fitting if rule.needs is None]
+            rule = None if never else next(iter(beside + plain), None)
+            if never or not fitting:
+                self._wrong(number, f"{word} is not on the list of words for this control")
+            elif rule is None:
+                self._wrong(number, f"{word} stands beside nothing that it belongs to")
+            elif self._without_point(word):
+                self._wrong(number, f"{word} without a decimal point: the control may count it in its least increment")
+            rules.append(rule)
+        return rules
+
+    def _without_point(self, word: str) -> bool:
+        return word[0] in self.list.points and "." not in word and word[1:2] != "" and word[1:].lstrip("-+").isdigit()
+
+    def _places(self, line: Line, words: list[str], rules: list[WordRule | None], before: str) -> None:
+        """Complain of words that are not in their place."""
+        number = line.number
+        names = [word.name for word in line.words if word.name not in "GM"]
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            self._wrong(number, f"{name} stands twice in one block")
+        if sum(word.name == "M" for word in line.words) > 1:
+            self._wrong(number, "two M words in one block")
+        if sum(word in _MOTION for word in words) > 1:
+            self._wrong(number, "two motions in one block")
+        states = [rule.state for rule in rules if rule is not None and rule.state]
+        if len(set(states)) < len(states):
+            self._wrong(number, "two words of one group in one block")
+        for k, rule in enumerate(rules):
+            if rule is None:
+                continue
+            others = [*words[:k], *words[k + 1 :]]
+            word = words[k] if len(rules) == len(words) else _text(words)
+            if rule.must is not None and not _any(rule.must, others):
+                self._wrong(number, f"{word} without {_shown(rule.must)}")
+            if rule.alone:
+                for other, theirs in zip(words, rules, strict=True):
+                    if other != word and not (theirs and theirs.needs and theirs.needs.fullmatch(word)):
+                        self._wrong(number, f"{other} in the block of {word}")
+            if rule.after is not None:
+                if not any(rule.after.fullmatch(said_before) for said_before in (*self._said, *others)):
+                    self._wrong(number, f"{word} without {_shown(rule.after)} before it")
+                self._said = {told for told in self._said if not rule.after.fullmatch(told)}
+            if rule.behind is not None and not rule.behind.fullmatch(before):
+                self._wrong(number, f"{word} does not follow what it belongs to")
+            if rule.share is not None:
+                match = rule.pattern.fullmatch(word)
+                if match and float(match[1]) > rule.share * self.tolerance * (1 + 1e-9) + 1e-5:
+                    self._wrong(number, f"{word} is more than {rule.share:g} of the tolerance")
+            if rule.then is not None:
+                self._then = (rule, number)
+            if rule.retract:
+                self._retract = number
+            if rule.after is not None or word.startswith("TOOL CALL "):
+                self._retract = 0
+
+    def _next_block(self, text: str, number: int) -> str:
+        """Look at whether the block before wanted this one; return it."""
+        if self._then is not None:
+            rule, line = self._then
+            if rule.then is not None and not rule.then.fullmatch(text):
+                self._wrong(line, f"{_shown(rule.pattern)} without {_shown(rule.then)} behind it")
+            self._then = None
+        before, self._before = self._before, text
+        return before
+
+    # states
+
+    def _states(self, number: int, words: list[str], rules: list[WordRule | None]) -> None:
+        """Take over what a block changes."""
+        if len(rules) != len(words):
+            return
+        for word, rule in zip(words, rules, strict=True):
+            if rule is None or not rule.state:
+                continue
+            beside = [
+                other
+                for other, theirs in zip(words, rules, strict=True)
+                if theirs and theirs.needs and theirs.needs.fullmatch(word) and not theirs.compared
+            ]
+            self._state[rule.state] = (" ".join([word, *beside]), number)
+            self._changed = True
+            if rule.before and self._first is not None and word != self._first.get(rule.state):
+                self._arc = (word, number)
+
+    def _moved(self, number: int, code: float) -> None:
+        """Look at what holds where the tool moves."""
+        self._changed = False
+        if self._first is None:
+            self._first = {state: word for state, (word, _) in self._state.items()}
+            for state, rules in self.list.heads().items():
+                spoken = {word for word in self._said if any(rule.pattern.fullmatch(word) for rule in rules)}
+                if not spoken:
+                    wanted = " or ".join(_shown(rule.pattern) for rule in rules)
+                    self._wrong(number, f"{state}: {wanted} must be said before the first motion", NOT_ESTABLISHED)
+            self._retract, self._arc = 0, None
+            return
+        if self._retract:
+            self._wrong(self._retract, "a retract that another motion of the same tool follows")
+            self._retract = 0
+        if self._arc is not None:
+            word, line = self._arc
+            if code not in (2.0, 3.0):
+                self._wrong(line, f"{word} where no arc follows")
+            self._arc = None
+        following = {rule.state for rule in self.list.words if rule.follows}
+        for state, (word, line) in self._state.items():
+            if state in following or word == self._first.get(state) or (state, line) in self._complained:
+                continue
+            self._complained.add((state, line))
+            before = self._first.get(state, "nothing")
+            self._wrong(line, f"{state}: {word} where {before} holds for the whole program")
+
+
+def said(word: Word) -> str:
+    """Text of a word as the list has it: blanks left out, codes without leading zeros."""
+    if word.name in ("G", "M") and word.text[:1] == word.name:
+        return f"{word.name}{word.value:g}"
+    return word.text if word.name == "block" else word.text.replace(" ", "").replace("\t", "")
+
+
+def _text(words: list[str]) -> str:
+    return " ".join(words)
+
+
+def _any(pattern: re.Pattern[str], words: list[str]) -> bool:
+    return any(pattern.fullmatch(word) for word in words)
+
+
+def _shown(pattern: re.Pattern[str]) -> str:
+    """Regular expression in the user's words."""
+    text = pattern.pattern
+    for old, new in _PLAIN:
+        text = text.replace(old, new)
+    return text
+
+
+_PLAIN: Final = (
+    *((old, "…") for old in (r"\d+", r"\d{1,8}", r"\d{1,5}", r"[\d.]+", r"\w+", ".*", "(\\.\\d*)?")),
+    (r"\.", "."),
+    ("(?:", "("),
+    ("|", " or "),
+)

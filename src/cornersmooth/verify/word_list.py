@@ -1,0 +1,121 @@
+"""The closed list of words of each control: what they are, what must hold before the tool moves, where they may stand.
+
+The lists are data, one TOML file for each control in `word_lists`, with the manual that they are from. Keys:
+
+``begin``, ``end``
+    Blocks, as regular expressions, that a program begins and ends with.
+``points``
+    Addresses whose numbers need their decimal point.
+``orders``
+    What a comment begins with that the control would obey.
+``[[word]]``
+    ``is``: the word, blanks left out. ``says``: what it means, for the documentation.
+
+    ``state``: what it changes. Where the tool moves, every state must be what it was at the first motion, but for those
+    that ``follows`` the CL file, which others compare. ``head``: one of these words must be said before the first
+    motion. ``off``: what must hold at the end of the program. ``compared``: others compare it with the CL file.
+
+    ``needs``: a word that must stand in the same block, of whose state it may say more. ``must``: the same, for a word
+    that is nothing without. ``alone``: no other words may stand beside it. ``before``: ``"arc"``. ``after``: a word
+    that must have been said since the last time. ``then``, ``behind``: the next block, the block before. ``share``:
+    what the number in brackets may be of the tolerance. ``never``: the control has no such word.
+``[[block]]``
+    A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but the approach of
+    another tool.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.resources import files
+from typing import Any, Final
+
+#: keys of a word that are regular expressions
+_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind"))
+
+
+@dataclass(frozen=True)
+class WordRule:
+    """What the list says of a word; the module says what the fields mean."""
+
+    pattern: re.Pattern[str]
+    says: str = ""
+    state: str = ""
+    head: bool = False
+    off: bool = False
+    follows: bool = False
+    compared: bool = False
+    needs: re.Pattern[str] | None = None
+    must: re.Pattern[str] | None = None
+    alone: bool = False
+    before: str = ""
+    after: re.Pattern[str] | None = None
+    then: re.Pattern[str] | None = None
+    behind: re.Pattern[str] | None = None
+    share: float | None = None
+    never: bool = False
+    retract: bool = False
+
+
+@dataclass(frozen=True)
+class WordList:
+    """The words of a control.
+
+    Parameters
+    ----------
+    begin, end : tuple of pattern
+    points : frozenset of str
+    orders : pattern or None
+    words, blocks : tuple of WordRule
+        What is the control's own comes first.
+    """
+
+    begin: tuple[re.Pattern[str], ...] = ()
+    end: tuple[re.Pattern[str], ...] = ()
+    points: frozenset[str] = frozenset()
+    orders: re.Pattern[str] | None = None
+    words: tuple[WordRule, ...] = ()
+    blocks: tuple[WordRule, ...] = field(default=())
+
+    def heads(self) -> dict[str, list[WordRule]]:
+        """Words of which one must be said before the first motion, by state."""
+        found: dict[str, list[WordRule]] = {}
+        for rule in self.words:
+            if rule.head and not any(self.shadows(other, rule) for other in self.words):
+                found.setdefault(rule.state, []).append(rule)
+        return found
+
+    def shadows(self, other: WordRule, rule: WordRule) -> bool:
+        """Whether a rule that stands before another is for the same words."""
+        same = other.pattern.pattern == rule.pattern.pattern and other.needs == rule.needs
+        return same and self.words.index(other) < self.words.index(rule)
+
+
+@cache
+def word_list(control: str) -> WordList:
+    """Words of a control."""
+    table = tomllib.loads(files(__package__).joinpath("word_lists", f"{control}.toml").read_text(encoding="utf-8"))
+    base = word_list(table["like"]) if "like" in table else WordList()
+    own: dict[str, Any] = {name: _patterns(table[name]) for name in ("begin", "end") if name in table}
+    if "points" in table:
+        own["points"] = frozenset(table["points"])
+    if "orders" in table:
+        own["orders"] = re.compile(table["orders"], re.IGNORECASE)
+    return replace(
+        base,
+        **own,
+        words=(*map(_rule, table.get("word", ())), *base.words),
+        blocks=(*map(_rule, table.get("block", ())), *base.blocks),
+    )
+
+
+def _patterns(texts: list[str]) -> tuple[re.Pattern[str], ...]:
+    return tuple(map(re.compile, texts))
+
+
+def _rule(entry: dict[str, Any]) -> WordRule:
+    values: dict[str, Any] = {key: re.compile(value) if key in _PATTERNS else value for key, value in entry.items()}
+    return WordRule(values.pop("is"), **values)
