@@ -20,6 +20,7 @@ from cornersmooth.cl import read
 from cornersmooth.errors import Finding, InputError, PromiseError
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
+from cornersmooth.nc.program_frame import blend_word
 from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
 from cornersmooth.report import report
 from cornersmooth.settings import Settings
@@ -192,6 +193,7 @@ def postprocess(
                 output.path,
                 tolerance=smoothed.settings.verified_tolerance,
                 axis_length=smoothed.settings.axis_length,
+                trusted=_users_blocks(frame, form, program, smoothed.settings),
                 processes=useful_processes() if processes is None else processes,
                 **back,
             )
@@ -228,6 +230,15 @@ def _remarks(program: Program, settings: Settings) -> Iterator[Finding]:
     extent = float(np.linalg.norm(np.ptp(program.tip[cuts | np.roll(cuts, -1)], axis=0)))
     if settings.tolerance > extent and np.ptp(program.axis[cuts], axis=0).max() == 0.0:
         yield Finding("CS182", "warning", 0, f"the tolerance {settings.tolerance:g} mm is larger than the whole path")
+
+
+def _users_blocks(frame: Frame | None, form: Form, program: Program, settings: Settings) -> list[str]:
+    """Blocks that the user wants before and behind the motion, as far as they are words: comments may be anything."""
+    if frame is None:
+        return []
+    units, blend = form.table.layout.units[program.units], blend_word(settings.tolerance / program.mm_per_unit)
+    texts = (*frame.header, *frame.footer)
+    return [text.replace("{units}", units).replace("{blend}", blend).replace("{program}", "") for text in texts]
 
 
 def _verified(verifier: Verifier, form: Form, frame: Frame | None) -> tuple[Verification | None, str]:

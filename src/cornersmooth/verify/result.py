@@ -67,6 +67,8 @@ class Verification:
     pose_angle : (n,) float64, degrees
     pose_nc_line : (n,) int64
         NC line that passes nearest.
+    trusted : tuple of (int, str)
+        NC lines, and blocks, whose meaning is taken on trust because the user put them there.
     """
 
     passed: bool
@@ -90,6 +92,7 @@ class Verification:
     pose_axis_point: Floats = field(repr=False)
     pose_angle: Floats = field(repr=False)
     pose_nc_line: Ints = field(repr=False)
+    trusted: tuple[tuple[int, str], ...] = ()
 
     @property
     def max_tip_deviation_mm(self) -> float:
@@ -128,6 +131,7 @@ class Verification:
             "elements": self.elements,
             "curves": self.curves,
             "problem_count": self.problem_count,
+            "trusted": [{"nc_line": line, "text": text} for line, text in self.trusted],
             **{key: _finite(where.value) for key, where in places.items()},
             "where": {key: {"cl_line": where.cl_line, "nc_line": where.nc_line} for key, where in places.items()},
             "problems": [

@@ -38,6 +38,7 @@ class Style:
 
     Parameters
     ----------
+    control : str
     dialect : Dialect
     machine : Machine or None
     tcp : bool
@@ -45,6 +46,7 @@ class Style:
         As in `read_nc`.
     """
 
+    control: str
     dialect: Dialect
     machine: Machine | None
     tcp: bool
@@ -63,7 +65,7 @@ class Style:
         dialect = dialect_of(control, "".join(machine.names) if machine is not None else "")
         if machine is None and not tcp:
             raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
-        return cls(dialect, machine, tcp, tolerance, axis_length)
+        return cls(control, dialect, machine, tcp, tolerance, axis_length)
 
     def steps(self, sample: bytes) -> Steps:
         """Printed digits, from the beginning of a text (`DIGITS_SAMPLE`)."""

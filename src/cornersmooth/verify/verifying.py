@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
@@ -28,6 +28,7 @@ from cornersmooth.verify.statements import asked, compare, said
 from cornersmooth.verify.style import DIGITS_SAMPLE, Style
 from cornersmooth.verify.task import Task
 from cornersmooth.verify.wide_search import way_apart
+from cornersmooth.verify.word_check import WordCheck
 from cornersmooth.verify.workers import Helper, can_fork, map_in_processes
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def verify(
     machine: Machine | None = None,
     tcp: bool = True,
     words: bool = True,
+    trusted: Sequence[str] = (),
     processes: int = 1,
 ) -> Verification:
     """Measure an NC text against the CL program it was made from.
@@ -65,7 +67,10 @@ def verify(
     control, machine, tcp
         As in `read_nc`.
     words : bool
-        Whether words beside the motion must say what the CL file asks for; not where nobody knows what they mean.
+        Whether words beside the motion must say what the CL file asks for, and be on the list of the control's words;
+        not where nobody knows what they mean.
+    trusted : sequence of str
+        Blocks that belong where they stand because the user put them there: what they do is taken on trust.
     processes : int
         Processes to work on long texts with, where the system can fork; the result does not depend on it.
 
@@ -95,6 +100,7 @@ def verify(
         machine=machine,
         tcp=tcp,
         words=words,
+        trusted=trusted,
         processes=processes,
     ) as verifier:
         return verifier.result()
@@ -125,10 +131,12 @@ class Verifier:
         machine: Machine | None = None,
         tcp: bool = True,
         words: bool = True,
+        trusted: Sequence[str] = (),
         processes: int = 1,
     ) -> None:
         _check_bounds(tolerance, axis_length)
         self._program, self._words, self._processes = program, words, processes
+        self._trusted = tuple(trusted)
         self._name = None if isinstance(nc, bytes) else str(nc)
         self._style = Style.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._source = Source(readable_twice(nc))
@@ -172,11 +180,16 @@ class Verifier:
             lever = float(rotary.levers(task.original.trail.tip).max(initial=0.0))
         reader = Reader(self._name, style, steps, lever)
         lines = read_lines(source.part(0, sys.maxsize), self._name, style.dialect.lexer)
-        text = _Text(reader.chunks(lines), reader.events)
-        measured = _measure(task, text, words=self._words, processes=self._processes)
-        return measured.verification(
-            reader.problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
+        check = WordCheck(
+            style.control, style.dialect.lexer, style.tolerance / self._program.mm_per_unit, self._trusted
         )
+        text = _Text(reader.chunks(check.watch(lines) if self._words else lines), reader.events)
+        measured = _measure(task, text, words=self._words, processes=self._processes)
+        problems = [*reader.problems, *check.problems]
+        found = measured.verification(
+            problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
+        )
+        return replace(found, trusted=tuple(check.trusted))
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from cornersmooth.verify.word_list import WordList, WordRule, word_list
 from cornersmooth.verify.words import Line, Table, Word
 
 #: code of words that are not on the list or not in their place, and of what is not established
-NOT_LISTED: Final = "CS561"
-NOT_ESTABLISHED: Final = "CS562"
+NOT_LISTED: Final = "CS571"
+NOT_ESTABLISHED: Final = "CS572"
 
 #: words of positions along the linear axes: with them a block is a motion that the states count for
 _LINEAR: Final = frozenset("XYZ")
@@ -84,7 +84,7 @@ class WordCheck:
             return []
         return [said(word) for word in line.words]
 
-    def _wrong(self, line: int, text: str, code: str = NOT_LISTED) -> None:
+    def _wrong(self, code: str, line: int, text: str) -> None:
         self.problems.append(Problem(code, 0, line, text))
 
     def _table(self, table: Table) -> None:
@@ -118,12 +118,12 @@ class WordCheck:
         """Look at a line on its own."""
         for comment in line.comments:
             if self.list.orders is not None and self.list.orders.match(comment):
-                self._wrong(line.number, f"a comment that the control obeys: {comment[:40]}")
+                self._wrong(NOT_LISTED, line.number, f"a comment that the control obeys: {comment[:40]}")
             if _CONTROL_CHARACTERS.search(comment):
-                self._wrong(line.number, "a comment with a character that ends a block or is none")
+                self._wrong(NOT_LISTED, line.number, "a comment with a character that ends a block or is none")
         if not line.words and not line.tape:
             if line.skipped:
-                self._wrong(line.number, "block skip: what the control does depends on a switch")
+                self._wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
             return
         words = [said(word) for word in line.words] or ["%"]
         text = _text(words)
@@ -133,7 +133,7 @@ class WordCheck:
             self._note(line, words)
             return
         if line.skipped:
-            self._wrong(line.number, "block skip: what the control does depends on a switch")
+            self._wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
         if not self._start(line.number, text):
             rules = self._rules(line.number, words, text)
             before = self._next_block(text, line.number)
@@ -147,8 +147,9 @@ class WordCheck:
         """Keep the motion of a block on its own."""
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
-        retract = any(rule.retract and rule.pattern.fullmatch(_text(words)) for rule in self.list.blocks)
-        if not retract and any(word.name in _LINEAR for word in line.words):
+        still = any(rule.retract and rule.pattern.fullmatch(_text(words)) for rule in self.list.blocks)
+        still |= any(rule.alone and _any(rule.pattern, words) for rule in self.list.words)
+        if not still and any(word.name in _LINEAR for word in line.words):
             self._moved(line.number, self._code)
 
     # the frame of the program
@@ -159,7 +160,7 @@ class WordCheck:
             wanted = self.list.begin[self._begun :]
             place = next((k for k, pattern in enumerate(wanted) if pattern.fullmatch(text)), None)
             if place != 0:
-                self._wrong(number, f"the program must begin with {_shown(wanted[0])}")
+                self._wrong(NOT_LISTED, number, f"the program must begin with {_shown(wanted[0])}")
             if place is None:
                 self._begun = len(self.list.begin)
             else:
@@ -169,7 +170,7 @@ class WordCheck:
             self._tail.append((number, text))
             return True
         for line, ending in self._tail:
-            self._wrong(line, f"{ending} ends the program, and more follows")
+            self._wrong(NOT_LISTED, line, f"{ending} ends the program, and more follows")
         self._tail = []
         return False
 
@@ -181,17 +182,19 @@ class WordCheck:
         )
         if not whole:
             wanted = ", ".join(map(_shown, self.list.end))
-            self._wrong(self._tail[0][0] if self._tail else self._line, f"the program must end with {wanted}, once")
+            self._wrong(
+                NOT_LISTED, self._tail[0][0] if self._tail else self._line, f"the program must end with {wanted}, once"
+            )
         last = self._tail[0][0] if self._tail else self._line
         off = {rule.state for rule in self.list.words if rule.off}
         for state in sorted(off & self._state.keys()):
             word, _ = self._state[state]
             if not self._is_off(state, word):
-                self._wrong(last, f"{state}: {word} still holds at the end", NOT_ESTABLISHED)
+                self._wrong(NOT_ESTABLISHED, last, f"{state}: {word} still holds at the end")
         total = sum(count for count, _ in self._weights.values())
         for value, (count, line) in self._weights.items():
             if count < _SELDOM * total:
-                self._wrong(line, f"a weight of {value:g} on a curve, where all others have other weights")
+                self._wrong(NOT_LISTED, line, f"a weight of {value:g} on a curve, where all others have other weights")
 
     def _is_off(self, state: str, word: str) -> bool:
         return any(rule.state == state and rule.off and rule.pattern.fullmatch(word) for rule in self.list.words)
@@ -212,11 +215,15 @@ class WordCheck:
             plain = [rule for rule in fitting if rule.needs is None]
             rule = None if never else next(iter(beside + plain), None)
             if never or not fitting:
-                self._wrong(number, f"{word} is not on the list of words for this control")
+                self._wrong(NOT_LISTED, number, f"{word} is not on the list of words for this control")
             elif rule is None:
-                self._wrong(number, f"{word} stands beside nothing that it belongs to")
+                self._wrong(NOT_LISTED, number, f"{word} stands beside nothing that it belongs to")
             elif self._without_point(word):
-                self._wrong(number, f"{word} without a decimal point: the control may count it in its least increment")
+                self._wrong(
+                    NOT_LISTED,
+                    number,
+                    f"{word} without a decimal point: the control may count it in its least increment",
+                )
             rules.append(rule)
         return rules
 
@@ -228,35 +235,36 @@ class WordCheck:
         number = line.number
         names = [word.name for word in line.words if word.name not in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
-            self._wrong(number, f"{name} stands twice in one block")
+            self._wrong(NOT_LISTED, number, f"{name} stands twice in one block")
         if sum(word.name == "M" for word in line.words) > 1:
-            self._wrong(number, "two M words in one block")
+            self._wrong(NOT_LISTED, number, "two M words in one block")
         if sum(word in _MOTION for word in words) > 1:
-            self._wrong(number, "two motions in one block")
+            self._wrong(NOT_LISTED, number, "two motions in one block")
         states = [rule.state for rule in rules if rule is not None and rule.state]
         if len(set(states)) < len(states):
-            self._wrong(number, "two words of one group in one block")
+            self._wrong(NOT_LISTED, number, "two words of one group in one block")
         for k, rule in enumerate(rules):
             if rule is None:
                 continue
             others = [*words[:k], *words[k + 1 :]]
             word = words[k] if len(rules) == len(words) else _text(words)
             if rule.must is not None and not _any(rule.must, others):
-                self._wrong(number, f"{word} without {_shown(rule.must)}")
+                self._wrong(NOT_LISTED, number, f"{word} without {_shown(rule.must)}")
             if rule.alone:
-                for other, theirs in zip(words, rules, strict=True):
-                    if other != word and not (theirs and theirs.needs and theirs.needs.fullmatch(word)):
-                        self._wrong(number, f"{other} in the block of {word}")
+                own = [bool(theirs and theirs.needs and theirs.needs.fullmatch(word)) for theirs in rules]
+                for other, belongs in zip(words, own, strict=True):
+                    if other != word and (not belongs or sum(own) > 1):
+                        self._wrong(NOT_LISTED, number, f"{other} in the block of {word}")
             if rule.after is not None:
                 if not any(rule.after.fullmatch(said_before) for said_before in (*self._said, *others)):
-                    self._wrong(number, f"{word} without {_shown(rule.after)} before it")
+                    self._wrong(NOT_LISTED, number, f"{word} without {_shown(rule.after)} before it")
                 self._said = {told for told in self._said if not rule.after.fullmatch(told)}
             if rule.behind is not None and not rule.behind.fullmatch(before):
-                self._wrong(number, f"{word} does not follow what it belongs to")
+                self._wrong(NOT_LISTED, number, f"{word} does not follow what it belongs to")
             if rule.share is not None:
                 match = rule.pattern.fullmatch(word)
                 if match and float(match[1]) > rule.share * self.tolerance * (1 + 1e-9) + 1e-5:
-                    self._wrong(number, f"{word} is more than {rule.share:g} of the tolerance")
+                    self._wrong(NOT_LISTED, number, f"{word} is more than {rule.share:g} of the tolerance")
             if rule.then is not None:
                 self._then = (rule, number)
             if rule.retract:
@@ -269,7 +277,7 @@ class WordCheck:
         if self._then is not None:
             rule, line = self._then
             if rule.then is not None and not rule.then.fullmatch(text):
-                self._wrong(line, f"{_shown(rule.pattern)} without {_shown(rule.then)} behind it")
+                self._wrong(NOT_LISTED, line, f"{_shown(rule.pattern)} without {_shown(rule.then)} behind it")
             self._then = None
         before, self._before = self._before, text
         return before
@@ -302,16 +310,16 @@ class WordCheck:
                 spoken = {word for word in self._said if any(rule.pattern.fullmatch(word) for rule in rules)}
                 if not spoken:
                     wanted = " or ".join(_shown(rule.pattern) for rule in rules)
-                    self._wrong(number, f"{state}: {wanted} must be said before the first motion", NOT_ESTABLISHED)
+                    self._wrong(NOT_ESTABLISHED, number, f"{state}: {wanted} must be said before the first motion")
             self._retract, self._arc = 0, None
             return
         if self._retract:
-            self._wrong(self._retract, "a retract that another motion of the same tool follows")
+            self._wrong(NOT_LISTED, self._retract, "a retract that another motion of the same tool follows")
             self._retract = 0
         if self._arc is not None:
             word, line = self._arc
             if code not in (2.0, 3.0):
-                self._wrong(line, f"{word} where no arc follows")
+                self._wrong(NOT_LISTED, line, f"{word} where no arc follows")
             self._arc = None
         following = {rule.state for rule in self.list.words if rule.follows}
         for state, (word, line) in self._state.items():
@@ -319,7 +327,7 @@ class WordCheck:
                 continue
             self._complained.add((state, line))
             before = self._first.get(state, "nothing")
-            self._wrong(line, f"{state}: {word} where {before} holds for the whole program")
+            self._wrong(NOT_LISTED, line, f"{state}: {word} where {before} holds for the whole program")
 
 
 def said(word: Word) -> str:
