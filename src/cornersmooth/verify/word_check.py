@@ -137,9 +137,9 @@ class WordCheck:
         if not self._start(line.number, text):
             rules = self._rules(line.number, words, text)
             before = self._next_block(text, line.number)
+            self._said |= set(words)
             self._places(line, words, rules, before)
             self._states(line.number, words, rules)
-            self._said |= set(words)
         self._blocks += 1
         self._note(line, words)
 
@@ -156,6 +156,8 @@ class WordCheck:
 
     def _start(self, number: int, text: str) -> bool:
         """Whether a block is one that begins or ends the program, where it belongs."""
+        if self._blocks == 0 and self.list.header is not None and self.list.header.fullmatch(text):
+            return True
         if self._begun < len(self.list.begin):
             wanted = self.list.begin[self._begun :]
             place = next((k for k, pattern in enumerate(wanted) if pattern.fullmatch(text)), None)
@@ -256,7 +258,7 @@ class WordCheck:
                     if other != word and (not belongs or sum(own) > 1):
                         self._wrong(NOT_LISTED, number, f"{other} in the block of {word}")
             if rule.after is not None:
-                if not any(rule.after.fullmatch(said_before) for said_before in (*self._said, *others)):
+                if not any(rule.after.fullmatch(said_before) for said_before in self._said):
                     self._wrong(NOT_LISTED, number, f"{word} without {_shown(rule.after)} before it")
                 self._said = {told for told in self._said if not rule.after.fullmatch(told)}
             if rule.behind is not None and not rule.behind.fullmatch(before):

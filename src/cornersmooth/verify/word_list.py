@@ -4,6 +4,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
 
 ``begin``, ``end``
     Blocks, as regular expressions, that a program begins and ends with.
+``header``
+    What may stand before that: a mark of the transfer.
 ``points``
     Addresses whose numbers need their decimal point.
 ``orders``
@@ -67,6 +69,7 @@ class WordList:
     Parameters
     ----------
     begin, end : tuple of pattern
+    header : pattern or None
     points : frozenset of str
     orders : pattern or None
     words, blocks : tuple of WordRule
@@ -75,6 +78,7 @@ class WordList:
 
     begin: tuple[re.Pattern[str], ...] = ()
     end: tuple[re.Pattern[str], ...] = ()
+    header: re.Pattern[str] | None = None
     points: frozenset[str] = frozenset()
     orders: re.Pattern[str] | None = None
     words: tuple[WordRule, ...] = ()
@@ -100,6 +104,8 @@ def word_list(control: str) -> WordList:
     table = tomllib.loads(files(__package__).joinpath("word_lists", f"{control}.toml").read_text(encoding="utf-8"))
     base = word_list(table["like"]) if "like" in table else WordList()
     own: dict[str, Any] = {name: _patterns(table[name]) for name in ("begin", "end") if name in table}
+    if "header" in table:
+        own["header"] = re.compile(table["header"])
     if "points" in table:
         own["points"] = frozenset(table["points"])
     if "orders" in table:

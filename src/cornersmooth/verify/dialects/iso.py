@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from cornersmooth.verify.dialects.base import AFTER_MOTION, HIGH_SPEED, Dialect, State
 from cornersmooth.verify.lexer import NUMBER, Lexer, fixed, number_of
-from cornersmooth.verify.words import MOTION_CODES, Columns, Line, Word
+from cornersmooth.verify.words import MOTION_CODES, NURBS, Columns, Line, Word
 
 #: letters whose words are events
 _EVENT_LETTERS = "TSMHD"
@@ -38,6 +38,8 @@ class IsoWords:
         `Dialect.unsaid`.
     curves_need : str
         `Dialect.curves_need`.
+    semicolon : bool
+        Whether a comment may begin with one.
     """
 
     tip_control: Mapping[float, str]
@@ -47,6 +49,7 @@ class IsoWords:
     others: str = "NOQ"
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
     curves_need: str = ""
+    semicolon: bool = False
 
 
 _FANUC = {43.0: "G43", 43.4: "G43.4", 43.5: "G43.5", 49.0: ""}
@@ -70,6 +73,7 @@ ISO_WORDS: Mapping[str, IsoWords] = {
         silent=frozenset((61.0, 61.1, 64.0)),
         dwell=1000.0,
         unsaid=_NO_THROUGH,
+        semicolon=True,
     ),
     "generic": IsoWords(_FANUC, unsaid=_NO_THROUGH | {"offset"}),
 }
@@ -90,7 +94,7 @@ class Iso(Dialect):
 
     def __init__(self, name: str, rotary: str = "") -> None:
         self.iso = ISO_WORDS[name]
-        super().__init__(_IsoLexer(rotary), rotary)
+        super().__init__(_LinuxLexer(rotary) if self.iso.semicolon else _IsoLexer(rotary), rotary)
         self.controls, self.unsaid, self.curves_need = self.iso.controls, self.iso.unsaid, self.iso.curves_need
 
     def words(self, line: Line, state: State) -> None:
@@ -153,7 +157,8 @@ class _IsoLexer(Lexer):
     """
 
     word = re.compile(rf"([A-Z])[ \t]*({NUMBER})|(<[^>]*>)")
-    comment = re.compile(r"\(([^)]*)\)|;(.*)$")
+    #: a semicolon at the end of a line is how listings show the end of a block
+    comment = re.compile(r"\(([^)]*)\)|;[ \t]*$")
     begins = re.compile(rb"\n[ /]*(?:N\d+ *)?G")
 
     def __init__(self, rotary: str) -> None:
@@ -173,10 +178,18 @@ class _IsoLexer(Lexer):
         code = given["G"].value if "G" in given else None
         if not given.keys() <= self.letters or not given.keys() & self.places or self.odd_vector(given.keys(), code):
             return None
-        return dict(given) if code is None or code in MOTION_CODES else None
+        if code not in (None, *MOTION_CODES) or ("P" in given and code != NURBS):
+            return None
+        return dict(given)
 
     def odd_vector(self, names: Set[str], code: float | None) -> bool:
         """Whether a block has words of a vector that rotary words have no use for."""
         if not self._rotary:
             return False
         return bool(names & {"I", "J", "K"}) and (code in (0.0, 1.0) or (code is None and "I" in names))
+
+
+class _LinuxLexer(_IsoLexer):
+    """The same, where a comment may begin with a semicolon."""
+
+    comment = re.compile(r"\(([^)]*)\)|;(.*)$")

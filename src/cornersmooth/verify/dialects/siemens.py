@@ -84,7 +84,7 @@ class Siemens(Dialect):
                 motion[name] = value
             elif name in ("TRAORI", "TRAFOOF", *_ORIENTATIONS):
                 self._transform(name, state)
-            elif name not in ("D", "N") and name not in _SILENT_CALLS:
+            elif name not in ("D", "N", "%") and name not in _SILENT_CALLS:
                 self._refuse(line, name, text, state)
         state.move(line, motion)
 
@@ -140,7 +140,9 @@ class _SiemensLexer(Lexer):
 
     def words(self, rest: str, place: int, number: int, name: str | None) -> list[Word]:
         """Words of a line from a place on; raises CS501."""
-        return [] if rest.startswith("%", place) else super().words(rest, place, number, name)
+        if rest.startswith("%", place):  # a mark of the transfer
+            return [Word("%", 0.0, rest[place:])]
+        return super().words(rest, place, number, name)
 
     def named(self, match: re.Match[str]) -> Iterable[Word] | None:
         """Words of one match: an axis of a polynomial has several."""
