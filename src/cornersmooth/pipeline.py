@@ -211,6 +211,11 @@ def postprocess(
     findings = (*smoothed.findings, *_remarks(program, smoothed.settings), *written.findings)
     if unverified:
         findings += (Finding("CS509", "warning", 0, f"NOT VERIFIED: {unverified}"),)
+    if verification is not None:
+        findings += tuple(
+            Finding("CS573", "note", 0, f"taken on trust: {block}, NC line {line}")
+            for line, block in verification.trusted
+        )
     path = path_of(target)
     if output.rejected and path is not None:
         path += REJECTED

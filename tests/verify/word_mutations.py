@@ -377,19 +377,17 @@ def _harmless(text: Text, rng: np.random.Generator, each: int) -> Iterator[Mutan
         yield Mutant("harmless: what holds anyway", text.inserted(before, word), None, word)
 
 
-def judged(
-    cases: list[Case], each: int, seed: int = 0, share: float = 1.0, told: Callable[[str], None] | None = None
-) -> Score:
-    """Judge mutants of some cases; a share of them, chosen at random."""
-    score, rng = Score(), np.random.default_rng(seed)
-    for case in cases:
-        assert named_in(case, text_of(case)) == []
-        before = sum(score.judged.values())
-        for mutant in mutants(case, rng, each):
-            if rng.random() < share:
-                score.take(case, mutant, named_in(case, mutant.lines, mutant.end))
-        if told is not None:
-            told(f"{case}: {sum(score.judged.values()) - before} mutants, {len(score.wrong)} wrong so far")
+def judged(cases: list[Case], each: int, most: int | None = None, told: Callable[[str], None] | None = None) -> Score:
+    """Judge mutants of some cases: all, or so many of them, chosen at random."""
+    score, rng = Score(), np.random.default_rng(len(cases))
+    chosen = [(case, mutant) for case in cases for mutant in mutants(case, rng, each)]
+    chosen = [chosen[k] for k in sorted(rng.permutation(len(chosen))[:most].tolist())]
+    for place, (case, mutant) in enumerate(chosen):
+        if place == 0 or case != chosen[place - 1][0]:
+            assert named_in(case, text_of(case)) == []
+            if told is not None:
+                told(f"{place} of {len(chosen)} mutants judged, {len(score.wrong)} wrongly; next: {case}")
+        score.take(case, mutant, named_in(case, mutant.lines, mutant.end))
     return score
 
 
