@@ -17,7 +17,7 @@ from .word_mutations import judged, named_in, text_of
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONTROLS = ("fanuc", "mitsubishi", "haas", "linuxcnc", "generic", "siemens", "heidenhain")
 #: mutants of each control
-SAMPLE = 14
+SAMPLE = 10
 
 
 @pytest.mark.parametrize("control", CONTROLS)
