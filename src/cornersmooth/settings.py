@@ -11,6 +11,7 @@ from cornersmooth.methods import DEFAULT_METHOD, METHODS
 
 Shape = Literal["paper", "auto"]
 Allocation = Literal["half", "fair"]
+Lines = Literal["dense", "long"]
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,13 @@ class Settings:
         Distance between the written lines and the curve in dense output; None for a tenth of ε.
     axis_step : float or None, degrees
         Largest change of axis in one written line next to a rounded corner; None for what ε and H ask for.
+    lines : {"dense", "long"} or None
+        Whether lines follow the curves closely, or are as few as ε allows; None for what suits the control.
+    curve_share, line_share : float
+        Parts of what the rounding of the digits leaves of ε: for the curves, and for long lines along them. What is
+        left of `line_share` is for what the control does to lines by itself.
+    blend_share : float
+        Part of ε within which the control is told to round the corners of lines by itself, where it can be told.
     round_feed_changes : bool
         Whether a corner where the feed changes may be rounded; false for output that cannot change F inside a curve,
         and has no curves at a feed per revolution.
@@ -68,6 +76,10 @@ class Settings:
     max_axis_step: float = 90.0
     chord_tolerance: float | None = None
     axis_step: float | None = None
+    lines: Lines | None = None
+    curve_share: float = 1.0
+    line_share: float = 1.0
+    blend_share: float = 0.1
     round_feed_changes: bool = True
     tip_resolution: float = 0.0
     axis_point_resolution: float = 0.0
@@ -79,6 +91,8 @@ class Settings:
             raise SettingsError("CS201", f"unknown method {self.method!r}", f"use {' or '.join(METHODS)}")
         if self.shape not in ("paper", "auto"):
             raise SettingsError("CS201", f"unknown shape {self.shape!r}", "use paper or auto")
+        if self.lines not in (None, "dense", "long"):
+            raise SettingsError("CS201", f"unknown lines {self.lines!r}", "use dense or long")
         if self.allocation not in ("half", "fair"):
             raise SettingsError("CS201", f"unknown allocation {self.allocation!r}", "use half or fair")
         prescribed = METHODS[self.method].prescribed
@@ -97,18 +111,34 @@ class Settings:
             raise SettingsError(
                 "CS203",
                 f"tolerance {self.tolerance:g} mm is finer than the written digits can hold",
-                f"use at least {2 * (self.tolerance - min(self.tip_tolerance, self.axis_point_tolerance)):.2g} mm",
+                f"use at least {2 * max(self._tip_rounding, self._axis_point_rounding):.2g} mm",
             )
 
     @property
     def tip_tolerance(self) -> float:
-        """ε less the rounding of the tip: half a step in each of three coordinates."""
-        return self.tolerance - math.sqrt(3) / 2 * self.tip_resolution
+        """What curves may use at the tip: ε less the rounding, half a step in each of three coordinates."""
+        return self.curve_share * (self.tolerance - self._tip_rounding)
 
     @property
     def axis_point_tolerance(self) -> float:
-        """ε less the rounding of tip and axis point."""
-        return self.tolerance - math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
+        """What curves may use at the axis point: ε less the rounding of tip and axis point."""
+        return self.curve_share * (self.tolerance - self._axis_point_rounding)
+
+    @property
+    def line_tolerances(self) -> tuple[float, float]:
+        """What long lines may use at the tip and at the axis point, mm."""
+        return (
+            self.line_share * (self.tolerance - self._tip_rounding),
+            self.line_share * (self.tolerance - self._axis_point_rounding),
+        )
+
+    @property
+    def _tip_rounding(self) -> float:
+        return math.sqrt(3) / 2 * self.tip_resolution
+
+    @property
+    def _axis_point_rounding(self) -> float:
+        return math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
 
     @property
     def verified_tolerance(self) -> float:
@@ -116,7 +146,7 @@ class Settings:
         excess = METHODS[self.method].excess
         if not excess:
             return self.tolerance
-        return (1.0 + excess) * self.tolerance + math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
+        return (1.0 + excess) * self.tolerance + self._axis_point_rounding
 
     @property
     def chord(self) -> float:
@@ -155,6 +185,9 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "max_axis_step": (1.0, 90.0),
     "chord_tolerance": (1e-7, 1.0),
     "axis_step": (1e-3, 90.0),
+    "curve_share": (0.01, 1.0),
+    "line_share": (0.01, 1.0),
+    "blend_share": (0.0, 1.0),
     "tip_resolution": (0.0, 0.1),
     "axis_point_resolution": (0.0, 0.1),
     "duplicate_distance": (0.0, 0.01),

@@ -156,6 +156,11 @@ chord_tolerance = click.option(
     type=LENGTH,
     help="Distance between the written lines and the curve. [default: a tenth of -e]",
 )
+lines = click.option(
+    "--lines",
+    type=click.Choice(["dense", "long"]),
+    help="Lines close to the curves, or as few as -e allows. [default: what suits the control]",
+)
 axis_step = click.option(
     "--axis-step",
     type=float,
@@ -386,6 +391,7 @@ _SETTINGS = {
     "weights": weights,
     "orientation_tolerance": orientation_tolerance,
     "reversal_angle": reversal_angle,
+    "lines": lines,
     "chord_tolerance": chord_tolerance,
     "axis_step": axis_step,
 }

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 @options.weights
 @options.orientation_tolerance
 @options.reversal_angle
+@options.lines
 @options.chord_tolerance
 @options.axis_step
 @options.feed

@@ -17,8 +17,9 @@ from cornersmooth.nc.control_tables import control_names, control_table, load_co
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.form_choice import check_program, choose_form
+from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.motion_writer import MotionWriter
-from cornersmooth.nc.program_frame import BLEND_SHARE, Frame, blend_word
+from cornersmooth.nc.program_frame import Frame, blend_word
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.statement_writer import StatementWriter
@@ -89,7 +90,18 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
             f"{form.control} form {form.name} holds curves with weights 1 only",
             "leave out --weights and --shape, or choose another form",
         )
+    long = form.table.lines
+    lines = settings.lines or (long.lines if form.long_lines else "dense")
+    if lines == "long":
+        if not form.long_lines:
+            raise SettingsError(
+                "CS223",
+                f"{form.control} form {form.name} cannot be written in long lines",
+                "leave out --lines; lines with the tip under tool tip control can be",
+            )
+        settings = settings.but(curve_share=long.curve_share, line_share=long.line_share, blend_share=long.blend_share)
     return settings.but(
+        lines=lines,
         tip_resolution=form.tip_resolution(units, tolerance),
         axis_point_resolution=form.axis_point_resolution(units, tolerance, settings.axis_length),
         round_feed_changes=settings.round_feed_changes and not form.curves,
@@ -165,7 +177,7 @@ def write(
     writer = BlockWriter(chosen, program, statements, findings, circles)
     motion = MotionWriter(program, writer, statements, findings)
     with _BackgroundWriter(stream) as behind:
-        text_writer = frame.start(behind, chosen, program, smoothed.settings.tolerance)
+        text_writer = frame.start(behind, chosen, program, smoothed.settings)
         text_writer.head()
         chunks = ((rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, findings))
         for rows, ticks in _one_ahead(chunks):
@@ -181,9 +193,9 @@ def write(
 
 def _values(program: Program, settings: Settings) -> dict[str, str]:
     """What stands for braces in blocks that switch functions of the control on."""
-    turn = math.degrees(BLEND_SHARE * settings.tolerance / settings.axis_length)
+    turn = math.degrees(settings.blend_share * settings.tolerance / settings.axis_length)
     return {
-        "blend": blend_word(settings.tolerance / program.mm_per_unit),
+        "blend": blend_word(settings.blend_share * settings.tolerance / program.mm_per_unit),
         "turn": format_number(max(turn, 10.0**-_TURN_DECIMALS), _TURN_DECIMALS),
     }
 
@@ -193,8 +205,11 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findi
         return rotary_curve_rows(smoothed, form, findings)
     if form.curves:
         return curve_rows(smoothed, divide=form.curve in _TURNING)
-    rows = dense_rows(smoothed, circles.blocks)
-    return rotary_rows(rows, smoothed.program, smoothed.settings, form, findings) if form.rotary else rows
+    long = smoothed.settings.lines == "long"
+    rows = coarse_rows(smoothed, circles.blocks) if long else dense_rows(smoothed, circles.blocks)
+    if form.rotary:
+        return rotary_rows(rows, smoothed, form, findings, long=long)
+    return long_rows(rows, smoothed) if long else rows
 
 
 def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:

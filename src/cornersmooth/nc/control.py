@@ -219,6 +219,23 @@ class Extra:
 
 
 @dataclass(frozen=True)
+class LineStyle:
+    """What lines suit the control, and how it is to share ε between what is written and what it does by itself.
+
+    Parameters
+    ----------
+    lines : {"dense", "long"}
+    curve_share, line_share, blend_share : float
+        Those of `Settings` where lines are long.
+    """
+
+    lines: str = "dense"
+    curve_share: float = 0.5
+    line_share: float = 1.0
+    blend_share: float = 0.1
+
+
+@dataclass(frozen=True)
 class Control:
     """A control as its table describes it; the first form is the default.
 
@@ -238,6 +255,7 @@ class Control:
     words: Words
     forms: Mapping[str, FormTable]
     extras: Mapping[str, Extra] = field(default_factory=dict)
+    lines: LineStyle = LineStyle()
     own: bool = False
 
     @property

@@ -20,21 +20,23 @@ from cornersmooth.nc.control import (
     Digits,
     Extra,
     FormTable,
+    LineStyle,
     Mode,
     Motion,
     Orientation,
     TextStyle,
     Words,
 )
+from cornersmooth.settings import Lines
 from cornersmooth.tables import Shelf, Table, is_file
 
-Record = TypeVar("Record", Digits, TextStyle, Words, Motion, Extra)
+Record = TypeVar("Record", Digits, TextStyle, Words, Motion, Extra, LineStyle)
 
 _SHELF = Shelf(
     "control",
     __package__,
     "controls",
-    keys=("name", "description", "digits", "layout", "words", "motion", "forms", "extras"),
+    keys=("name", "description", "digits", "layout", "words", "motion", "forms", "extras", "lines"),
     unknown="CS210",
     unreadable="CS212",
     unknown_key="CS214",
@@ -116,6 +118,7 @@ def parse_control(text: str, *, file: str = "<control>", name: str = "control") 
             words=_words(table.get("words", {})),
             forms=_forms(table),
             extras=_extras(table.get("extras", {})),
+            lines=_lines(table.get("lines", {})),
             own=True,
         )
     except SettingsError as error:
@@ -213,6 +216,16 @@ def _form(name: str, entry: Table, motion: Table) -> FormTable:
     return FormTable(name, _text(entry, "description", ""), curve, modes)
 
 
+def _lines(table: Table) -> LineStyle:
+    lines = _record(LineStyle, table, "lines")
+    if lines.lines not in get_args(Lines):
+        raise _SHELF.wrong(f"lines.lines is {lines.lines!r}", f"use {' or '.join(get_args(Lines))}")
+    for name in ("curve_share", "line_share", "blend_share"):
+        if not 0.0 < getattr(lines, name) <= 1.0:
+            raise _SHELF.wrong(f"lines.{name} is {getattr(lines, name)}", "give a part of 1")
+    return lines
+
+
 def _extras(table: Table) -> dict[str, Extra]:
     _check_table(table, "extras")
     extras = {}
@@ -251,6 +264,10 @@ def _record(kind: type[Record], table: Table, where: str) -> Record:
             if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
                 raise _SHELF.wrong(f"{where}.{key} is {value!r}", f"give a whole number up to {most}")
             values[key] = value
+        elif isinstance(default, float):
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise _SHELF.wrong(f"{where}.{key} is {value!r}", "give a number")
+            values[key] = float(value)
         else:
             values[key] = _string(value, f"{where}.{key}")
     return kind(**values)

@@ -53,6 +53,11 @@ class Form:
         return bool(self.curve)
 
     @property
+    def long_lines(self) -> bool:
+        """Whether the form can be written in long lines: the tip runs straight on them whatever the axis does."""
+        return not self.curve and self.orientation in ("vector", "angles")
+
+    @property
     def vectors(self) -> bool:
         """Whether the words behind the tip are a unit vector."""
         return self.orientation == "vector"

@@ -13,10 +13,8 @@ from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Program
 from cornersmooth.nc.control import TextStyle
 from cornersmooth.nc.form import Form
+from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
-
-#: share of the tolerance that a control may blend lines with, where it is told so
-BLEND_SHARE = 0.1
 
 #: decimals of that
 _BLEND_DECIMALS = 5
@@ -51,7 +49,7 @@ class Frame:
     footer: tuple[str, ...] = ()
     comments: bool = True
 
-    def start(self, stream: Stream, form: Form, program: Program, tolerance: float) -> FramedText:
+    def start(self, stream: Stream, form: Form, program: Program, settings: Settings) -> FramedText:
         """Frame for one text.
 
         Raises
@@ -67,7 +65,7 @@ class Frame:
         values = {
             "program": self.program or layout.program,
             "units": layout.units[program.units],
-            "blend": blend_word(tolerance / program.mm_per_unit),
+            "blend": blend_word(settings.blend_share * settings.tolerance / program.mm_per_unit),
         }
         number = layout.block_number or ("N{number} " if self.block_numbers else "")
         return FramedText(
@@ -80,9 +78,9 @@ class Frame:
         )
 
 
-def blend_word(tolerance: float) -> str:
-    """A tenth of ε; never zero, which would lift all limits."""
-    return format_number(max(BLEND_SHARE * tolerance, 10.0**-_BLEND_DECIMALS), _BLEND_DECIMALS)
+def blend_word(blend: float) -> str:
+    """How far the control may round the corners of lines; never zero, which would lift all limits."""
+    return format_number(max(blend, 10.0**-_BLEND_DECIMALS), _BLEND_DECIMALS)
 
 
 @dataclass

@@ -13,11 +13,13 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import inverse_time
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
+from cornersmooth.nc.long_rows import line_limits
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves, rotary_angles
 from cornersmooth.settings import Settings
+from cornersmooth.smoothing.long_lines import fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.vectors import norm
 
@@ -36,7 +38,7 @@ _NO_TURN = 1e-9
 
 
 def rotary_rows(
-    rows: Iterator[Rows], program: Program, settings: Settings, form: Form, findings: Findings
+    rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findings: Findings, *, long: bool = False
 ) -> Iterator[Rows]:
     """Rows of lines with the words of the form's machine in `Rows.other`, in the order of its axes.
 
@@ -44,15 +46,19 @@ def rotary_rows(
     ----------
     rows : iterator of Rows
         From `dense_rows`, with tool vectors.
+    smoothed : SmoothProgram
+    form : Form
     findings : Findings
         Takes what the kinematics notice.
+    long : bool
+        Whether only those rows are left that ε asks for (`cornersmooth.smoothing.long_lines`).
 
     Raises
     ------
     InputError
         The machine cannot follow the path.
     """
-    machine = form.machine
+    program, settings, machine = smoothed.program, smoothed.settings, form.machine
     if machine is None:
         raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
     tip, axis, move = _whole(rows)
@@ -63,6 +69,9 @@ def rotary_rows(
     path = rotary_angles(machine, tip, axis, tolerance=tolerance, rapid=rapid, line=line, file=file)
     for finding in path.findings:
         findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
+    largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
+    start, at_pose = segments_of_rows(move)
+    limits = line_limits(settings, machine, largest_turn)
     timed = _timed_cuts(path.angles, move, program) if form.orientation == "machine" else None
     inserted, first_inserted, unsolved = 0, 0, []
     for begin in range(0, max(len(move) - 1, 1), _CHUNK):
@@ -75,7 +84,7 @@ def rotary_rows(
             tolerance=tolerance,
             rapid=rapid[here],
             tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
-            max_step=min(settings.axis_step or LARGEST_TURN, LARGEST_TURN),
+            max_step=largest_turn,
             line=line[here],
             file=file,
         )
@@ -84,6 +93,12 @@ def rotary_rows(
         inserted += len(more)
         unsolved += line[here][more.unsolved + 1].tolist()
         filled = fill(tip[here], axis[here], path.angles[here], more)
+        if long:
+            row = filled.pose
+            exact = at_pose[here][row] & ~filled.inserted
+            of_move, of_start = move[here][row], start[here][row]
+            found = vertices(smoothed, filled.tip, filled.axis, filled.angles, of_move, of_start, exact)
+            filled = filled.only(fewest_lines(found, limits))
         rate = _rates(filled, move[here], None if timed is None else timed[here], program, settings, form)
         own = slice(1 if begin else 0, None)
         count = len(filled.pose[own])

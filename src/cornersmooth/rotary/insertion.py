@@ -71,6 +71,10 @@ class FilledPath:
     axis: Floats
     angles: Floats
 
+    def only(self, rows: Ints) -> FilledPath:
+        """The path without its other rows."""
+        return FilledPath(self.pose[rows], self.inserted[rows], self.tip[rows], self.axis[rows], self.angles[rows])
+
 
 def insertions(
     machine: Machine,

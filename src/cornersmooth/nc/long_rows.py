@@ -1,0 +1,75 @@
+"""Rows of as few lines as ε allows: what `cornersmooth.smoothing.long_lines` leaves of the dense ones."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator
+
+import numpy as np
+
+from cornersmooth.kinematics import tool_axis
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.model import Ints, SmoothProgram
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
+from cornersmooth.smoothing.sampling import Rows, dense_rows
+from cornersmooth.vectors import unit
+
+#: rows handed on at a time
+_CHUNK = 32768
+
+#: chord tolerance that leaves transitions with as few lines as their change of axis allows, mm
+_COARSE = 1.0
+
+#: longest change of a tool vector in one line: controls that turn it evenly in angle and those that turn it evenly in
+#: its words are less than 1e-5 rad apart then (θ³/54)
+_LARGEST_STEP = 0.08
+
+
+def coarse_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Iterator[Rows]:
+    """Dense rows without those that only the chord tolerance asks for."""
+    settings = smoothed.settings.but(chord_tolerance=_COARSE)
+    return dense_rows(SmoothProgram(smoothed.program, smoothed.corners, settings), circles)
+
+
+def line_limits(settings: Settings, machine: Machine | None, largest_turn: float) -> LineLimits:
+    """What lines with tool vectors, or with rotary words of a machine (at most `largest_turn` degrees), must keep."""
+    step = _LARGEST_STEP if machine is None else largest_turn
+    if settings.axis_step is not None:
+        step = min(step, math.radians(settings.axis_step) if machine is None else settings.axis_step)
+    return LineLimits(
+        *settings.line_tolerances,
+        step,
+        settings.axis_length,
+        unit if machine is None else lambda words: tool_axis(machine, words),
+    )
+
+
+def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram) -> Iterator[Rows]:
+    """Rows with tool vectors at which long lines end; arcs stay as they are."""
+    chunks = deque(rows)
+    if not chunks:
+        return
+    tip, axis = np.concatenate([chunk.tip for chunk in chunks]), np.concatenate([chunk.other for chunk in chunks])
+    move = np.concatenate([chunk.move for chunk in chunks])
+    arc = None
+    if any(chunk.arc is not None for chunk in chunks):
+        none = [np.full(len(chunk.tip), -1, np.int64) if chunk.arc is None else chunk.arc for chunk in chunks]
+        arc = np.concatenate(none)
+    chunks.clear()
+    start, at_pose = segments_of_rows(move)
+    limits = line_limits(smoothed.settings, None, 0.0)
+    for begin in range(0, max(len(move) - 1, 1), _CHUNK):
+        here = slice(begin, begin + _CHUNK + 1)  # the last row of a chunk is the start of the next
+        part = vertices(smoothed, tip[here], axis[here], axis[here], move[here], start[here], at_pose[here])
+        kept = begin + fewest_lines(part, limits)[1 if begin else 0 :]
+        nothing = np.zeros(len(kept), np.int8)
+        yield Rows(
+            tip[kept],
+            axis[kept],
+            move[kept],
+            nothing,
+            nothing.astype(np.bool_),
+            arc=None if arc is None else arc[kept],
+        )

@@ -1,0 +1,225 @@
+"""The smoothed motion in as few lines as ε allows (`lines="long"`).
+
+Many controls run the faster, the longer lines are: each must be able to stop within those that it has read. From every
+vertex a line goes to the farthest vertex that it can reach within ε. Vertices are points of the smoothed motion.
+
+A line is compared with the original motion at a common parameter, as transitions are (design 3.2): both run evenly
+between two points at which the original is known, so that their tips are farthest apart at one of these. The parameter
+is the length of the original in six dimensions. It never runs backwards, so the paths are as near, both ways.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
+from cornersmooth.vectors import dot, norm, square
+
+#: rows after which a line ends in any case; so many parts are worked on side by side
+LANE = 512
+
+#: rows at which lines are tested at once: intermediate arrays fit the processor's cache
+_TOGETHER = 1 << 16
+
+#: corners that lines may pass by; all others are passed exactly
+_PASSED_BY = (Status.SMOOTHED, Status.STRAIGHT, Status.DUPLICATE, Status.TOO_SHORT)
+
+#: mm by which the parameter goes on while a word changes by one
+_PER_WORD = 1e-3
+
+#: share of ε that is used: the rest is for what turns between two points at which the original is known
+_USED = 0.98
+
+
+@dataclass(frozen=True)
+class Vertices:
+    """Points of the smoothed motion at which lines may end, r rows in path order.
+
+    Parameters
+    ----------
+    tip : (r, 3) float64, mm
+    words : (r, d) float64
+        What the control runs evenly along a line besides the tip: tool vectors, or rotary words in degrees.
+    original_tip, original_axis_point : (r, 3) float64, mm
+        Where the original motion is meanwhile.
+    parameter : (r,) float64, mm
+        Never decreasing.
+    fixed : (r,) bool
+        A line ends here in any case.
+    """
+
+    tip: Floats
+    words: Floats
+    original_tip: Floats
+    original_axis_point: Floats
+    parameter: Floats
+    fixed: Bools
+
+
+@dataclass(frozen=True)
+class LineLimits:
+    """What a line must keep.
+
+    Parameters
+    ----------
+    tip, axis_point : float, mm
+        Largest distances from the original motion at a common parameter.
+    turn : float
+        Largest change of any word in one line, in the unit of the words.
+    axis_length : float, mm
+    axis_of : callable
+        Unit tool axes (m, 3) of words (m, d).
+    """
+
+    tip: float
+    axis_point: float
+    turn: float
+    axis_length: float
+    axis_of: Callable[[Floats], Floats]
+
+
+def segments_of_rows(move: Ints) -> tuple[Ints, Bools]:
+    """Pose that the segment of each row starts from (r,), -1 before the first, and last rows of their moves (r,).
+
+    The last row of a move is at its pose, or in the middle of the transition that rounds it; `move` as in `Rows`.
+    """
+    last = np.append(move[1:] != move[:-1], True)[: len(move)]
+    first = np.concatenate(([True], last))[: len(move)]
+    starts = np.concatenate(([-1], move[last][:-1]))
+    return starts[np.cumsum(first) - 1], last
+
+
+def vertices(
+    smoothed: SmoothProgram,
+    tip: Floats,
+    axis: Floats,
+    words: Floats,
+    move: Ints,
+    start: Ints,
+    at_pose: Bools,
+) -> Vertices:
+    """Find where the original motion is at the rows of the smoothed one.
+
+    Parameters
+    ----------
+    smoothed : SmoothProgram
+    tip, axis : (r, 3) float64
+        Rows in path order, as `dense_rows` gives them, perhaps with more rows on straight lines.
+    words : (r, d) float64
+    move, start : (r,) int64
+        As in `Rows`, and from `segments_of_rows`.
+    at_pose : (r,) bool
+        Last rows of their moves.
+    """
+    program, height = smoothed.program, smoothed.settings.axis_length
+    known = np.maximum(start, 0)
+    from_tip, to_tip = program.tip[known], program.tip[move]
+    from_axis, to_axis = height * program.axis[known], height * program.axis[move]
+    way, turn = to_tip - from_tip, to_axis - from_axis
+    whole = (square(way) + square(way + turn)) / 2.0  # m(D)²
+    gone, lever = tip - from_tip, height * axis - from_axis
+    along = (dot(gone, way) + dot(gone + lever, way + turn)) / 2.0
+    share = np.clip(np.divide(along, whole, out=np.ones_like(whole), where=whole > 0.0), 0.0, 1.0)
+    share[at_pose] = 1.0
+    moves_behind = 2.0 * np.cumsum(np.concatenate(([False], at_pose[:-1])))
+    share = np.maximum.accumulate(share + moves_behind) - moves_behind  # it may not fall within a move
+    lengths = np.sqrt(whole)
+    behind = np.concatenate(([0.0], np.cumsum(np.where(at_pose, lengths, 0.0))[:-1]))
+    here = from_tip + share[:, None] * way
+    axis_here = from_axis + share[:, None] * turn
+    axis_here *= (height / np.maximum(norm(axis_here), np.finfo(np.float64).tiny))[:, None]
+    parameter = behind + share * lengths
+    # where only words change, as at the pole of a machine, the parameter goes on too
+    parameter[1:] += _PER_WORD * np.cumsum(np.abs(np.diff(words, axis=0)).max(axis=1, initial=0.0))
+    return Vertices(tip, words, here, here + axis_here, parameter, _fixed(smoothed, move, at_pose))
+
+
+def _fixed(smoothed: SmoothProgram, move: Ints, at_pose: Bools) -> Bools:
+    """(r,) bool: rows at which something happens, or which the smoothed motion passes exactly."""
+    program, corners = smoothed.program, smoothed.corners
+    n = len(program)
+    exact = np.ones(n, np.bool_)
+    exact[corners.pose[np.isin(corners.status, _PASSED_BY)]] = False
+    spoken = np.zeros(n + 1, np.int64)
+    np.add.at(spoken, [min(statement.pose, n) for statement in program.statements], 1)
+    said = np.concatenate(([0], np.cumsum(spoken)))  # statements before pose i stand in said[i + 1]
+    after = np.append(move[1:], move[-1:])
+    fixed = (program.kind[move] != Move.LINEAR) | (program.kind[after] != Move.LINEAR)
+    feed, next_feed = program.feed[move], program.feed[after]
+    changed = (feed != next_feed) & ~(np.isnan(feed) & np.isnan(next_feed))
+    changed |= program.feed_mode[move] != program.feed_mode[after]
+    fixed |= changed | (at_pose & (exact[move] | (said[after + 1] > said[move + 1])))
+    fixed[:1] = fixed[-1:] = True
+    ends: Bools = fixed
+    return ends
+
+
+def fewest_lines(rows: Vertices, limits: LineLimits) -> Ints:
+    """Rows at which lines end, ascending, the first and the last row among them.
+
+    Notes
+    -----
+    From each vertex on, the farthest row is found by doubling and halving: a row is taken because its line was tested,
+    whatever lies between. All parts between fixed rows are worked on at the same time.
+    """
+    count = len(rows.parameter)
+    if count < 3:
+        return np.arange(count)
+    ends = rows.fixed.copy()
+    ends[::LANE] = True
+    begin = np.flatnonzero(ends)
+    at, stop = begin[:-1].copy(), begin[1:].copy()
+    kept = ends
+    near, beyond = at + 1, stop + 1  # the farthest row known to be reached, the nearest known not to be
+    while len(at):
+        done = beyond - near == 1
+        reached = near[done]
+        kept[reached] = True
+        at[done], near[done], beyond[done] = reached, reached + 1, stop[done] + 1
+        going = at < stop
+        if not going.all():
+            at, stop, near, beyond = at[going], stop[going], near[going], beyond[going]
+        untried = beyond > stop
+        target = np.where(untried, np.minimum(2 * near - at, stop), (near + beyond) // 2)
+        target = np.where(near == stop, stop, target)
+        good = _reaches(rows, limits, at, target)
+        near = np.where(good, target, near)
+        beyond = np.where(good, np.where(target == stop, stop + 1, beyond), target)
+    return np.flatnonzero(kept)
+
+
+def _reaches(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
+    """(q,) bool: whether lines from some rows to others keep the limits."""
+    good = np.abs(rows.words[end] - rows.words[start]).max(axis=1) <= limits.turn
+    good |= end == start + 1
+    asked = np.flatnonzero(good & (end > start + 1))
+    between = np.cumsum(end[asked] - start[asked] - 1)
+    for part in np.split(asked, np.searchsorted(between, np.arange(_TOGETHER, between[-1:].sum(), _TOGETHER))):
+        if len(part):
+            good[part] = _keeps(rows, limits, start[part], end[part])
+    reached: Bools = good
+    return reached
+
+
+def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
+    inner = end - start - 1
+    line = np.repeat(np.arange(len(start)), inner)
+    first = np.cumsum(inner) - inner
+    row = np.arange(len(line)) - first[line] + start[line] + 1
+    s, low = rows.parameter, rows.parameter[start]
+    length = s[end] - low
+    share = (s[row] - low[line]) / np.where(length > 0.0, length, 1.0)[line]
+    share = share[:, None]
+    begin, finish = start[line], end[line]
+    tip = rows.tip[begin] + share * (rows.tip[finish] - rows.tip[begin])
+    words = rows.words[begin] + share * (rows.words[finish] - rows.words[begin])
+    axis_point = tip + limits.axis_length * limits.axis_of(words)
+    off = np.maximum(
+        norm(tip - rows.original_tip[row]) / limits.tip,
+        norm(axis_point - rows.original_axis_point[row]) / limits.axis_point,
+    )
+    kept: Bools = np.maximum.reduceat(off, first) <= _USED
+    return kept

@@ -1,0 +1,110 @@
+"""Long lines: as few as ε allows, for every control whose tip runs straight on them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.errors import SettingsError
+from cornersmooth.model import Program
+from cornersmooth.nc import choose_form, fit_settings
+from cornersmooth.settings import Settings
+from nc.cases import CHOSEN, Case
+from nc.promise import random_verdict, runs_of, verdict, without_holes, written
+
+SAMPLES = Path(__file__).parents[2] / "samples"
+
+LONG = [case for case in CHOSEN if case.choose().long_lines]
+LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
+
+
+@pytest.mark.parametrize("case", LONG, ids=str)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_random_chains_keep_the_tolerance(case: Case, seed: int) -> None:
+    tolerance, axis_length = LIMITS[(len(str(case)) + seed) % 3]
+    settings = Settings(tolerance=tolerance, axis_length=axis_length, lines="long")
+    found = random_verdict(case, settings, 7 * seed + len(str(case)), 16)
+    assert found.deviation.worst <= tolerance, found
+
+
+@pytest.mark.parametrize("case", LONG, ids=str)
+def test_sample_keeps_the_tolerance(case: Case) -> None:
+    program = without_holes(read((SAMPLES / "impeller.cls").read_bytes(), name="impeller.cls"))
+    settings = Settings(tolerance=0.02, axis_length=20.0, lines="long")
+    found = verdict(program, runs_of(program, 0.02), case, case.choose(endless=True), settings)
+    assert found.deviation.worst <= 0.02, found
+
+
+def dense_arc(count: int) -> Program:
+    """A turn of 90 degrees about (0, 0, 1) with a radius of 50 mm, the tool leaning 20 degrees outwards."""
+    angle = np.linspace(0.0, np.pi / 2.0, count)
+    tip = np.stack((50.0 * np.cos(angle), 50.0 * np.sin(angle), np.zeros(count)), axis=1)
+    lean = np.radians(20.0)
+    out = np.sin(lean)
+    axis = np.stack((out * np.cos(angle), out * np.sin(angle), np.full(count, np.cos(lean))), axis=1)
+    return Program.from_poses(tip, axis, feed=1000.0)
+
+
+def lines_of(program: Program, settings: Settings) -> int:
+    text, _ = written(program, choose_form("fanuc", "g1"), settings)
+    return sum(line.startswith("G1") or line[:1] in "XYZIJK" for line in text.splitlines())
+
+
+def test_number_of_lines_is_that_of_the_geometry() -> None:
+    """A chord between two points ε outside of a circle of radius r may reach ε inside of it: 2·sqrt(8·ε·r/2) long.
+
+    Here both ends lie on the circle or inside of it, so a chord of sqrt(8·ε·r) is the longest: the axis point, which
+    runs on a circle of r + H·sin 20°, sets it.
+    """
+    tolerance, height = 0.01, 10.0
+    program = dense_arc(2001)
+    settings = Settings(tolerance=tolerance, axis_length=height, lines="long")
+    radius = 50.0 + height * np.sin(np.radians(20.0))
+    step = 2.0 * np.arccos(1.0 - tolerance / radius)
+    fewest = np.pi / 2.0 / step
+    found = lines_of(program, settings)
+    assert fewest <= found <= 1.15 * fewest + 2
+    assert lines_of(program, settings.but(lines="dense")) > 20 * found
+
+
+def test_more_poses_of_the_same_path_make_no_more_lines() -> None:
+    settings = Settings(tolerance=0.01, lines="long")
+    few, many = (lines_of(dense_arc(count), settings) for count in (501, 8001))
+    assert abs(few - many) <= 0.1 * few + 8001 * 3 // 512
+
+
+def test_feeds_and_statements_stay_at_their_poses() -> None:
+    text = """TOOL PATH/A
+FEDRAT/MMPM,1000
+GOTO/0,0,0,0,0,1
+GOTO/10,0.001,0,0,0,1
+GOTO/20,0,0,0,0,1
+FEDRAT/MMPM,500
+GOTO/30,0.001,0,0,0,1
+GOTO/40,0,0,0,0,1
+PPRINT/HERE
+GOTO/50,0.001,0,0,0,1
+COOLNT/ON
+GOTO/60,0,0,0,0,1
+GOTO/70,0.001,0,0,0,1
+END-OF-PATH
+"""
+    program = read(text.encode(), name="a.cls")
+    lines, _ = written(program, choose_form("fanuc", "g1"), Settings(tolerance=0.01, lines="long"))
+    order = [line for line in lines.splitlines() if line.startswith(("X", "G1", "(", "M8"))]
+    places = [
+        next(index for index, line in enumerate(order) if key in line)
+        for key in ("X20.", "F500", "X40.", "HERE", "X50.", "M8", "X70.")
+    ]
+    assert places == sorted(places)
+    assert not any("X10." in line or "X30." in line for line in order)
+
+
+@pytest.mark.parametrize(("control", "form"), [("fanuc", "g6.2"), ("siemens", "bspline")])
+def test_curves_have_no_long_lines(control: str, form: str) -> None:
+    with pytest.raises(SettingsError, match="cannot be written in long lines") as caught:
+        fit_settings(Settings(lines="long"), choose_form(control, form), "mm")
+    assert caught.value.code == "CS223"
