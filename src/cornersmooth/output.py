@@ -8,15 +8,18 @@ compared by its hash, so that nobody's change in between goes unnoticed.
 from __future__ import annotations
 
 import contextlib
+import errno
+import filecmp
 import glob
 import hashlib
+import json
 import os
 import secrets
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import BinaryIO, cast
 
 from cornersmooth.errors import OutputError, SettingsError
@@ -28,6 +31,9 @@ Target = str | os.PathLike[str] | BinaryIO
 REJECTED = ".rejected"
 
 
+#: extended attribute that holds the mark of a file
+_MARK = "user.cornersmooth"
+
 #: names of the files that are being written in this process, for whoever ends it from a signal handler
 _unfinished: set[str] = set()
 
@@ -37,7 +43,11 @@ class ClosedPipe(Exception):  # noqa: N818 - no error of ours: whoever read the 
 
 
 def check_output(
-    target: Target, inputs: Iterable[str | os.PathLike[str] | int] = (), *, force: bool = False, ours: bytes = b""
+    target: Target,
+    inputs: Iterable[str | os.PathLike[str] | int] = (),
+    *,
+    force: bool | None = False,
+    ours: bytes = b"",
 ) -> bool:
     """Refuse an output that would destroy something.
 
@@ -47,8 +57,8 @@ def check_output(
         A stream is never refused.
     inputs : iterable of path or file descriptor
         What is read: an output is never one of them.
-    force : bool
-        Whether an existing file may be replaced.
+    force : bool or None
+        Whether an existing file may be replaced; None for not, but it may stay if it turns out to be the same.
     ours : bytes
         How a file begins that an earlier run made; such a file is replaced without `force`.
 
@@ -74,11 +84,11 @@ def check_output(
     folder = os.path.dirname(os.path.realpath(path))
     if not os.path.isdir(folder):
         raise OutputError("CS402", f"there is no folder {folder}", "make it first", file=path)
-    if force or not os.path.isfile(path):
-        return force
-    if not (ours and _begins_with(path, ours)):
-        raise OutputError("CS403", "exists already", "use --force to replace it", file=path)
-    return True
+    if force or force is None or not os.path.isfile(path):
+        return bool(force)
+    if ours and _begins_with(path, ours):
+        return True
+    raise OutputError("CS403", "exists already", "use --force to replace it", file=path)
 
 
 def path_of(target: Target) -> str | None:
@@ -107,6 +117,11 @@ class HashedStream:
         """Hand everything to the operating system."""
         self._stream.flush()
 
+    @property
+    def digest(self) -> str:
+        """Hash of what was written, in hexadecimal digits."""
+        return self._hash.hexdigest()
+
     def check(self, path: str) -> None:
         """Compare what a file holds with what was written.
 
@@ -116,7 +131,7 @@ class HashedStream:
             CS407: somebody else has changed it.
         """
         with open(path, "rb") as file:
-            if hashlib.file_digest(file, "blake2b").digest() != self._hash.digest():
+            if hashlib.file_digest(file, "blake2b").hexdigest() != self.digest:
                 raise OutputError("CS407", "somebody changed the text before it took its place", "try again", file=path)
 
 
@@ -131,11 +146,14 @@ class Output:
         Where the text is until then; empty where it goes straight to a stream or device.
     rejected : bool
         Set by the writer: the text must not take the place of the output.
+    mark : mapping of str to str
+        Set by the writer: kept with the file where the file system can, for `read_mark`.
     """
 
     stream: HashedStream
     path: str = ""
     rejected: bool = False
+    mark: Mapping[str, str] = field(default_factory=dict)
 
 
 @contextlib.contextmanager
@@ -180,6 +198,27 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
             else:
                 yield Output(HashedStream(device))
             device.flush()
+
+
+def read_mark(path: str) -> dict[str, str] | None:
+    """Mark that was set when the file was written; empty where it has none or has been changed since.
+
+    Returns
+    -------
+    dict or None
+        None where the file system keeps no marks.
+    """
+    if not hasattr(os, "getxattr"):
+        return None
+    try:
+        mark = json.loads(os.getxattr(path, _MARK))
+        with open(path, "rb") as file:
+            changed = hashlib.file_digest(file, "blake2b").hexdigest() != mark.pop("text")
+    except OSError as failure:
+        return None if failure.errno in (errno.ENOTSUP, errno.EPERM) else {}
+    except (ValueError, KeyError, AttributeError):
+        return {}
+    return {} if changed else mark
 
 
 def remove_unfinished() -> None:
@@ -228,6 +267,9 @@ def _moving(target: str, told: str, *, replace: bool) -> Iterator[Output]:
             os.fchmod(file.fileno(), stat.S_IMODE(os.stat(target).st_mode))
         os.fsync(file.fileno())
         output.stream.check(temporary)
+        if output.mark and hasattr(os, "setxattr"):
+            with contextlib.suppress(OSError):
+                os.setxattr(temporary, _MARK, json.dumps({"text": output.stream.digest, **output.mark}).encode())
         if output.rejected:
             os.replace(temporary, target + REJECTED)
         elif replace:
@@ -249,6 +291,8 @@ def _move_to_free_place(temporary: str, target: str, told: str) -> None:
                 pass
             os.replace(temporary, target)
     except FileExistsError:
+        if filecmp.cmp(temporary, target, shallow=False):  # what stands there is the same
+            return
         raise OutputError(
             "CS403", "has appeared while the text was made", "use --force to replace it", file=told
         ) from None

@@ -128,7 +128,8 @@ def postprocess(
     feed: float | None = None,
     verify: bool = True,
     require_verified: bool = False,
-    force: bool = False,
+    force: bool | None = False,
+    mark: Mapping[str, str] | None = None,
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
@@ -154,8 +155,10 @@ def postprocess(
         Whether the text is read back and measured before it takes its place.
     require_verified : bool
         Whether a text that is not wholly verified is an error, too.
-    force : bool
-        Whether an existing file may be replaced.
+    force : bool or None
+        Whether an existing file may be replaced; None for not, but it may stay if it is the same.
+    mark : mapping of str to str, optional
+        Kept with the file where the file system can (`cornersmooth.output.read_mark`).
     processes : int, optional
         Processes to verify with; by default as many as are useful. The result does not depend on it.
     progress : callable, optional
@@ -208,6 +211,8 @@ def postprocess(
                 verification, unverified = _verified(verifier, form, frame)
         broken = verification is not None and not verification.passed
         output.rejected = broken or bool(require_verified and unverified)
+        if mark:
+            output.mark = {**mark, "not_verified": unverified}
     findings = (*smoothed.findings, *_remarks(program, smoothed.settings), *written.findings)
     if unverified:
         findings += (Finding("CS509", "warning", 0, f"NOT VERIFIED: {unverified}"),)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
 
 from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.job import Job, Outcome, run_job
+
+#: what becomes of a file
+STATUSES = ("done", "skipped", "rejected", "failed")
 
 
 class Batch:
@@ -19,20 +23,34 @@ class Batch:
     jobs : list of Job
     processes : int
         0 for all cores.
+    progress : callable, optional
+        Called with the files that have ended, and with all.
     """
 
-    def __init__(self, jobs: list[Job], processes: int) -> None:
-        self.jobs = jobs
-        self.done = 0
+    def __init__(
+        self, jobs: list[Job], processes: int, progress: Callable[[str, int, int], None] | None = None
+    ) -> None:
+        self.jobs, self._progress = jobs, progress
+        self.counts: Counter[str] = Counter()
         self._processes = min(processes or os.cpu_count() or 1, len(jobs))
 
     def run(self, ending: Ending) -> Iterator[Outcome]:
         """Outcomes in the order of the inputs; a file that fails does not stop the others."""
-        ending.say = lambda: f"interrupted: {self.done} of {len(self.jobs)} done; run again to continue"
-        outcomes = map(run_job, self.jobs) if self._processes == 1 else self._beside(ending)
-        for outcome in outcomes:
-            self.done += outcome.exit_code == 0
-            yield outcome
+        ending.say = self._interrupted
+        if self._processes == 1:
+            yield from map(self._counted, map(run_job, self.jobs))
+        else:
+            yield from self._beside(ending)
+
+    def _interrupted(self) -> str:
+        ready = self.counts["done"] + self.counts["skipped"]
+        return f"interrupted: {ready} of {len(self.jobs)} done; run again to continue"
+
+    def _counted(self, outcome: Outcome) -> Outcome:
+        self.counts[outcome.status] += 1
+        if self._progress is not None:
+            self._progress("files", self.counts.total(), len(self.jobs))
+        return outcome
 
     def _beside(self, ending: Ending) -> Iterator[Outcome]:
         from cornersmooth.cli.worker import Worker
@@ -49,7 +67,7 @@ class Batch:
         def work(job: Job) -> Outcome:
             worker = free.get()
             try:
-                return worker.run(job)
+                return self._counted(worker.run(job))
             finally:
                 free.put(worker)
 

@@ -45,7 +45,7 @@ def target_of(path: str) -> output.Target:
     return sys.stdout.buffer
 
 
-def check_path(path: str, inputs: list[str], *, force: bool, ours: bytes = b"") -> bool:
+def check_path(path: str, inputs: list[str], *, force: bool | None, ours: bytes = b"") -> bool:
     """Refuse an output that would destroy something, as `check_output`; standard streams are known by ``-``."""
     if path == STANDARD:
         return True

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import traceback
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.fingerprint import fingerprint
 from cornersmooth.errors import CornersmoothError, PromiseError, SettingsError
-from cornersmooth.output import ClosedPipe, open_output
+from cornersmooth.output import ClosedPipe, make_folder, open_output, read_mark
 
 if TYPE_CHECKING:
     from cornersmooth.nc import Form, Frame
@@ -53,6 +55,11 @@ class Job:
         Whether a text that is not wholly verified is set aside.
     alone : bool
         Whether no other job runs at the same time: verification may use all processors.
+    batch : bool
+        Whether it is one of a batch: folders are made, and what an earlier run has made of the same input with the same
+        settings is left as it is.
+    skip_existing : bool
+        Whether an output that exists is left as it is, whatever it was made of.
     plot : str
         Picture of the path; empty for none.
     tool : Tool or None
@@ -71,6 +78,8 @@ class Job:
     verify: bool = True
     require_verify: bool = False
     alone: bool = False
+    batch: bool = False
+    skip_existing: bool = False
     plot: str = ""
     tool: Tool | None = None
 
@@ -83,15 +92,27 @@ class Outcome:
     exit_code: int = 0
     message: str = ""
     contents: dict[str, Any] = field(default_factory=dict)
+    #: why nothing had to be done
+    skipped: str = ""
+    #: what of the text is not verified; empty for nothing
+    unverified: str = ""
 
     @property
-    def unverified(self) -> str:
-        """What of the text is not verified; empty for nothing."""
-        return str(self.contents.get("not_verified", ""))
+    def status(self) -> str:
+        """What became of it, in a word."""
+        if self.skipped:
+            return "skipped"
+        return {0: "done", 1: "rejected"}.get(self.exit_code, "failed")
 
 
-def check(job: Job) -> dict[str, bool]:
+def check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | None]:
     """Refuse what would fail later or destroy something; nothing is read or written.
+
+    Parameters
+    ----------
+    job : Job
+    replace_target : bool or None
+        Whether the NC file may be replaced, besides `Job.force`: as `force` of `cornersmooth.output.check_output`.
 
     Returns
     -------
@@ -99,7 +120,11 @@ def check(job: Job) -> dict[str, bool]:
         For each output, whether what stands at its place may be replaced.
     """
     outputs = [job.target, *job.reports, *([job.plot] if job.plot else [])]
-    may_replace = {job.target: check_path(job.target, [job.source], force=job.force)}
+    replace_target = job.force or replace_target
+    may_replace: dict[str, bool | None] = {}
+    may_replace[job.target] = check_path(job.target, [job.source], force=replace_target)
+    if replace_target is None:
+        may_replace[job.target] = None
     for path in job.reports:
         suffix = os.path.splitext(path)[1].lower()
         if suffix not in _OURS:
@@ -121,7 +146,8 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
     """
     outcome = Outcome(job)
     try:
-        outcome.contents = _smooth_file(job, check(job), outcome, progress)
+        if not (job.skip_existing and _exists(job, outcome)):
+            outcome.contents = _smooth_file(job, outcome, progress)
     except CornersmoothError as failure:
         outcome.exit_code = failure.exit_code
         outcome.message = str(failure)
@@ -146,11 +172,48 @@ def internal_error(failure: Exception, source: str = "") -> str:
     )
 
 
-def _smooth_file(job: Job, may_replace: dict[str, bool], outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
-    """Make text and reports; a broken promise goes to the outcome."""
+def _exists(job: Job, outcome: Outcome) -> bool:
+    if os.path.exists(job.target):
+        outcome.skipped = "its output exists"
+    return bool(outcome.skipped)
+
+
+def _made_of(job: Job, source: bytes) -> str:
+    """Name for everything that the text of a job depends on."""
+    text = hashlib.sha256(source).hexdigest()
+    wanted = (job.verify, job.require_verify, job.feed)
+    return fingerprint(text, job.reading, job.settings, job.form, job.frame, *wanted)
+
+
+def _may_replace(job: Job, made_of: str, outcome: Outcome) -> bool | None:
+    """Whether the output of an earlier run may be replaced; where nothing has to be done the outcome says so."""
+    if job.force or not os.path.exists(job.target):
+        return job.force
+    before = read_mark(job.target)
+    if before is None:  # nothing can be known of it: it may stay if it is the same
+        return None
+    if before.get("made_of") != made_of:
+        return False
+    if all(map(os.path.exists, job.reports)):
+        outcome.skipped, outcome.unverified = "nothing has changed", before.get("not_verified", "")
+    return True
+
+
+def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
+    """Make text and reports; a broken promise goes to the outcome, and why there was nothing to do."""
     from cornersmooth.pipeline import postprocess
 
     source, name = read_input(job.source)
+    made_of = ""
+    replace_target: bool | None = False
+    if job.batch:
+        made_of = _made_of(job, source)
+        replace_target = _may_replace(job, made_of, outcome)
+        if outcome.skipped:
+            return {}
+        for path in (job.target, *job.reports):
+            make_folder(os.path.dirname(path) or ".")
+    may_replace = check(job, replace_target=replace_target)
     try:
         result = postprocess(
             source,
@@ -163,6 +226,7 @@ def _smooth_file(job: Job, may_replace: dict[str, bool], outcome: Outcome, progr
             verify=job.verify,
             require_verified=job.require_verify,
             force=may_replace[job.target],
+            mark={"made_of": made_of} if made_of else None,
             processes=None if job.alone else 1,
             progress=progress,
         )
@@ -170,12 +234,13 @@ def _smooth_file(job: Job, may_replace: dict[str, bool], outcome: Outcome, progr
         result = broken.result
         outcome.exit_code = broken.exit_code
         outcome.message = _say_rejected(name, result, broken)
+    outcome.unverified = result.unverified
     contents = result.report()
     for path in job.reports:
-        _write_report(path, job, may_replace[path], source, result, contents)
+        _write_report(path, job, bool(may_replace[path]), source, result, contents)
     if job.plot:
         picture = _picture(job, result, contents)
-        with open_output(target_of(job.plot), replace=may_replace[job.plot]) as output:
+        with open_output(target_of(job.plot), replace=bool(may_replace[job.plot])) as output:
             output.stream.write(picture)
     return contents
 

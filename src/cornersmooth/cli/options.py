@@ -171,8 +171,22 @@ output = click.option(
     "-o", "--output", type=click.Path(), help="NC file, - for standard output. [default: - for a single input]"
 )
 directory = click.option(
-    "-d", "--directory", type=click.Path(), help="Folder for the NC files of several inputs, made where missing."
+    "-d",
+    "--directory",
+    type=click.Path(),
+    help="Folder for the NC files of several inputs, made where missing; folders below an input stay folders.",
 )
+glob = click.option(
+    "--glob",
+    type=str,
+    metavar="PATTERN",
+    multiple=True,
+    help="Files to take from folders, as in '*.cls'. May be repeated. [default: names of CL files]",
+)
+skip_existing = click.option(
+    "--skip-existing", is_flag=True, help="Leave outputs that exist as they are, whatever they were made of."
+)
+summary = click.option("--summary", type=click.Path(), help="Write a row for each file of a batch: .json or .csv.")
 jobs = click.option(
     "-j",
     "--jobs",

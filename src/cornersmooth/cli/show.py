@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from cornersmooth.cli.job import Outcome
     from cornersmooth.pipeline import Progress
 
 #: code of the finding that a text is not verified
@@ -29,21 +29,34 @@ def console() -> Console:
 
 
 @contextmanager
-def progress_bar(quiet: bool) -> Iterator[Progress | None]:
-    """Progress callback drawing a bar, or None where nobody would see it."""
+def progress_bar(quiet: bool, *, rate: bool = False) -> Iterator[Progress | None]:
+    """Progress callback drawing a bar, or None where nobody would see it; `rate` adds pieces a second and time left."""
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        ProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns: list[ProgressColumn] = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()]
+    columns.append(TimeElapsedColumn())
+    if rate:
+        columns += [TextColumn("{task.fields[rate]}"), TimeRemainingColumn()]
     with Progress(*columns, console=console(), transient=True) as bar:
         tasks: dict[str, Any] = {}
+        begin = time.monotonic()
 
         def advance(stage: str, done: int, total: int) -> None:
             if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=total)
-            bar.update(tasks[stage], completed=done, total=total)
+                tasks[stage] = bar.add_task(stage, total=total, rate="")
+            took = time.monotonic() - begin
+            bar.update(tasks[stage], completed=done, total=total, rate=f"{done / took:.1f}/s" if took else "")
 
         yield advance
 
@@ -110,41 +123,6 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
         print_line(f"{given['name']}{sharp_text(corner)}, stays sharp")
     if summary["sharp"] > len(shown):
         print_line(f"{given['name']}: {summary['sharp'] - len(shown)} more stay sharp; --report part.html lists them")
-
-
-def show_batch(outcomes: list[Outcome]) -> None:
-    """Print one row for every file."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("file", overflow="fold")
-    for heading in ("result", "corners", "rounded", "tip mm", "axis mm", "blocks"):
-        table.add_column(heading, no_wrap=True)
-    for outcome in outcomes:
-        name = outcome.job.source
-        if not outcome.contents:
-            table.add_row(name, f"failed ({outcome.exit_code})", "", "", "", "", "")
-            continue
-        summary = outcome.contents["summary"]
-        table.add_row(
-            name,
-            ("not verified" if outcome.unverified else "done")
-            if outcome.exit_code == 0
-            else f"exit {outcome.exit_code}",
-            str(summary["corners"]),
-            str(summary["smoothed"]),
-            f"{summary['max_tip_error_mm']:.4f}",
-            f"{summary['max_axis_error_mm']:.4f}",
-            str(summary["blocks_out"]),
-        )
-    failed = sum(outcome.exit_code != 0 for outcome in outcomes)
-    out = console()
-    if not out.is_terminal:  # in a file every name stands whole on its line
-        out.width = max(out.width, 60 + max(len(outcome.job.source) for outcome in outcomes))
-    out.print(table)
-    unverified = sum(bool(outcome.unverified) for outcome in outcomes)
-    counts = [f"{len(outcomes)} files, {failed} failed" if failed else f"{len(outcomes)} files done"]
-    out.print(", ".join(counts + ([f"{unverified} NOT VERIFIED"] if unverified else [])))
 
 
 def print_line(text: str) -> None:

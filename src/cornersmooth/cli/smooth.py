@@ -11,9 +11,10 @@ from cornersmooth.cli import options
 from cornersmooth.cli.batch import Batch
 from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.files import STANDARD, check_path, read_input
+from cornersmooth.cli.inputs import Input, find_inputs
 from cornersmooth.cli.job import Job, Outcome, check, run_job
-from cornersmooth.cli.show import print_line, progress_bar, show_batch, show_findings, show_summary
-from cornersmooth.errors import CornersmoothError
+from cornersmooth.cli.show import print_line, progress_bar, show_findings, show_summary
+from cornersmooth.cli.summary import check_summary, counts_line, line_of, write_summary
 from cornersmooth.output import make_folder
 
 if TYPE_CHECKING:
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 @options.form
 @options.axis_length
 @options.directory
+@options.glob
+@options.skip_existing
+@options.summary
 @options.jobs
 @options.reports
 @options.plot_path
@@ -69,6 +73,7 @@ def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
       cornersmooth smooth part.cls -e 0.04 --control linuxcnc --machine xyzac-trt -o part.ngc
       cornersmooth smooth part.ncl -e 0.0005in -H 25 -o part.nc
       cornersmooth smooth *.cls -e 0.04 -d out/ -j 2
+      cornersmooth smooth cl/ -e 0.04 -d nc/ -j --summary made.csv
       cat part.cls | cornersmooth smooth - -e 0.04 > part.nc
     """
     jobs = _make_jobs(inputs, given)
@@ -82,19 +87,27 @@ def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
             show_summary(outcome.contents, verbose)
         return outcome.exit_code
     outcomes = []
-    for outcome in Batch(jobs, given["jobs"]).run(ending):
-        _tell(outcome, quiet, verbose)
-        outcomes.append(outcome)
+    with progress_bar(quiet, rate=True) as progress:
+        batch = Batch(jobs, given["jobs"], progress)
+        for outcome in batch.run(ending):
+            told = outcome.status in ("done", "skipped") and not quiet and (progress is None or verbose > 0)
+            if told:
+                print_line(line_of(outcome))
+            _tell(outcome, quiet, verbose, told)
+            outcomes.append(outcome)
+    if given["summary"]:
+        write_summary(given["summary"], outcomes)
     if not quiet:
-        show_batch(outcomes)
+        print_line(counts_line(batch.counts, sum(bool(outcome.unverified) for outcome in outcomes)))
     worst: int = max(outcome.exit_code for outcome in outcomes)
     return worst
 
 
-def _tell(outcome: Outcome, quiet: bool, verbose: int) -> None:
+def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> None:
+    """Print what went wrong and what was noticed, and what is not verified where no line or summary has told it."""
     if outcome.message:
         print_line(outcome.message)
-    if outcome.unverified and (quiet or not outcome.job.alone):  # never in silence; the summary says it, too
+    if outcome.unverified and not told and (quiet or outcome.job.batch):
         print_line(f"{outcome.job.source}: NOT VERIFIED: {outcome.unverified}")
     if outcome.contents and not quiet:
         show_findings(outcome.job.source, outcome.contents, verbose)
@@ -111,6 +124,14 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
         raise click.UsageError("--no-verify and --require-verify exclude each other")
     if folder and output:
         raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
+    files = find_inputs(inputs, given["glob"]) if folder else [Input(path, _stem(path)) for path in inputs]
+    if given["glob"] and not folder:
+        raise click.UsageError("--glob is for folders, which need -d FOLDER")
+    if given["summary"]:
+        if not folder:
+            raise click.UsageError("--summary is for batches, which need -d FOLDER; --report tells of a single file")
+        check_summary(given["summary"])
+        check_path(given["summary"], [found.path for found in files], force=True)
     if len(inputs) > 1 and not folder:
         raise click.UsageError("several inputs need -d FOLDER; -o goes with a single input")
     if len(inputs) > 1 and STANDARD in inputs:
@@ -118,23 +139,22 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     reports = given["reports"]
     if given["plot"]:
         options.picture_form(given["plot"])
-        if len(inputs) > 1:
+        if len(files) > 1:
             raise click.UsageError("--plot is for a single input; --report out/{stem}.html goes with several")
-    if len(inputs) > 1 and any("{stem}" not in path for path in reports):
+    if len(files) > 1 and any("{stem}" not in path for path in reports):
         raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
     settings, form, frame = options.settings_of(given), _form(given), _frame(given)
     fit_settings(settings, form, "mm")  # refuses wrong ones before any file is touched
     if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
         raise click.UsageError("--feed must be a positive number of mm/min")
     jobs = []
-    for source in inputs:
-        stem = "stdin" if source == STANDARD else os.path.splitext(os.path.basename(source))[0]
-        target = os.path.join(folder, f"{stem}.nc") if folder else output or STANDARD
+    for found in files:
+        target = os.path.join(folder, found.stem + form.table.layout.suffix) if folder else output or STANDARD
         jobs.append(
             Job(
-                source=source,
+                source=found.path,
                 target=target,
-                reports=tuple(path.replace("{stem}", stem) for path in reports),
+                reports=tuple(path.replace("{stem}", found.stem) for path in reports),
                 reading=options.reading_of(given),
                 settings=settings,
                 form=form,
@@ -143,7 +163,9 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 force=given["force"],
                 verify=not given["no_verify"],
                 require_verify=given["require_verify"],
-                alone=len(inputs) == 1,
+                alone=len(files) == 1,
+                batch=bool(folder),
+                skip_existing=given["skip_existing"],
                 plot=given["plot"] or "",
                 tool=given["tool"],
             )
@@ -186,11 +208,23 @@ def _frame(given: dict[str, Any]) -> Frame:
 
 def _check_against_inputs(jobs: list[Job]) -> None:
     """No output of one job may be the input of another."""
-    sources = [job.source for job in jobs]
+    sources = {name for job in jobs for name in _names(job.source)}
     for job in jobs:
         for path in (job.target, *job.reports):
-            try:
-                check_path(path, sources, force=True)
-            except CornersmoothError as failure:
-                if failure.exit_code == 2:
-                    raise
+            if path != STANDARD and not sources.isdisjoint(_names(path)):
+                check_path(path, [other.source for other in jobs], force=True)
+
+
+def _names(path: str) -> list[object]:
+    """What tells a file from others: its place, and where it exists, its number."""
+    if path == STANDARD:
+        return []
+    try:
+        found = os.stat(path)
+    except OSError:
+        return [os.path.realpath(path)]
+    return [os.path.realpath(path), (found.st_dev, found.st_ino)]
+
+
+def _stem(path: str) -> str:
+    return "stdin" if path == STANDARD else os.path.splitext(os.path.basename(path))[0]

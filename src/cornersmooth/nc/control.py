@@ -167,6 +167,8 @@ class TextStyle:
         Characters that a line may have; 0 for any number.
     continuation : str
         What a line ends with whose block goes on in the next; empty where blocks cannot.
+    suffix : str
+        What the names of its files end in.
     """
 
     program: str = "O0001"
@@ -182,6 +184,7 @@ class TextStyle:
     number_last: int = 0
     longest_block: int = 0
     continuation: str = ""
+    suffix: str = ".nc"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,70 @@
+"""Which files a batch works on, and where each of their outputs goes."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from fnmatch import fnmatch
+
+from cornersmooth.cli.files import STANDARD
+from cornersmooth.errors import SettingsError
+
+#: names of CL files, for folders
+PATTERNS = ("*.cls", "*.clsf", "*.cl", "*.ncl", "*.apt", "*.aptsource", "*.nccl")
+
+
+@dataclass(frozen=True)
+class Input:
+    """A file to work on.
+
+    Parameters
+    ----------
+    path : str
+    stem : str
+        Its place below the folder that was named, without the ending: where its outputs go below theirs.
+    """
+
+    path: str
+    stem: str
+
+
+def find_inputs(named: tuple[str, ...], patterns: tuple[str, ...]) -> list[Input]:
+    """Files that were named, and those of the folders that were, with all folders in them, in alphabetical order.
+
+    Parameters
+    ----------
+    named : tuple of str
+    patterns : tuple of str
+        What the names of files in folders are like; those of CL files where it is empty.
+
+    Raises
+    ------
+    SettingsError
+        CS223: a folder without any such file.
+    """
+    found = []
+    for name in named:
+        if name != STANDARD and os.path.isdir(name):
+            inside = _inside(name, patterns or PATTERNS)
+            if not inside:
+                wanted = ", ".join(patterns or PATTERNS)
+                raise SettingsError("CS223", f"no file in {name} is like {wanted}", "name others with --glob")
+            found += inside
+        else:
+            found.append(Input(name, "stdin" if name == STANDARD else _stem(os.path.basename(name))))
+    return found
+
+
+def _inside(folder: str, patterns: tuple[str, ...]) -> list[Input]:
+    found = []
+    for here, below, names in os.walk(folder):
+        below.sort()
+        for name in sorted(names):
+            if any(fnmatch(name.lower(), pattern.lower()) for pattern in patterns):
+                path = os.path.join(here, name)
+                found.append(Input(path, _stem(os.path.relpath(path, folder))))
+    return found
+
+
+def _stem(path: str) -> str:
+    return os.path.splitext(path)[0]

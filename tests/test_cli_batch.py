@@ -1,0 +1,167 @@
+"""Batches: folders and their trees, what a run again leaves as it is, counts, summaries, ends in the middle."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from interruptions import FILES, Bench
+from oracle.chains import cl_text, random_chains
+from oracle.command import BAD_INPUT, BAD_OUTPUT, DONE, SMALL, USAGE, run
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """Three files in folders below one another, one of which is no CL file by its name."""
+    folder = tmp_path / "cl"
+    (folder / "a" / "deep").mkdir(parents=True)
+    for index, name in enumerate(("one.cls", "a/two.NCL", "a/deep/three.aptsource")):
+        (folder / name).write_bytes(cl_text(random_chains(index, 6, tame=True))[0])
+    (folder / "a" / "notes.txt").write_text("not a path")
+    return folder
+
+
+def files_in(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def lines(*args: object, code: int = DONE) -> list[str]:
+    result = run("smooth", *args)
+    assert result.returncode == code, result.stderr.decode()
+    return result.stderr.decode().splitlines()
+
+
+def statuses(said: list[str]) -> list[str]:
+    return [line.split()[0] for line in said if line.startswith(("done ", "skipped "))]
+
+
+def test_folders_are_mirrored(tree: Path, tmp_path: Path) -> None:
+    said = lines(tree, "-d", tmp_path / "nc", "--report", tmp_path / "rep" / "{stem}.json")
+    assert list(files_in(tmp_path / "nc")) == ["a/deep/three.nc", "a/two.nc", "one.nc"]
+    assert list(files_in(tmp_path / "rep")) == ["a/deep/three.json", "a/two.json", "one.json"]
+    assert said[-1] == "3 files: 3 done"
+    assert run("smooth", tree / "one.cls").stdout == files_in(tmp_path / "nc")["one.nc"]
+    beside = lines(tree, "-d", tmp_path / "again", "-j", "2")
+    assert [line.split(" s")[0].rsplit(",", 1)[0] for line in beside] == [
+        line.split(" s")[0].rsplit(",", 1)[0] for line in said
+    ]
+    assert files_in(tmp_path / "again") == files_in(tmp_path / "nc")
+
+
+def test_patterns_choose_files(tree: Path, tmp_path: Path) -> None:
+    lines(tree, "-d", tmp_path / "nc", "--glob", "t*.ncl", "--glob", "one*")
+    assert list(files_in(tmp_path / "nc")) == ["a/two.nc", "one.nc"]
+    assert "no file in" in lines(tree, "-d", tmp_path / "none", "--glob", "*.xyz", code=USAGE)[0]
+    assert run("smooth", tree / "one.cls", "--glob", "*").returncode == USAGE
+
+
+def test_names_end_as_the_control_wants(tree: Path, tmp_path: Path) -> None:
+    (tree / "one.cls").write_bytes(SMALL)
+    for control, suffix in (("siemens", ".mpf"), ("heidenhain", ".h"), ("linuxcnc", ".ngc"), ("fanuc", ".nc")):
+        options = ["--machine", "xyzac-trt"] if control == "linuxcnc" else []
+        lines(tree / "one.cls", "-d", tmp_path / control, "--control", control, *options)
+        assert list(files_in(tmp_path / control)) == [f"one{suffix}"]
+
+
+def test_a_run_again_continues(tree: Path, tmp_path: Path) -> None:
+    out = tmp_path / "nc"
+    assert statuses(lines(tree, "-d", out)) == ["done"] * 3
+    before = files_in(out)
+    (out / "one.nc").unlink()
+    assert sorted(statuses(lines(tree, "-d", out))) == ["done", "skipped", "skipped"]
+    assert files_in(out) == before
+    assert statuses(lines(tree, "-d", out, "--force")) == ["done"] * 3
+
+
+def test_what_has_changed_is_not_skipped(tree: Path, tmp_path: Path) -> None:
+    out = tmp_path / "nc"
+    lines(tree, "-d", out)
+    before = files_in(out)
+    (tree / "one.cls").write_bytes(SMALL)
+    (out / "a" / "two.nc").write_bytes(b"edited by hand")
+    said = lines(tree, "-d", out, code=BAD_OUTPUT)
+    assert [line for line in said if "exists already" in line] == [
+        f"{out / name}: error: exists already; use --force to replace it" for name in ("one.nc", "a/two.nc")
+    ]
+    assert said[-1] == "3 files: 1 skipped, 2 failed"
+    assert files_in(out) == before | {"a/two.nc": b"edited by hand"}
+    for options in (["-e", "0.02"], ["--no-verify"], ["-f", "g6.2"], ["--block-numbers"], ["--feed", "900"]):
+        assert lines(tree, "-d", out, *options, code=BAD_OUTPUT)[-1] == "3 files: 3 failed"
+
+
+def test_a_report_that_is_missing_is_made(tree: Path, tmp_path: Path) -> None:
+    out, reports = tmp_path / "nc", tmp_path / "{stem}.csv"
+    lines(tree, "-d", out)
+    before = files_in(out)
+    assert statuses(lines(tree, "-d", out, "--report", reports)) == ["done"] * 3
+    assert (tmp_path / "a" / "two.csv").exists()
+    assert statuses(lines(tree, "-d", out, "--report", reports)) == ["skipped"] * 3
+    assert files_in(out) == before
+
+
+def test_without_marks_what_is_made_is_compared(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unsupported(*args: object) -> bytes:
+        raise OSError(errno.ENOTSUP, "Operation not supported")
+
+    monkeypatch.setattr(os, "setxattr", unsupported, raising=False)
+    monkeypatch.setattr(os, "getxattr", unsupported, raising=False)
+    out = tmp_path / "nc"
+    lines(tree, "-d", out)
+    (out / "one.nc").write_bytes(b"edited by hand")
+    before = files_in(out)
+    said = lines(tree, "-d", out, code=BAD_OUTPUT)
+    assert said[-1] == "3 files: 2 done, 1 failed"
+    assert files_in(out) == before
+
+
+def test_existing_outputs_may_be_skipped(tree: Path, tmp_path: Path) -> None:
+    out = tmp_path / "nc"
+    out.mkdir()
+    (out / "one.nc").write_bytes(b"mine")
+    assert lines(tree, "-d", out, "--skip-existing")[-1] == "3 files: 2 done, 1 skipped"
+    assert (out / "one.nc").read_bytes() == b"mine"
+
+
+def test_summaries_have_a_row_for_each_file(tree: Path, tmp_path: Path) -> None:
+    (tree / "bad.cls").write_bytes(SMALL.replace(b"GOTO/10,10,0,0,0.1,1", b"GOTO/10,nan,0,0,0.1,1"))
+    out, text, table = tmp_path / "nc", tmp_path / "s.json", tmp_path / "s.csv"
+    lines(tree, "-d", out, "--summary", text, code=BAD_INPUT)
+    found = json.loads(text.read_text())
+    assert found["counts"] == {"done": 3, "skipped": 0, "rejected": 0, "failed": 1}
+    failed, first = found["files"][:2]
+    assert (failed["status"], failed["exit_code"], failed["corners"]) == ("failed", BAD_INPUT, None)
+    assert "bad.cls:9: error" in failed["reason"]
+    assert first["output"] == str(out / "one.nc")
+    assert first["blocks"] > first["corners"] >= first["smoothed"] > 0
+    lines(tree, "-d", out, "--summary", table, code=BAD_INPUT)
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert [row["status"] for row in rows] == ["failed", "skipped", "skipped", "skipped"]
+    assert rows[1]["reason"] == "nothing has changed"
+    for wrong in (["--summary", tmp_path / "s.txt", "-d", out], ["--summary", text]):
+        assert run("smooth", tree / "one.cls", *wrong).returncode == USAGE
+
+
+def test_a_batch_that_was_interrupted_goes_on_where_it_was(tmp_path: Path) -> None:
+    """Whatever the moment, a run again makes what is missing and leaves the rest as it is."""
+    bench = Bench(tmp_path, single=10, several=1500)
+    out = tmp_path / "out"
+    words = [word for word in bench.words(True, out) if word != "--force"]
+    for moment in (0.5, 0.6, 0.7):
+        process = subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True)
+        try:
+            process.wait(moment * bench.seconds[True])
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGTERM)
+        _, said = process.communicate()
+        assert process.returncode in (0, 143), said.decode()
+    result = subprocess.run(words, capture_output=True, check=True)
+    counts = result.stderr.decode().splitlines()[-1]
+    assert counts.startswith(f"{FILES} files: ")
+    assert files_in(out) == {name: text for name, text in bench.whole.items() if name != "single.nc"}
