@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -72,9 +73,9 @@ class WordCheck:
         for item in items:
             if isinstance(item, Table):
                 self._table(item)
+                yield item
             else:
-                self._block(item)
-            yield item
+                yield self._block(item)
         self._end()
 
     def _words_of(self, text: str) -> list[str]:
@@ -114,8 +115,8 @@ class WordCheck:
             before, line = self._weights.get(value, (0, int(table.line[rows[row]])))
             self._weights[value] = (before + many, line)
 
-    def _block(self, line: Line) -> None:
-        """Look at a line on its own."""
+    def _block(self, line: Line) -> Line:
+        """Look at a line on its own; of one that is taken on trust only what is understood goes on to the reader."""
         for comment in line.comments:
             if self.list.orders is not None and self.list.orders.match(comment):
                 self._wrong(NOT_LISTED, line.number, f"a comment that the control obeys: {comment[:40]}")
@@ -124,14 +125,19 @@ class WordCheck:
         if not line.words and not line.tape:
             if line.skipped:
                 self._wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
-            return
+            return line
         words = [said(word) for word in line.words] or ["%"]
         text = _text(words)
         self._line = line.number
         if text in self._own:
             self.trusted.append((line.number, text))
-            self._note(line, words)
-            return
+            self._blocks += 1
+            rules = self._fitting(words, text)
+            if len(rules) == len(words):
+                kept = [rule is not None and not rule.compared for rule in rules]
+                line = replace(line, words=tuple(word for word, keep in zip(line.words, kept, strict=True) if keep))
+            self._note(line, [said(word) for word in line.words])
+            return line
         if line.skipped:
             self._wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
         if not self._start(line.number, text):
@@ -142,6 +148,7 @@ class WordCheck:
             self._states(line.number, words, rules)
         self._blocks += 1
         self._note(line, words)
+        return line
 
     def _note(self, line: Line, words: list[str]) -> None:
         """Keep the motion of a block on its own."""
@@ -203,8 +210,8 @@ class WordCheck:
 
     # the words of a block
 
-    def _rules(self, number: int, words: list[str], text: str) -> list[WordRule | None]:
-        """Rule of every word; complains of words that are not on the list."""
+    def _fitting(self, words: list[str], text: str) -> list[WordRule | None]:
+        """Rule of every word, or of the whole block; None for a word that is not on the list, or not beside these."""
         whole = next((rule for rule in self.list.blocks if rule.pattern.fullmatch(text)), None)
         if whole is not None:
             return [whole]
@@ -212,21 +219,29 @@ class WordCheck:
         for k, word in enumerate(words):
             others = [*words[:k], *words[k + 1 :]]
             fitting = [rule for rule in self.list.words if rule.pattern.fullmatch(word)]
-            never = bool(fitting) and fitting[0].never
+            if fitting and fitting[0].never:
+                fitting = []
             beside = [rule for rule in fitting if rule.needs is not None and _any(rule.needs, others)]
             plain = [rule for rule in fitting if rule.needs is None]
-            rule = None if never else next(iter(beside + plain), None)
-            if never or not fitting:
-                self._wrong(NOT_LISTED, number, f"{word} is not on the list of words for this control")
-            elif rule is None:
+            rules.append(next(iter(beside + plain), None))
+        return rules
+
+    def _rules(self, number: int, words: list[str], text: str) -> list[WordRule | None]:
+        """Rule of every word; complains of words that are not on the list."""
+        rules = self._fitting(words, text)
+        if len(rules) != len(words):
+            return rules
+        for word, rule in zip(words, rules, strict=True):
+            if rule is not None:
+                if self._without_point(word):
+                    text = f"{word} without a decimal point: the control may count it in its least increment"
+                    self._wrong(NOT_LISTED, number, text)
+                continue
+            fitting = [rule for rule in self.list.words if rule.pattern.fullmatch(word)]
+            if fitting and not fitting[0].never:
                 self._wrong(NOT_LISTED, number, f"{word} stands beside nothing that it belongs to")
-            elif self._without_point(word):
-                self._wrong(
-                    NOT_LISTED,
-                    number,
-                    f"{word} without a decimal point: the control may count it in its least increment",
-                )
-            rules.append(rule)
+            else:
+                self._wrong(NOT_LISTED, number, f"{word} is not on the list of words for this control")
         return rules
 
     def _without_point(self, word: str) -> bool:
