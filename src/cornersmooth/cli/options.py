@@ -227,6 +227,14 @@ header = click.option(
     metavar="FILE",
     help="Lines to write behind the head; {program} and {units} are filled in.",
 )
+trusted = click.option(
+    "--trust",
+    "trusted",
+    type=click.Path(),
+    multiple=True,
+    metavar="FILE",
+    help="Lines that belong in the text because you put them there, as --header and --footer of smooth. Repeatable.",
+)
 footer = click.option("--footer", type=click.Path(), metavar="FILE", help="Lines to write before the tail.")
 program_name = click.option("--program-name", type=str, metavar="TEXT", help="Name or number of the NC program.")
 block_numbers = click.option("--block-numbers", is_flag=True, help="Number the blocks.")

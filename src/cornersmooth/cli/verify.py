@@ -33,6 +33,7 @@ _PROBLEMS_SHOWN = 20
 @options.control
 @options.machine
 @options.no_tcp
+@options.trusted
 @options.reading
 @options.found_reports
 @options.tool
@@ -72,7 +73,10 @@ def command(source: str, text: str, **given: Any) -> int:
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     if given["plot"] or given["verbose"] or pages:  # it is looked at more than once
         nc = readable_twice(nc)
-    found = verify(program, nc, **how, words=not own, processes=useful_processes())
+    trusted = [
+        line for path in given["trusted"] for line in read_input(path)[0].decode("utf-8", "replace").splitlines()
+    ]
+    found = verify(program, nc, **how, words=not own, trusted=trusted, processes=useful_processes())
     _write_reports(program, found, [path for path in given["reports"] if path not in pages])
     if pages:
         from cornersmooth.page import verified_page
@@ -148,6 +152,8 @@ def _summary(found: Verification) -> Iterator[str]:
     yield f"{'tangent jump':<18}{_place(found.tangent_jump, 'deg')}"
     if found.curves:
         yield f"{'curvature jump':<18}{_place(found.curvature_jump, '1/mm')}"
+    for line, block in found.trusted:
+        yield f"{'taken on trust':<18}{block}, NC line {line}"
     yield f"{'blocks':<18}{found.blocks}, shortest move {_place(found.shortest, 'mm')}"
 
 
