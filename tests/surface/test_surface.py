@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 from functools import partial
 from pathlib import Path
 
@@ -213,16 +212,14 @@ def brute_force(point, motion, tool, edge):
 
 @pytest.mark.parametrize("tolerance", [0.01, 0.04])
 @pytest.mark.parametrize("name", ["impeller", pytest.param("hecc_flank_nx", marks=pytest.mark.corpus)])
-def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance):
+def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance, request):
     from cornersmooth.surface import original_cuts, written_cuts
     from cornersmooth.verify import read_nc
 
     if name == "impeller":
         path, height = Path(__file__).parents[2] / "samples" / "impeller.cls", 12.0
     else:
-        if not os.environ.get("CORNERSMOOTH_CORPUS"):
-            pytest.skip("CORNERSMOOTH_CORPUS names no folder of CL files")
-        path, height = Path(os.environ["CORNERSMOOTH_CORPUS"]) / "hecc_flank_nx.cls", 10.0
+        path, height = request.getfixturevalue("corpus") / "hecc_flank_nx.cls", 10.0
     program, text = case(path, tolerance, height)
     [(_, tool, _)] = tools_of(program)
     found = measure_surface(program, text, tool, tolerance=tolerance, edge=height, stations=150)

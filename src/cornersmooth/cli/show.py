@@ -76,16 +76,22 @@ def show_findings(source: str, contents: dict[str, Any], verbose: int) -> None:
         print_line(f"{source}: {len(ranked) - len(shown)} more findings; -v shows them")
 
 
+def show_verdict(contents: dict[str, Any]) -> None:
+    """Print how it went, in one sentence."""
+    from cornersmooth.report.verdict import verdict
+
+    console().print(verdict(contents), style="bold")
+
+
 def show_summary(contents: dict[str, Any], verbose: int) -> None:
-    """Print the verdict, the small table of one file, and its sharp corners."""
+    """Print the small table of one file, and its sharp corners."""
     from rich.table import Table
 
-    from cornersmooth.report.verdict import sharp_text, verdict
+    from cornersmooth.report.verdict import sharp_text
     from cornersmooth.smoothing.construction import construction_of
 
     summary, settings = contents["summary"], contents["settings"]
     given = contents["input"]
-    console().print(verdict(contents), style="bold")
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold")
     table.add_column()

@@ -13,7 +13,7 @@ from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.files import STANDARD, check_path, read_input
 from cornersmooth.cli.inputs import Input, find_inputs
 from cornersmooth.cli.job import Job, Outcome, check, run_job
-from cornersmooth.cli.show import print_line, progress_bar, show_findings, show_summary
+from cornersmooth.cli.show import print_line, progress_bar, show_findings, show_summary, show_verdict
 from cornersmooth.cli.summary import check_summary, counts_line, line_of, write_summary
 from cornersmooth.output import make_folder
 
@@ -82,6 +82,8 @@ def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
         check(jobs[0])
         with progress_bar(quiet) as progress:
             outcome = run_job(jobs[0], progress)
+        if outcome.contents and not quiet:
+            show_verdict(outcome.contents)
         _tell(outcome, quiet, verbose)
         if outcome.contents and not quiet:
             show_summary(outcome.contents, verbose)

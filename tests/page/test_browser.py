@@ -1,0 +1,305 @@
+"""Pages in a browser: opened from disk, without network, looked at by pixels and driven by hand."""
+
+from __future__ import annotations
+
+import base64
+import os
+import shutil
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from page.making import HOSTILE, page_of, smoothed
+
+pytestmark = pytest.mark.browser
+
+#: without a graphics card
+SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
+
+#: milliseconds for one thing to happen on a busy machine
+PATIENCE = 60_000
+
+#: where pictures are left
+ARTEFACTS = Path(os.environ.get("CORNERSMOOTH_ARTEFACTS", Path(__file__).parents[2] / "build" / "pages"))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    driver = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    names = ("chromium", "chromium-browser", "google-chrome")
+    program = next((path for name in names if (path := shutil.which(name))), None)
+    if program is None:
+        pytest.skip("no Chromium (Debian package chromium)")
+    with driver.sync_playwright() as driving:
+        started = driving.chromium.launch(executable_path=program, args=list(SOFTWARE), timeout=PATIENCE)
+        yield started
+        started.close()
+
+
+class Looked:
+    """A page that is open."""
+
+    def __init__(self, browser, path, *, width=1400, height=950, scheme="light"):
+        self.errors = []
+        size = {"width": width, "height": height}
+        self.context = browser.new_context(
+            viewport=size, color_scheme=scheme, offline=True, reduced_motion="reduce", has_touch=width < 600
+        )
+        self.context.set_default_timeout(PATIENCE)
+        self.page = self.context.new_page()
+        self.page.on("console", lambda told: self.errors.append(told.text) if told.type == "error" else None)
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.requests = []
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(path.as_uri())
+        self.page.wait_for_selector("html[data-ready=true]")
+        self.settle()
+
+    def settle(self):
+        """Wait until everything is drawn."""
+        self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        self.page.wait_for_function("() => !cornersmooth.view.waiting")
+
+    def camera(self):
+        return np.array(self.page.evaluate("() => cornersmooth.view.camera.position.toArray()"))
+
+    def tool(self):
+        return np.array(self.page.evaluate("() => cornersmooth.view.tool.position.toArray()"))
+
+    def canvas(self):
+        """Pixels (h, w, 3) of the view, without what lies over it."""
+        self.settle()
+        shown = self.page.evaluate(
+            """() => { const canvas = document.createElement("canvas"); const view = document.getElementById("canvas");
+            canvas.width = view.width; canvas.height = view.height; const pen = canvas.getContext("2d");
+            pen.drawImage(view, 0, 0); return [canvas.width, canvas.height,
+            btoa(Array.from(pen.getImageData(0, 0, canvas.width, canvas.height).data,
+            value => String.fromCharCode(value)).join(""))]; }"""
+        )
+        width, height, data = shown
+        return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4)[..., :3]
+
+    def keep(self, name):
+        ARTEFACTS.mkdir(parents=True, exist_ok=True)
+        self.page.screenshot(path=ARTEFACTS / f"{name}.png")
+
+
+@pytest.fixture
+def look(browser, tmp_path):
+    opened = []
+
+    def open_page(text, **how):
+        path = tmp_path / f"page{len(opened)}.html"
+        path.write_text(text, encoding="utf-8")
+        opened.append(Looked(browser, path, **how))
+        return opened[-1]
+
+    yield open_page
+    for looked in opened:
+        looked.context.close()
+        assert looked.errors == []
+        assert [url for url in looked.requests if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    return page_of(smoothed())
+
+
+def colours(pixels):
+    """How many colours cover more than a few pixels."""
+    _, counts = np.unique(pixels.reshape(-1, 3) // 16, axis=0, return_counts=True)
+    return int((counts > 20).sum())
+
+
+def test_a_page_is_drawn_and_can_be_driven(look, text):
+    looked = look(text)
+    page = looked.page
+    first = looked.canvas()
+    assert colours(first) > 8
+    looked.keep("path")
+    assert page.inner_text("#verdict").startswith("OK: within 0.02 mm everywhere; 1 corner stays sharp")
+    assert page.inner_text("#badge") == "kept"
+    # the first corner of the list is the sharp one: a click goes there and fills the panel
+    before = looked.camera()
+    row = page.locator("#rows .row").first
+    assert row.inner_text().startswith("sharp: reversal")
+    row.click()
+    looked.settle()
+    after = looked.camera()
+    assert np.linalg.norm(after - before) > 1.0
+    target = np.array(page.evaluate("() => cornersmooth.view.controls.target.toArray()"))
+    corner = np.array(page.evaluate("() => Array.from(cornersmooth.arrays.c_tip.subarray(0, 3))"))
+    assert np.linalg.norm(target - corner) < 1e-6
+    panel = page.inner_text("#panel")
+    for word in ("sharp: reversal", "CL line", "12", "NC line", "turn", "176"):
+        assert word in panel
+    # the tool is at the corner, too; the slider takes it away
+    assert np.linalg.norm(looked.tool() - corner) < 0.2
+    looked.keep("corner")
+    page.evaluate(
+        "() => { const s = document.getElementById('slider'); s.value = 9000; s.dispatchEvent(new Event('input')); }"
+    )
+    looked.settle()
+    assert np.linalg.norm(looked.tool() - corner) > 5.0
+    seconds = float(page.inner_text("#clock").split()[0])
+    assert seconds == pytest.approx(0.9 * page.evaluate("() => cornersmooth.meta.seconds"), abs=0.02)
+    page.locator("#fit").click()
+    looked.settle()
+    assert np.linalg.norm(looked.camera() - after) > 1.0
+    # every choice of colour looks different, and has its legend
+    seen = []
+    for option in page.locator("#channel option").all_inner_texts():
+        page.select_option("#channel", label=option)
+        seen.append(looked.canvas())
+        assert option in page.inner_text("#legend")
+    assert len(seen) >= 6
+    different = [np.abs(one.astype(int) - other).sum() for one, other in pairwise(seen)]
+    assert sum(change > 0 for change in different) >= len(different) - 1
+
+
+def test_keys_charts_and_switches(look, text):
+    looked = look(text)
+    page = looked.page
+    page.locator("#canvas").focus()
+    for key in ("ArrowLeft", "ArrowUp", "+", "-", "f"):
+        before = looked.camera()
+        page.keyboard.press(key)
+        looked.settle()
+        assert np.linalg.norm(looked.camera() - before) > 1e-3, key
+    page.keyboard.press("n")
+    looked.settle()
+    assert "sharp: reversal" in page.inner_text("#panel")
+    # over a chart the place is marked in the view; a click sends the tool there
+    over = page.locator("#plots .u-over").first
+    box = over.bounding_box()
+    page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 20)
+    page.wait_for_function("() => cornersmooth.view.spot.visible")
+    page.mouse.click(box["x"] + 0.4 * box["width"], box["y"] + 20)
+    looked.settle()
+    way = page.evaluate("() => cornersmooth.meta.way")
+    where = page.evaluate(
+        "() => cornersmooth.arrays.w_way[cornersmooth.arrays.w_time.findIndex(t => t >= cornersmooth.drive.seconds)]"
+    )
+    assert where == pytest.approx(0.4 * way, rel=0.1)
+    page.locator("[data-scale=time]").click()
+    assert page.evaluate("() => cornersmooth.charts.plots[0].data[0].at(-1)") == pytest.approx(
+        max(page.evaluate("() => cornersmooth.meta.totals").values()), rel=0.01
+    )
+    # dragging looks closer in all charts
+    box = page.locator("#plots .u-over").first.bounding_box()
+    page.mouse.move(box["x"] + 0.2 * box["width"], box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 20, steps=5)
+    page.mouse.up()
+    ranges = page.evaluate("() => cornersmooth.charts.plots.map(p => [p.scales.x.min, p.scales.x.max])")
+    assert all(found == pytest.approx(ranges[0]) for found in ranges)
+    assert ranges[0][1] - ranges[0][0] < 0.6 * page.evaluate("() => cornersmooth.meta.seconds")
+    for name in ("show-written", "show-original", "show-rapids", "show-tool"):
+        before = looked.canvas()
+        page.locator(f"#{name}").click()
+        assert np.abs(looked.canvas().astype(int) - before).sum() > 0, name
+    page.locator("#show-written").click()
+    page.keyboard.press("f")
+    looked.settle()
+    drawn = []
+    for axes in ("surface", "whiskers", "none"):
+        page.select_option("#axes", axes)
+        drawn.append(looked.canvas().astype(int))
+    assert np.abs(drawn[0] - drawn[1]).sum() > 0
+    assert np.abs(drawn[1] - drawn[2]).sum() > 0
+    # the tool moves by itself
+    page.locator("#play").click()
+    before = looked.tool()
+    page.wait_for_function("() => Math.abs(cornersmooth.drive.seconds) > 0 && cornersmooth.drive.running")
+    page.wait_for_timeout(600)
+    page.locator("#play").click()
+    assert np.linalg.norm(looked.tool() - before) > 0.0
+
+
+def test_a_click_on_a_marker_chooses_the_corner(look, text):
+    looked = look(text)
+    x, y = looked.page.evaluate(
+        """() => { const { view, arrays } = cornersmooth; const p = view.controls.target.clone();
+        p.set(arrays.c_tip[0], arrays.c_tip[1], arrays.c_tip[2]).project(view.camera);
+        const box = view.canvas.getBoundingClientRect();
+        return [box.x + (0.5 + 0.5 * p.x) * box.width, box.y + (0.5 - 0.5 * p.y) * box.height]; }"""
+    )
+    looked.page.mouse.click(x + 2, y + 1)
+    looked.settle()
+    assert "sharp: reversal" in looked.page.inner_text("#panel")
+
+
+def test_narrow_and_dark_are_usable(look, text):
+    looked = look(text, width=390, height=844, scheme="dark")
+    page = looked.page
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= 390
+    pixels = looked.canvas()
+    assert pixels[5, 5].max() < 60  # a dark ground
+    assert colours(pixels) > 8
+    assert page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 27)"
+    for name in ("#stage", "#drive", "#charts", "#side"):
+        page.locator(name).scroll_into_view_if_needed()
+        box = page.locator(name).bounding_box()
+        assert box["width"] > 350
+        assert box["height"] > 35
+    page.locator("#rows .row").first.tap()
+    looked.settle()
+    assert "sharp: reversal" in page.inner_text("#panel")
+    page.evaluate("() => scrollTo(0, 0)")
+    looked.settle()
+    looked.keep("narrow-dark")
+    page.emulate_media(color_scheme="light")
+    looked.settle()
+    assert looked.canvas()[5, 5].min() > 200
+
+
+def test_hostile_names_do_nothing(look):
+    made = smoothed(
+        name=HOSTILE.replace("{", "{{").replace("}", "}}"), comment=HOSTILE, source=HOSTILE.replace("/", "|") + "\n.cls"
+    )
+    looked = look(page_of(made))
+    page = looked.page
+    assert page.title() != "taken"
+    assert page.locator("img").count() == 0
+    assert page.inner_text("#title").startswith("<|script>")
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= 1400
+
+
+def test_surface_on_a_page(look):
+    from cornersmooth.page import verified_page
+    from cornersmooth.page.pages import read_written
+    from cornersmooth.surface import measure_surface, tools_of
+
+    result = smoothed()
+    nc = read_written(result)
+    tool = tools_of(result.program)[0][1]
+    surface = measure_surface(result.program, nc, tool, tolerance=0.02, stations=300)
+    looked = look(verified_page(result.program, nc, result.verification, surface=surface))
+    with_surface = looked.canvas().astype(int)
+    looked.keep("surface")
+    assert "overcut" in looked.page.inner_text("#legend")
+    looked.page.locator("#show-surface").click()
+    assert np.abs(looked.canvas() - with_surface).sum() > 0
+    assert "overcut" not in looked.page.inner_text("#legend")
+
+
+def test_mouse_turns_and_zooms(look, text):
+    looked = look(text, width=1000, height=600)
+    page = looked.page
+    box = page.locator("#canvas").bounding_box()
+    before = looked.camera()
+    page.mouse.move(box["x"] + 200, box["y"] + 150)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 320, box["y"] + 190, steps=4)
+    page.mouse.up()
+    looked.settle()
+    assert np.linalg.norm(looked.camera() - before) > 0.1
+    before = looked.camera()
+    page.mouse.wheel(0, -300)
+    page.wait_for_timeout(300)
+    looked.settle()
+    assert np.linalg.norm(looked.camera() - before) > 0.1

@@ -1,0 +1,287 @@
+"""What a page holds: numbers, words, and nothing that a name could do harm with."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+
+import numpy as np
+import pytest
+
+import cornersmooth
+from cornersmooth.feedrate import Limits, direct
+from cornersmooth.page.document import document
+from cornersmooth.page.motions import original_path, written_path
+from cornersmooth.page.pages import read_written
+from cornersmooth.page.thinning import thinned
+from oracle.command import run
+from page.making import HOSTILE, PATH, page_of, smoothed, values_of
+
+
+@pytest.fixture(scope="module")
+def result():
+    return smoothed()
+
+
+@pytest.fixture(scope="module")
+def page(result):
+    return page_of(result)
+
+
+def test_a_page_is_one_file_that_fetches_nothing(page, result):
+    assert page.startswith("<!doctype html>\n<!-- cornersmooth page -->\n")
+    assert page == page_of(result)  # same input, same bytes
+    own = page.split("<script>")[2]  # behind the libraries
+    places = re.findall(r'(?:src|href)="([^"]*)"', re.sub(r"<(script|style).*?</", "", page, flags=re.S))
+    assert places == ["data:,"]
+    assert "http" not in own
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)[1]
+    assert "default-src 'none'" in policy
+    for script in re.findall(r"<script>(.*?)</script>", page, re.S):
+        digest = hashlib.sha256(script.encode()).digest()
+        assert f"'sha256-{base64.b64encode(digest).decode()}'" in policy
+
+
+def test_the_verdict_names_the_sharp_corner(page, result):
+    meta, arrays = values_of(page)
+    assert meta["verdict"].startswith("OK: within 0.02 mm everywhere; 1 corner stays sharp, first :12 reversal 17")
+    assert re.search(r"(saves|takes) \d+\.\d s", meta["verdict"])
+    assert meta["kept"] is True
+    facts = dict(meta["facts"])
+    assert facts["SHA-256 of the CL file"] == hashlib.sha256(b"part").hexdigest()
+    assert cornersmooth.__version__ in facts["made by"]
+    kinds = [meta["corners"]["kinds"][kind] for kind in arrays["c_kind"]]
+    assert kinds[0] == "sharp"
+    assert meta["corners"]["reasons"][arrays["c_reason"][0]] == "reversal"
+    assert arrays["c_line"][0] == 12
+    assert 170 < arrays["c_turn"][0] < 180
+    assert sum(meta["corners"]["counts"].values()) == len(result.smoothed.corners)
+
+
+def test_deviations_are_those_of_the_verification(page, result):
+    meta, arrays = values_of(page)
+    found = result.verification
+    for key, largest in (("w_off", found.tip.value), ("w_axis_off", found.axis_point.value)):
+        values = arrays[key][np.isfinite(arrays[key])]
+        # sampled poses: what verification found between them may be a little more
+        assert 0.5 * largest <= values.max() <= largest + 1e-6
+    corner = arrays["c_kind"] > 1
+    assert np.all(arrays["c_off"][corner] <= meta["tolerance"])
+    assert np.nanmax(arrays["way_off"]) == pytest.approx(np.nanmax(arrays["w_off"]), abs=1e-6)
+
+
+def test_deviation_of_each_point_is_its_distance_from_the_path(result):
+    program = result.program
+    original = original_path(program)
+    written = written_path(program, read_written(result), original, tolerance=0.02, axis_length=10.0)
+    cutting = np.flatnonzero(np.isfinite(written.tip_off))
+    assert len(cutting) > 20
+    feeding = np.flatnonzero(program.kind == cornersmooth.model.Move.LINEAR)
+    share = np.linspace(0.0, 1.0, 4001)[:, None]
+    for values, height in ((written.tip_off, 0.0), (written.axis_off, 10.0)):
+        samples = []
+        for pose in feeding:
+            axis = program.axis[pose - 1] + share * (program.axis[pose] - program.axis[pose - 1])
+            axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+            samples.append(program.tip[pose - 1] + share * (program.tip[pose] - program.tip[pose - 1]) + height * axis)
+        every = np.concatenate(samples)
+        for row in cutting:
+            point = written.tip[row] + height * written.axis[row]
+            least = np.linalg.norm(every - point, axis=1).min()
+            assert values[row] == pytest.approx(least, abs=5e-3 * 0.5)
+            assert values[row] >= least - 5e-3
+
+
+def test_planned_times_and_speeds_agree_with_the_laws(page, result):
+    meta, arrays = values_of(page)
+    law = direct(result.program, Limits(), "velocity_jump", settings=result.smoothed.settings)
+    assert meta["totals"]["direct"] == pytest.approx(law.total, rel=1e-9)
+    assert meta["seconds"] == pytest.approx(meta["totals"]["written"], rel=1e-6)
+    assert set(meta["charts"]["speeds"]) == {"direct", "local", "written"}
+    for name in meta["charts"]["speeds"]:
+        for scale in ("way", "time"):
+            speed = arrays[f"{scale}_speed_{name}"]
+            assert 1400.0 < np.nanmax(speed) <= 1500.0 * (1 + 1e-6)  # the feed; rapids are left out
+    assert np.all(np.diff(arrays["w_time"]) >= 0.0)
+    assert np.all(np.diff(arrays["w_way"]) >= 0.0)
+    # the reversal is a stop of the written path
+    at = np.searchsorted(arrays["way_x"], arrays["c_way"][0])
+    assert np.nanmin(arrays["way_speed_written"][at - 4 : at + 4]) < 100.0
+
+
+def test_axes_of_a_machine_have_charts(result):
+    from dataclasses import replace
+
+    from cornersmooth.kinematics import load_machine
+    from cornersmooth.page.scene import Story, Subject, scene
+
+    subject = Subject(
+        result.program,
+        read_written(result),
+        result.smoothed.settings,
+        result.verification,
+        result.smoothed,
+        machine=load_machine("table-ac"),
+    )
+    meta, _ = scene(subject, Story("part", "", True))
+    assert set(meta["charts"]["axes"]) == set("XYZAC")
+    bare = replace(subject, machine=None)
+    assert "axes" not in scene(bare, Story("part", "", True))[0]["charts"]
+
+
+def test_a_file_without_feeds_says_that_no_speed_is_planned():
+    made = smoothed(PATH.replace("FEDRAT/MMPM,1500.0\n", ""))
+    meta, arrays = values_of(page_of(made))
+    assert any("No speed is planned" in note for note in meta["notes"])
+    assert meta["timed"] is False
+    assert meta["seconds"] > 0.0
+    assert np.all(np.diff(arrays["w_time"]) >= 0.0)
+    meta, _ = values_of(page_of(made, limits=Limits(feed=1000.0)))
+    assert meta["timed"] is True
+
+
+def test_hostile_names_and_comments_are_text():
+    made = smoothed(
+        name=HOSTILE.replace("{", "{{").replace("}", "}}"),
+        comment=HOSTILE,
+        source=HOSTILE.replace("/", "|") + "\n.cls",
+    )
+    page = page_of(made)
+    assert page.count("<script") == 4
+    assert page.count("</script>") == 4
+    assert "<img" not in page
+    assert "xxx" * 500 not in page
+    meta, _ = values_of(page)
+    assert meta["title"].startswith("<|script><script>")
+
+
+def test_thinning_keeps_what_matters():
+    random = np.random.default_rng(5)
+    n = 100_000
+    points = np.cumsum(random.normal(size=(n, 3)), axis=0)
+    points[50_123] += 1e5  # a spike in the path
+    weight = random.random(n)
+    weight[77_777] = 2.0
+    weight[10] = np.nan
+    must = np.zeros(n, bool)
+    must[[5, 31_234, 99_998]] = True
+    rows = thinned(points, weight, must, 4000)
+    assert np.all(np.diff(rows) > 0)
+    assert 1000 < len(rows) < 5000
+    assert {0, 5, 31_234, 50_123, 77_777, 99_998, n - 1} <= set(rows.tolist())
+    assert np.array_equal(thinned(points[:100], weight[:100], must[:100], 4000), np.arange(100))
+
+
+def test_thinning_of_a_long_path_hides_no_corner_out_of_tolerance(monkeypatch):
+    from cornersmooth.page import scene as module
+    from cornersmooth.verify import read_nc, verify
+
+    monkeypatch.setattr(module, "MOST_POINTS", 500)
+    x = np.linspace(0.0, 600.0, 1201)
+    tips = np.stack((x, np.where(np.arange(1201) % 2, 1.0, 0.0), np.zeros(1201)), axis=1)
+    up = np.broadcast_to([0.0, 0.0, 1.0], tips.shape)
+    program = cornersmooth.Program.from_poses(tips, up, feed=1000.0)
+    off = np.random.default_rng(3).choice(np.arange(1, 1200), 23, replace=False)
+    written = tips.copy()
+    written[off, 2] += 0.05
+    lines = ["%", "G90 G21 G94", "G43.5 H1"]
+    lines += [f"G1 X{x:.4f} Y{y:.4f} Z{z:.4f} I0 J0 K1 F1000" for x, y, z in written.tolist()]
+    nc = read_nc("\n".join([*lines, "M30", "%"]).encode())
+    found = verify(program, nc, tolerance=0.02)
+    subject = module.Subject(program, nc, cornersmooth.Settings(tolerance=0.02), found)
+    meta, pack = module.scene(subject, module.Story("long", "", False))
+    meta, arrays = values_of(document(meta, pack))
+    assert len(arrays["w_off"]) < 1600 < 2400
+    assert meta["corners"]["counts"]["out of tolerance"] >= 23
+    listed = set(arrays["c_line"][arrays["c_kind"] == 0].tolist())
+    assert {int(pose) + 1 for pose in off} <= listed
+    drawn = set(arrays["w_line"][arrays["w_off"] > 0.02].tolist())
+    assert {int(pose) + 1 for pose in off} <= drawn
+    assert any("are drawn" in note for note in meta["notes"])
+
+
+def test_commands_write_pages(tmp_path):
+    source = tmp_path / "part.cls"
+    source.write_text(PATH.format(name="PART", comment="none"))
+    nc, page = tmp_path / "part.nc", tmp_path / "part.html"
+    done = run("smooth", source, "-e", "0.02", "-o", nc, "--report", page)
+    assert done.returncode == 0, done.stderr
+    said = done.stderr.decode()
+    assert said.startswith("OK: within 0.02 mm everywhere; 1 corner stays sharp, first :12 reversal 17")
+    assert "part.cls:12 reversal 17" in said
+    first = page.read_bytes()
+    # a page of ours is replaced without being asked; anything else is not
+    assert run("smooth", source, "-e", "0.02", "-o", nc, "--report", page, "--force").returncode == 0
+    assert page.read_bytes() == first
+    found = tmp_path / "found.html"
+    done = run("verify", source, nc, "-e", "0.02", "--report", found)
+    assert done.returncode == 0
+    assert done.stdout.decode().startswith("OK: within 0.02 mm everywhere\n")
+    meta, _ = values_of(found.read_text())
+    assert meta["verdict"].startswith("OK: within 0.02 mm everywhere")
+    times = tmp_path / "times.html"
+    assert run("time", source, "-e", "0.02", "--report", times, "-q").returncode == 0
+    meta, _ = values_of(times.read_text())
+    assert meta["verdict"].startswith("proportional takes ") or "zhang2016 takes " in meta["verdict"]
+    assert run("time", source, "--report", tmp_path / "times.json").returncode == 2
+
+
+def test_a_text_off_the_path_is_broken_in_words(tmp_path):
+    source = tmp_path / "part.cls"
+    source.write_text(PATH.format(name="PART", comment="none"))
+    nc, page = tmp_path / "part.nc", tmp_path / "found.html"
+    assert run("smooth", source, "-e", "0.02", "-o", nc, "-q").returncode == 0
+    text = nc.read_text()
+    line = next(line for line in text.splitlines() if "Y15." in line and line.startswith("G1"))
+    nc.write_text(text.replace(line, line.replace("Y15.", "Y15.3"), 1))
+    done = run("verify", source, nc, "-e", "0.02", "--report", page)
+    assert done.returncode == 1
+    assert done.stdout.decode().startswith("BROKEN: ")
+    meta, arrays = values_of(page.read_text())
+    assert meta["kept"] is False
+    assert meta["verdict"].startswith("BROKEN: ")
+    assert (arrays["w_off"] > 0.02).any()
+
+
+def test_picture_of_the_path(tmp_path):
+    pytest.importorskip("matplotlib")
+    source = tmp_path / "part.cls"
+    source.write_text(PATH.format(name="PART", comment="none"))
+    for suffix, start in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")):
+        picture = tmp_path / f"part.{suffix}"
+        done = run("smooth", source, "-e", "0.02", "-o", tmp_path / f"{suffix}.nc", "--plot", picture, "-q")
+        assert done.returncode == 0, done.stderr
+        assert picture.read_bytes().startswith(start)
+    assert run("smooth", source, "-o", tmp_path / "x.nc", "--plot", tmp_path / "part.gif").returncode == 2
+
+
+def test_surface_command(tmp_path):
+    pytest.importorskip("matplotlib")
+    source, nc = tmp_path / "part.cls", tmp_path / "part.nc"
+    source.write_text(PATH.format(name="PART", comment="none"))
+    assert run("smooth", source, "-e", "0.02", "-o", nc, "-q").returncode == 0
+    names = ["map.json", "map.csv", "map.html", "map.png", "map.svg"]
+    reports = [word for name in names for word in ("--report", tmp_path / name)]
+    done = run("surface", source, nc, "-e", "0.02", *reports)
+    assert done.returncode == 0, done.stderr
+    said = done.stdout.decode()
+    assert "ball 8 mm" in said
+    assert "overcut" in said
+    assert "undercut" in said
+    told = json.loads((tmp_path / "map.json").read_text())
+    rows = (tmp_path / "map.csv").read_text().splitlines()
+    assert len(rows) == told["points"] + 1
+    assert 0.0 < told["undercut"]["max_mm"] <= 0.02
+    meta, arrays = values_of((tmp_path / "map.html").read_text())
+    assert len(arrays["s_off"]) == told["points"] - told["points_beyond_reach"]
+    assert "overcut by up to" in meta["verdict"]
+    assert arrays["h_counts"].sum() == len(arrays["s_off"])
+    # another tool; and a file that describes none
+    assert b"cutter 6 mm" in run("surface", source, nc, "-e", "0.02", "--tool", "6,1").stdout
+    source.write_text(PATH.format(name="PART", comment="none").replace("TLDATA", "$$ TLDATA"))
+    done = run("surface", source, nc, "-e", "0.02")
+    assert done.returncode == 2
+    assert b"--tool 10,5" in done.stderr
+    assert run("surface", source, nc, "--tool", "x").returncode == 2
