@@ -1,51 +1,49 @@
-"""Time the whole ``cornersmooth smooth`` command beside a plain C program: ``bench.py [--points N] [--runs K]``.
+"""Time the whole ``cornersmooth smooth`` command, with verification and without: ``bench.py [--points N] [--runs K]``.
 
-Both read the same file of five-axis points and write the same kind of NC text; runs alternate, medians are shown.
-The C program (`baseline.c`) leaves out all that is not reading, rounding corners and writing. With ``--controls`` the
-text of several controls is timed beside that of fanuc g1 instead, all of them without verification.
+The text of several controls and forms is timed, beside a plain C program (`baseline.c`) that reads the same file of
+five-axis points, rounds corners and writes the same kind of NC text, and nothing else. Runs alternate, medians are
+shown. The peak of memory is that of all processes of a command together, each shared page counted once (PSS, Linux).
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-FORMS = ("g1", "g6.2")
-#: control and form, with the machine where it needs one; the first is what the others are compared with
-CONTROLS = {
+#: control and form, with the machine where it needs one
+CASES = {
     "fanuc g1": ("--control", "fanuc", "-f", "g1"),
-    "siemens g1": ("--control", "siemens", "-f", "g1"),
+    "fanuc g6.2": ("--control", "fanuc", "-f", "g6.2"),
     "siemens bspline": ("--control", "siemens", "-f", "bspline"),
+    "heidenhain g1": ("--control", "heidenhain", "-f", "g1"),
     "linuxcnc xyzac-trt": ("--control", "linuxcnc", "--machine", "xyzac-trt"),
 }
+#: those that the C program writes too, and how it is asked
+BASELINE: dict[str, tuple[str, ...]] = {"fanuc g1": (), "fanuc g6.2": ("--g6.2",)}
 TOLERANCE, AXIS_LENGTH = 0.01, 10.0  # mm
 POINTS = 1_000_000
+#: seconds between two looks at the memory
+INTERVAL = 0.03
 HERE = Path(__file__).parent
 
 
 @dataclass(frozen=True)
 class Run:
-    """What one process took."""
+    """What one command took, with all its processes."""
 
     wall: float
-    user: float
-    system: float
+    processor: float
     memory: float  # MB at the peak
-
-    @property
-    def processor(self) -> float:
-        """Seconds of processor time."""
-        return self.user + self.system
 
 
 def run(command: Sequence[str | Path]) -> Run:
@@ -53,20 +51,56 @@ def run(command: Sequence[str | Path]) -> Run:
     with tempfile.TemporaryFile() as messages:
         start = time.perf_counter()
         process = subprocess.Popen([str(word) for word in command], stdout=messages, stderr=messages)
+        ended = threading.Event()
+        peaks = [0.0]
+
+        def look() -> None:
+            while not ended.wait(INTERVAL):
+                peaks.append(memory_of(process.pid))
+
+        looking = threading.Thread(target=look)
+        looking.start()
         _, status, usage = os.wait4(process.pid, 0)
         wall = time.perf_counter() - start
+        ended.set()
+        looking.join()
         process.returncode = os.waitstatus_to_exitcode(status)
         if process.returncode:
             messages.seek(0)
             said = messages.read().decode(errors="replace")
             sys.exit(f"{Path(command[0]).name} ended with {process.returncode}:\n{said}")
     per_megabyte = 1 << 20 if sys.platform == "darwin" else 1 << 10  # ru_maxrss: bytes there, kilobytes elsewhere
-    return Run(wall, usage.ru_utime, usage.ru_stime, usage.ru_maxrss / per_megabyte)
+    memory = max(peaks) if sys.platform == "linux" else usage.ru_maxrss / per_megabyte
+    return Run(wall, usage.ru_utime + usage.ru_stime, memory)
+
+
+def memory_of(root: int) -> float:
+    """MB that a process and all that it has started take together."""
+    parents: dict[int, int] = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                parents[int(entry.name)] = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            except (OSError, IndexError, ValueError):  # it has just ended
+                continue
+    family, found = {root}, {root}
+    while found:
+        found = {process for process, parent in parents.items() if parent in found} - family
+        family |= found
+    total = 0
+    for process in family:
+        try:
+            for line in Path(f"/proc/{process}/smaps_rollup").read_text().splitlines():
+                if line.startswith("Pss:"):
+                    total += int(line.split()[1])
+        except (OSError, ValueError):
+            continue
+    return total / 1024
 
 
 def typical(runs: Sequence[Run]) -> Run:
-    """Medians of what several runs took."""
-    return Run(*(median(getattr(one, name) for one in runs) for name in ("wall", "user", "system", "memory")))
+    """Medians of what several runs took; of the memory the largest."""
+    return Run(median(one.wall for one in runs), median(one.processor for one in runs), max(one.memory for one in runs))
 
 
 def count_lines(path: Path) -> int:
@@ -89,85 +123,39 @@ def compile_baseline(folder: Path) -> Path:
     return program
 
 
-def compare(form: str, path: Path, folder: Path, programs: dict[str, Path], runs: int) -> None:
-    """Time one output form and print its table."""
-    names = ("smooth", "smooth --no-verify", "verify", "baseline.c")
-    written = {name: folder / f"{number}-{form}.nc" for number, name in enumerate(names)}
-    written["verify"] = written["smooth"]
-    report = folder / "report.json"
-    options: list[str | Path] = [
-        "-e",
-        f"{TOLERANCE}",
-        "-H",
-        f"{AXIS_LENGTH}",
-        "-f",
-        form,
-        "--report",
-        report,
-        "--force",
-        "-q",
-    ]
-    smooth = [programs["cornersmooth"], "smooth", path, *options, "-o"]
-    commands: dict[str, list[str | Path]] = {
-        "smooth": [*smooth, written["smooth"]],
-        "smooth --no-verify": [*smooth, written["smooth --no-verify"], "--no-verify"],
-        "verify": [programs["cornersmooth"], "verify", path, written["verify"], "-e", f"{TOLERANCE}", "-q"],
-        "baseline.c": [programs["baseline.c"], path, written["baseline.c"], f"{TOLERANCE}", f"{AXIS_LENGTH}"],
-    }
-    if form == "g6.2":
-        commands["baseline.c"].append("--g6.2")
-    taken: dict[str, list[Run]] = {name: [] for name in commands}
-    seconds: dict[str, float] = {}
+def measure(name: str, path: Path, folder: Path, programs: dict[str, Path], runs: int) -> None:
+    """Time one control and form, and print its line."""
+    written = folder / "text.nc"
+    measures: list[str | Path] = ["-e", f"{TOLERANCE}", "-H", f"{AXIS_LENGTH}", "--force", "-q", "-o", written]
+    smooth = [programs["cornersmooth"], "smooth", path, *CASES[name], *measures]
+    commands: dict[str, list[str | Path]] = {"verified": smooth, "written": [*smooth, "--no-verify"]}
+    if name in BASELINE and "baseline.c" in programs:
+        plain = [programs["baseline.c"], path, folder / "plain.nc", f"{TOLERANCE}", f"{AXIS_LENGTH}"]
+        commands["baseline.c"] = [*plain, *BASELINE[name]]
+    taken: dict[str, list[Run]] = {command: [] for command in commands}
     for _ in range(runs):
-        for name, command in commands.items():
-            taken[name].append(run(command))
-            if name == "smooth":
-                seconds = json.loads(report.read_text())["summary"]["seconds"]
-
-    print(f"\n{form}: {'':17}    wall s   user+sys s   peak MB        lines")
-    summary = {name: typical(one) for name, one in taken.items()}
-    for name, one in summary.items():
-        lines = count_lines(written[name])
-        print(f"  {name:20}  {one.wall:8.2f}   {one.processor:10.2f}   {one.memory:7.0f}   {lines:10,}")
-    plain = summary["baseline.c"]
-    for name in names[:2]:
-        one = summary[name]
-        print(f"  {name + ', ratio':27} {one.wall / plain.wall:2.2f}   {one.processor / plain.processor:10.2f}")
-    writing = summary["smooth --no-verify"].wall
-    added = (summary["smooth"].wall - writing) / writing
+        for command, words in commands.items():
+            taken[command].append(run(words))
+    summary = {command: typical(one) for command, one in taken.items()}
+    whole, plain_text = summary["verified"], summary["written"]
+    added = (whole.wall - plain_text.wall) / plain_text.wall
     print(
-        f"  verification beside writing: {added:.2f} times as long; afterwards: {summary['verify'].wall / writing:.2f}"
+        f"{name:20} {whole.wall:8.2f} {whole.processor:8.2f} {whole.memory:8.0f}   {plain_text.wall:8.2f} "
+        f"{plain_text.processor:8.2f} {plain_text.memory:8.0f}   {added:8.2f}   {count_lines(written):10,} "
+        f"{written.stat().st_size / 1e6:8.1f}",
+        flush=True,
     )
-    print("  stages of the last run: " + ", ".join(f"{stage} {value:.2f} s" for stage, value in seconds.items()))
-
-
-def compare_controls(path: Path, folder: Path, command: Path, runs: int) -> None:
-    """Time the text of several controls in turn and print one table."""
-    taken: dict[str, list[Run]] = {name: [] for name in CONTROLS}
-    written = folder / "control.nc"
-    size: dict[str, tuple[float, int]] = {}
-    for _ in range(runs):
-        for name, options in CONTROLS.items():
-            numbers = ("-e", f"{TOLERANCE}", "-H", f"{AXIS_LENGTH}", "--no-verify", "--force", "-q", "-o", written)
-            taken[name].append(run([command, "smooth", path, *options, *numbers]))
-            size[name] = (written.stat().st_size / 1e6, count_lines(written))
-    print(f"\n{'':22}    wall s   ratio   user+sys s   ratio   peak MB        lines       MB")
-    summary = {name: typical(one) for name, one in taken.items()}
-    first = summary[next(iter(CONTROLS))]
-    for name, one in summary.items():
-        megabytes, lines = size[name]
-        print(
-            f"  {name:20}  {one.wall:8.2f}   {one.wall / first.wall:5.2f}   {one.processor:10.2f}   "
-            f"{one.processor / first.processor:5.2f}   {one.memory:7.0f}   {lines:10,}   {megabytes:6.1f}"
-        )
+    if "baseline.c" in summary:
+        plain_c = summary["baseline.c"]
+        print(f"{'  baseline.c':20} {'':26}   {plain_c.wall:8.2f} {plain_c.processor:8.2f} {plain_c.memory:8.0f}")
 
 
 def main() -> None:
-    """Make the file, compile the C program, time both."""
+    """Make the file, compile the C program, time everything."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", type=int, default=POINTS, help="points of the file (default %(default)s)")
     parser.add_argument("--runs", type=int, default=3, help="runs of each program (default %(default)s)")
-    parser.add_argument("--controls", action="store_true", help="time the text of several controls, no C program")
+    parser.add_argument("--case", action="append", choices=sorted(CASES), help="only these; without the C program")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="bench-") as name:
         folder = Path(name)
@@ -177,12 +165,16 @@ def main() -> None:
         print(
             f"{given.points:,} points, {path.stat().st_size / 1e6:.1f} MB, tolerance {TOLERANCE} mm, {given.runs} runs"
         )
-        if given.controls:
-            compare_controls(path, folder, find_command(), given.runs)
-            return
-        programs = {"cornersmooth": find_command(), "baseline.c": compile_baseline(folder)}
-        for form in FORMS:
-            compare(form, path, folder, programs, given.runs)
+        programs = {"cornersmooth": find_command()}
+        if not given.case:
+            programs["baseline.c"] = compile_baseline(folder)
+        print(f"{'':20} {'verified':>26}   {'written only':>26}   {'added':>8}")
+        print(
+            f"{'':20} {'wall s':>8} {'CPU s':>8} {'peak MB':>8}   {'wall s':>8} {'CPU s':>8} {'peak MB':>8}   ", end=""
+        )
+        print(f"{'in wall':>8}   {'lines':>10} {'MB':>8}")
+        for case in given.case or CASES:
+            measure(case, path, folder, programs, given.runs)
 
 
 if __name__ == "__main__":

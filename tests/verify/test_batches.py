@@ -17,7 +17,7 @@ from cornersmooth.model import FeedMode, Move, Program, Statement
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import Verifier, Where, batches, reader, verify, verifying
+from cornersmooth.verify import Verifier, Where, batches, reader, verify, verifier
 
 from .writing import unit, wavy
 
@@ -29,7 +29,7 @@ forks = pytest.param(3, marks=pytest.mark.skipif(sys.platform != "linux", reason
 def used(monkeypatch):
     """Small batches for all texts; takes down how many there were."""
     found = []
-    work = verifying.map_in_processes
+    work = verifier.map_in_processes
 
     def noted(function, items, processes):
         count = 0
@@ -38,10 +38,10 @@ def used(monkeypatch):
             yield result
         found.append(count)
 
-    monkeypatch.setattr(verifying, "map_in_processes", noted)
+    monkeypatch.setattr(verifier, "map_in_processes", noted)
     monkeypatch.setattr(batches, "BATCH", 150)
     monkeypatch.setattr(reader, "GIVEN_OUT", 170)
-    monkeypatch.setattr(verifying, "_LONG", 0)
+    monkeypatch.setattr(verifier, "_LONG", 0)
     return found
 
 

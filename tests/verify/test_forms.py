@@ -15,7 +15,7 @@ from cornersmooth.model import Program
 from cornersmooth.nc import Form
 from cornersmooth.settings import Settings
 from cornersmooth.verify import NcProgram, read_nc, verify
-from cornersmooth.verify.ncprogram import Element
+from cornersmooth.verify.elements import Element
 from cornersmooth.verify.polyline import written_at
 from nc.cases import CHOSEN, Case
 from nc.grammars import reader

@@ -7,7 +7,7 @@ import pytest
 
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.verify import block_tables, read_nc
-from cornersmooth.verify.ncprogram import Element
+from cornersmooth.verify.elements import Element
 
 from .writing import simple_text, wavy
 

@@ -10,7 +10,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.smoothing.arcs import arc_points
 from cornersmooth.vectors import angle_between, dot, norm
 from cornersmooth.verify import NcProgram, deviation_along
-from cornersmooth.verify.ncprogram import Element
+from cornersmooth.verify.elements import Element
 from cornersmooth.verify.polyline import written_at
 
 #: points on every curve or arc, and on every line of short texts and of long ones

@@ -39,10 +39,10 @@ Where is what:
 """
 
 from cornersmooth.verify.along import Distribution, deviation_along
-from cornersmooth.verify.ncprogram import Event, NcProgram, Problem
+from cornersmooth.verify.elements import Event, NcProgram, Problem
 from cornersmooth.verify.reader import CONTROLS, read_nc
 from cornersmooth.verify.result import Verification, Where
-from cornersmooth.verify.verifying import Verifier, verify
+from cornersmooth.verify.verifier import Verifier, verify
 from cornersmooth.verify.workers import useful_processes
 
 __all__ = [

@@ -15,17 +15,22 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, Move
 from cornersmooth.verify.guide import STRIDE, cut, guide
-from cornersmooth.verify.holes import HoleRuns, divide_at_holes
-from cornersmooth.verify.ncprogram import Element, Elements, Problem
+from cornersmooth.verify.drilling import HoleRuns, divide_at_holes
+from cornersmooth.verify.elements import Element, Elements, Problem
 from cornersmooth.verify.polyline import Polyline, directions
 from cornersmooth.verify.rapids import Rapids, fraction_along, moving_rapids
 from cornersmooth.verify.task import Task
 
 #: elements in a batch
-BATCH: Final = 1 << 16
+BATCH: Final = 1 << 15
 
 #: batches that are held back while stops of the text fit nothing
 _HELD: Final = 4
+
+#: vertices of the original in a stretch that is looked at: whether the text can have run all of it, which is not much
+#: longer than what it has run
+_MANY: Final = 1024
+_LONGER: Final = 2.5
 
 #: a stretch in a batch: it begins at the end of one element and ends with another; where it begins on the CL path
 #: (segment and fraction), and its last segment plus one
@@ -250,11 +255,36 @@ class _Part:
             while element_last - self.element > BATCH + BATCH // 2:
                 yield from self._cut_long(element_last, stop, open_end=False)
         start, fraction = self.start, self.fraction
+        if stop - start > _MANY:
+            stop = self._within_reach(start, stop, element_last)
         if start >= stop:
             start, fraction = stop - 1, 1.0
-        if self.pending and element_last - self.pending[0][0] > BATCH:
+        if self.pending and (element_last - self.pending[0][0] > BATCH or stop - self.pending[0][2] > 2 * BATCH):
             yield from self._flush()
         self.pending.append((self.element, element_last, start, stop, fraction))
+
+    def _within_reach(self, start: int, stop: int, element_last: int) -> int:
+        """Vertex of the original where a stretch ends at the latest: what it cannot have run is missing."""
+        task = self.task
+        length = task.path.length
+        six = self._six(slice(self.element - self.base, element_last + 1 - self.base))
+        run = _LONGER * float(Polyline.of(six).length[-1]) + 2.0 * task.tolerance + task.margin(self.held)
+        if length[stop] - length[start] <= run:
+            return stop
+        reached = max(int(np.searchsorted(length, length[start] + run)), start + 1)
+        original = task.original
+        line = int(original.program.line[original.pose[original.trail.owner[reached]]])
+        extent = float(length[stop] - length[reached])
+        text = "feed moves of the CL file are missing"
+        nc_line = int(self.held.line[element_last - self.base])
+        self.batches.problems.append(Problem("CS535", line, nc_line, text, extent))
+        return reached
+
+    def _six(self, part: slice) -> Floats:
+        """(k, 6) tips and axis points at the ends of elements of what is held."""
+        tip = self.held.tip[part]
+        axis = directions(self.held, tip, self.held.second[part])
+        return np.hstack((tip, tip + self.task.axis_length * axis))
 
     def _flush(self) -> Iterator[Batch]:
         """Give out what waits."""
@@ -282,8 +312,7 @@ class _Part:
         for wanted in (BATCH, _HELD * BATCH):
             size = min(element_last - self.element, wanted + BATCH // 2)
             part = slice(begin, begin + size + 1)
-            tip = nc.tip[part]
-            six = np.hstack((tip, tip + task.axis_length * directions(nc, tip, nc.second[part])))
+            six = self._six(part)
             length = Polyline.of(six).length
             found = guide(six, length, path, origin, limits, far)
             ends = np.append(np.diff(nc.line[part]) != 0, True)

@@ -9,7 +9,7 @@ from cornersmooth.verify.curves import CurveGroup, groups
 from cornersmooth.verify.distances import Distances
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.ncprogram import Element, Elements
+from cornersmooth.verify.elements import Element, Elements
 
 
 def measure_continuity(distances: Distances, found: Findings) -> None:

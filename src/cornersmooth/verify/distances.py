@@ -15,7 +15,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.curves import CurveGroup
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.ncprogram import Element
+from cornersmooth.verify.elements import Element
 from cornersmooth.verify.nearest import Gap, Metric, climb, gap_between, nearest_segments
 from cornersmooth.verify.polyline import directions, written_at
 from cornersmooth.verify.wide_search import look_farther
@@ -160,6 +160,9 @@ def _brackets(match: Match) -> tuple[Ints, Ints, Ints, Ints]:
     return vertex, np.clip(on[k], low, high), low, high
 
 
+#: poses that are looked for on single elements in a batch; and how many tolerances off is far then
+_MOST_SEARCHED, _FAR_OFF = 4096, 10.0
+
 #: vectors shorter than this have no direction
 _LEAST = 1e-300
 
@@ -202,6 +205,11 @@ def _on_bent(match: Match, point: Floats, segment: Ints, at: Floats) -> tuple[Fl
             axis[rows] = directions(nc, found[good, :3], found[good, 3:])
             open_rows[rows] = False
     rest = np.flatnonzero(open_rows)
+    if len(rest) > _MOST_SEARCHED:  # of what is far off anyway the polyline tells enough
+        tip[rest], axis[rest] = _on(trail.tip, segment[rest], at[rest]), _unit_on(trail.axis, segment[rest], at[rest])
+        away = point[rest, :3] - tip[rest]
+        near = np.einsum("ij,ij->i", away, away) <= (_FAR_OFF * match.tolerance) ** 2
+        rest = rest[near][:_MOST_SEARCHED]
     if len(rest):
         tip[rest], axis[rest], _ = search_elements(match, owner[rest][:, None], point[rest])
     return tip, axis, place

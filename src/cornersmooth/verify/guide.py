@@ -18,8 +18,8 @@ from cornersmooth.verify.polyline import Polyline
 #: of so many vertices the place of one is found first
 STRIDE: Final = 32
 
-#: vertices from which on a stretch is long: shorter ones are gone through evenly from end to end
-LONG: Final = 1024
+#: vertices from which on a stretch is long: shorter ones are gone through evenly from end to end, as far as that goes
+LONG: Final = 8192
 
 #: vertices in a group, at most
 _GROUP: Final = 64

@@ -17,7 +17,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.assignment import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.batches import Batch
 from cornersmooth.verify.guide import LONG, STRIDE, guide
-from cornersmooth.verify.ncprogram import Elements
+from cornersmooth.verify.elements import Elements
 from cornersmooth.verify.nearest import nearest_from
 from cornersmooth.verify.polyline import CHORD_SHARE, Original, Polyline, Written, written_motion
 from cornersmooth.verify.task import Task
@@ -26,8 +26,11 @@ from cornersmooth.verify.task import Task
 #: rounding is shorter than its corner by no more than twice its deviation
 _SHORTCUT = 2.0
 
-#: part of its length by which a stretch may be longer or shorter than the original and still be gone through evenly
-_UNEVEN = 0.05
+#: one of so many places that are lost where a stretch is gone through evenly is enough to have it guided
+_LOST = 8
+
+#: windows that are assigned anew, one after another, without any gain: the text itself is off then
+_MOST_FUTILE = 8
 
 #: slack of arithmetic on lengths, mm
 _ARITHMETIC = 1e-9
@@ -239,40 +242,41 @@ class _Search:
         """(k,) path length where about each of `self.vertex` is, from path lengths and the places of few."""
         rows, path, owner = self.rows, self.path, self.owner
         first, last = rows["first"], rows["last"]
-        way = length[last] - length[first]
+        way, size = length[last] - length[first], last - first
         scale = np.divide(self.end - self.begin, way, out=np.zeros(len(way)), where=way > 0)
         about: Floats = self.begin[owner] + (length[self.vertex] - length[first][owner]) * scale[owner]
-        size = last - first
-        uneven = np.abs(way - (self.end - self.begin)) > _UNEVEN * way
-        for k in np.flatnonzero((size > LONG) | (uneven & (size > 2 * STRIDE))).tolist():
-            part = slice(int(first[k]), int(last[k]) + 1)
-            at, found, _ = guide(
-                self.six[part], length[part], path, self.begin[k], (rows["start"][k], rows["stop"][k] - 1), self.far
-            )
-            known = np.append(at, last[k] - first[k])
-            off = np.append(found, self.end[k]) - length[part][known]
-            own = slice(*np.searchsorted(owner, (k, k + 1)).tolist())
-            about[own] = length[part] + np.interp(np.arange(len(length[part])), known, off)
         few = np.arange(STRIDE - 1, len(owner), STRIDE)
+        few = few[(size <= LONG)[owner[few]]]
         chosen = self.vertex[few]
         segment, fraction, square = nearest_from(
             self.six.take(chosen, axis=0), path, about[few], self.low[chosen], self.high[chosen]
         )
+        off = path.length_at(segment, fraction) - about[few]
         sure = square <= self.far**2
-        few = few[sure]
-        off = path.length_at(segment[sure], fraction[sure]) - about[few]
+        sure[1:] &= (np.abs(np.diff(off)) <= 2 * STRIDE * self.far) | (np.diff(owner[few]) != 0)
+        lost = np.bincount(owner[few[~sure]], minlength=len(rows))
+        guided = (size > LONG) | (lost > np.bincount(owner[few], minlength=len(rows)) / _LOST)
+        few, off = few[sure], off[sure]
         edges = np.flatnonzero(np.diff(owner, prepend=-1, append=len(rows)))
         ends = np.append(edges[:-1], edges[1:] - 1)
         known = np.append(few, ends)
         order = np.argsort(known, kind="stable")
         about += np.interp(np.arange(len(owner)), known[order], np.append(off, np.zeros(len(ends)))[order])
+        for k in np.flatnonzero(guided).tolist():
+            part = slice(int(first[k]), int(last[k]) + 1)
+            limits = int(rows["start"][k]), int(rows["stop"][k]) - 1
+            at, found, _ = guide(self.six[part], length[part], path, self.begin[k], limits, self.far)
+            known = np.append(at, size[k])
+            off = np.append(found, self.end[k]) - length[part][known]
+            own = slice(int(edges[k]), int(edges[k + 1]))
+            about[own] = length[part] + np.interp(np.arange(len(length[part])), known, off)
         return about
 
     def look_again(self) -> None:
         """Assign anew, and with more care, what is too far away or in the wrong order."""
         known = np.isfinite(self.distance)
         limit = self.task.tolerance + self.margin
-        apart = self.apart
+        apart, futile = self.apart, 0
         for around, most_pairs, most_windows in ROUNDS:
             doubtful = (self.backward | apart | (known & (self.distance > self.far))) & (self.number >= 0)
             # both together may be so far, but not one of them alone
@@ -287,7 +291,16 @@ class _Search:
             if around > ROUNDS[0][0] and len(windows) > most_windows:
                 return  # no mishap of the search: the text is off everywhere
             for first, last in windows[:most_windows]:
+                part = slice(first, last + 1)
+                before = self._doubts(part)
                 self._assign(first, last, most_pairs, doubtful, wide=around > ROUNDS[0][0])
+                futile = 0 if self._doubts(part) < before else futile + bool(before)
+                if futile > _MOST_FUTILE:
+                    return  # nor here
+
+    def _doubts(self, part: slice) -> int:
+        """How many vertices are too far away or in the wrong order."""
+        return int(np.count_nonzero(self.backward[part]) + np.count_nonzero(self.distance[part] > self.far))
 
     def _assign(self, first: int, last: int, most_pairs: int, doubtful: Bools, *, wide: bool) -> None:
         """Assign a window anew if that is no worse."""

@@ -14,7 +14,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.verify.arcs import arc_points
 from cornersmooth.verify.curves import CurveGroup, groups
-from cornersmooth.verify.ncprogram import Element, Elements
+from cornersmooth.verify.elements import Element, Elements
 
 #: how far, relative to the tolerance, a trail may stay off the motion it stands for
 CHORD_SHARE = 0.1

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
-from cornersmooth.verify.ncprogram import Element, Elements, Problem
+from cornersmooth.verify.elements import Element, Elements, Problem
 from cornersmooth.verify.polyline import Original, directions
 
 #: slack of arithmetic on coordinates that are a million times larger, mm
@@ -20,6 +20,9 @@ ARITHMETIC = 1e-9
 
 #: longer runs of stops that do not fit are not searched for their best correspondence
 _LONGEST_SEARCH = 2000
+
+#: stops missing one after another of which it is looked for where they should be
+_LOCATED: Final = 16
 
 #: stops of the text that are looked at together where they do not fit, before the end of it is known
 WINDOW: Final = 64
@@ -173,9 +176,9 @@ class Rapids:
             for i, j in zip(theirs[i0 : i0 + both].tolist(), range(j0, j0 + both), strict=True):
                 pairs.append((i, j))
                 self._compare(nc, i, int(ours[j]), same=tag == "equal")
-            for i in theirs[i0 + both : i1].tolist():
-                first = int(ours[j1 - 1]) if j1 else before
-                self.missing(nc, i, first, int(ours[j1]) if j1 < len(ours) else len(nc) - 1)
+            first, last = int(ours[j1 - 1]) if j1 else before, int(ours[j1]) if j1 < len(ours) else len(nc) - 1
+            for count, i in enumerate(theirs[i0 + both : i1].tolist()):
+                self.missing(nc, i, first if count < _LOCATED else last, last)
             for j in range(j0 + both, j1):
                 if not _negligible(nc.tip, ours[j], nc):
                     move = self.stops[min(int(theirs[0]) + i1, len(self.stops)) - 1] if len(theirs) else self.stops[-1]

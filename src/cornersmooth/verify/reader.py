@@ -15,10 +15,10 @@ from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.dialects import CONTROLS
 from cornersmooth.verify.dialects.base import HIGH_SPEED
-from cornersmooth.verify.motion import Modal, Piece, execute
-from cornersmooth.verify.ncprogram import Curves, Element, Elements, Event, NcArcs, NcProgram, Problem, Second
+from cornersmooth.verify.execution import Modal, Piece, execute
+from cornersmooth.verify.elements import Curves, Element, Elements, Event, NcArcs, NcProgram, Problem, Second
 from cornersmooth.verify.source import Source, readable_twice
-from cornersmooth.verify.style import DIGITS_SAMPLE, Steps, Style
+from cornersmooth.verify.reading_options import DIGITS_SAMPLE, Steps, Style
 from cornersmooth.verify.unknown import settle
 from cornersmooth.verify.words import MOTION_CODES, NURBS, Line, Table, table_of
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.findings import Findings, Poses, Worst
-from cornersmooth.verify.ncprogram import Problem
+from cornersmooth.verify.elements import Problem
 
 #: problems of one code that are kept
 MOST_PROBLEMS = 1000

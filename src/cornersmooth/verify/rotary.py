@@ -15,8 +15,8 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.curves import basis, groups
-from cornersmooth.verify.motion import Modal, Piece
-from cornersmooth.verify.ncprogram import Curves, Element
+from cornersmooth.verify.execution import Modal, Piece
+from cornersmooth.verify.elements import Curves, Element
 from cornersmooth.verify.splines import CurveTable
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.ncprogram import Problem
+from cornersmooth.verify.elements import Problem
 from cornersmooth.verify.words import Table
 
 #: FANUC: order of a curve whose first block has no P (B-63324EN/03 4.17)

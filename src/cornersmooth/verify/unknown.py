@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.verify.ncprogram import Element, Elements
+from cornersmooth.verify.elements import Element, Elements
 
 
 def settle(elements: Elements) -> int | None:

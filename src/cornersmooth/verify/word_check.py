@@ -11,7 +11,7 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.verify.lexer import Lexer
-from cornersmooth.verify.ncprogram import Problem
+from cornersmooth.verify.elements import Problem
 from cornersmooth.verify.word_list import WordList, WordRule, word_list
 from cornersmooth.verify.words import Line, Table, Word
 

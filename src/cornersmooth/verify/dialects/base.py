@@ -10,7 +10,7 @@ from cornersmooth.verify.lexer import Lexer
 from cornersmooth.verify.words import Columns, Line
 
 if TYPE_CHECKING:
-    from cornersmooth.verify.motion import Modal
+    from cornersmooth.verify.execution import Modal
 
 
 #: M words that act after the motion of their block: stops, spindle off, coolant off, end

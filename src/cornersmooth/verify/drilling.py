@@ -13,7 +13,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.verify.cycles import Drilling, drillings
-from cornersmooth.verify.ncprogram import Element, Elements, Problem
+from cornersmooth.verify.elements import Element, Elements, Problem
 from cornersmooth.verify.polyline import Original, directions
 from cornersmooth.verify.rapids import digit_errors
 

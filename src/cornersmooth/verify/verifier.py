@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -20,12 +21,12 @@ from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.checks import Examined, examine
 from cornersmooth.verify.findings import Findings, Largest, Poses
-from cornersmooth.verify.ncprogram import Elements, Event, NcProgram, Problem
+from cornersmooth.verify.elements import Elements, Event, NcProgram, Problem
 from cornersmooth.verify.reader import CONTROL_WORDS, Reader
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.source import Source, readable_twice
 from cornersmooth.verify.statements import asked, compare, said
-from cornersmooth.verify.style import DIGITS_SAMPLE, Style
+from cornersmooth.verify.reading_options import DIGITS_SAMPLE, Style
 from cornersmooth.verify.task import Task
 from cornersmooth.verify.wide_search import way_apart
 from cornersmooth.verify.word_check import WordCheck
@@ -287,10 +288,8 @@ def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measur
 
     def items() -> Iterator[tuple[Batch, Ints, Largest]]:
         for batch in batches.of(_noted(text, found)):
-            own = np.array([event.element - 1 for event in text.events], np.int64)
-            last = batch.offset + batch.last
-            own = np.unique(own[(own >= batch.offset) & (own <= last)])
-            yield batch, own, found.findings.largest.copy()
+            own = _elements(text.events, batch.offset, batch.offset + batch.last)
+            yield batch, np.unique(own), found.findings.largest.copy()
 
     def work(item: tuple[Batch, Ints, Largest]) -> Examined:
         return examine(task, *item)
@@ -305,16 +304,22 @@ def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measur
     return found
 
 
+def _elements(events: list[Event], first: int, last: int) -> Ints:
+    """Elements from `first` to `last` with words behind them, ascending."""
+    low = bisect_left(events, first + 1, key=lambda event: event.element)
+    high = bisect_right(events, last + 1, key=lambda event: event.element)
+    return np.array([event.element - 1 for event in events[low:high]], np.int64)
+
+
 def _noted(text: _Text, found: _Measured) -> Iterable[Elements]:
     """Give out the elements of a text, and take down what is to be known of those with words behind them."""
     offset = 0
     for nc in text.chunks:
         found.margin = found.task.margin(nc)
         if nc.rotary and len(nc):
-            own = [event.element - 1 for event in text.events]
-            for element in {*own, offset + len(nc) - 1}:  # words behind the last are still to come
-                if offset <= element < offset + len(nc):
-                    found.rooms[element] = found.task.axis_length * float(nc.second_room[element - offset])
+            last = offset + len(nc) - 1
+            for element in {*_elements(text.events, offset, last).tolist(), last}:  # words behind it are still to come
+                found.rooms[element] = found.task.axis_length * float(nc.second_room[element - offset])
         offset += len(nc)
         yield nc
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.arcs import circles
-from cornersmooth.verify.ncprogram import Element, Problem
+from cornersmooth.verify.elements import Element, Problem
 from cornersmooth.verify.splines import CurveTable, interval_curves, knot_curves, poly_curves, spl_curves
 from cornersmooth.verify.words import BSPLINE, NURBS, POLY, SPL, Table
 
