@@ -97,14 +97,18 @@ def test_cut_leaves_no_doubt():
     halves = np.empty((11999, 6))
     halves[::2], halves[1::2] = original, path.point_at(np.arange(5999), np.full(5999, 0.5))
     own = Polyline.of(halves)
-    found = guide(halves, own.length, path, 0.0, (0, 5998), FAR)
-    allowed = np.ones(len(halves), np.bool_)
-    assert cut(halves, found, path, allowed, 6000, 2 * FAR) is None  # all of them are at poses
-    odd = found[0] + 1, found[1] + np.diff(own.length, append=own.length[-1])[found[0]], found[2]
-    vertex, place = cut(halves, odd, path, allowed, 6000, 2 * FAR)
+    limits = 0, 5998
+    found = guide(halves, own.length, path, 0.0, limits, FAR)
+    rest = 6000, (1e-4, 2 * FAR)
+    at_poses = np.arange(len(halves)) % 2 == 0
+    assert cut(halves, own.length, found, path, limits, at_poses, *rest) is None
+    vertex, place = cut(halves, own.length, found, path, limits, at_poses | True, *rest)
     assert vertex % 2 == 1
-    assert 3000 <= vertex <= 6000
+    assert 5900 <= vertex <= 6000
     assert place == pytest.approx(own.length[vertex], abs=1e-9)
+    halves[vertex] += 0.01  # better before, where the text is on its path
+    before, _ = cut(halves, own.length, found, path, limits, at_poses | True, *rest)
+    assert before == vertex - 2
     circle = np.radians(np.arange(0.0, 3600.0, 3.0))
     loops = np.stack((np.cos(circle), np.sin(circle), *(0 * circle,) * 4), axis=1) * 5
     path = Polyline.of(loops)

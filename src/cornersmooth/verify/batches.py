@@ -316,7 +316,8 @@ class _Part:
             length = Polyline.of(six).length
             found = guide(six, length, path, origin, limits, far)
             ends = np.append(np.diff(nc.line[part]) != 0, True)
-            chosen = cut(six, found, path, ends, min(wanted, size - STRIDE), 2.0 * task.tolerance + margin)
+            latest = min(wanted, size - STRIDE)
+            chosen = cut(six, length, found, path, limits, ends, latest, (margin, 2.0 * task.tolerance + margin))
             if chosen is not None:
                 break
             if open_end and size < wanted + BATCH // 2:

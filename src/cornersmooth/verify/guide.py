@@ -36,6 +36,10 @@ _FOLD, _SLACK = 4.0, 0.05
 #: a cut lies no nearer to the ends of its segment than this part of it: so it is clear to which side vertices belong
 _INNER: Final = 0.2
 
+#: places found that are looked at for a cut, with the vertices between them; cuts tried; and how far around them, in
+#: `near`, the path must not come back
+_LOOKED_AT, _TRIED, _AROUND = 64, 32, 100.0
+
 
 def guide(
     six: Floats, length: Floats, path: Polyline, begin: float, limits: tuple[int, int], far: float
@@ -141,27 +145,29 @@ def _places(point: Floats, path: Polyline, low: int, high: int) -> tuple[Floats,
 
 def cut(
     six: Floats,
+    length: Floats,
     found: tuple[Ints, Floats, Floats],
     path: Polyline,
+    limits: tuple[int, int],
     allowed: Bools,
     wanted: int,
-    near: float,
+    margins: tuple[float, float],
 ) -> tuple[int, float] | None:
     """Choose where to cut a long stretch: the vertex, not far before `wanted`, and the path length at its place.
 
-    There must be no doubt about the place: its neighbours follow one another as they should, and the path does not
-    come back to it.
+    There must be no doubt about the place: the vertex lies on the path, if there is such a one, its neighbours follow
+    one another as they should, and the path does not come back to it.
 
     Parameters
     ----------
-    six : (v, 6) float64
-        Written vertices.
-    found : as of `guide`
-    path : Polyline
+    six, length, path, limits
+        As of `guide`.
+    found : as `guide` returns it
     allowed : (v,) bool
         Vertices where it may be cut.
     wanted : int
-    near : float, mm
+    margins : tuple of float, mm
+        Distance that printed digits account for, and that within which a vertex is on its way.
 
     Returns
     -------
@@ -169,29 +175,32 @@ def cut(
         None where there is none.
     """
     vertex, place, distance = found
-    inner = np.flatnonzero((vertex > 0) & (vertex <= wanted) & allowed[vertex])
-    known = np.diff(vertex, prepend=-STRIDE, append=vertex[-1] + 2 * STRIDE) == STRIDE
-    inner = inner[known[inner] & known[inner + 1] & (distance[inner] <= near)]
-    segment = np.searchsorted(path.length, place[inner], side="right") - 1
-    segment = np.clip(segment, 0, len(path.length) - 2)
-    size = path.length[segment + 1] - path.length[segment]
-    share = np.divide(place[inner] - path.length[segment], size, out=np.zeros(len(inner)), where=size > 0)
-    inside = (share >= _INNER) & (share <= 1 - _INNER)
-    for k in inner[inside][::-1].tolist():
-        if vertex[k] < wanted // 2:
-            break
-        if _clear(six[vertex[k]], path, place[k - 1 : k + 2], float(distance[k]), near):
-            return int(vertex[k]), float(place[k])
-    later = inner[inside & (vertex[inner] >= wanted // 2)]
-    if len(later):
-        return int(vertex[later[-1]]), float(place[later[-1]])
-    return None
+    margin, near = margins
+    known = np.diff(vertex) == STRIDE
+    known &= (distance[:-1] <= near) & (distance[1:] <= near) & (vertex[:-1] > 0) & (vertex[1:] <= wanted)
+    rows = np.flatnonzero(known & (vertex[:-1] >= wanted // 2))[-_LOOKED_AT:]
+    if not len(rows):
+        return None
+    candidate = (vertex[rows][:, None] + np.arange(STRIDE)).ravel()
+    candidate = candidate[allowed[candidate]]
+    about = np.interp(length[candidate], length[vertex], place)
+    low, high = (np.full(len(candidate), limit) for limit in limits)
+    segment, fraction, square = nearest_from(six[candidate], path, about, low, high)
+    inside = (fraction >= _INNER) & (fraction <= 1 - _INNER) & (square <= near * near)
+    candidate, off = candidate[inside], np.sqrt(square[inside])
+    at = path.length_at(segment[inside], fraction[inside])
+    order = np.lexsort((-candidate, np.maximum(off, margin)))  # the latest of those that lie on the path, else nearest
+    for k in order[:_TRIED].tolist():
+        if _clear(six[candidate[k]], path, float(at[k]), float(off[k]), near):
+            return int(candidate[k]), float(at[k])
+    return (int(candidate[order[0]]), float(at[order[0]])) if len(order) else None
 
 
-def _clear(point: Floats, path: Polyline, places: Floats, distance: float, near: float) -> bool:
-    """Whether no other place between those of its neighbours could be that of a vertex as well."""
-    low, high = np.searchsorted(path.length, (places[0] - near, places[2] + near)).tolist()
-    place, square = _places(point, path, max(low - 1, 0), min(high, len(path.length) - 2))
+def _clear(point: Floats, path: Polyline, place: float, distance: float, near: float) -> bool:
+    """Whether no other place in its neighbourhood could be that of a vertex as well."""
+    around = _AROUND * near
+    low, high = np.searchsorted(path.length, (place - around, place + around)).tolist()
+    places, square = _places(point, path, max(low - 1, 0), min(high, len(path.length) - 2))
     close = square <= 4 * near * near
-    away = np.abs(place - places[1])[close]
+    away = np.abs(places - place)[close]
     return not (away > _FOLD * (np.sqrt(square[close]) + distance) + _SLACK * near).any()
