@@ -27,15 +27,15 @@ margin            what printed digits account for, mm; *slack* is that and what 
 
 Where is what:
 
-- bytes to elements: `source`, `style`, `dialects`, `lexer`, `words`, `block_tables`, `line_patterns`; `reader` holds
-  the modal state, `motion` executes: `arcs`, `splines`, `rotary`, `unknown`; `ncprogram` is what comes out
+- bytes to elements: `source`, `reading_options`, `dialects`, `lexer`, `words`, `block_tables`, `line_patterns`;
+  `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `rotary`; `elements` is what comes out
 - what is measured against: `task`, `polyline`
-- elements to batches: `batches`, with `rapids`, `holes`, `cycles`, and `guide` for long stretches
+- elements to batches: `batches`, with `rapids`, `drilling`, and `guide` for long stretches
 - where everything is: `match`, with `nearest` and `assignment`
 - checks (`checks` lists them): `deviation`, `backtracking`, `feeds`, `continuity`; they share `distances`, with
   `wide_search`, `hull_bounds`, `curves`; what they find is in `findings`
 - words beside the motion: `statements`
-- all of it: `verifying`, `result`, with `workers`; `along` for pictures
+- all of it: `verifier`, `result`, with `workers`; `along` for pictures
 """
 
 from cornersmooth.verify.along import Distribution, deviation_along

@@ -7,9 +7,9 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.curves import CurveGroup, groups
 from cornersmooth.verify.distances import Distances
+from cornersmooth.verify.elements import Element, Elements
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.elements import Element, Elements
 
 
 def measure_continuity(distances: Distances, found: Findings) -> None:

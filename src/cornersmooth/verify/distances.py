@@ -14,8 +14,8 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.curves import CurveGroup
-from cornersmooth.verify.match import Match
 from cornersmooth.verify.elements import Element
+from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import Gap, Metric, climb, gap_between, nearest_segments
 from cornersmooth.verify.polyline import directions, written_at
 from cornersmooth.verify.wide_search import look_farther

@@ -55,7 +55,7 @@ class Modal:
 
 
 @dataclass
-class Piece:
+class Executed:
     """Path elements of one run, in units of the text; the fields are those of `NcProgram` and its tables."""
 
     kind: NDArray[np.uint8]
@@ -78,7 +78,7 @@ class Piece:
         return np.flatnonzero(self.kind == Element.CURVE)
 
 
-def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
+def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
     """Run the blocks of a table.
 
     Parameters
@@ -90,7 +90,7 @@ def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
 
     Returns
     -------
-    Piece
+    Executed
         The second triple of a text with rotary words are their degrees.
     Modal
         After the last block.
@@ -133,7 +133,7 @@ def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
     if len(curves):
         kind[curved] = Element.CURVE
         rapid = kind == Element.RAPID
-    piece = Piece(
+    run = Executed(
         kind=kind,
         tip=end[:, :3],
         second=end[:, 3:],
@@ -146,19 +146,19 @@ def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
     )
     unknown = np.flatnonzero(np.isnan(code[rows]))
     if len(unknown):
-        problems.append(Problem("CS502", 0, int(piece.line[unknown[0]]), "a motion before the first G0 or G1"))
+        problems.append(Problem("CS502", 0, int(run.line[unknown[0]]), "a motion before the first G0 or G1"))
     _check_straight(table, straight, problems, knots="R PL PW K" if points or modal.rotary else "R PL PW")
     if modal.inverse_time:
         _check_inverse_time(table, code, rows, problems)
     if len(curves):
-        _check_starts(piece, modal, code[rows[curved]] == NURBS)
+        _check_starts(run, modal, code[rows[curved]] == NURBS)
     if is_arc.any():
         element = np.flatnonzero(kind == Element.ARC)
         own = rows[element]
         part = Table(table.line[own], {name: column[own] for name, column in table.columns.items()})
-        piece.arc_element = element
-        piece.arc_centre, piece.arc_normal, piece.arc_sweep = circles(
-            part, np.vstack((modal.tip, piece.tip))[element], piece.tip[element], code[own] == 3, modal.plane, problems
+        run.arc_element = element
+        run.arc_centre, run.arc_normal, run.arc_sweep = circles(
+            part, np.vstack((modal.tip, run.tip))[element], run.tip[element], code[own] == 3, modal.plane, problems
         )
     after = modal.but(
         code=float(code[-1]),
@@ -167,7 +167,7 @@ def execute(table: Table, modal: Modal) -> tuple[Piece, Modal]:
         feed=float(feed[-1]),
         points=points,
     )
-    return piece, after
+    return run, after
 
 
 class _Held:
@@ -256,20 +256,20 @@ def _curves(
     return CurveTable.joined(found)
 
 
-def _check_starts(piece: Piece, modal: Modal, exact: Bools) -> None:
+def _check_starts(run: Executed, modal: Modal, exact: Bools) -> None:
     """First control points must be where the tool is, digit for digit (FANUC alarm PS1009)."""
-    element = piece.curve_element[exact]
-    points = piece.curves.points
-    control = piece.curves.control.take((np.cumsum(points) - points)[exact], axis=0)
+    element = run.curve_element[exact]
+    points = run.curves.points
+    control = run.curves.control.take((np.cumsum(points) - points)[exact], axis=0)
     wrong = np.zeros(len(element), np.bool_)
-    for ends, start, columns in ((piece.tip, modal.tip, (0, 1, 2)), (piece.second, modal.second, (3, 4, 5))):
+    for ends, start, columns in ((run.tip, modal.tip, (0, 1, 2)), (run.second, modal.second, (3, 4, 5))):
         for k, column in enumerate(columns):
             position = ends[element - 1, k]
             position[element == 0] = start[k]
             wrong |= control[:, column] != position
     for k in np.flatnonzero(wrong).tolist():
         text = "first control point is not the current position"
-        piece.problems.append(Problem("CS519", 0, int(piece.line[element[k]]), text))
+        run.problems.append(Problem("CS519", 0, int(run.line[element[k]]), text))
 
 
 def _check_straight(table: Table, straight: Bools, problems: list[Problem], *, knots: str) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.verify.distances import Distances
+from cornersmooth.verify.elements import Element, Elements, Problem
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.elements import Element, Elements, Problem
 from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.rotary import SHORT_STEPS
 

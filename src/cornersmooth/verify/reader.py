@@ -15,11 +15,20 @@ from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.dialects import CONTROLS
 from cornersmooth.verify.dialects.base import HIGH_SPEED
-from cornersmooth.verify.execution import Modal, Piece, execute
-from cornersmooth.verify.elements import Curves, Element, Elements, Event, NcArcs, NcProgram, Problem, Second
+from cornersmooth.verify.elements import (
+    Curves,
+    Element,
+    Elements,
+    Event,
+    NcArcs,
+    NcProgram,
+    Problem,
+    Second,
+    settle,
+)
+from cornersmooth.verify.execution import Executed, Modal, execute
+from cornersmooth.verify.reading_options import DIGITS_SAMPLE, ReadingOptions, Steps
 from cornersmooth.verify.source import Source, readable_twice
-from cornersmooth.verify.reading_options import DIGITS_SAMPLE, Steps, Style
-from cornersmooth.verify.unknown import settle
 from cornersmooth.verify.words import MOTION_CODES, NURBS, Line, Table, table_of
 
 if TYPE_CHECKING:
@@ -87,18 +96,20 @@ def read_nc(
     SettingsError
         CS204 for an unknown control, CS215 for positions of a machine that is not named.
     """
-    return read_styled(data, Style.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length), name)
+    return read_styled(
+        data, ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length), name
+    )
 
 
-def read_styled(data: bytes | str | os.PathLike[str], style: Style, name: str | None = None) -> NcProgram:
+def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, name: str | None = None) -> NcProgram:
     """Read an NC text; see `read_nc`."""
     label = name if name is not None or isinstance(data, bytes) else str(data)
     source = Source(readable_twice(data))
     try:
         source.finish()
-        reader = Reader(label, style, style.steps(source.read(0, DIGITS_SAMPLE)))
+        reader = Reader(label, options, options.steps(source.read(0, DIGITS_SAMPLE)))
         reader.comments = []
-        parts = list(reader.chunks(read_lines(source.part(0, sys.maxsize), label, style.dialect.lexer)))
+        parts = list(reader.chunks(read_lines(source.part(0, sys.maxsize), label, options.dialect.lexer)))
         return reader.program(parts)
     finally:
         source.close()
@@ -111,15 +122,15 @@ class Reader:
     ----------
     name : str or None
         For messages.
-    style : Style
+    options : ReadingOptions
     steps : Steps
     lever : float, optional
         Longest distance, mm, at which rotary axes move the tip; as far as the text goes by default.
     """
 
-    def __init__(self, name: str | None, style: Style, steps: Steps, lever: float | None = None) -> None:
-        self.name, self.style, self.dialect, self.steps = name, style, style.dialect, steps
-        self.rotary = style.rotary(steps)
+    def __init__(self, name: str | None, options: ReadingOptions, steps: Steps, lever: float | None = None) -> None:
+        self.name, self.options, self.dialect, self.steps = name, options, options.dialect, steps
+        self.rotary = options.rotary(steps)
         self.modal = Modal(rotary=self.rotary.names if self.rotary is not None else "")
         self.tip_control = ""
         self.memory: dict[str, Any] = {}
@@ -181,22 +192,22 @@ class Reader:
         factor = MM_PER_UNIT[self.units]
         for table in _joined(self.waiting):
             before = self.modal
-            piece, self.modal = execute(table, before)
+            run, self.modal = execute(table, before)
             self._check_control(table, before.code)
             if self.modal.points and not before.points:
-                self._know_points(piece)
-            self.problems.extend(piece.problems)
+                self._know_points(run)
+            self.problems.extend(run.problems)
             unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
             unit = 1.0 if before.inverse_time else unit
-            piece = _in_mm(piece, factor, unit, points=self.modal.points)
-            piece.feed_room += self.dialect.feed_step / 2 * unit
+            run = _in_mm(run, factor, unit, points=self.modal.points)
+            run.feed_room += self.dialect.feed_step / 2 * unit
             if self.rotary is not None:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
                 rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
-                piece = rotary.resolve(piece, start, inverse_time=before.inverse_time)
-                levers = self.rotary.levers(piece.tip)
+                run = rotary.resolve(run, start, inverse_time=before.inverse_time)
+                levers = self.rotary.levers(run.tip)
                 self.lever = max(self.lever, float(levers.max(initial=0.0, where=~np.isnan(levers))))
-            self._add(piece)
+            self._add(run)
         self.waiting = []
 
     @property
@@ -209,16 +220,16 @@ class Reader:
                 return float(known[-1])
         return self.modal.code
 
-    def _know_points(self, piece: Piece) -> None:
+    def _know_points(self, run: Executed) -> None:
         """From here on U V W are a point on the axis: what was said before of the axis is no such point."""
         if self.placed:
-            self._refuse_unknown(int(piece.line[0]))
+            self._refuse_unknown(int(run.line[0]))
         for part in self.ready:
             part.second[:] = np.nan
 
-    def _add(self, piece: Piece) -> None:
+    def _add(self, run: Executed) -> None:
         """Take over the elements of a run."""
-        if not len(piece.kind):
+        if not len(run.kind):
             return
         second_is: Second = "point" if self.modal.points else "vector"
         scale = MM_PER_UNIT[self.units]
@@ -226,20 +237,20 @@ class Reader:
         if self.rotary is not None:
             lever = self.lever if self._given_lever is None else self._given_lever
             steps = replace(self.rotary, tip_step=steps[0]).steps(lever)
-        curves = piece.curves
+        curves = run.curves
         size = curves.points + curves.order
         self.ready.append(
             Elements(
-                kind=piece.kind,
-                tip=piece.tip,
-                second=piece.second,
-                line=piece.line,
-                feed=piece.feed,
-                per_revolution=piece.per_revolution,
-                feed_room=piece.feed_room,
-                second_room=np.zeros(len(piece.kind)),
+                kind=run.kind,
+                tip=run.tip,
+                second=run.second,
+                line=run.line,
+                feed=run.feed,
+                per_revolution=run.per_revolution,
+                feed_room=run.feed_room,
+                second_room=np.zeros(len(run.kind)),
                 curves=Curves(
-                    piece.curve_element,
+                    run.curve_element,
                     curves.order,
                     np.cumsum(curves.points) - curves.points,
                     curves.points,
@@ -248,16 +259,16 @@ class Reader:
                     curves.weight,
                     curves.knot,
                 ),
-                arcs=NcArcs(piece.arc_element, piece.arc_centre, piece.arc_normal, piece.arc_sweep),
+                arcs=NcArcs(run.arc_element, run.arc_centre, run.arc_normal, run.arc_sweep),
                 second_is=second_is,
                 tip_step=steps[0],
                 second_step=steps[1],
                 rotary=self.rotary is not None,
             )
         )
-        self.elements += len(piece.kind)
+        self.elements += len(run.kind)
         self.curves += len(curves)
-        if not self.placed and (piece.kind != Element.RAPID).any():
+        if not self.placed and (run.kind != Element.RAPID).any():
             self._settle()
 
     def _settle(self) -> None:
@@ -284,7 +295,7 @@ class Reader:
         if self.rotary is not None:
             room = self.rotary.pole_room(found.second)
         elif found.second_is == "vector" and not self.steps.second:  # no word says anything of the tool axis
-            room += FIXED_SHARE * self.style.tolerance / self.style.axis_length
+            room += FIXED_SHARE * self.options.tolerance / self.options.axis_length
         return replace(found, second_room=room)
 
     @property
@@ -418,16 +429,16 @@ def closed(table: Table) -> bool:
     return first is not None and not np.isnan(first[0])
 
 
-def _in_mm(piece: Piece, factor: float, feed: float, *, points: bool) -> Piece:
+def _in_mm(run: Executed, factor: float, feed: float, *, points: bool) -> Executed:
     """Lengths in millimetres; a factor of one leaves the numbers untouched."""
     if factor == 1.0:
-        return piece
+        return run
     columns = slice(0, 6 if points else 3)
-    piece.curves.control[:, columns] *= factor
+    run.curves.control[:, columns] *= factor
     return replace(
-        piece,
-        tip=piece.tip * factor,
-        second=piece.second * factor if points else piece.second,
-        feed=piece.feed * feed,
-        arc_centre=piece.arc_centre * factor,
+        run,
+        tip=run.tip * factor,
+        second=run.second * factor if points else run.second,
+        feed=run.feed * feed,
+        arc_centre=run.arc_centre * factor,
     )

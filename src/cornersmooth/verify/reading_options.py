@@ -33,7 +33,7 @@ class Steps:
 
 
 @dataclass(frozen=True)
-class Style:
+class ReadingOptions:
     """How a text is to be understood.
 
     Parameters
@@ -54,7 +54,9 @@ class Style:
     axis_length: float
 
     @classmethod
-    def of(cls, control: str, machine: Machine | None, *, tcp: bool, tolerance: float, axis_length: float) -> Style:
+    def of(
+        cls, control: str, machine: Machine | None, *, tcp: bool, tolerance: float, axis_length: float
+    ) -> ReadingOptions:
         """Choose it.
 
         Raises

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.findings import Findings, Poses, Worst
 from cornersmooth.verify.elements import Problem
+from cornersmooth.verify.findings import Findings, Poses, Worst
 
 #: problems of one code that are kept
 MOST_PROBLEMS = 1000

@@ -15,8 +15,8 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.curves import basis, groups
-from cornersmooth.verify.execution import Modal, Piece
 from cornersmooth.verify.elements import Curves, Element
+from cornersmooth.verify.execution import Executed, Modal
 from cornersmooth.verify.splines import CurveTable
 
 if TYPE_CHECKING:
@@ -129,28 +129,28 @@ class Rotary:
         linear = self.tip_step if self.tip_control else np.sqrt(3) * self.tip_step
         return float(linear + lever * turn), 2 * turn
 
-    def resolve(self, piece: Piece, before: Modal, *, inverse_time: bool) -> Piece:
+    def resolve(self, run: Executed, before: Modal, *, inverse_time: bool) -> Executed:
         """Return a run in tips and tool vectors, all in mm, the second triple being degrees before.
 
         Parameters
         ----------
-        piece : Piece
+        run : Executed
             In mm.
         before : Modal
             In mm; what is not known of the angles is zero.
         inverse_time : bool
             Whether the feeds are moves per minute.
         """
-        position = np.vstack((before.tip, piece.tip))
-        angles = np.nan_to_num(np.vstack((before.second, piece.second))[:, :2])
+        position = np.vstack((before.tip, run.tip))
+        angles = np.nan_to_num(np.vstack((before.second, run.second))[:, :2])
         tip, vector = self.tips(position, angles), self.directions(angles)
-        curves = self._curves(piece.curves)
-        feed, room = piece.feed, piece.feed_room
+        curves = self._curves(run.curves)
+        feed, room = run.feed, run.feed_room
         if inverse_time:
             feed, room = self._timed(feed, position, tip, vector, angles)
-        count = self._counts(piece, position, angles, tip, vector)
+        count = self._counts(run, position, angles, tip, vector)
         if not len(count) or count.max() == 1:
-            return replace(piece, tip=tip[1:], second=vector[1:], curves=curves, feed=feed, feed_room=room)
+            return replace(run, tip=tip[1:], second=vector[1:], curves=curves, feed=feed, feed_room=room)
         last = np.cumsum(count) - 1
         owner = np.repeat(np.arange(len(count)), count)
         part = np.arange(len(owner)) - last[owner] + count[owner] - 1
@@ -161,32 +161,32 @@ class Rotary:
         words = [start[own] + at * (start[own + 1] - start[own]) for start in (position, angles)]
         fine_tip[inner], fine_vector[inner] = self.tips(*words), self.directions(words[1])
         return replace(
-            piece,
-            kind=piece.kind[owner],
+            run,
+            kind=run.kind[owner],
             tip=fine_tip,
             second=fine_vector,
-            line=piece.line[owner],
+            line=run.line[owner],
             feed=feed[owner],
             feed_room=room[owner],
-            per_revolution=piece.per_revolution[owner],
+            per_revolution=run.per_revolution[owner],
             curves=curves,
-            arc_element=last[piece.arc_element],
+            arc_element=last[run.arc_element],
         )
 
     @property
     def _fine(self) -> float:
         return max(LINE_SHARE * self.tolerance, LEAST)
 
-    def _counts(self, piece: Piece, position: Floats, angles: Floats, tip: Floats, vector: Floats) -> Ints:
+    def _counts(self, run: Executed, position: Floats, angles: Floats, tip: Floats, vector: Floats) -> Ints:
         """Number of lines that each element becomes."""
-        count = np.ones(len(piece.kind), np.int64)
+        count = np.ones(len(run.kind), np.int64)
         turn = np.radians(np.abs(np.diff(angles, axis=0)).sum(axis=1))
         bound = self.axis_length * turn**2
         if not self.tip_control:
             way = np.linalg.norm(np.diff(position, axis=0), axis=1)
             bound += turn**2 * self.levers(position[:-1]) + 2 * turn * way
         from_somewhere = ~np.isnan(position[:-1]).any(axis=1)
-        rows = np.flatnonzero((piece.kind == Element.LINE) & (bound / 4 > self._fine) & from_somewhere)
+        rows = np.flatnonzero((run.kind == Element.LINE) & (bound / 4 > self._fine) & from_somewhere)
         if not len(rows):
             return count
         off = np.zeros(len(rows))

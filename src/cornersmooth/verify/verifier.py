@@ -20,13 +20,13 @@ from cornersmooth.settings import BOUNDS
 from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.checks import Examined, examine
-from cornersmooth.verify.findings import Findings, Largest, Poses
 from cornersmooth.verify.elements import Elements, Event, NcProgram, Problem
+from cornersmooth.verify.findings import Findings, Largest, Poses
 from cornersmooth.verify.reader import CONTROL_WORDS, Reader
+from cornersmooth.verify.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.source import Source, readable_twice
 from cornersmooth.verify.statements import asked, compare, said
-from cornersmooth.verify.reading_options import DIGITS_SAMPLE, Style
 from cornersmooth.verify.task import Task
 from cornersmooth.verify.wide_search import way_apart
 from cornersmooth.verify.word_check import WordCheck
@@ -139,7 +139,7 @@ class Verifier:
         self._program, self._words, self._processes = program, words, processes
         self._trusted = tuple(trusted)
         self._name = None if isinstance(nc, bytes) else str(nc)
-        self._style = Style.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
+        self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._source = Source(readable_twice(nc))
         self._helper: Helper | None = None
 
@@ -172,17 +172,17 @@ class Verifier:
 
     def _work(self) -> Verification:
         """Read and measure the text as far as it goes."""
-        style, source = self._style, self._source
-        task = Task.of(self._program, style.tolerance, style.axis_length)
-        steps = style.steps(source.read(0, DIGITS_SAMPLE))
-        rotary = style.rotary(steps)
+        options, source = self._options, self._source
+        task = Task.of(self._program, options.tolerance, options.axis_length)
+        steps = options.steps(source.read(0, DIGITS_SAMPLE))
+        rotary = options.rotary(steps)
         lever = None
         if rotary is not None:
             lever = float(rotary.levers(task.original.trail.tip).max(initial=0.0))
-        reader = Reader(self._name, style, steps, lever)
-        lines = read_lines(source.part(0, sys.maxsize), self._name, style.dialect.lexer)
+        reader = Reader(self._name, options, steps, lever)
+        lines = read_lines(source.part(0, sys.maxsize), self._name, options.dialect.lexer)
         check = WordCheck(
-            style.control, style.dialect.lexer, style.tolerance / self._program.mm_per_unit, self._trusted
+            options.control, options.dialect.lexer, options.tolerance / self._program.mm_per_unit, self._trusted
         )
         text = _Text(reader.chunks(check.watch(lines) if self._words else lines), reader.events)
         measured = _measure(task, text, words=self._words, processes=self._processes)

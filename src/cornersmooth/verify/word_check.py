@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.verify.lexer import Lexer
 from cornersmooth.verify.elements import Problem
+from cornersmooth.verify.lexer import Lexer
 from cornersmooth.verify.word_list import WordList, WordRule, word_list
 from cornersmooth.verify.words import Line, Table, Word
 
