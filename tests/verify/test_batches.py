@@ -196,7 +196,15 @@ def test_pass_longer_than_batches_is_cut(used, control, form, processes):
     while not lines[number].startswith("G1 X"):
         number += 1
     spoilt = [*lines[:number], lines[number].replace("X", "X9", 1), *lines[number + 1 :]]
-    found = check(program, ("\n".join(spoilt) + "\n").encode(), used, processes, batches_used=False, control=control)
+    found = check(
+        program,
+        ("\n".join(spoilt) + "\n").encode(),
+        used,
+        processes,
+        batches_used=False,
+        everywhere=False,
+        control=control,
+    )
     assert abs(found.problems[0].nc_line - number) < 3
 
 

@@ -8,6 +8,8 @@ The power is high, so that it is the largest distances that decide.
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
@@ -15,8 +17,8 @@ from cornersmooth.model import Bools, Floats, Ints
 #: of the squared distance, in tolerances
 _POWER = 3
 
-#: squared distance, in tolerances, beyond which all is equally bad: sums of larger ones would drown what decides
-_FARTHEST = 400.0
+#: distance, in tolerances, beyond which all is equally bad: sums of larger ones would drown what decides
+_FARTHEST: Final = 20.0
 
 #: written vertices around a doubtful one that are assigned anew with it; then those around what is still in doubt, for
 #: near the pole many blocks stand still; of both the largest number of pairs that are looked at for one window, and of
@@ -74,18 +76,18 @@ def assign(
     ways = path[low + 1 : high + 2] - begin
     sizes = np.einsum("ij,ij->i", ways, ways)
     fraction, square = _project(six, begin, ways, np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0))
-    cost = np.minimum(square / tolerance**2, _FARTHEST) ** _POWER
+    cost = np.minimum(square / tolerance**2, _FARTHEST**2) ** _POWER
     # original vertices between the segments, against written segments
     way = six[1:] - six[:-1]
     size = np.einsum("ij,ij->i", way, way)
     inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
     _, passed = _project(begin[1:], six[:-1], way, inverse)
     passing = np.concatenate(
-        ([np.zeros(len(way))], np.cumsum(np.minimum(passed / tolerance**2, _FARTHEST) ** _POWER, axis=0))
+        ([np.zeros(len(way))], np.cumsum(np.minimum(passed / tolerance**2, _FARTHEST**2) ** _POWER, axis=0))
     ).T
     # going back on one segment counts like being so far off: else a path that runs to and fro is all on its first line
     back = np.maximum(fraction[:-1] - fraction[1:], 0.0) ** 2 * sizes
-    back = np.minimum(back / tolerance**2, _FARTHEST) ** _POWER
+    back = np.minimum(back / tolerance**2, _FARTHEST**2) ** _POWER
     columns = np.arange(count)
     best = np.where(columns == 0, 0.0, np.inf)
     came = np.zeros((len(six), count), np.int32)

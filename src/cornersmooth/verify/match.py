@@ -317,8 +317,8 @@ class _Search:
         if wide:  # most of so wide a window has its place already
             begin, end = self._moved(part, segment, fraction, doubtful[part])
         new, at = slice(begin, end), slice(first + begin, first + end)
-        if end <= begin or off[new].max() > self.distance[at].max() + _ARITHMETIC:  # worse, not by the last bit only
-            return
+        if end <= begin or off[new].max() > self.distance[at].max() + _ARITHMETIC:
+            return  # worse, not by the last bit only
         self.segment[at], self.fraction[at], self.distance[at] = segment[new], fraction[new], off[new]
         self.nearest[at] = False
         start_point = self.path.six[segment]
