@@ -26,6 +26,9 @@ from cornersmooth.report import report
 from cornersmooth.settings import Settings
 from cornersmooth.verify import CONTROLS, Verification, Verifier, useful_processes
 
+#: blocks taken on trust that are told one by one
+_TRUSTED_TOLD = 3
+
 #: called with the stage, what is done of it, and all of it
 Progress = Callable[[str, int, int], None]
 
@@ -260,7 +263,12 @@ def _verified(verifier: Verifier, form: Form, frame: Frame | None) -> tuple[Veri
         if not own and (frame is None or not (frame.header or frame.footer)):
             raise
         return None, f"{failure.what}, NC line {failure.line}"
-    return found, "words beside the motion, which a table of your own may define" if form.table.own else ""
+    unsure = [f"{block}, NC line {line}" for line, block in found.trusted[:_TRUSTED_TOLD]]
+    if len(found.trusted) > _TRUSTED_TOLD:
+        unsure.append(f"{len(found.trusted) - _TRUSTED_TOLD} more blocks of your own")
+    if form.table.own:
+        unsure.append("what words beside the motion do, as a table of your own may define them")
+    return found, "; ".join(unsure)
 
 
 def _rejection(result: Result, why: str) -> PromiseError:

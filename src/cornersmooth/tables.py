@@ -101,8 +101,8 @@ class Shelf:
             raise SettingsError(self.unknown, f"unknown {self.kind} {name!r}", hint)
         return (resources.files(self.package) / self.folder / f"{name}.toml").read_text(encoding="utf-8")
 
-    def parse(self, text: str) -> Parsed:
-        """Table that a text holds, on top of the one that it is like.
+    def parse(self, text: str | Table) -> Parsed:
+        """Table that a text holds, or one that was read already, on top of the one that it is like.
 
         Raises
         ------
@@ -110,7 +110,7 @@ class Shelf:
             The text is not TOML, has an unknown key, or is like a table that is not known.
         """
         try:
-            table = tomllib.loads(text)
+            table = tomllib.loads(text) if isinstance(text, str) else dict(text)
         except tomllib.TOMLDecodeError as error:
             raise SettingsError(self.unreadable, f"not TOML: {error}", "correct the text") from error
         self.check_keys(table, (*self.keys, "like"), "")

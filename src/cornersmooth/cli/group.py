@@ -20,6 +20,7 @@ COMMANDS = {
     "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
     "controls": ("cornersmooth.cli.controls", "List the controls that NC text can be written for, and their forms."),
     "machines": ("cornersmooth.cli.machines", "List the machines whose rotary words can be written, or describe one."),
+    "config": ("cornersmooth.cli.config", "Say which values hold here, and where each comes from."),
     "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
 }
 

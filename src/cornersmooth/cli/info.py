@@ -9,6 +9,7 @@ import click
 
 from cornersmooth.cli import options
 from cornersmooth.cli.files import read_input
+from cornersmooth.cli.shop import ShopCommand
 
 if TYPE_CHECKING:
     from cornersmooth.report.info import Info, Spread
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 @click.command(
     "info",
+    cls=ShopCommand,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid.",
 )

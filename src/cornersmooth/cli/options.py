@@ -18,6 +18,8 @@ from cornersmooth.methods import DEFAULT_METHOD, METHODS
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
+    from cornersmooth.kinematics import Machine
+    from cornersmooth.nc import Control
     from cornersmooth.settings import Settings
 
 _LENGTH = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(mm|in|inch|\")?")
@@ -455,6 +457,22 @@ def settings_of(given: dict[str, Any]) -> Settings:
     return Settings(**{name: given[name] for name in _SETTINGS if name in given})
 
 
+def control_of(given: Mapping[str, Any]) -> Control:
+    """Control of that name, of that file, or of the shop settings."""
+    from cornersmooth.nc import load_control
+
+    control: str | Control = given["control"]
+    return load_control(control) if isinstance(control, str) else control
+
+
+def machine_of(given: Mapping[str, Any]) -> Machine | None:
+    """Machine of that name, of that file, or of the shop settings; None where none is named."""
+    from cornersmooth.kinematics import load_machine
+
+    machine: str | Machine | None = given["machine"]
+    return load_machine(machine) if isinstance(machine, str) and machine else machine or None
+
+
 def reading_back_of(given: Mapping[str, Any]) -> dict[str, Any]:
     """Keyword arguments of `cornersmooth.verify.read_nc` for a text that somebody wrote.
 
@@ -463,17 +481,14 @@ def reading_back_of(given: Mapping[str, Any]) -> dict[str, Any]:
     SettingsError
         CS204: nobody knows how the control's text is read; or the control or the machine is unknown.
     """
-    from cornersmooth.kinematics import load_machine
-    from cornersmooth.nc import load_control
     from cornersmooth.verify import CONTROLS
 
-    control = load_control(given["control"])
+    control = control_of(given)
     if control.dialect not in CONTROLS:
         raise SettingsError(
-            "CS204", f"{given['control']} is like no control that can be read", 'say like = "fanuc" or another in it'
+            "CS204", f"{control.name} is like no control that can be read", 'say like = "fanuc" or another in it'
         )
-    machine = load_machine(given["machine"]) if given["machine"] else None
-    return {"control": control.dialect, "machine": machine, "tcp": not given["no_tcp"]}
+    return {"control": control.dialect, "machine": machine_of(given), "tcp": not given["no_tcp"]}
 
 
 def picture_form(path: str | None) -> str:

@@ -13,6 +13,7 @@ from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.files import STANDARD, check_path, read_input
 from cornersmooth.cli.inputs import Input, find_inputs
 from cornersmooth.cli.job import Job, Outcome, check, run_job
+from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import print_line, progress_bar, show_findings, show_summary, show_verdict
 from cornersmooth.cli.summary import check_summary, counts_line, line_of, write_summary
 from cornersmooth.output import make_folder
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 @click.command(
     "smooth",
+    cls=ShopCommand,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 1 done, but a promise is broken; 2 wrong usage or configuration; "
     "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
@@ -188,12 +190,11 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
 
 def _form(given: dict[str, Any]) -> Form:
     """Form of the control."""
-    from cornersmooth.kinematics import load_machine
     from cornersmooth.nc import choose_form
 
-    machine = load_machine(given["machine"]) if given["machine"] else None
+    machine = options.machine_of(given)
     return choose_form(
-        given["control"], given["form"], machine=machine, tcp=not given["no_tcp"], extras=given["extras"]
+        options.control_of(given), given["form"], machine=machine, tcp=not given["no_tcp"], extras=given["extras"]
     )
 
 

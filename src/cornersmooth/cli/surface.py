@@ -9,6 +9,7 @@ import click
 
 from cornersmooth.cli import options
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
 
@@ -21,6 +22,7 @@ _SUFFIXES = (".json", ".csv", ".html", ".png", ".svg", ".pdf")
 
 @click.command(
     "surface",
+    cls=ShopCommand,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
     "cannot be read or is not valid; 4 output cannot be written.",

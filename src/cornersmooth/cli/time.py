@@ -9,6 +9,7 @@ import click
 
 from cornersmooth.cli import options
 from cornersmooth.cli.files import check_path, read_input, target_of
+from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import progress_bar
 from cornersmooth.methods import METHODS
 from cornersmooth.output import open_output
@@ -26,6 +27,7 @@ LAWS = tuple(_TITLES)
 
 @click.command(
     "time",
+    cls=ShopCommand,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid; "
     "4 output cannot be written.",
@@ -106,9 +108,8 @@ def command(source: str, **given: Any) -> int:
 def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
     from cornersmooth.cl import read
     from cornersmooth.feedrate import compare
-    from cornersmooth.kinematics import load_machine
 
-    machine = load_machine(given["machine"]) if given["machine"] else None
+    machine = options.machine_of(given)
     limits, settings = options.limits_of(given), options.settings_of(given)
     program = read(data, name=name, **options.reading_of(given))
     with progress_bar(given["quiet"]) as progress:

@@ -10,6 +10,7 @@ import click
 
 from cornersmooth.cli import options
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ _PROBLEMS_SHOWN = 20
 
 @click.command(
     "verify",
+    cls=ShopCommand,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 the text keeps the tolerance; 1 it does not, or something else is wrong with it; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
@@ -57,14 +59,13 @@ def command(source: str, text: str, **given: Any) -> int:
       cornersmooth verify part.cls part.nc -e 0.04 --report found.html
     """
     from cornersmooth.cl import read
-    from cornersmooth.nc import load_control
     from cornersmooth.verify import deviation_along, useful_processes, verify
     from cornersmooth.verify.source import readable_twice
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     form = _check_outputs(source, text, given)
-    own = load_control(given["control"]).own
+    own = options.control_of(given).own
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
     how = {**measures, **options.reading_back_of(given)}
     data, name = read_input(source)

@@ -8,7 +8,7 @@ from typing import Any
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics.dynamics import LINEAR, Dynamics
 from cornersmooth.kinematics.machine import Machine, RotaryAxis
-from cornersmooth.tables import Shelf
+from cornersmooth.tables import Shelf, Table
 
 _SHELF = Shelf(
     "machine",
@@ -54,12 +54,12 @@ def machine_table(name: str) -> str:
     return _SHELF.built_in(name)
 
 
-def parse_machine(text: str, *, file: str = "<machine>", name: str = "machine") -> Machine:
-    """Machine that a TOML text describes.
+def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "machine") -> Machine:
+    """Machine that a TOML text, or a table read from one, describes.
 
     Parameters
     ----------
-    text : str
+    text : str or dict
         Keys: ``like`` (a machine that comes with the program; then only what is different), ``name``, ``description``,
         ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``part_zero`` and two tables ``[[axis]]`` with
         ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``; and for the planning of the time

@@ -13,7 +13,7 @@ from cornersmooth.model import Ints, Program, SmoothProgram, Units
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.circles import Circles, plan_circles
 from cornersmooth.nc.control import Control
-from cornersmooth.nc.control_tables import control_names, control_table, load_control
+from cornersmooth.nc.control_tables import control_names, control_table, load_control, parse_control
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.form_choice import check_program, choose_form
@@ -38,6 +38,7 @@ __all__ = [
     "control_table",
     "fit_settings",
     "load_control",
+    "parse_control",
     "write",
 ]
 

@@ -91,8 +91,8 @@ def load_control(name_or_path: str | Path) -> Control:
     return control if is_file(name_or_path) else replace(control, own=False)
 
 
-def parse_control(text: str, *, file: str = "<control>", name: str = "control") -> Control:
-    """Control that a TOML text describes.
+def parse_control(text: str | Table, *, file: str = "<control>", name: str = "control") -> Control:
+    """Control that a TOML text, or a table read from one, describes.
 
     Parameters
     ----------

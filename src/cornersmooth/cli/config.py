@@ -1,0 +1,39 @@
+"""``cornersmooth config``: every default that holds here, and where it comes from."""
+
+from __future__ import annotations
+
+import click
+
+from cornersmooth.cli import shop
+
+
+@click.command(
+    "config",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
+)
+@click.argument("source", metavar="[IN]", default=".")
+def command(source: str) -> int:
+    """Say which values 'cornersmooth smooth' would use for the file or folder IN, and where each comes from.
+
+    Options come first, then the environment (CORNERSMOOTH_TOLERANCE), the file cornersmooth.toml in the folder of the
+    input or above it, ~/.config/cornersmooth/cornersmooth.toml, and the defaults.
+
+    \b
+    Examples:
+      cornersmooth config
+      cornersmooth config jobs/part.cls
+    """
+    from cornersmooth.cli.smooth import command as smooth
+
+    with smooth.make_context("smooth", [source]) as context:
+        rows = []
+        for option in shop.settable(smooth):
+            value = context.params[str(option.name)]
+            value = getattr(value, "name", value)  # a control or machine of one's own
+            told = "" if value is None else ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+            rows.append((shop.keys(option)[0], told, shop.origin(context, str(option.name))))
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    for key, value, origin in rows:
+        click.echo(f"{key:<{widths[0]}}  {value:<{widths[1]}}  {origin}")
+    return 0

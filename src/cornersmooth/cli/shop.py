@@ -1,0 +1,263 @@
+"""Shop settings: defaults of a project and of a user, from ``cornersmooth.toml`` and the environment.
+
+A project's file stands in the folder of the input or above it, a user's in ``~/.config/cornersmooth``::
+
+    [smooth]
+    tolerance = 0.01        # options by their long names
+    control = "shop"
+
+    [smooth.shop]           # only with this control
+    form = "bspline"
+
+    [controls.shop]         # a control of one's own, as docs/controls.md says it
+    like = "siemens"
+
+    [machines.mill]
+    like = "table-ac"
+
+What counts is the option, then the environment (``CORNERSMOOTH_TOLERANCE``), the project, the user, the default. What
+[smooth] says holds for all commands that have the option; [verify], [time], [info] and [surface] may say otherwise.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import click
+
+from cornersmooth.errors import SettingsError
+from cornersmooth.tables import closest
+
+FILE = "cornersmooth.toml"
+PREFIX = "CORNERSMOOTH_"
+#: tables with options; the first holds for all commands
+COMMAND_TABLES = ("smooth", "verify", "time", "info", "surface")
+_OWN_TABLES = {"controls": "control", "machines": "machine"}
+
+#: options that belong to one run
+_ONE_RUN = frozenset(
+    {"output", "directory", "force", "reports", "plot", "csv", "summary", "as_json", "law", "no_verify", "help"}
+)
+
+
+@dataclass(frozen=True)
+class ShopFile:
+    """One file of shop settings."""
+
+    path: str
+    tables: dict[str, Any]
+
+    def options(self, command: str, control: str) -> Iterator[tuple[str, str, Any]]:
+        """Table, key and value of every option that holds for a command and a control; what counts more comes later."""
+        for table in dict.fromkeys((COMMAND_TABLES[0], command)):
+            entries = self.tables.get(table, {})
+            for key, value in entries.items():
+                if not isinstance(value, dict):
+                    yield table, key, value
+            for key, value in entries.get(control, {}).items():
+                yield f"{table}.{control}", key, value
+
+    def own(self, kind: str, name: str) -> dict[str, Any] | None:
+        """Table of a control or machine of one's own."""
+        found = self.tables.get(kind, {}).get(name)
+        return found if isinstance(found, dict) else None
+
+
+@dataclass
+class Shop:
+    """What the files say, the one that counts most first, and where each value of a run is from."""
+
+    files: tuple[ShopFile, ...] = ()
+    origins: dict[str, str] = field(default_factory=dict)
+
+
+class ShopCommand(click.Command):
+    """A command whose options have defaults in shop settings."""
+
+    def __init__(self, *args: Any, **given: Any) -> None:
+        super().__init__(*args, **given)
+        for option in settable(self):
+            option.envvar = PREFIX + keys(option)[1].upper()
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the shop settings that go with the input, then the options."""
+        first, control = _first_look(self, ctx, list(args))
+        _check_environment(self)
+        shop = Shop(find_files(first))
+        ctx.meta[__name__] = shop
+        ctx.default_map = defaults(self, shop, control)
+        rest = super().parse_args(ctx, args)
+        for kind, name in _OWN_TABLES.items():
+            if isinstance(ctx.params.get(name), str):
+                ctx.params[name] = _own(shop, kind, ctx.params[name])
+        return rest
+
+
+def origin(ctx: click.Context, name: str) -> str:
+    """Where the value of an option is from, in words."""
+    source = ctx.get_parameter_source(name)
+    if source == click.core.ParameterSource.COMMANDLINE:
+        return "command line"
+    if source == click.core.ParameterSource.ENVIRONMENT:
+        return next(str(option.envvar) for option in settable(ctx.command) if option.name == name)
+    if source == click.core.ParameterSource.DEFAULT_MAP:
+        shop: Shop = ctx.meta[__name__]
+        return shop.origins[name]
+    return "default"
+
+
+def find_files(first: str) -> tuple[ShopFile, ...]:
+    """Shop settings of the project that a file or folder belongs to, and of the user.
+
+    Raises
+    ------
+    SettingsError
+        CS240: a file cannot be read or is not TOML. CS241: an unknown table.
+    """
+    here = Path(os.path.abspath(first))
+    folders = [here, *here.parents] if here.is_dir() else list(here.parents)
+    project = next((folder / FILE for folder in folders if (folder / FILE).is_file()), None)
+    config = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
+    user = Path(config) / "cornersmooth" / FILE
+    return tuple(_read(path) for path in (project, user) if path is not None and path.is_file())
+
+
+def defaults(command: click.Command, shop: Shop, control: str | None) -> dict[str, Any]:
+    """Values of options by name, as the files have them.
+
+    Raises
+    ------
+    SettingsError
+        CS241: an unknown key. CS242: a value that is none for the option.
+    """
+    by_key = {key: option for option in settable(command) for key in keys(option)}
+    if control is None:
+        control = next((_control_of(file, command.name or "") for file in shop.files), None) or "fanuc"
+    values: dict[str, Any] = {}
+    for file in reversed(shop.files):
+        for table, key, value in file.options(command.name or "", control):
+            option = by_key.get(key)
+            if option is None:
+                if key not in (known := _all_keys()):
+                    raise _unknown(file.path, f"{table}.{key}", key, sorted(known))
+                continue
+            name = str(option.name)
+            values[name] = _checked(option, value, file.path, f"{table}.{key}")
+            shop.origins[name] = f"{file.path} [{table}]"
+    return values
+
+
+def _control_of(file: ShopFile, command: str) -> str | None:
+    for table in (command, COMMAND_TABLES[0]):
+        if isinstance(named := file.tables.get(table, {}).get("control"), str):
+            return named
+    return None
+
+
+def _first_look(command: click.Command, ctx: click.Context, args: list[str]) -> tuple[str, str | None]:
+    """First input, or the current folder, and the control that options or the environment name."""
+    given, _, _ = command.make_parser(ctx).parse_args(args)
+    inputs = next((given.get(str(param.name)) for param in command.params if isinstance(param, click.Argument)), None)
+    first = inputs[0] if isinstance(inputs, (tuple, list)) and inputs else inputs
+    control = given.get("control") or os.environ.get(f"{PREFIX}CONTROL")
+    here = isinstance(first, str) and first != "-"
+    return (str(first) if here else "."), control if isinstance(control, str) else None
+
+
+def settable(command: click.Command) -> list[click.Option]:
+    """Options of a command that shop settings may set: not those that belong to one run."""
+    return [param for param in command.params if isinstance(param, click.Option) and param.name not in _ONE_RUN]
+
+
+def keys(option: click.Option) -> list[str]:
+    """Names of an option in a file: its long one, with hyphens or underscores."""
+    long = next((text for text in option.opts if text.startswith("--")), "").lstrip("-")
+    return [long, long.replace("-", "_")] if long else []
+
+
+def _all_keys() -> set[str]:
+    """Keys of the options of all commands."""
+    from cornersmooth.cli.group import COMMANDS, cli
+
+    found = set()
+    for name in COMMANDS:
+        command = cli.get_command(click.Context(cli), name)
+        if isinstance(command, ShopCommand):
+            found |= {key for option in settable(command) for key in keys(option)}
+    return found
+
+
+def _checked(option: click.Option, value: Any, file: str, where: str) -> Any:
+    """Value as the option takes it."""
+    if option.is_flag:
+        if not isinstance(value, bool):
+            raise SettingsError("CS242", f"{where} is {value!r}", "give true or false", file=file)
+        return value
+    if option.multiple:
+        if not (isinstance(value, list) and all(isinstance(item, str) for item in value)):
+            raise SettingsError("CS242", f"{where} is {value!r}", "give a list of texts", file=file)
+        return value
+    if isinstance(value, list):
+        value = ",".join(map(str, value))
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise SettingsError("CS242", f"{where} is {value!r}", "give a number or a text", file=file)
+    try:
+        return option.type.convert(value if isinstance(value, float) else str(value), option, None)
+    except click.BadParameter as wrong:
+        raise SettingsError("CS242", f"{where}: {wrong.message}", "correct the file", file=file) from None
+
+
+def _read(path: Path) -> ShopFile:
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as wrong:
+        raise SettingsError("CS240", f"cannot read it: {wrong}", "correct the file", file=str(path)) from wrong
+    known = (*COMMAND_TABLES, *_OWN_TABLES)
+    for name, table in tables.items():
+        if name not in known:
+            raise _unknown(str(path), name, name, known)
+        if not isinstance(table, dict):
+            raise SettingsError("CS242", f"{name} is {table!r}", f"write a table [{name}]", file=str(path))
+    return ShopFile(str(path), tables)
+
+
+def _unknown(file: str, where: str, name: str, known: Sequence[str]) -> SettingsError:
+    close = closest(name, known)
+    hint = f"did you mean {close}?" if close else f"known are {', '.join(known)}"
+    return SettingsError("CS241", f"unknown key {where}", hint, file=file)
+
+
+def _check_environment(command: click.Command) -> None:
+    """Refuse names in the environment that are nearly those of an option."""
+    known = {str(option.envvar) for option in settable(command)}
+    strange = [name for name in os.environ if name.startswith(PREFIX) and name not in known]
+    if not strange:
+        return
+    words = {key.replace("-", "_").upper() for key in _all_keys()}
+    for name in strange:
+        close = get_close_matches(name.removeprefix(PREFIX), words, n=1, cutoff=0.75)
+        if close and close[0] != name.removeprefix(PREFIX):
+            raise SettingsError("CS241", f"unknown {name} in the environment", f"did you mean {PREFIX}{close[0]}?")
+
+
+def _own(shop: Shop, kind: str, name: str) -> Any:
+    """Control or machine that the files describe; the name where they do not."""
+    for file in shop.files:
+        table = file.own(kind, name)
+        if table is None:
+            continue
+        where = f"{file.path} [{kind}.{name}]"
+        if kind == "controls":
+            from cornersmooth.nc import parse_control
+
+            return parse_control(table, file=where, name=name)
+        from cornersmooth.kinematics import parse_machine
+
+        return parse_machine(table, file=where, name=name)
+    return name
