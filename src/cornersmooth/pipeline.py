@@ -267,7 +267,7 @@ def _verified(verifier: Verifier, form: Form, frame: Frame | None) -> tuple[Veri
     if len(found.trusted) > _TRUSTED_TOLD:
         unsure.append(f"{len(found.trusted) - _TRUSTED_TOLD} more blocks of your own")
     if form.table.own:
-        unsure.append("what words beside the motion do, as a table of your own may define them")
+        unsure.append("words beside the motion, which a table of your own may define")
     return found, "; ".join(unsure)
 
 
