@@ -22,17 +22,14 @@ What counts is the option, then the environment (``CORNERSMOOTH_TOLERANCE``), th
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import click
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.tables import closest
 
 FILE = "cornersmooth.toml"
 PREFIX = "CORNERSMOOTH_"
@@ -214,6 +211,8 @@ def _checked(option: click.Option, value: Any, file: str, where: str) -> Any:
 
 
 def _read(path: Path) -> ShopFile:
+    import tomllib
+
     try:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as wrong:
@@ -228,6 +227,8 @@ def _read(path: Path) -> ShopFile:
 
 
 def _unknown(file: str, where: str, name: str, known: Sequence[str]) -> SettingsError:
+    from cornersmooth.tables import closest
+
     close = closest(name, known)
     hint = f"did you mean {close}?" if close else f"known are {', '.join(known)}"
     return SettingsError("CS241", f"unknown key {where}", hint, file=file)
@@ -239,6 +240,8 @@ def _check_environment(command: click.Command) -> None:
     strange = [name for name in os.environ if name.startswith(PREFIX) and name not in known]
     if not strange:
         return
+    from difflib import get_close_matches
+
     words = {key.replace("-", "_").upper() for key in _all_keys()}
     for name in strange:
         close = get_close_matches(name.removeprefix(PREFIX), words, n=1, cutoff=0.75)
