@@ -198,6 +198,8 @@ def test_keys_charts_and_switches(look, text):
     ranges = page.evaluate("() => cornersmooth.charts.plots.map(p => [p.scales.x.min, p.scales.x.max])")
     assert all(found == pytest.approx(ranges[0]) for found in ranges)
     assert ranges[0][1] - ranges[0][0] < 0.6 * page.evaluate("() => cornersmooth.meta.seconds")
+    page.locator("#fit").click()
+    looked.settle()
     for name in ("show-written", "show-original", "show-rapids", "show-tool"):
         before = looked.canvas()
         page.locator(f"#{name}").click()

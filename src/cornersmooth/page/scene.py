@@ -124,6 +124,12 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     if seconds is None:
         seconds = feed_seconds(written, subject.limits.rapid)
     places = _place_of_poses(written, program)
+    if subject.verification is not None:
+        # what is measured from the original poses belongs to the points that are reached there
+        found = subject.verification
+        for off, of_poses in ((written.tip_off, found.pose_tip), (written.axis_off, found.pose_axis_point)):
+            poses = np.flatnonzero(np.isfinite(of_poses) & np.isfinite(off[places]))
+            np.maximum.at(off, places[poses], of_poses[poses])
     _add_original(pack, original, program, corners, centre)
     _add_written(pack, written, planned, seconds, corners, places, settings, centre)
     charts = _add_charts(pack, original, written, planned, seconds)

@@ -44,7 +44,7 @@ class View {
       if (move[i] === 2) cuts.push(i);
       else if (move[i] === 1) rapids.push(i);
     }
-    this.original = new THREE.LineSegments(pairs(tip, cuts), new THREE.LineBasicMaterial({ color: 0x808080 }));
+    this.original = this.line(tip, cuts, 1.4);
     this.rapids = new THREE.LineSegments(
       pairs(tip, rapids),
       new THREE.LineDashedMaterial({ color: 0xc08020, dashSize: this.bounds.radius / 60, gapSize: this.bounds.radius / 90 }),
@@ -52,7 +52,8 @@ class View {
     this.rapids.computeLineDistances();
     this.rapids.visible = false;
     this.segments = this.writtenSegments();
-    this.written = this.buildWritten();
+    this.written = this.line(arrays.w_tip, this.segments);
+    this.written.renderOrder = 2;
     this.ribs = this.buildRibs();
     this.whiskers = this.buildWhiskers();
     this.markers = this.buildMarkers();
@@ -104,24 +105,24 @@ class View {
     return ends;
   }
 
-  buildWritten() {
-    const tip = this.arrays.w_tip;
-    const { segments } = this;
-    if (segments.length > MOST_WIDE) {
-      const geometry = pairs(tip, segments);
-      geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(segments.length * 6), 3));
-      return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: true }));
+  /**
+   * Segments that lead to some points, in a colour each if no width is given.
+   * @param {Values} tip @param {number[]} ends @param {number} [width] pixels
+   */
+  line(tip, ends, width) {
+    const coloured = width === undefined;
+    const geometry = pairs(tip, ends);
+    const blank = new Float32Array(ends.length * 6);
+    if (ends.length > MOST_WIDE) {
+      if (coloured) geometry.setAttribute("color", new THREE.BufferAttribute(blank, 3));
+      return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: coloured }));
     }
-    const geometry = new THREE.LineSegmentsGeometry();
-    const flat = new Float32Array(segments.length * 6);
-    segments.forEach((end, k) => flat.set(/** @type {Float32Array} */ (tip).subarray(3 * end - 3, 3 * end + 3), 6 * k));
-    geometry.setPositions(flat);
-    geometry.setColors(new Float32Array(segments.length * 6));
-    const material = new THREE.LineMaterial({ linewidth: 3, vertexColors: true });
+    const wide = new THREE.LineSegmentsGeometry();
+    wide.setPositions(/** @type {Float32Array} */ (geometry.getAttribute("position").array));
+    if (coloured) wide.setColors(blank);
+    const material = new THREE.LineMaterial({ linewidth: width ?? 3, vertexColors: coloured });
     this.wide.push(material);
-    const lines = new THREE.LineSegments2(geometry, material);
-    lines.renderOrder = 2;
-    return lines;
+    return new THREE.LineSegments2(wide, material);
   }
 
   /** The ruled surface that the tool axis sweeps over its length H. */
@@ -334,7 +335,7 @@ class View {
     attribute(this.ring, "position").setXYZ(0, target.x, target.y, target.z).needsUpdate = true;
     this.ring.visible = true;
     const size = Math.max(3 * (length[i] || 0), 20 * this.meta.tolerance, this.bounds.radius / 1000);
-    this.flyTo(target, Math.min(size, this.bounds.radius) * 2.6);
+    this.flyTo(target, Math.min(size, this.bounds.radius) * 1.5);
   }
 
   /** Marks a place on the path. @param {number[] | null} at */
