@@ -14,7 +14,7 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.model import SmoothProgram
-from cornersmooth.nc import choose_form, write
+from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
 from nc.grammars import reader
@@ -103,7 +103,8 @@ def test_isolated_corners_are_splines_of_their_own() -> None:
 def test_single_splines_are_warned_of(count: int, said: int) -> None:
     """At least 6 blocks out of every 10 must be spline blocks (programming manual)."""
     form = choose_form("siemens", "bspline")
-    smoothed = smooth(read(circle(count, 0.3), name="part.cls"), Settings(tolerance=TOLERANCE))
+    settings = fit_settings(Settings(tolerance=TOLERANCE), form, "mm")
+    smoothed = smooth(read(circle(count, 0.3), name="part.cls"), settings)
     found = write(smoothed, io.BytesIO(), form=form).findings
     assert sum(finding.count for finding in found if finding.code == "CS325") == said
 

@@ -85,6 +85,30 @@ def match_samples(path: Path, original: Original, poses: Ints, axis_length: floa
     return np.maximum.accumulate(segment + part)
 
 
+def _strays(path: Path, original: Original, axis_length: float, limit: float) -> tuple[Floats, Floats, Floats]:
+    """Places on the original of every sample and of every pose, and how far tip and b are from their partners."""
+    poses = match_poses(path, original, axis_length, limit)
+    matched = match_samples(path, original, poses, axis_length)
+    parameter = np.concatenate((matched, np.arange(len(original), dtype=float)))
+    sample = np.concatenate((np.arange(len(path)), poses))
+    tip, point = original.at(parameter, axis_length)
+    strays_tip = np.linalg.norm(path.tip[sample] - tip, axis=1)
+    strays_point = np.linalg.norm(path.point[sample] - point, axis=1)
+    return parameter, strays_tip, strays_point
+
+
+def within(path: Path, original: Original, axis_length: float, limit: float) -> bool:
+    """Whether one run deviates by `limit` at most: as `deviation`, without asking by how much it does not."""
+    _, *strays = _strays(path, original, axis_length, limit)
+    if max(float(stray.max()) for stray in strays) <= limit:
+        return True
+    lines = original.dense(axis_length, limit)
+    return all(
+        float(stray.max()) <= limit or leash_is_enough(samples, line, limit)
+        for stray, samples, line in zip(strays, (path.tip, path.point), lines, strict=True)
+    )
+
+
 def deviation(path: Path, original: Original, axis_length: float, limit: float) -> Deviation:
     """Deviation of one run of feed motion from the poses it was made of; see the module text.
 
@@ -98,13 +122,7 @@ def deviation(path: Path, original: Original, axis_length: float, limit: float) 
     limit : float, mm
         The verdict looked for: distances at or below it are upper bounds, distances above it exact.
     """
-    poses = match_poses(path, original, axis_length, limit)
-    matched = match_samples(path, original, poses, axis_length)
-    parameter = np.concatenate((matched, np.arange(len(original), dtype=float)))
-    sample = np.concatenate((np.arange(len(path)), poses))
-    tip, point = original.at(parameter, axis_length)
-    strays_tip = np.linalg.norm(path.tip[sample] - tip, axis=1)
-    strays_point = np.linalg.norm(path.point[sample] - point, axis=1)
+    parameter, strays_tip, strays_point = _strays(path, original, axis_length, limit)
     worst_tip, worst_point = int(np.argmax(strays_tip)), int(np.argmax(strays_point))
     found = [float(strays_tip[worst_tip]), float(strays_point[worst_point])]
     exact = max(found) > limit

@@ -21,7 +21,7 @@ from cornersmooth.kinematics.poses import angle_between
 from cornersmooth.rotary import FilledPath, fill, insertions, rotary_angles
 
 TOLERANCE = 0.02  # degrees
-CASES = 400
+CASES = 200
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import Machine, load_machine, machine_names, tool_axis
 from cornersmooth.model import Move, Program, SmoothProgram, Status
-from cornersmooth.nc import choose_form, write
+from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.rotary.angle_curves import RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.rotary.nurbs_knots import SPANS, CurveGroup, refinement, weight_factors
 from cornersmooth.settings import Settings
@@ -428,14 +428,14 @@ def test_axis_that_turns_over(name: str, aside: float):
     axis = np.array([[0.3, 0.1, 1], [0.3, 0.2, 1], [-0.3, -0.2, -1], [-0.3, -0.1, -1], [0, 0.1, -1]])
     axis[2] += aside * np.array([0.5, -0.3, 0.2])
     tip = np.array([[0, 0, 0], [10, 1, 0], [20, 0, 0], [30, 2, 0], [40, 1, 0.0]])
-    smoothed = smooth(Program.from_poses(tip, unit(axis)), reserved())
+    chosen = choose_form("fanuc", "g6.2", machine=machine)
+    smoothed = smooth(Program.from_poses(tip, unit(axis)), fit_settings(reserved(), chosen, "mm"))
     curves = rotary(smoothed, machine)
     if aside < 1e-7:
         assert curves.inserted.unsolved.tolist() == [2]
     else:
         assert_straight(smoothed, machine, curves)
     assert_curves(smoothed, machine, curves)
-    chosen = choose_form("fanuc", "g6.2", machine=machine)
     told = write(smoothed, io.BytesIO(), form=chosen).findings
     assert [finding.count for finding in told if finding.code == "CS369"] == ([1] if aside < 1e-7 else [])
 

@@ -21,7 +21,7 @@ from cornersmooth.model import Move, Program
 from .mutations import Mutant
 
 #: runs of the job in one text
-RUNS = 12
+RUNS = 6
 #: lines behind a run where its end may be named
 BEHIND = 3
 #: feed of the calm cuts, mm/min

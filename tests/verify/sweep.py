@@ -1,0 +1,145 @@
+"""Does verification judge as an independent reader does? Random programs and files, by hand.
+
+``python -m verify.sweep [--seeds FIRST LAST] [--only CASE] [--eps MM]... [FILE]...`` prints a line for every text that
+is refused although the oracle finds it right, for every text that passes although it does not, and for every failure;
+exit code 1 for any. Programs with holes have no oracle: what is written for them must pass.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import sys
+import time
+import traceback
+import warnings
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from cornersmooth.cl import read
+from cornersmooth.errors import CornersmoothError
+from cornersmooth.model import Move, Program
+from cornersmooth.nc import Form, fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from cornersmooth.verify import verify
+from nc.cases import CHOSEN, Case
+from nc.grammars import reader
+from nc.promise import runs_of
+from oracle.distance import within
+from verify.random_programs import Trial, trial
+
+#: what verification may find beyond ε and the oracle not, and the other way round: its own arithmetic, in ε
+HAIR = 2e-3
+
+#: axis lengths that files are tried with
+LENGTHS = (10.0, 50.0)
+
+
+def texts(program: Program, form: Form, settings: Settings) -> tuple[bytes, Settings]:
+    """NC text of a program, and the settings with the digits of the control in them."""
+    fitted = fit_settings(settings, form, program.units)
+    stream = io.BytesIO()
+    write(smooth(program, fitted), stream, form=form)
+    return stream.getvalue(), fitted
+
+
+def keeps(case: Case, program: Program, text: bytes, settings: Settings, allowed: float) -> bool:
+    """Whether the oracle finds the text within `allowed` ε of the CL path."""
+    limit = allowed * settings.tolerance
+    found = reader(case.control, case.form, case.machine, case.tcp, program.units).read(
+        text.decode("ascii"), settings.axis_length, settings.tolerance
+    )
+    paths, originals = found.runs(settings.axis_length), runs_of(program, settings.tolerance)
+    assert len(paths) == len(originals), f"{len(paths)} runs written for {len(originals)}"
+    return all(
+        within(path, original, settings.axis_length, limit) for path, original in zip(paths, originals, strict=True)
+    )
+
+
+def judged(case: Case, program: Program, settings: Settings, *, oracle: bool) -> tuple[str, str]:
+    """Outcome of one text: a word, and what is to be said of it."""
+    form = case.choose(endless=True)
+    try:
+        text, fitted = texts(program, form, settings)
+    except CornersmoothError as refusal:
+        return f"refused {refusal.code}", str(refusal)
+    try:
+        found = verify(
+            program,
+            text,
+            tolerance=fitted.verified_tolerance,
+            axis_length=settings.axis_length,
+            control=case.control,
+            machine=form.machine,
+            tcp=case.tcp,
+        )
+        problems = [f"{problem.nc_line}: {problem.code} {problem.text}" for problem in found.problems]
+    except CornersmoothError as refusal:
+        problems = [str(refusal)]
+    allowed = fitted.verified_tolerance / fitted.tolerance
+    if problems:
+        wrong = oracle and not keeps(case, program, text, settings, allowed - HAIR)
+        if wrong and settings.method == "zhang2016":  # it promises ε of its own construction
+            return "rightly found", ""
+        return ("BROKEN PROMISE" if wrong else "FALSE ALARM"), " | ".join(problems[:3])
+    if oracle and not keeps(case, program, text, settings, allowed + HAIR):
+        return "MISSED", "beyond the tolerance"
+    return "passed", ""
+
+
+def has_holes(program: Program) -> bool:
+    """Whether what is cut is more than the CL file's own moves."""
+    return bool((program.kind == Move.HOLE).any())
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("files", nargs="*", type=Path)
+    parser.add_argument("--seeds", type=int, nargs=2, default=(0, 0))
+    parser.add_argument("--only", default="", help="cases whose name holds this")
+    parser.add_argument("--eps", type=float, action="append", help="for files; may be repeated")
+    parser.add_argument("--keep", type=Path, help="folder for the CL files of what goes wrong")
+    given = parser.parse_args()
+    warnings.simplefilter("error")
+    count: Counter[str] = Counter()
+    begin = time.process_time()
+
+    def take(name: str, case: Case, data: bytes, settings: Settings, *, oracle: bool = True) -> None:
+        try:
+            program = read(data, name="trial.cls")
+            outcome, said = judged(case, program, settings, oracle=oracle and not has_holes(program))
+        except Exception as failure:
+            where = traceback.extract_tb(failure.__traceback__)[-1]
+            outcome, said = "FAILED", f"{type(failure).__name__}: {failure} ({where.filename}:{where.lineno})"
+        count[outcome] += 1
+        if outcome.isupper():
+            print(f"{outcome} {name}: {said}", flush=True)
+            if given.keep:
+                given.keep.mkdir(exist_ok=True)
+                (given.keep / f"{name.split(':')[0].replace(' ', '')}.cls").write_bytes(data)
+
+    for seed in range(*given.seeds):
+        one: Trial = trial(seed, only=given.only)
+        take(str(one), one.case, one.cl.encode(), one.settings, oracle=one.oracle)
+    cases = [case for case in CHOSEN if given.only in str(case)]
+    for number, path in enumerate(given.files):
+        data = path.read_bytes()
+        try:
+            read(data, name=path.name)
+        except CornersmoothError as refusal:
+            print(f"{path.name}: not a CL file: {refusal}")
+            continue
+        for eps in given.eps or (0.001, 0.04, 0.15):
+            settings = Settings(tolerance=eps, axis_length=LENGTHS[number % len(LENGTHS)])
+            for case in cases:
+                take(f"{path.name} {case} eps {eps:g}", case, data, settings, oracle=False)
+    print(dict(sorted(count.items())), f"{time.process_time() - begin:.0f} s")
+    return 1 if any(name.isupper() for name in count) else 0
+
+
+if __name__ == "__main__":
+    np.seterr(all="raise", under="ignore")
+    sys.exit(main())
