@@ -42,7 +42,7 @@ def test_controls_are_listed_with_their_forms() -> None:
 def test_the_table_of_a_control_is_printed_to_start_from(tmp_path: Path) -> None:
     mine = tmp_path / "mine.toml"
     mine.write_bytes(run("controls", "siemens", "--table").stdout)
-    mine.write_text(mine.read_text().replace('tail = ["M30"]', 'tail = ["M17"]'))
+    mine.write_text(mine.read_text().replace('"{footer}", "M30"]', '"{footer}", "M17"]'))
     assert lines_of("--control", mine)[-1] == "M17"
     assert run("controls", mine).stdout.decode().startswith("siemens: ")
     assert run("controls", "--table").returncode == 2
@@ -97,7 +97,7 @@ def test_control_form_and_machine_are_chosen() -> None:
 
 def test_own_tables_are_taken_from_files(tmp_path: Path) -> None:
     control, machine = tmp_path / "mine.toml", tmp_path / "mill.toml"
-    control.write_text('like = "siemens"\n[layout]\ntail = ["M17"]\n')
+    control.write_text('like = "siemens"\n[program]\nend = ["M17"]\n')
     machine.write_text(
         'name = "mill"\n[[axis]]\nname = "C"\ncarrier = "table"\ndirection = [0, 0, 1]\n'
         '[[axis]]\nname = "B"\ncarrier = "table"\ndirection = [0, 1, 0]\nlimits = [-10, 110]\n'
@@ -159,7 +159,8 @@ def test_frame_of_the_text(tmp_path: Path) -> None:
     footer.write_text("G91 G28 Z0.\n")
     options = ("--header", header, "--footer", footer, "--program-name", "O0815", "--block-numbers")
     lines = lines_of(*options)
-    assert lines[1:5] == ["N10 O0815", "N20 G21 G90 G94 G17 G40 G49 G80", "N30 (O0815 IN G21)", "N40 G54"]
+    assert lines[1:5] == ["N10 O0815", "N20 G21 G90 G94 G17 G40 G49 G80", "N30 G91 G28 Z0.", "N40 G90"]
+    assert lines[5:7] == ["N50 (O0815 IN G21)", "N60 G54"]
     assert [line.partition(" ")[2] for line in lines[-3:-1]] == ["G91 G28 Z0.", "M30"]
 
 
@@ -192,13 +193,13 @@ def test_text_that_cannot_be_read_back_says_so(tmp_path: Path) -> None:
         lines_of(*options, "--report", tmp_path / "report.json")
         return json.loads((tmp_path / "report.json").read_text()).get("not_verified", "")
 
-    (tmp_path / "foot.txt").write_text("G91 G28 Z0.\n")
-    assert re.fullmatch(r"G91 is not understood, NC line \d+", found("--footer", tmp_path / "foot.txt"))
+    (tmp_path / "foot.txt").write_text("G10 L2 P1\n")
+    assert re.fullmatch(r"G10 L2 P1, NC line \d+", found("--footer", tmp_path / "foot.txt"))
     own = tmp_path / "mine.toml"
     own.write_text('like = "fanuc"\n[words]\ncoolant = { ON = ["M50"], OFF = ["M51"] }\n')
     # its M words may mean anything, its motion is fanuc's
     assert found("--control", own) == "words beside the motion, which a table of your own may define"
-    own.write_text('like = "fanuc"\n[layout]\ntail = ["G91 G28 Z0.", "M30"]\n')
-    assert re.fullmatch(r"G91 is not understood, NC line \d+", found("--control", own))
+    own.write_text('like = "fanuc"\n[program]\nend = ["G10 L2 P1", "M30"]\n')
+    assert re.fullmatch(r"G10 is not understood, NC line \d+", found("--control", own))
     assert found("--control", "fanuc") == ""
     assert found("--no-verify") == "it was not asked for"

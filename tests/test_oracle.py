@@ -22,14 +22,15 @@ def _six(values: np.ndarray) -> tuple[float, float, float, float, float, float]:
     return (x, y, z, i, j, k)
 
 
-HEAD = ["%", "O0001", "(test)", "G21 G90 G94 G17 G40 G49 G80", "T1 M6", "S12000 M3"]
+UP = ["G91 G28 Z0.", "G90"]
+HEAD = ["%", "O0001", "(test)", "G21 G90 G94 G17 G40 G49 G80", *UP, "T1 M6", "S12000 M3"]
 TAIL = ["M5", "M30", "%"]
 G1 = [
-    "G43.5 H1",
+    "G43.5 H1\nG0 X0.0000 Y0.0000 I0.0000000 J0.0000000 K1.0000000",
     "G0 X0.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000",
     "G1 X10.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000 F250.",
     "G1 X20.0000 Y0.0000 Z0.0000 I0.0000000 J0.6000000 K0.8000000",
-    "G49",
+    "\n".join([*UP, "G49"]),
 ]
 G62 = [
     "G43 H1",
@@ -45,7 +46,7 @@ G62 = [
     "K1.",
     "K1.",
     "G1 X10.0000 Y10.0000 Z0.0000 U10.0000 V10.0000 W10.0000",
-    "G49",
+    "\n".join([*UP, "G49"]),
 ]
 
 
@@ -305,7 +306,7 @@ def test_rounded_corner_has_its_closed_form_error() -> None:
 def test_the_error_line_is_the_line() -> None:
     with pytest.raises(BadTextError) as caught:
         parse(changed(G1, 2, "X10.0000", "X10.00"), "g1")
-    assert re.match(rf"{len(HEAD) + 3}: not a block", str(caught.value))
+    assert re.match(rf"{len(HEAD) + 4}: not a block", str(caught.value))
     assert leash_is_enough(np.zeros((2, 3)), np.zeros((3, 3)), 0.0)
 
 
@@ -322,7 +323,7 @@ def test_sampling_is_fine_enough(limit: float, monkeypatch: pytest.MonkeyPatch) 
     found = []
     for share in (motion.SAGITTA_SHARE, motion.SAGITTA_SHARE / 1000):
         monkeypatch.setattr(motion, "SAGITTA_SHARE", share)
-        (path,) = written_path(parse(text([*body, "G49"]), "g1"), H, limit)
+        (path,) = written_path(parse(text([*body, *UP, "G49"]), "g1"), H, limit)
         found.append(deviation(path, original, H, 1.0).worst)
     assert found[0] == pytest.approx(found[1], rel=1e-3)
     assert found[1] > 0.05

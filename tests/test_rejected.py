@@ -17,6 +17,7 @@ from cornersmooth.cli import run
 CL = """\
 TOOL PATH/A,TOOL,B
 LOAD/TOOL,1
+SPINDL/RPM,1000,CLW
 RAPID
 GOTO/0.,0.,50.,0.,0.,1.
 FEDRAT/MMPM,1000.
@@ -74,7 +75,7 @@ def test_the_default_method_keeps_the_promise_on_the_same_path(part, tmp_path):
 def own(tmp_path: Path) -> str:
     """A control whose last words nobody knows."""
     path = tmp_path / "own.toml"
-    path.write_text('like = "siemens"\n[layout]\ntail = ["SUPA G0 Z0 D0", "M30"]\n')
+    path.write_text('like = "siemens"\n[program]\nend = ["DIAMON", "M30"]\n')
     return str(path)
 
 
@@ -85,7 +86,7 @@ def test_what_is_not_verified_is_never_silent(part, own, tmp_path, capsys, quiet
     assert lines == 0
     last = len(out.read_text().splitlines()) - 1
     said = capsys.readouterr().err
-    assert re.search(rf"NOT VERIFIED:? +SUPA is not understood here, NC line {last}", said)
+    assert re.search(rf"NOT VERIFIED:? +DIAMON is not understood here, NC line {last}", said)
     assert "verified    passed" not in said
     assert run(["smooth", str(part), "-o", str(out), "--force", "--no-verify", *["-q"] * quiet]) == 0
     assert "NOT VERIFIED" in capsys.readouterr().err
@@ -96,7 +97,7 @@ def test_a_batch_counts_what_is_not_verified(part, own, tmp_path, capsys):
     twin.write_text(CL)
     assert run(["smooth", str(part), str(twin), "--control", own, "-d", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().err
-    assert said.count("NOT VERIFIED: SUPA is not understood here, NC line") == 2
+    assert said.count("NOT VERIFIED: DIAMON is not understood here, NC line") == 2
     assert said.endswith("2 files: 2 done, 2 NOT VERIFIED\n")
 
 

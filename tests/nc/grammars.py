@@ -11,18 +11,30 @@ from nc.splines import HeidenhainSplines, KnotSplines, SiemensPolynomials, Sieme
 #: comments, ends, tools, spindle, coolant, stops, feed modes, planes and compensation of the ISO controls
 ISO = (
     r"\([^()]*\)|%|T\d+ M6|T\d+|S\d+ M[34]|M(?:0|1|3|4|5|7|8|9|19|30)|G9[345]|G1[789]|G4[12] D\d+|G40|"
-    r"G2[01] G90 G94 G17 G40 G49 G80"
+    r"G2[01] G90 G94 G17 G40 G49 G80|G54"
 )
 MILLISECONDS, SECONDS = r"|O\d{4}|G4 P\d+", r"|O\d{4}|G4 P\d+\.\d*"
 SIEMENS = (
-    r"; .*|G90 G94 G17 G40 G7[01]0|T\d+|M6|D1|S[\d.]+ M[34]|M(?:0|1|3|4|5|7|8|9|30)|SPOS=0|G4 F[\d.]+|G9[345]|"
+    r"; .*|G90 G94 G17 G40 G7[01]0|T\d+|M6|D1|G54|S[\d.]+ M[34]|M(?:0|1|3|4|5|7|8|9|30)|SPOS=0|G4 F[\d.]+|G9[345]|"
     r"G1[789]|G4[0-2]|TRAORI|TRAFOOF|ORIWKS ORIVECT|ORIWKS ORICURVE|ORIMKS ORIAXES"
 )
 HEIDENHAIN = (
     r"; .*|BEGIN PGM \w+ (?:MM|INCH)|END PGM \w+ (?:MM|INCH)|TOOL CALL \d+ Z|TOOL CALL Z S\d+(?:\.\d{1,3})?|"
+    r"PLANE RESET STAY|CYCL DEF 247 DATUM SETTING Q339=\+1|M126|"
     r"TOOL DEF \d+|STOP|M(?:1|3|4|5|8|9|30|136|137)|CYCL DEF 9\.0 DWELL TIME|CYCL DEF 9\.1 DWELL [\d.]+|"
     r"FUNCTION TCPM F TCP AXIS POS PATHCTRL (?:VECTOR|AXIS)|FUNCTION RESET TCPM"
 )
+
+#: the retract of every control, and the block that must follow it
+HOMES = {
+    "fanuc": {"home": r"G91 G28 Z0\.", "back": "G90", "retracts_on": True},
+    "mitsubishi": {"home": r"G91 G28 Z0\.", "back": "G90", "retracts_on": True},
+    "haas": {"home": r"G53 G0 Z0\.", "retracts_on": True},
+    "linuxcnc": {"home": "G53 G0 Z0", "retracts_on": True},
+    "siemens": {"home": "SUPA G0 Z0 D0"},
+    "heidenhain": {"home": "L Z-1 R0 FMAX M91"},
+    "generic": {},
+}
 
 #: how tip control or the length of the tool is switched on and off
 LENGTH = {"on": r"G43 H\d+", "off": "G49"}
@@ -37,6 +49,7 @@ def reader(control: str, form: str, machine: str = "", tcp: bool = True, units: 
     """Reader of the text of a control in one of its forms."""
     tip = 4 if units == "mm" else 5
     made = {"siemens": _siemens, "heidenhain": _heidenhain}.get(control, _iso)(control, form, machine, tcp, tip)
+    made = replace(made, **HOMES[control])
     return replace(made, scale=1.0 if units == "mm" else 25.4)
 
 
@@ -54,7 +67,7 @@ def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
         switch = VECTORS
     codes = ISO + (SECONDS if control in ("haas", "linuxcnc") else MILLISECONDS)
     if control == "generic":
-        codes = codes.replace(" G49", "")
+        codes = codes.replace(" G49", "").replace("|G54", "")
     if control == "linuxcnc":
         codes = codes.replace("M(?:", "M(?:2|").replace("M(?:2|0|1|3|4|5|7|8|9|19|30)", "M(?:0|1|2|3|4|5|7|8|9)")
         codes += r"|S\d+\.\d{1,3} M[34]|M19 R0|G64 P(?!0\.0* )\d+\.\d+ Q0"

@@ -101,6 +101,8 @@ class Reader:
         Patterns of what switches tool tip control (or the length) on and off, and of tool changes.
     modes : tuple of str
         Blocks for feed per minute, per revolution and inverse time.
+    home, back : str
+        Patterns of the retract, and of the block that must follow it; empty where there is none.
     circles : str
         Address of the radius of circular blocks; empty where there are none.
     longest : int
@@ -122,6 +124,9 @@ class Reader:
     off: str = ""
     tool: str = r"T\d+ M6"
     modes: tuple[str, ...] = ("G94", "G95", "G93")
+    home: str = ""
+    retracts_on: bool = False  #: the retract comes before tip control or the length is switched off
+    back: str = ""
     circles: str = ""
     longest: int = 255
     extra: Extra | None = None
@@ -135,6 +140,9 @@ class Reader:
         self.straight = re.compile(
             rf"(?:(?P<rapid>{self.rapid} )|{self.feed} ){' '.join(number)}(?P<tail>{self.rapid_end}|{feed})"
         )
+        other = " " + " ".join(number[3:]) if number[3:] else ""
+        self.above = re.compile(rf"{self.rapid} {number[0]} {number[1]}{other}{self.rapid_end}")
+        self.turn_only = re.compile(rf"{self.rapid}{other}{self.rapid_end}") if self.machine else None
         radius = rf"{self.circles}((?:0|[1-9]\d*)\.\d{{{self.decimals[0]}}})"
         self.circle = re.compile(rf"G(?P<way>[23]) {' '.join(number[:3])} {radius}{feed}") if self.circles else None
 
@@ -144,14 +152,37 @@ class Reader:
         reading, position = Reading(), None
         self.step, self.axis_length = axis_step(axis_length, limit), axis_length
         self.limit, self.plane, self.mode, self.tip_control = limit, 17, self.modes[0], not self.on
-        self.compensation = False
+        self.compensation, self.raised, self.over, self.wanted = False, False, None, ""
         for number, line in self.blocks(text):
-            if match := self.straight.fullmatch(line):
+            if self.wanted and not re.fullmatch(self.wanted, line):
+                raise TextError(f"{number}: expected {self.wanted}: {line!r}")
+            if self.wanted:
+                self.wanted = ""
+                reading.codes.append(line)
+            elif self.home and re.fullmatch(self.home, line):
+                if self.raised or (self.on and self.tip_control and not self.retracts_on):
+                    raise TextError(f"{number}: a retract again, or under tip control")
+                self.raised, self.wanted = True, self.back
+                reading.codes.append(line)
+            elif self.turn_only and self.turn_only.fullmatch(line):
+                if not self.raised:
+                    raise TextError(f"{number}: rotary axes turn below the height of the retract")
+                reading.codes.append(line)
+            elif match := self.above.fullmatch(line):
+                if not self.raised or not self.tip_control or self.over is not None:
+                    raise TextError(f"{number}: a rapid without Z that comes from no retract")
+                self.over = match.groups()
+                reading.codes.append(line)
+            elif match := self.straight.fullmatch(line):
                 rapid = match["rapid"] is not None if self.rapid != self.feed else match["tail"] == self.rapid_end
                 values = self.numbers(number, match.groups()[1 : 1 + len(self.words)])
                 if position is not None and not rapid and (values == position).all() and match["f"] is None:
                     raise TextError(f"{number}: move of no length")
                 self.check_motion(number, rapid, match["f"])
+                words = match.groups()[1 : 1 + len(self.words)]
+                if self.raised and self.turn != "point" and self.over != (*words[:2], *words[3:]):
+                    raise TextError(f"{number}: from the retract the tool must come from above: {self.over}")
+                self.raised, self.over = False, None
                 feed = None if match["f"] is None else float(match["f"])
                 start = position if position is not None else values
                 reading.pieces.append(self.piece(number, rapid, start, values, feed))
@@ -171,6 +202,8 @@ class Reader:
             else:
                 raise TextError(f"{number}: not a block of this control: {line!r}")
         left = [self.mode != self.modes[0], self.plane != 17, self.compensation, bool(self.on) and self.tip_control]
+        if self.home and not self.raised:
+            raise TextError("end: no retract")
         if any(left):
             raise TextError(f"end: feed mode, plane, compensation, tip control still on: {left}")
         return reading
@@ -221,6 +254,8 @@ class Reader:
         if self.on and re.fullmatch(self.on, line):
             self.tip_control = True
         elif self.off and re.fullmatch(self.off, line):
+            if self.retracts_on and not self.raised:
+                raise TextError(f"{number}: {line} may move by the length of the tool: retract before")
             self.tip_control = False
         elif line in self.modes:
             self.mode = line
@@ -230,8 +265,11 @@ class Reader:
             self.compensation = True
         elif line == "G40":
             self.compensation = False
-        elif re.fullmatch(self.tool, line) and self.on and self.tip_control:
-            raise TextError(f"{number}: tool change under tip control")
+        elif re.fullmatch(self.tool, line):
+            if self.on and self.tip_control:
+                raise TextError(f"{number}: tool change under tip control")
+            if self.home and not self.raised:
+                raise TextError(f"{number}: tool change without a retract")
 
     def direction(self, values: Floats) -> Floats:
         """Tool direction of the words behind the tip, (m, ...)."""

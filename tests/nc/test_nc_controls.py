@@ -29,7 +29,7 @@ def test_a_statement_is_said_in_the_words_of_the_control(control: str) -> None:
     lines = lines_of(choose_form(control, machine=machine), CL)
     wanted = {
         "heidenhain": ["; FIRST", "TOOL CALL 3 Z", "TOOL CALL Z S9000", "M3", "M8", "CYCL DEF 9.1 DWELL 0.5", "STOP"],
-        "siemens": ["; FIRST", "T3", "M6", "D1", "S9000 M3", "M8", "G4 F0.5", "M0"],
+        "siemens": ["; FIRST", "T3", "M6", "S9000 M3", "M8", "D1", "G54", "G4 F0.5", "M0"],
         "haas": ["(FIRST)", "T3 M6", "S9000 M3", "M8", "G4 P0.5", "M0"],
         "linuxcnc": ["(FIRST)", "T3 M6", "S9000 M3", "M8", "G4 P0.5", "M0"],
     }.get(control, ["(FIRST)", "T3 M6", "S9000 M3", "M8", "G4 P500", "M0"])
@@ -100,9 +100,9 @@ name = "mine"
 mm = 3
 vector = 6
 
-[layout]
-program = "O7777"
-head = ["%", "{program} (MY MILL)", "{units} G90"]
+[program]
+name = "O7777"
+start = ["%", "{program} (MY MILL)", "{units} G90"]
 
 [words]
 coolant = { FLOOD = ["M108"], THRU = ["M88", "G4 P100"] }
@@ -140,7 +140,7 @@ def test_a_table_of_the_users_says_only_what_is_different(tmp_path: Path) -> Non
             "like = 'fanuc'\n[words]\ntool_change = ['T{number}']",
             "own.toml: error: words.tool_change: 'T{number}' has unknown braces; use {tool}",
         ),
-        ("like = 'fanuc'\n[layout]\nhead = ['ü']", "own.toml: error: layout.head is 'ü'; give ASCII text"),
+        ("like = 'fanuc'\n[program]\nend = ['ü']", "own.toml: error: program.end is 'ü'; give ASCII text"),
         ("like = 'fanuc'\n[forms.g1.vektor]\n", "own.toml: error: unknown key forms.g1.vektor; did you mean vector?"),
         ("like = 'fanuc'\n[forms.g1.vector]\nwords = ['I']", "own.toml: error: forms.g1.vector has 1 words; give 3"),
         ("like = 'fanuc'\n[forms.x]\ncurve = 'g5'", "own.toml: error: forms.x.curve is 'g5'; use one of g6.2, "),
@@ -167,7 +167,8 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 def test_name_numbers_header_and_footer() -> None:
     frame = Frame("O4711", block_numbers=True, header=("({program} {units})",), footer=("G91 G28 Z0.", "G90"))
     lines = lines_of(choose_form("fanuc"), CL, frame=frame)
-    assert lines[:4] == ["%", "N10 O4711", "N20 G21 G90 G94 G17 G40 G49 G80", "N30 (O4711 G21)"]
+    assert lines[:3] == ["%", "N10 O4711", "N20 G21 G90 G94 G17 G40 G49 G80"]
+    assert lines[3:6] == ["N30 G91 G28 Z0.", "N40 G90", "N50 (O4711 G21)"]
     numbers = [int(line.split()[0][1:]) for line in lines[1:-1]]
     assert numbers == list(range(10, 10 * len(lines) - 10, 10))
     assert [line.partition(" ")[2] for line in lines[-5:-1]] == ["G49", "G91 G28 Z0.", "G90", "M30"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from cornersmooth.cl import read
@@ -35,7 +37,7 @@ def test_a_curve_says_the_feed_where_no_line_is_left_before_it(case: Case) -> No
     settings = Settings(tolerance=0.003, allocation="fair", shape="paper")
     text, _ = written(program, form, settings)
     blocks = text.replace(" ~\n", " ").splitlines()
-    rapid = max(k for k, block in enumerate(blocks) if block.startswith("G0 ") or block.endswith(" FMAX"))
+    rapid = max(k for k, block in enumerate(blocks) if re.search("^G0 .*X|X.* FMAX$", block))
     behind = blocks[rapid + 1 :]
     curve = next(block for block in behind if "X" in block)
     assert any(word in curve for word in ("G6.2", "BSPLINE", "POLY", "SPL"))

@@ -154,4 +154,4 @@ def test_cycle832_is_asked_for_by_name() -> None:
     text, _ = written(program, form, Settings(tolerance=0.02, axis_length=25.0))
     lines = text.splitlines()
     assert lines[lines.index("TRAORI") - 1] == "CYCLE832(0.00200,_ORI_FINISH,0.00458)"
-    assert lines[lines.index("TRAFOOF") + 1] == "CYCLE832(0,_OFF,1)"
+    assert lines[lines.index("TRAFOOF", 2) + 1] == "CYCLE832(0,_OFF,1)"

@@ -6,16 +6,16 @@ import pytest
 
 from nc.writing import codes, text_of_cl
 
-HEAD = ["%", "O0001", "G21 G90 G94 G17 G40 G49 G80"]
+HEAD = ["%", "O0001", "G21 G90 G94 G17 G40 G49 G80", "G91 G28 Z0.", "G90"]
 TAIL = ["M30", "%"]
 
 
 def said(cl: str, *, start: str = "UNITS/MM\n") -> tuple[list[str], dict[str, int]]:
-    """Blocks between head and tail of statements that stand alone, and the findings."""
+    """Blocks between the head and the first motion of statements that stand alone, and the findings."""
     lines, written = text_of_cl(f"{start}{cl}\nRAPID\nGOTO/0,0,0\nFINI\n")
-    assert lines[:3] == HEAD
+    assert lines[:5] == HEAD
     assert lines[-2:] == TAIL
-    return [line for line in lines[3:-2] if not line.startswith(("G0 ", "G43", "G49", "(UNITS"))], codes(written)
+    return [line for line in lines[5 : lines.index("G54")] if not line.startswith("(UNITS")], codes(written)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,6 @@ def test_what_is_understood(cl: str, blocks: list[str]) -> None:
         "DELAY/-1",
         "DELAY/1,2",
         "CUTCOM/LEFT,SOMETHING",
-        "GOHOME",
         "CLEARP/XYPLAN,50",
         "AUXFUN/30",  # it would end the program
         "PREFUN/51",
@@ -136,19 +135,26 @@ def test_several_tools_have_their_own_lengths() -> None:
         "UNITS/MM\nFEDRAT/100,MMPM\nLOADTL/2\nSPINDL/500,RPM,CLW\nGOTO/0,0,0\nGOTO/1,0,0\n"
         "LOAD/TOOL,5,ADJUST,25\nSPINDL/700,RPM,CLW\nGOTO/1,0,0\nGOTO/2,0,0\nSPINDL/OFF\nFINI\n"
     )
-    assert [line.split(" X")[0] for line in lines[4:-2]] == [
+    assert [line.split(" X")[0] for line in lines[6:-2]] == [
         "T2 M6",
         "S500 M3",
+        "G54",
         "G43.5 H2",
         "G1",
         "G1",
+        "G91 G28 Z0.",
+        "G90",
         "G49",
+        "M5",
         "T5 M6",
         "S700 M3",
+        "G54",
         "G43.5 H25",
         "G1",  # again: after the change the tool is elsewhere
         "G1",
         "M5",
+        "G91 G28 Z0.",
+        "G90",
         "G49",
     ]
 
@@ -201,3 +207,32 @@ def test_comments_stand_where_they_stood() -> None:
 def test_feed_per_revolution_wants_a_speed(spindle: str, count: int) -> None:
     _, written = text_of_cl(f"UNITS/MM\n{spindle}FEDRAT/0.1,MMPR\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
     assert codes(written).get("CS324", 0) == count
+
+
+def test_the_way_home_is_the_retract_and_the_next_motion_comes_from_above() -> None:
+    lines, written = text_of_cl(
+        "UNITS/MM\nLOADTL/2\nSPINDL/500,RPM,CLW\nRAPID\nGOTO/0,0,9\nFEDRAT/100,MMPM\nGOTO/0,0,0\nGOHOME\n"
+        "RAPID\nGOTO/5,0,9\nGOTO/5,0,0\nFINI\n"
+    )
+    assert codes(written) == {"CS332": 1}
+    at = lines.index("(GOHOME)")
+    assert lines[at + 1 : at + 6] == ["G91 G28 Z0.", "G90", "G49", "G54", "G43.5 H2"]
+    assert lines[at + 6].startswith("G0 X5.0000 Y0.0000 Z9.0000 ")
+
+
+def test_what_a_tool_change_stops_goes_on_behind_it() -> None:
+    lines, written = text_of_cl(
+        "UNITS/MM\nLOADTL/2\nSPINDL/500,RPM,CLW\nCOOLNT/ON\nRAPID\nGOTO/0,0,9\nFEDRAT/100,MMPM\nGOTO/0,0,0\n"
+        "LOADTL/3\nRAPID\nGOTO/0,0,9\nGOTO/0,0,0\nFINI\n"
+    )
+    change = lines.index("T3 M6")
+    assert [line for line in lines[:change] if line in ("M9", "M5")] == ["M9", "M5"]
+    assert lines[change + 1 : change + 3] == ["M8", "S500 M3"]
+    assert [line for line in lines[change:] if line in ("M9", "M5")] == ["M9", "M5"]
+    assert codes(written) == {"CS331": 1}
+
+
+def test_fragments_say_what_is_missing() -> None:
+    """No tool, no spindle, a first move at feed: each is counted."""
+    _, written = text_of_cl("UNITS/MM\nFEDRAT/100,MMPM\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
+    assert codes(written, fragment=False) == {"CS333": 1, "CS334": 1, "CS335": 1}

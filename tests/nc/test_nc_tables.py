@@ -80,7 +80,9 @@ def test_misspelt_keys_are_refused_with_the_right_one(control: str) -> None:
 
 def test_what_would_only_fail_later_is_refused_too() -> None:
     for text, message in (
-        ("like = 'fanuc'\n[layout]\nprogram_pattern = '('\n", "layout.program_pattern is '('"),
+        ("like = 'fanuc'\n[program]\nname_pattern = '('\n", "program.name_pattern is '('"),
+        ("like = 'fanuc'\n[program]\nend = ['{retract} M5']\n", "program.end: '{retract} M5' holds more than a step"),
+        ("like = 'fanuc'\n[program]\nend = ['{retrakt}']\n", "program.end: '{retrakt}' has unknown braces"),
         ("like = 'fanuc'\n[digits]\nmm = 10\n", "digits.mm is 10; give a whole number up to 9"),
         ("like = 'fanuc'\n[layout]\ncomment = ['(']\n", "layout.comment is"),
         ("like = 'fanuc'\n[extras]\nx = 1\n", "extras.x is 1"),

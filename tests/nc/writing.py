@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,18 @@ from cornersmooth.nc import Form, Frame, Written, choose_form, fit_settings, wri
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 
+#: a rapid over the next position, at the height of the retract
+ABOVE = re.compile(r"G0 X\S+ Y\S+( [^Z].*)?")
+
 
 def text_of(program: Program, form: str = "g1", **settings: Any) -> tuple[list[str], Written]:
-    """Lines of the NC text, and what was said of it."""
+    """Lines of the NC text without the rapids over its first positions, and what was said of it."""
     chosen = choose_form("fanuc", form)
     smoothed = smooth(program, fit_settings(Settings(**settings), chosen, program.units))
     stream = io.BytesIO()
     written = write(smoothed, stream, form=form)
-    return stream.getvalue().decode("ascii").splitlines(), written
+    lines = stream.getvalue().decode("ascii").splitlines()
+    return [line for line in lines if not ABOVE.fullmatch(line)], written
 
 
 def text_of_cl(cl: str, form: str = "g1", **settings: Any) -> tuple[list[str], Written]:
@@ -39,9 +44,15 @@ def lines_of(form: Form, cl: str, *, frame: Frame | None = None) -> list[str]:
     return lines
 
 
-def codes(written: Written) -> dict[str, int]:
-    """Findings by code, with their counts."""
-    return {finding.code: finding.count for finding in written.findings}
+#: what is said of fragments that load no tool, start no spindle or begin at feed
+OF_FRAGMENTS = ("CS333", "CS334", "CS335")
+
+
+def codes(written: Written, *, fragment: bool = True) -> dict[str, int]:
+    """Findings by code, with their counts; without those of fragments, unless all are asked for."""
+    return {
+        finding.code: finding.count for finding in written.findings if not (fragment and finding.code in OF_FRAGMENTS)
+    }
 
 
 def one_arc(

@@ -106,6 +106,9 @@ class _State:
     tool_length: bool = False  # G43.5 in form g1, G43 in form g6.2
     compensation: bool = False  # G41, G42
     changed: bool = False  # a tool change leaves the machine elsewhere: the next move is one
+    raised: bool = False  # Z is at its reference position
+    incremental: bool = False  # G91, for the way there
+    over: tuple[str, ...] | None = None  # words of the rapid over the next position, at that height
     ended: bool = False
     in_curve: bool = False  # the last motion block was a knot: only a group 01 code may follow
     blocks: list[Block] = field(default_factory=list)
@@ -128,6 +131,7 @@ CODE = re.compile(
     |G43(?:\.5)?\ H\d+|G49    # tool length along the tool vector or along Z, and off
     |G40|G4[12]\ D\d+         # cutter compensation
     |G1[789]|G9[45]           # plane, feed mode
+    |G5[4-9]                  # work offset
     """,
     re.VERBOSE,
 )
@@ -178,6 +182,7 @@ class _Grammar:
         second = VECTOR_DECIMALS if form == "g1" else tip
         six = _words("XYZ", tip) + " " + _words(SECOND[form], second)
         self.line = re.compile(rf"G([01]) {six}{FEED}")
+        self.above = re.compile(rf"G0 {_words('XY', tip)} {_words(SECOND[form], second)}")
         self.arc = re.compile(rf"G([23]) {_words('XYZ', tip)} R({_fixed(tip)}){FEED}")
         self.first = re.compile(rf"G6\.2 P4 K0\. {six} R({WEIGHT}){FEED}")
         self.point = re.compile(rf"K(0\.|0\.5) {six} R({WEIGHT})")
@@ -189,13 +194,35 @@ class _Grammar:
             raise BadTextError(f"{number}: {line!r} after M30")
         if line.startswith("G6.2"):
             return self.curve(lines, index, state)
-        if match := self.line.fullmatch(line):
+        if state.incremental and line != "G90":
+            raise BadTextError(f"{number}: {line!r} under G91")
+        if line == "G91 G28 Z0.":
+            if state.raised or state.in_curve:
+                raise BadTextError(f"{number}: {line!r} again, or in a curve")
+            state.raised = state.incremental = True
+            state.blocks.append(Code(number, line))
+        elif line == "G90":
+            if not state.incremental:
+                raise BadTextError(f"{number}: G90 is modal already")
+            state.incremental = False
+            state.blocks.append(Code(number, line))
+        elif match := self.above.fullmatch(line):
+            if not state.raised or not state.tool_length or state.over is not None:
+                raise BadTextError(f"{number}: a rapid without Z that comes from no retract")
+            state.over = match.groups()
+            state.blocks.append(Code(number, line))
+        elif match := self.line.fullmatch(line):
+            if state.raised and self.form == "g1" and state.over != (*match.groups()[1:3], *match.groups()[4:7]):
+                raise BadTextError(f"{number}: from the retract the tool must come from above: {state.over}")
+            state.raised, state.over = False, None
             self.straight(match, number, state)
         elif match := self.arc.fullmatch(line):
+            if state.raised:
+                raise BadTextError(f"{number}: an arc from the height of the retract")
             self.circular(match, number, state)
         elif line == "M30":
-            if state.tool_length:
-                raise BadTextError(f"{number}: M30 while tool length is on")
+            if state.tool_length or not state.raised:
+                raise BadTextError(f"{number}: M30 while tool length is on, or without a retract")
             state.ended = True
             state.blocks.append(Code(number, line))
         elif re.fullmatch(r"G2[01] G90 G94 G17 G40 G49 G80", line) and state.position is None:
@@ -216,6 +243,8 @@ class _Grammar:
                 raise BadTextError(f"{number}: {line} while tool length is on")
             state.tool_length = True
         elif line == "G49":
+            if not state.raised:
+                raise BadTextError(f"{number}: G49 may move by the length of the tool: retract before")
             state.tool_length = False
         elif line.startswith(("G40", "G41", "G42")):
             state.compensation = line != "G40"
@@ -231,6 +260,8 @@ class _Grammar:
         elif line.startswith("T"):
             if state.tool_length:
                 raise BadTextError(f"{number}: tool change while tool length is on")
+            if " M6" in line and not state.raised:
+                raise BadTextError(f"{number}: tool change without a retract")
             state.changed = True
         state.blocks.append(Code(number, line))
 

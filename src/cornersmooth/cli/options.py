@@ -239,6 +239,12 @@ trusted = click.option(
 )
 footer = click.option("--footer", type=click.Path(), metavar="FILE", help="Lines to write before the tail.")
 program_name = click.option("--program-name", type=str, metavar="TEXT", help="Name or number of the NC program.")
+work_offset = click.option(
+    "--work-offset",
+    type=str,
+    metavar="WORD",
+    help="Work offset, such as G55, or the number of a preset; 'none' leaves it out. Default: G54, or preset 1.",
+)
 block_numbers = click.option("--block-numbers", is_flag=True, help="Number the blocks.")
 extras = click.option(
     "--with",
@@ -434,7 +440,8 @@ def reading_of(given: dict[str, Any]) -> dict[str, Any]:
 def writing(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that writes NC text, besides its form."""
     return _apply(
-        function, (control, machine, no_tcp, extras, program_name, header, footer, block_numbers, no_comments)
+        function,
+        (control, machine, no_tcp, extras, program_name, work_offset, header, footer, block_numbers, no_comments),
     )
 
 

@@ -206,7 +206,14 @@ def _frame(given: dict[str, Any]) -> Frame:
     for name in ("header", "footer"):
         path = given[name]
         texts[name] = tuple(read_input(path)[0].decode("utf-8", "replace").splitlines()) if path else ()
-    return Frame(given["program_name"], given["block_numbers"], **texts, comments=not given["no_comments"])
+    return Frame(
+        given["program_name"],
+        given["block_numbers"],
+        header=texts["header"],
+        footer=texts["footer"],
+        comments=not given["no_comments"],
+        work_offset="" if given["work_offset"] == "none" else given["work_offset"],
+    )
 
 
 def _check_against_inputs(jobs: list[Job]) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol
 
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.model import Ints, Program, SmoothProgram, Units
+from cornersmooth.model import Ints, SmoothProgram, Units
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.circles import Circles, plan_circles
 from cornersmooth.nc.control import Control
@@ -19,14 +18,14 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.form_choice import check_program, choose_form
 from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.motion_writer import MotionWriter
-from cornersmooth.nc.program_frame import Frame, blend_word
+from cornersmooth.nc.operation import Operation
+from cornersmooth.nc.program_frame import Frame
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
-from cornersmooth.text import format_number
 
 __all__ = [
     "Control",
@@ -48,10 +47,6 @@ _POLYNOMIAL = ("poly", "spl")
 
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
 _TURNING = ("bspline", "poly")
-
-
-#: decimals of an orientation tolerance, degrees
-_TURN_DECIMALS = 5
 
 
 class Stream(Protocol):
@@ -170,35 +165,26 @@ def write(
     check_fitted(smoothed.settings, chosen, program.units)
     check_program(chosen, program, smoothed.settings)
     frame = frame or Frame()
-    statements = StatementWriter(
-        chosen, program, findings, _values(program, smoothed.settings), comments=frame.comments
-    )
+    values = frame.values(chosen, program, smoothed.settings)
+    operation = Operation(chosen, values, frame.texts(chosen, values), findings)
+    statements = StatementWriter(chosen, program, findings, operation, comments=frame.comments)
     circles = plan_circles(program, smoothed.settings, chosen)
     add_warnings(chosen, smoothed, circles, findings)
     writer = BlockWriter(chosen, program, statements, findings, circles)
-    motion = MotionWriter(program, writer, statements, findings)
+    motion = MotionWriter(program, writer, statements, operation, findings)
     with _BackgroundWriter(stream) as behind:
-        text_writer = frame.start(behind, chosen, program, smoothed.settings)
-        text_writer.head()
+        text = frame.start(behind, chosen)
+        text.write_blocks(operation.start())
         chunks = ((rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, findings))
         for rows, ticks in _one_ahead(chunks):
-            for text in motion.write(rows, ticks):
-                text_writer.write(text)
+            for lines in motion.write(rows, ticks):
+                text.write(lines)
             if progress is not None and len(rows.move):
                 progress(int(rows.move[-1]) + 1, len(program))
-        for text in motion.finish():
-            text_writer.write(text)
-        text_writer.tail(motion.end())
-    return Written(text_writer.blocks + motion.blocks + writer.blocks, findings.all())
-
-
-def _values(program: Program, settings: Settings) -> dict[str, str]:
-    """What stands for braces in blocks that switch functions of the control on."""
-    turn = math.degrees(settings.blend_share * settings.tolerance / settings.axis_length)
-    return {
-        "blend": blend_word(settings.blend_share * settings.tolerance / program.mm_per_unit),
-        "turn": format_number(max(turn, 10.0**-_TURN_DECIMALS), _TURN_DECIMALS),
-    }
+        for lines in motion.finish():
+            text.write(lines)
+        text.write_blocks(motion.end())
+    return Written(text.blocks + motion.blocks + writer.blocks, findings.all())
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findings) -> Iterator[Rows]:

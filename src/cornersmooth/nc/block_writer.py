@@ -71,6 +71,39 @@ class BlockWriter:
             words, decimals, plus=motion.signs, trim=not motion.trailing_zeros, leading_zero=motion.leading_zeros
         )
 
+    def rotary_blocks(self, ticks: Ints) -> dict[str, tuple[str, ...]]:
+        """Blocks that bring the rotary axes to zero, and to where a row of ticks has them; none without such."""
+        if not self.form.rotary or self.form.machine is None:
+            return {"rotary_zero": (), "rotary_start": ()}
+        low, high = self.form.machine.limits.T * 10.0**self.form.table.digits.angle
+        order = [self.form.machine.names.index(word) for word in self.form.other_words]
+        zero = np.clip(0.0, np.ceil(low), np.floor(high))[order].astype(np.int64)
+        zero_block, start_block = (
+            self._rapid(words, slice(3, None)) for words in (np.append(np.zeros(3, np.int64), zero), ticks)
+        )
+        return {"rotary_zero": (zero_block,), "rotary_start": (start_block,)}
+
+    def approach(self, ticks: Ints) -> list[str]:
+        """Blocks that bring the tool over a row of ticks, at the height where it is.
+
+        None where the other words are those of a second point: without Z they would turn the tool elsewhere.
+        """
+        if self.form.orientation == "point":
+            return []
+        return [self._rapid(ticks, np.arange(len(ticks)) != 2)]
+
+    def _rapid(self, ticks: Ints, chosen: slice | Bools) -> str:
+        """Rapid block of some words of a row."""
+        motion = self.form.mode.motion
+        words = np.array([*motion.coordinates, *self.form.other_words])[chosen].tolist()
+        decimals = np.array(self.form.decimals(self.program.units))[chosen].tolist()
+        blank = self._blank.encode()
+        spelt = (words[0].encode(), *(blank + word.encode() for word in words[1:]))
+        prefix, suffix = f"{motion.rapid}{self._blank}".encode(), motion.rapid_end.encode()
+        row = self._row_format(spelt, tuple(decimals))
+        none = np.zeros(1, np.int64)
+        return row.rows(ticks[chosen][None], [prefix], none, [suffix], none)[0].decode()
+
     def end(self) -> list[str]:
         """Blocks that bring feed mode and plane back to where they were at the start."""
         words, blocks = self.statements.words, []

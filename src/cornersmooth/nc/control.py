@@ -32,6 +32,8 @@ class Words:
     spindle_speed : tuple of str
         With ``{speed}`` and ``{direction}``, one of the next two.
     clockwise, counterclockwise : str
+    speed_without_tip_control : bool
+        Whether tool tip control must be off where a speed is given.
     coolant : mapping
         Blocks by CL word; other words are not translated.
     dwell : tuple of str
@@ -49,6 +51,7 @@ class Words:
     spindle_speed: Blocks = ()
     clockwise: str = "M3"
     counterclockwise: str = "M4"
+    speed_without_tip_control: bool = False
     spindle_off: Blocks = ()
     spindle_orient: Blocks = ()
     coolant: Mapping[str, Blocks] = field(default_factory=dict)
@@ -126,6 +129,8 @@ class Mode:
         Addresses of vector or point; rotary addresses come from the machine.
     on, off : tuple of str
         Blocks before the motion and behind it; with ``{offset}``, the length register.
+    begin : tuple of str or None
+        In place of `ProgramTable.begin`.
     motion : Motion
     circles : bool
         Whether arcs may be written as circular blocks, without the words of the orientation.
@@ -139,20 +144,74 @@ class Mode:
     motion: Motion
     circles: bool
     timed_turns: bool
+    begin: Blocks | None = None
+
+
+@dataclass(frozen=True)
+class ProgramTable:
+    """The blocks around the motion, in the order in which they are written.
+
+    An item that is nothing but a name in braces is a step (`STEPS`); all others are blocks, with ``{program}``,
+    ``{units}`` and ``{blend}``, a tenth of ε.
+
+    Parameters
+    ----------
+    name : str
+        Name or number of the program where the user gives none.
+    name_pattern : str
+        Regular expression of the names that the control takes; empty for any.
+    work_offset : str
+        What ``{work_offset}`` stands for where the user gives nothing.
+    work_offset_pattern : str
+        Regular expression of what it may be.
+    work_offset_block : tuple of str
+        With ``{work_offset}``.
+    retract : tuple of str
+        Blocks that bring the tool to a height that clears everything; none where the control is told nothing.
+    start : tuple of str
+        Before everything else.
+    begin : tuple of str
+        Before the first motion of each tool, and after a retract.
+    tool_end : tuple of str
+        After the last motion of each tool.
+    end : tuple of str
+        After everything else, `tool_end` included.
+    """
+
+    name: str = "O0001"
+    name_pattern: str = ""
+    work_offset: str = ""
+    work_offset_pattern: str = ""
+    work_offset_block: Blocks = ()
+    retract: Blocks = ()
+    start: Blocks = ("{header}",)
+    begin: Blocks = ("{tip_control_on}",)
+    tool_end: Blocks = ("{tip_control_off}",)
+    end: Blocks = ("{footer}",)
+
+
+#: steps that `ProgramTable` may name; what is off already, or not asked for, is no block
+STEPS = {
+    "retract": "the blocks of `retract`, where the tool is not there yet",
+    "work_offset": "the block of the work offset",
+    "rotary_zero": "both rotary axes to zero, with a machine only",
+    "rotary_start": "both rotary axes to the angles of the first motion, with a machine only",
+    "tip_control_on": "functions that stand outside, tool tip control or the length of the tool, functions within",
+    "functions_off": "functions within tool tip control off",
+    "tip_control_off": "tool tip control or the length of the tool off, then functions that stand outside",
+    "spindle_off": "the spindle, where it turns",
+    "coolant_off": "the coolant, where it flows",
+    "header": "the user's lines of --header",
+    "footer": "the user's lines of --footer",
+}
 
 
 @dataclass(frozen=True)
 class TextStyle:
-    """The text around the motion.
+    """How lines look.
 
     Parameters
     ----------
-    program : str
-        Name or number of the program.
-    program_pattern : str
-        Regular expression of the names that the control takes; empty for any.
-    head, tail : tuple of str
-        Blocks; with ``{program}``, ``{units}`` and, in the head, ``{blend}``, a tenth of ε.
     units : mapping
         What ``{units}`` stands for.
     comment : (str, str)
@@ -171,10 +230,6 @@ class TextStyle:
         What the names of its files end in.
     """
 
-    program: str = "O0001"
-    program_pattern: str = ""
-    head: Blocks = ()
-    tail: Blocks = ()
     units: Mapping[Units, str] = field(default_factory=dict)
     comment: tuple[str, str] = ("(", ")")
     comment_orders: Blocks = ()
@@ -254,6 +309,7 @@ class Control:
     description: str
     like: str
     digits: Digits
+    program: ProgramTable
     layout: TextStyle
     words: Words
     forms: Mapping[str, FormTable]

@@ -15,6 +15,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.model import FeedMode
 from cornersmooth.nc.control import (
     INVERSE_TIME,
+    STEPS,
     Control,
     CurveStyle,
     Digits,
@@ -24,19 +25,20 @@ from cornersmooth.nc.control import (
     Mode,
     Motion,
     Orientation,
+    ProgramTable,
     TextStyle,
     Words,
 )
 from cornersmooth.settings import Lines
 from cornersmooth.tables import Shelf, Table, is_file
 
-Record = TypeVar("Record", Digits, TextStyle, Words, Motion, Extra, LineStyle)
+Record = TypeVar("Record", Digits, ProgramTable, TextStyle, Words, Motion, Extra, LineStyle)
 
 _SHELF = Shelf(
     "control",
     __package__,
     "controls",
-    keys=("name", "description", "digits", "layout", "words", "motion", "forms", "extras", "lines"),
+    keys=("name", "description", "digits", "program", "layout", "words", "motion", "forms", "extras", "lines"),
     unknown="CS210",
     unreadable="CS212",
     unknown_key="CS214",
@@ -44,7 +46,7 @@ _SHELF = Shelf(
 )
 
 _FORM_KEYS = ("description", "curve", *get_args(Orientation))
-_MODE_KEYS = ("words", "on", "off", "circles", "timed_turns", *(item.name for item in fields(Motion)))
+_MODE_KEYS = ("words", "on", "off", "begin", "circles", "timed_turns", *(item.name for item in fields(Motion)))
 _PLANES = {"xy": 17, "zx": 18, "yz": 19}
 _FEED_MODES = {
     "per_minute": int(FeedMode.PER_MINUTE),
@@ -52,8 +54,20 @@ _FEED_MODES = {
     "inverse_time": INVERSE_TIME,
 }
 #: keys whose values are tables
-_TABLES = ("digits", "layout", "layout.units", "words", "words.coolant", "words.plane", "words.feed_mode", "motion")
+_TABLES = (
+    "digits",
+    "program",
+    "layout",
+    "layout.units",
+    "words",
+    "words.coolant",
+    "words.plane",
+    "words.feed_mode",
+    "motion",
+)
 _MOST_DIGITS = 9
+#: what stands in braces in blocks of the program, names of steps among it
+_PROGRAM_BRACES: Table = {"program": "O1", "units": "G21", "blend": "0.001"} | dict.fromkeys(STEPS, "")
 #: what stands in braces in blocks
 _BRACES: dict[str, Table] = {
     "tool_change": {"tool": 1},
@@ -63,8 +77,8 @@ _BRACES: dict[str, Table] = {
     "compensation_left": {"register": 1},
     "compensation_right": {"register": 1},
     "on": {"offset": 1},
-    "head": {"program": "O1", "units": "G21", "blend": "0.001"},
-    "tail": {"program": "O1", "units": "G21"},
+    "work_offset_block": {"work_offset": "G54"},
+    **dict.fromkeys(("start", "begin", "tool_end", "end", "retract"), _PROGRAM_BRACES),
     "block_number": {"number": 10},
 }
 #: the same in blocks of extras
@@ -114,6 +128,7 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
             description=_text(table, "description", ""),
             like=like,
             digits=_record(Digits, table.get("digits", {}), "digits"),
+            program=_program(table.get("program", {})),
             layout=_layout(table.get("layout", {})),
             words=_words(table.get("words", {})),
             forms=_forms(table),
@@ -155,6 +170,21 @@ def _check_table(value: object, where: str) -> None:
         raise _SHELF.wrong(f"{where} is {value!r}", f"write a table [{where}]")
 
 
+def _program(table: Table) -> ProgramTable:
+    program = _record(ProgramTable, table, "program")
+    for key in ("name_pattern", "work_offset_pattern"):
+        pattern = getattr(program, key)
+        try:
+            re.compile(pattern)
+        except re.error as error:
+            raise _SHELF.wrong(f"program.{key} is {pattern!r}: {error}", "give a regular expression") from error
+    for key in ("start", "begin", "tool_end", "end", "retract"):
+        for block in getattr(program, key):
+            if any(f"{{{step}}}" in block and block != f"{{{step}}}" for step in STEPS):
+                raise _SHELF.wrong(f"program.{key}: {block!r} holds more than a step", "give the step alone")
+    return program
+
+
 def _layout(table: Table) -> TextStyle:
     units = {"mm": "", "inch": ""} | _strings(table.get("units", {}), "layout.units", ("mm", "inch"))
     plain = {key: value for key, value in table.items() if key != "units"}
@@ -162,11 +192,6 @@ def _layout(table: Table) -> TextStyle:
     layout = _record(TextStyle, plain, "layout")
     if len(layout.comment) != 2:
         raise _SHELF.wrong(f"layout.comment is {plain['comment']!r}", "give what stands before and behind")
-    try:
-        re.compile(layout.program_pattern)
-    except re.error as error:
-        what = f"layout.program_pattern is {layout.program_pattern!r}: {error}"
-        raise _SHELF.wrong(what, "give a regular expression") from error
     return TextStyle(**{**vars(layout), "units": units})
 
 
@@ -242,6 +267,7 @@ def _mode(entry: Table, motion: Table, where: str) -> Mode:
         words=_blocks(entry.get("words", []), f"{where}.words"),
         on=_blocks(entry.get("on", []), f"{where}.on"),
         off=_blocks(entry.get("off", []), f"{where}.off"),
+        begin=_blocks(entry["begin"], f"{where}.begin") if "begin" in entry else None,
         motion=_record(Motion, {**motion, **{key: value for key, value in entry.items() if key in own}}, where),
         circles=_flag(entry.get("circles", False), f"{where}.circles"),
         timed_turns=_flag(entry.get("timed_turns", False), f"{where}.timed_turns"),
@@ -290,7 +316,7 @@ def _string(value: object, where: str) -> str:
     if not isinstance(value, str) or not value.isascii() or not (value.isprintable()):
         raise _SHELF.wrong(f"{where} is {value!r}", "give ASCII text without line ends")
     places = _EXTRA_BRACES if where.startswith("extras.") else _BRACES.get(where.rpartition(".")[2], {})
-    if "{" in value or "}" in value:
+    if not where.endswith("_pattern") and ("{" in value or "}" in value):
         try:
             value.format(**places)
         except (KeyError, IndexError, ValueError) as error:

@@ -17,6 +17,7 @@ from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.holes import approaches, hole_moves, travel_height
+from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
@@ -35,12 +36,14 @@ class MotionWriter:
     program : Program
     writer : BlockWriter
     statements : StatementWriter
+    operation : Operation
     findings : Findings
     """
 
     program: Program
     writer: BlockWriter
     statements: StatementWriter
+    operation: Operation
     findings: Findings
     blocks: int = 0  #: those that are not `writer`'s
     _repeated: int = 0
@@ -48,6 +51,8 @@ class MotionWriter:
     _last: NDArray[np.int64] | None = None  #: what was written last, a tool change or not
     _return_to: int = _NOWHERE  #: first pose behind a tool change, until it is reached
     _next_statement: int = 0
+    _said_tool: bool = False
+    _said_spindle: bool = False
     _arc_begun: int = -1  #: arc behind a FROM whose start has been gone to
     _ticks: Ints = field(init=False)  #: of the block that is written
     _said: tuple[Statement, ...] = field(init=False)
@@ -84,7 +89,10 @@ class MotionWriter:
 
     def end(self) -> list[str]:
         """Blocks that cancel what is still on when the program ends."""
-        return [*self.statements.end_compensation(), *self.writer.end(), *self.statements.end_motion()]
+        last = [*self.statements.end_compensation(), *self.writer.end()]
+        if self._last is None:
+            return [*last, *self.operation.end()]
+        return [*last, *self.operation.end(self.writer.rotary_blocks(self._last))]
 
     def _statements_until(self, pose: int) -> Sequence[Statement]:
         begin = self._next_statement
@@ -97,6 +105,7 @@ class MotionWriter:
         text = self.statements.blocks(statement)
         if self.statements.changed:  # a tool change leaves the machine elsewhere
             self._position, self._return_to, self.statements.changed = None, statement.pose, False
+            self._said_spindle = False
         yield from self._blocks(text)
 
     def _blocks(self, text: Sequence[str]) -> Iterator[bytes]:
@@ -108,7 +117,6 @@ class MotionWriter:
         """Rows between statements, holes apart from the others."""
         if start >= stop:
             return
-        yield from self._blocks(self.statements.begin_motion())
         if self._approach is None:
             yield from self._lines(rows, start, stop)
             return
@@ -240,9 +248,33 @@ class MotionWriter:
         return run if kept.all() else run.only(kept)
 
     def _emit(self, run: Run, dwell: int = 0) -> Iterator[bytes]:
-        if len(run):
-            self._position = self._last = run.ticks[-1]
-            yield self.writer.text(run, dwell)
+        if not len(run):
+            return
+        first = run.ticks[0]
+        if not self.operation.begun:
+            yield from self._blocks(self.operation.begin(self.writer.rotary_blocks(first)))
+        if self.operation.retracted:
+            self.operation.retracted = False
+            yield from self._blocks(self.writer.approach(first))
+            if not run.rapid[0]:
+                text = "the first motion of a tool is a feed move: it feeds down from the height of the retract"
+                self.findings.add("CS333", "warning", int(self.program.line[run.move[0]]), text)
+        self._warn_of_standing_still(run)
+        self._position = self._last = run.ticks[-1]
+        yield self.writer.text(run, dwell)
+
+    def _warn_of_standing_still(self, run: Run) -> None:
+        """Say once that a tool moves that was not loaded, and for each tool that it cuts while the spindle stands."""
+        line = self.program.line[run.move]
+        if self.statements.tool is None and not self._said_tool:
+            self._said_tool = True
+            text = "the CL file loads no tool before it moves: the tool in the spindle is taken, with length register 1"
+            self.findings.add("CS334", "warning", int(line[0]), text)
+        cuts = np.flatnonzero(~run.rapid)
+        if len(cuts) and not self._said_spindle and not self.operation.spindle:
+            self._said_spindle = True
+            text = "the spindle is not started before the first cut of a tool"
+            self.findings.add("CS335", "warning", int(line[cuts[0]]), text)
 
 
 def _with_starts(program: Program) -> tuple[Statement, ...]:

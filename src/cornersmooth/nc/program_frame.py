@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import numpy as np
 
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Program
-from cornersmooth.nc.control import TextStyle
+from cornersmooth.nc.control import Blocks, TextStyle
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
@@ -41,6 +42,8 @@ class Frame:
         Lines behind the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``.
     comments : bool
         Whether what the CL file says in words is written.
+    work_offset : str or None
+        Such as ``G54``, or the number of a preset; None for that of the control's table, empty for none.
     """
 
     program: str | None = None
@@ -48,34 +51,61 @@ class Frame:
     header: tuple[str, ...] = ()
     footer: tuple[str, ...] = ()
     comments: bool = True
+    work_offset: str | None = None
 
-    def start(self, stream: Stream, form: Form, program: Program, settings: Settings) -> FramedText:
-        """Frame for one text.
+    def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
+        """What stands for braces in the blocks around the motion and in those of extras.
 
         Raises
         ------
         SettingsError
-            A line of header or footer has unknown braces or characters that NC text cannot hold.
+            The control takes no such program name.
         """
-        layout = form.table.layout
-        if self.program is not None and not re.fullmatch(layout.program_pattern or ".*", self.program):
+        table = form.table.program
+        if self.program is not None and not re.fullmatch(table.name_pattern or ".*", self.program):
             raise SettingsError(
-                "CS216", f"{form.control} takes no program name {self.program!r}", f"use one like {layout.program}"
+                "CS216", f"{form.control} takes no program name {self.program!r}", f"use one like {table.name}"
             )
-        values = {
-            "program": self.program or layout.program,
-            "units": layout.units[program.units],
+        turn = math.degrees(settings.blend_share * settings.tolerance / settings.axis_length)
+        return {
+            "program": self.program or table.name,
+            "units": form.table.layout.units[program.units],
             "blend": blend_word(settings.blend_share * settings.tolerance / program.mm_per_unit),
+            "turn": format_number(max(turn, 10.0**-_BLEND_DECIMALS), _BLEND_DECIMALS),
         }
+
+    def texts(self, form: Form, values: dict[str, str]) -> dict[str, Blocks]:
+        """Blocks of the steps that a user gives: work offset, header and footer.
+
+        Raises
+        ------
+        SettingsError
+            The control has no such work offset, or has no step for header or footer; or a line of these has unknown
+            braces or characters that NC text cannot hold.
+        """
+        table = form.table.program
+        offset = table.work_offset if self.work_offset is None else self.work_offset
+        if self.work_offset and not (
+            table.work_offset_block and re.fullmatch(table.work_offset_pattern, self.work_offset)
+        ):
+            hint = f"use one like {table.work_offset}" if table.work_offset_block else "leave it out"
+            raise SettingsError("CS216", f"{form.control} takes no work offset {self.work_offset!r}", hint)
+        blocks = table.work_offset_block if offset else ()
+        steps = (*table.start, *table.begin, *table.tool_end, *table.end)
+        for name, lines in (("header", self.header), ("footer", self.footer)):
+            if lines and f"{{{name}}}" not in steps:
+                raise SettingsError("CS216", f"{form.control} has no step for a {name}", f'write "{{{name}}}" into it')
+        return {
+            "work_offset": tuple(block.format(work_offset=offset) for block in blocks),
+            "header": tuple(_filled(self.header, values)),
+            "footer": tuple(_filled(self.footer, values)),
+        }
+
+    def start(self, stream: Stream, form: Form) -> FramedText:
+        """One text, nothing written yet."""
+        layout = form.table.layout
         number = layout.block_number or ("N{number} " if self.block_numbers else "")
-        return FramedText(
-            stream,
-            before=[*_filled(layout.head, values), *_filled(self.header, values)],
-            after=[*_filled(self.footer, values), *_filled(layout.tail, values)],
-            number=number,
-            layout=layout,
-            next_number=layout.number_start,
-        )
+        return FramedText(stream, number=number, layout=layout, next_number=layout.number_start)
 
 
 def blend_word(blend: float) -> str:
@@ -90,26 +120,15 @@ class FramedText:
     Parameters
     ----------
     stream : binary stream
-    before, after : list of str
     number : str
         With ``{number}``; empty for none.
     """
 
     stream: Stream
-    before: list[str]
-    after: list[str]
     number: str
     layout: TextStyle
     next_number: int
     blocks: int = 0  #: in head and tail
-
-    def head(self) -> None:
-        """Write what stands before the motion."""
-        self._write_lines(self.before)
-
-    def tail(self, last: Sequence[str]) -> None:
-        """Write what stands behind the motion, its own last blocks first."""
-        self._write_lines([*last, *self.after])
 
     def write(self, text: bytes) -> None:
         """Write whole lines."""
@@ -120,7 +139,8 @@ class FramedText:
             text = b"".join(self._folded(line) for line in text.splitlines(keepends=True))
         self.stream.write(text)
 
-    def _write_lines(self, lines: list[str]) -> None:
+    def write_blocks(self, lines: Sequence[str]) -> None:
+        """Write blocks of head or tail."""
         self.blocks += len(lines)
         if lines:
             self.write("".join(line + "\n" for line in lines).encode("ascii"))

@@ -8,7 +8,7 @@ is not understood becomes a comment and a counted warning, never an NC word by g
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from cornersmooth.model import Move, Program, Statement
@@ -17,6 +17,7 @@ from cornersmooth.nc.control import Words
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.holes import Cycle, read_cycle
+from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.spindle import milliseconds, revolutions
 from cornersmooth.nc.statement_args import number_after, numbers_of, spoken_text, whole_number, words_of
 from cornersmooth.text import format_number
@@ -48,8 +49,8 @@ class StatementWriter:
     program : Program
     findings : Findings
         Takes what is noticed.
-    values : mapping
-        What stands for braces in the blocks of extras.
+    operation : Operation
+        What is on around the motion.
     comments : bool
         Whether comments are written.
     """
@@ -57,16 +58,14 @@ class StatementWriter:
     form: Form
     program: Program
     findings: Findings
-    values: Mapping[str, str] = field(default_factory=dict)
+    operation: Operation
     comments: bool = True
     plane: int = 17  #: the plane selected, kept by who writes the motion
-    changed: bool = False  #: a tool change left the machine elsewhere
+    changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
     cycle: Cycle | None = None  #: the hole cycle in force, None where it is not understood
     speed: float | None = None  #: of the spindle, revolutions per minute
     _compensated: bool = False
-    _tool: int | None = None
-    _offset: int = 1
-    _tip_control: bool = False
+    tool: int | None = None  #: loaded last
     _direction: str = "clockwise"
     _diameter: float = 0.0
     _last_cycle: Cycle | None = None
@@ -76,7 +75,7 @@ class StatementWriter:
     def __post_init__(self) -> None:
         self.words = self.form.table.words
         said = {statement.word for statement in self.program.statements}
-        self._toolno_loads = not _TOOL_WORDS & said
+        self.toolno_loads = not _TOOL_WORDS & said
 
     def blocks(self, statement: Statement) -> list[str]:
         """NC blocks of one statement, without line ends."""
@@ -101,33 +100,6 @@ class StatementWriter:
             return False
         self.paint(statement)
         return True
-
-    def begin_motion(self) -> list[str]:
-        """Blocks needed before the next motion: tool tip control, where it is off."""
-        if self._tip_control:
-            return []
-        self._tip_control = True
-        return [
-            *self._extras("on", outside=True),
-            *(block.format(offset=self._offset) for block in self.form.mode.on),
-            *self._extras("on", outside=False),
-        ]
-
-    def end_motion(self) -> list[str]:
-        """Blocks that switch tool tip control off, where it is on."""
-        if not self._tip_control:
-            return []
-        self._tip_control = False
-        return [*self._extras("off", outside=False), *self.form.mode.off, *self._extras("off", outside=True)]
-
-    def _extras(self, side: str, *, outside: bool) -> list[str]:
-        extras = self.form.extras if side == "on" else self.form.extras[::-1]
-        return [
-            block.format(**self.values)
-            for extra in extras
-            if extra.outside is outside
-            for block in getattr(extra, side)
-        ]
 
     def end_compensation(self) -> list[str]:
         """Blocks that switch cutter compensation off, where it is on."""
@@ -158,25 +130,37 @@ class StatementWriter:
             return None
         offset = whole_number(number_after(statement, "ADJUST") or number_after(statement, "OSETNO"))
         offset = number if offset is None else offset
-        if (number, offset) == (self._tool, self._offset):  # CATIA loads a tool twice: at the change, in the operation
+        if (number, offset) == (self.tool, self.operation.offset):  # CATIA loads a tool twice
             return self.comment(statement.text)
-        blocks = self.end_motion()
-        if number != self._tool:
+        blocks = self.operation.end_tool(statement.line)
+        if number != self.tool:
             blocks += [block.format(tool=number) for block in self.words.tool_change]
-            self.changed = True
-        self._tool, self._offset = number, offset
+        self.changed = True
+        self.tool, self.operation.offset = number, offset
         return blocks
+
+    def go_home(self, statement: Statement) -> list[str]:
+        """GOHOME without coordinates: to the height of the retract."""
+        blocks = self.operation.go_home()
+        if not self.form.table.program.retract:
+            text = "GOHOME without coordinates is no motion in this text; see where the tool goes"
+            self.findings.add("CS332", "warning", statement.line, text)
+            return [*self.comment(statement.text), *blocks]
+        text = "GOHOME without coordinates is written as the retract of the control's table"
+        self.findings.add("CS332", "warning", statement.line, text)
+        self.changed = True
+        return [*self.comment(statement.text), *blocks]
 
     def toolno(self, statement: Statement) -> list[str] | None:
         """TOOLNO/n,...: describes the tool that LOADTL loads; without any such statement it loads itself."""
-        return self.load(statement) if self._toolno_loads else self.comment(statement.text)
+        return self.load(statement) if self.toolno_loads else self.comment(statement.text)
 
     def select(self, statement: Statement) -> list[str] | None:
         """SELECT/TOOL,n: brings the next tool near."""
         number = whole_number(numbers_of(statement))
         if number is None or words_of(statement) != ["TOOL"]:
             return None
-        if number == self._tool:
+        if number == self.tool:
             return self.comment(statement.text)
         blocks = [block.format(tool=number) for block in self.words.tool_select]
         return blocks or self.comment(statement.text)
@@ -200,8 +184,10 @@ class StatementWriter:
         if not set(words) <= {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}:
             return None
         if "LOCK" in words or "ORIENT" in words:
+            self.operation.turn(())
             return None if numbers else list(self.words.spindle_orient) or None
         if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
+            self.operation.turn(())
             return list(self.words.spindle_off) or None
         if len(numbers) > 1 or any(number < 0.0 for number in numbers):
             return None
@@ -217,11 +203,18 @@ class StatementWriter:
         if "CLW" in words or "CCLW" in words:
             self._direction = "counterclockwise" if "CCLW" in words else "clockwise"
         direction = getattr(self.words, self._direction)
-        if speed is None:
+        if speed is None and self.speed is None:
+            self.operation.turn((direction,))
             return [direction]
-        self.speed = speed
-        digits = format_number(speed, self.form.table.digits.speed, trim=True).rstrip(".")
-        return [block.format(speed=digits, direction=direction) for block in self.words.spindle_speed]
+        self.speed = self.speed if speed is None else speed
+        digits = format_number(self.speed or 0.0, self.form.table.digits.speed, trim=True).rstrip(".")
+        turning = tuple(block.format(speed=digits, direction=direction) for block in self.words.spindle_speed)
+        self.operation.turn(turning)
+        return [direction] if speed is None else [*self._outside_tip_control(), *turning]
+
+    def _outside_tip_control(self) -> list[str]:
+        """Blocks before a new speed, where the control takes none under tool tip control."""
+        return self.operation.pause() if self.words.speed_without_tip_control else []
 
     def coolant(self, statement: Statement) -> list[str] | None:
         """COOLNT/ON, OFF, FLOOD, MIST and what else the control has; a bare COOLNT means ON."""
@@ -232,9 +225,13 @@ class StatementWriter:
         if numbers_of(statement) or len(kinds) != 1:
             return None
         if "OFF" in words or kinds == ["NOMORE"]:
+            self.operation.cool(())
             return list(self.words.coolant.get("OFF", ())) or None
         blocks = self.words.coolant.get(kinds[0])
-        return None if blocks is None else list(blocks)
+        if blocks is None:
+            return None
+        self.operation.cool(blocks)
+        return list(blocks)
 
     def delay(self, statement: Statement) -> list[str] | None:
         """DELAY/seconds and DELAY/n,REV."""
@@ -259,7 +256,7 @@ class StatementWriter:
             return list(self.words.compensation_off) or None
         planes = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
         side = {"LEFT": self.words.compensation_left, "RIGHT": self.words.compensation_right}.get((words or [""])[0])
-        register = whole_number(numbers or [float(self._offset)])
+        register = whole_number(numbers or [float(self.operation.offset)])
         if not side or len(words) > 2 or not set(words[1:]) <= planes.keys() or register is None:
             return None
         self.findings.add(
@@ -313,7 +310,12 @@ class StatementWriter:
         number = whole_number(numbers_of(statement))
         if number is None or words_of(statement) or number in (2, 6, 30, 98, 99):
             return None
-        return [f"M{number}"]
+        blocks = (f"M{number}",)
+        if number in (3, 4, 5):
+            self.operation.turn(() if number == 5 else blocks)
+        elif number in (7, 8, 9):
+            self.operation.cool(() if number == 9 else blocks)
+        return list(blocks)
 
     def paint(self, statement: Statement) -> list[str]:
         """PAINT: colours and speeds of the CAM system's screen."""
@@ -350,6 +352,7 @@ _HANDLERS: dict[str, Handler] = {
     "CYCLE": StatementWriter.hole_cycle,
     "STOP": lambda writer, statement: list(writer.words.stop) or None,
     "OPSTOP": lambda writer, statement: list(writer.words.optional_stop) or None,
+    "GOHOME": StatementWriter.go_home,
     "END": StatementWriter.end,
     "INSERT": StatementWriter.insert,
     "AUXFUN": StatementWriter.auxiliary,

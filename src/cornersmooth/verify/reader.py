@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Iterable, Iterator
@@ -14,7 +15,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.dialects import CONTROLS
-from cornersmooth.verify.dialects.base import HIGH_SPEED
+from cornersmooth.verify.dialects.base import HIGH_SPEED, INCREMENTAL
 from cornersmooth.verify.elements import (
     Curves,
     Element,
@@ -148,6 +149,7 @@ class Reader:
         #: whether the tool has been fed from a position that was known
         self.placed = False
         self.blocks = 0
+        self.left = False  # an axis stands at a position of the machine
 
     def chunks(self, items: Iterable[Table | Line]) -> Iterator[Elements]:
         """Take runs of motion blocks and other lines, and give out the path elements as they come."""
@@ -192,8 +194,20 @@ class Reader:
         factor = MM_PER_UNIT[self.units]
         for table in _joined(self.waiting):
             before = self.modal
+            if self.memory.get(INCREMENTAL):
+                hint = "write G90 behind a position of the machine"
+                raise InputError(
+                    "CS503", "motion in incremental words (G91)", hint, file=self.name, line=int(table.line[0])
+                )
             run, self.modal = execute(table, before)
-            self._check_control(table, before.code)
+            approach: frozenset[int] = frozenset()
+            if self.left:
+                lines = set(run.line.tolist())
+                run = self._arrived(run)
+                approach = frozenset(lines.difference(run.line.tolist()))
+                if not len(run.kind):
+                    continue
+            self._check_control(table, before.code, approach)
             if self.modal.points and not before.points:
                 self._know_points(run)
             self.problems.extend(run.problems)
@@ -330,6 +344,33 @@ class Reader:
             self.refuse(line, "inverse time feed (G93) without rotary words", "name the machine with --machine")
         self.modal = self.modal.but(**modes)
 
+    def leave(self, axes: str) -> None:
+        """Say that axes go to positions of the machine: where they are in the part is not known any more."""
+        self.left = True
+        tip = tuple(math.nan if axis in axes else value for axis, value in zip("XYZ", self.modal.tip, strict=True))
+        self.modal = self.modal.but(tip=tip)
+
+    def _arrived(self, run: Executed) -> Executed:
+        """Leave out the rapids on the way back from positions of the machine, until all of the tip is known again."""
+        unknown = np.isnan(run.tip).any(axis=1)
+        gone = unknown & (run.kind == Element.RAPID)
+        if (unknown & ~gone).any():
+            line = int(run.line[np.argmax(unknown & ~gone)])
+            hint = "say X Y Z in rapid behind a position of the machine, before the first feed"
+            raise InputError(
+                "CS503", "a feed move where not all of the position is known", hint, file=self.name, line=line
+            )
+        self.left = bool(unknown.all())
+        if not gone.any():
+            return run
+        kept = ~gone
+        rows = {
+            key: value[kept]
+            for key in ("kind", "tip", "second", "line", "feed", "per_revolution", "feed_room")
+            if (value := getattr(run, key)) is not None
+        }
+        return replace(run, **rows, arc_element=(np.cumsum(kept) - 1)[run.arc_element])
+
     def wrong(self, code: str, line: Line, text: str) -> None:
         """Note what breaks the rules of the control."""
         self.problems.append(Problem(code, 0, line.number, text))
@@ -338,7 +379,7 @@ class Reader:
         """Give up: words that make it impossible to tell where the tool is."""
         raise InputError("CS503", what, hint, file=self.name, line=line.number)
 
-    def _check_control(self, table: Table, code: float) -> None:
+    def _check_control(self, table: Table, code: float, approach: frozenset[int] = frozenset()) -> None:
         """Complain, once for each state, of words that the control would not take for what they are."""
         needed = self.dialect.curves_need
         if needed and not self.memory.get(HIGH_SPEED) and (curves := np.flatnonzero(table.column("G") == NURBS)).size:
@@ -355,6 +396,8 @@ class Reader:
         if wanted is None or not used or self.tip_control in wanted or (kind, self.tip_control) in self.complained:
             return
         rows = table.rows_with(used, code)
+        if approach:  # from the height of a retract rotary axes turn before the control is told of the tip
+            rows = rows[[int(number) not in approach for number in table.line[rows]]]
         if not len(rows):
             return
         self.complained.add((kind, self.tip_control))

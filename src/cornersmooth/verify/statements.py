@@ -38,6 +38,8 @@ class Token:
         CL or NC line.
     room : float, mm
         How far the place is uncertain beyond what printed digits account for: rotary words near the pole.
+    moment : int
+        Tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts.
     """
 
     kind: str
@@ -45,6 +47,7 @@ class Token:
     place: float
     line: int
     room: float = 0.0
+    moment: int = 0
 
 
 _NAMES = {
@@ -65,6 +68,15 @@ _NAMES = {
 #: what holds before anything is said; repeating it changes nothing
 _AT_START = {"spindle": 5.0, "coolant": 9.0, "compensation": 40.0, "offset": 1.0}
 
+#: states that a tool change and the end of the program may end by themselves
+_ENDED = {"spindle": 5.0, "coolant": 9.0, "compensation": 40.0}
+
+#: states that a tool change stops, to go on behind it
+_STOPPED = ("spindle", "coolant")
+
+#: kinds during which a state matters although nothing moves
+_PAUSES = ("stop", "dwell")
+
 _STATES = ("tool", "offset", "spindle", "speed", "coolant", "compensation")
 
 
@@ -74,7 +86,7 @@ class _Asking:
     def __init__(self, program: Program) -> None:
         self.program = program
         self.tokens: list[Token] = []
-        self.place, self.line = 0.0, 0
+        self.place, self.line, self.moment = 0.0, 0, 0
         self.running, self.speed, self.diameter = 3.0, 0.0, 0.0
         self.tool, self.offset = -1.0, 1.0
         self.moving = np.flatnonzero(program.kind != Move.FROM)
@@ -104,12 +116,15 @@ class _Asking:
         if handler is not None:
             numbers = [value for value in statement.args if isinstance(value, float)]
             words = [value for value in statement.args if isinstance(value, str) and value]
+            if place != self.place:
+                self.moment += 1
             self.place, self.line = place, statement.line
             handler(words, numbers, statement)
 
     def say(self, kind: str, value: float) -> None:
         """Note a token."""
-        self.tokens.append(Token(kind, value, self.place, self.line))
+        self.tokens.append(Token(kind, value, self.place, self.line, moment=self.moment))
+        self.moment += kind in _PAUSES
 
     def load(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """Change the tool; ADJUST or OSETNO names another length register."""
@@ -196,7 +211,8 @@ class _Asking:
     def auxiliary(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """An M word by its number, unless it would end or change more than a word may."""
         if len(numbers) == 1 and not words and _whole(numbers[0]) and numbers[0] not in (2, 6, 30, 98, 99):
-            self.tokens += _of_m(numbers[0], self.place, self.line)
+            for token in _of_m(numbers[0], self.place, self.line):
+                self.say(token.kind, token.value)
 
     def end(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """END in the middle of the path is a stop."""
@@ -240,9 +256,11 @@ def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float
     """What the words of the NC text do; `places` are where they stand, and `rooms` how far that is uncertain, mm."""
     tokens: list[Token] = []
     chosen: float | None = None
+    moment = element = 0
     speaking = [row for row in zip(events, places, rooms, strict=True) if row[0].letter != "("]
     for k, (event, place, room) in enumerate(speaking):
         value, line, before = event.value, event.line, len(tokens)
+        moment, element = moment + (event.element != element), event.element
         if event.letter == "T":
             chosen = value
             following = speaking[k + 1][0] if k + 1 < len(speaking) else None
@@ -262,8 +280,8 @@ def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float
         elif event.letter in _PLAIN:
             number = round(value, SPEED_DECIMALS) if event.letter == "S" else value
             tokens.append(Token(_PLAIN[event.letter], number, place, line))
-        if room > 0.0:
-            tokens[before:] = [replace(token, room=room) for token in tokens[before:]]
+        tokens[before:] = [replace(token, room=room, moment=moment) for token in tokens[before:]]
+        moment += any(token.kind in _PAUSES for token in tokens[before:])
     return tokens
 
 
@@ -302,20 +320,23 @@ def compare(
     found = [token for token in found if token.kind not in unsaid]
     end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
 
-    def tidies(token: Token) -> bool:
+    def tidies(token: Token, kind: str) -> bool:
         """Whether a token only ends what ends with the program anyway."""
-        if token.kind != "compensation" or token.value != 40.0:
+        if token.kind != kind or token.value != _ENDED[kind]:
             return False
         return token.place >= end or not _away(end, token, room, apart)
 
-    def cancelled(tokens: list[Token]) -> int:
-        """How often compensation is cancelled."""
-        return sum(token.value == 40.0 for token in _effective(tokens, "compensation"))
+    def ended(tokens: list[Token], kind: str) -> int:
+        """How often a state is ended."""
+        return sum(token.value == _ENDED[kind] for token in _effective(tokens, kind))
 
-    if cancelled(found) > cancelled(asked_for) and not any(map(tidies, asked_for)):
-        found = [token for token in found if not tidies(token)]
+    for kind in _ENDED:
+        if ended(found, kind) > ended(asked_for, kind) and not any(tidies(token, kind) for token in asked_for):
+            found = [token for token in found if not tidies(token, kind)]
     for kind, (name, code) in _NAMES.items():
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
+        if kind in _STOPPED and [token.value for token in theirs] != [token.value for token in ours]:
+            theirs, ours = (_effective(_last_of_moments(tokens, kind), kind) for tokens in (asked_for, found))
         matcher = difflib.SequenceMatcher(
             None, [token.value for token in theirs], [token.value for token in ours], autojunk=False
         )
@@ -347,6 +368,12 @@ def _away(place: float, ours: Token, room: float, apart: Callable[[float, float]
         return False
     # a pose is a rounding off, and its place as far from it as the room
     return apart(place, ours.place) > 2 * room + ours.room
+
+
+def _last_of_moments(tokens: list[Token], kind: str) -> list[Token]:
+    """Tokens of one kind that the next motion, stop or dwell meets."""
+    mine = [token for token in tokens if token.kind == kind]
+    return [token for k, token in enumerate(mine) if k + 1 == len(mine) or mine[k + 1].moment != token.moment]
 
 
 def _effective(tokens: list[Token], kind: str) -> list[Token]:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 AFTER_MOTION = (0.0, 1.0, 2.0, 5.0, 9.0, 30.0)
 
 
+#: name in `State.memory` of whether incremental words (G91) are in force, which are read in no motion
+INCREMENTAL = "incremental"
+
 #: name in `State.memory` of whether look ahead of the kind that some controls ask for with curves is on
 HIGH_SPEED = "high speed"
 
@@ -41,6 +44,9 @@ class State(Protocol):
 
     def wrong(self, code: str, line: Line, text: str) -> None:
         """Note what breaks the rules of the control."""
+
+    def leave(self, axes: str) -> None:
+        """Say that axes go to positions of the machine: where they are in the part is not known any more."""
 
     def refuse(self, line: Line, what: str, hint: str) -> None:
         """Give up: words that make it impossible to tell where the tool is."""

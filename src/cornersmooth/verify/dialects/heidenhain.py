@@ -17,7 +17,18 @@ _TOOL_CALL: Final = re.compile(rf"TOOL CALL(?: (\d+))?(?: [XYZ])?(?: S({NUMBER})
 _FOLDED: Final = re.compile(rb"[^\n]*~[ \r]*\n(?:[^\n]*~[ \r]*\n)*[^\n]*\n?")
 
 #: blocks that change nothing measured here
-_SILENT = ("BEGIN PGM", "END PGM", "BLK FORM", "CYCL DEF 32", "CYCL DEF 9.0", "* -", "*-", "LBL")
+_SILENT = (
+    "BEGIN PGM",
+    "END PGM",
+    "BLK FORM",
+    "CYCL DEF 32",
+    "CYCL DEF 9.0",
+    "CYCL DEF 247",
+    "PLANE RESET",
+    "* -",
+    "*-",
+    "LBL",
+)
 _SIDES = {"R0": 40.0, "RL": 41.0, "RR": 42.0}
 
 
@@ -44,6 +55,9 @@ class Heidenhain(Dialect):
         """Interpret a line that is no motion block."""
         if line.words[0].name == "block":
             self._block(line.words[0].text, line, state)
+            return
+        if any(word[:2] == ("M", 91.0) for word in line.words):
+            self._to_machine(line, state)
             return
         motion: dict[str, float] = {}
         for name, value, text, *_ in line.words:
@@ -74,6 +88,20 @@ class Heidenhain(Dialect):
                 )
             state.move(line, values(columns or {}))
 
+    def _to_machine(self, line: Line, state: State) -> None:
+        """M91: a rapid in machine coordinates."""
+        axes, names = "", {word[0] for word in line.words}
+        for name, value, text, *_ in line.words:
+            if name in ("X", "Y", "Z", *self.rotary):
+                axes += name
+            elif name == "side":
+                state.event(line, "G", value, text)
+            elif name not in ("L", "PATH", "RAPID") and (name, value) != ("M", 91.0):
+                state.refuse(line, f"{text} beside a position of the machine", "give it a block of its own")
+        if "RAPID" not in names:
+            state.refuse(line, "M91 without FMAX", "positions of the machine are read in rapids only")
+        state.leave(axes)
+
     def _circle(self, motion: dict[str, float], line: Line, state: State) -> dict[str, float]:
         """C: about the centre that CC has said, in the plane XY."""
         centre = state.memory.get("centre", {})
@@ -88,6 +116,8 @@ class Heidenhain(Dialect):
             state.change(line, per_revolution=value == 136.0)
         elif value in (128.0, 129.0):
             state.tip_control = "M128" if value == 128.0 else ""
+        elif value in (126.0, 127.0):
+            pass  # which way rotary axes turn between two positions: less than half a turn either way
         elif value in (91.0, 92.0):
             state.refuse(line, f"{text}: positions of the machine", "only positions of the part are read")
         else:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 
-from cornersmooth.verify.dialects.base import AFTER_MOTION, HIGH_SPEED, Dialect, State
+from cornersmooth.verify.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, Dialect, State
 from cornersmooth.verify.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.verify.words import MOTION_CODES, NURBS, Columns, Line, Word
 
@@ -15,6 +15,9 @@ _EVENT_LETTERS = "TSMHD"
 
 #: G words that change nothing measured here: cancellations, work offsets
 _SILENT = frozenset((80.0, 90.0, *map(float, range(54, 60))))
+#: G words that send axes to positions of the machine
+_TO_REFERENCE = (28.0, 30.0)
+_IN_MACHINE = 53.0
 _COMPENSATION = (40.0, 41.0, 42.0)
 
 
@@ -99,6 +102,10 @@ class Iso(Dialect):
 
     def words(self, line: Line, state: State) -> None:
         """Interpret a line that is no motion block."""
+        codes = {word[1] for word in line.words if word[0] == "G"}
+        if codes & {*_TO_REFERENCE, _IN_MACHINE}:
+            self._to_machine(line, codes, state)
+            return
         motion: dict[str, float] = {}
         given = {letter: value for letter, value, *_ in line.words}
         if given.get("G") == 5.0:
@@ -124,6 +131,26 @@ class Iso(Dialect):
             state.refuse(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
         state.move(line, motion)
 
+    def _to_machine(self, line: Line, codes: set[float], state: State) -> None:
+        """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""
+        incremental = state.memory.get(INCREMENTAL, False)
+        incremental = 91.0 in codes or (incremental and 90.0 not in codes)
+        known = {*_TO_REFERENCE, _IN_MACHINE, 0.0, 90.0, 91.0}
+        axes = ""
+        for letter, value, text, *_ in line.words:
+            if letter in ("X", "Y", "Z", *self.rotary):
+                axes += letter
+                if _IN_MACHINE not in codes and not (incremental and value == 0.0):
+                    state.refuse(line, f"{text} on the way to the reference position", "write G91 and zero")
+            elif (letter, value) != ("G", 0.0) and (letter != "G" or value not in known) and letter != "N":
+                state.refuse(line, f"{text} beside a position of the machine", "give it a block of its own")
+        if _IN_MACHINE in codes and (incremental or 0.0 not in codes):
+            state.refuse(line, "G53 without G90 and G0", "write G90 before it, and G0")
+        state.memory[INCREMENTAL] = incremental
+        if 0.0 in codes:
+            state.move(line, {"G": 0.0})
+        state.leave(axes)
+
     def _dwell(self, given: Mapping[str, float], line: Line, state: State) -> None:
         """G4: P in milliseconds or seconds, X and U in seconds."""
         time = self.iso.dwell * given["P"] if "P" in given else 1000.0 * given.get("X", given.get("U", 0.0))
@@ -131,7 +158,9 @@ class Iso(Dialect):
 
     def _mode(self, code: float, line: Line, state: State) -> None:
         """Take a G word outside group 01 that changes the state."""
-        if code in (17.0, 18.0, 19.0):
+        if code == 90.0:
+            state.memory[INCREMENTAL] = False
+        elif code in (17.0, 18.0, 19.0):
             state.change(line, plane=int(code))
         elif code in (20.0, 21.0):
             state.change(line, inch=code == 20.0)

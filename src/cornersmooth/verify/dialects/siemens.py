@@ -70,6 +70,9 @@ class Siemens(Dialect):
                 state.refuse(line, "a dwell in revolutions", "give it in seconds")
             state.event(line, "G", 4.0, f"{1000.0 * given['F']:.10g}")
             return
+        if any(word[0] == "SUPA" for word in line.words):
+            self._to_machine(line, state)
+            return
         motion: dict[str, float] = {}
         for name, value, text, *_ in line.words:
             if name == "G" and value in _CODES:
@@ -87,6 +90,19 @@ class Siemens(Dialect):
             elif name not in ("D", "N", "%") and name not in _SILENT_CALLS:
                 self._refuse(line, name, text, state)
         state.move(line, motion)
+
+    def _to_machine(self, line: Line, state: State) -> None:
+        """SUPA: a rapid in machine coordinates, without frames."""
+        axes = ""
+        for name, value, text, *_ in line.words:
+            if name in ("X", "Y", "Z", *self.rotary):
+                axes += name
+            elif (name, value) not in (("SUPA", 0.0), ("G", 0.0), ("D", 0.0)) and name != "N":
+                state.refuse(line, f"{text} beside a position of the machine", "give it a block of its own")
+        if not any(word[:2] == ("G", 0.0) for word in line.words):
+            state.refuse(line, "SUPA without G0", "positions of the machine are read in rapids only")
+        state.move(line, {"G": 0.0})
+        state.leave(axes)
 
     def _refuse(self, line: Line, name: str, text: str, state: State) -> None:
         if name in "ABC":

@@ -1,0 +1,171 @@
+"""What begins and what ends the motion of a tool, and the program: the steps of the control's table.
+
+`ProgramTable` says which steps and blocks follow one another; this module knows what each step is at the moment. A step
+whose state is reached already is no block: the tool is retracted once, and the spindle is stopped where it turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from cornersmooth.nc.control import Blocks
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+
+#: blocks of the steps `rotary_zero` and `rotary_start`; nothing without rotary axes
+RotaryBlocks = Mapping[str, Blocks]
+
+_NO_ROTARY: RotaryBlocks = {"rotary_zero": (), "rotary_start": ()}
+
+#: what of `tool_end` is not done where the tool only goes home
+_RUNNING_ON = ("{spindle_off}", "{coolant_off}")
+
+
+@dataclass
+class Operation:
+    """Writes the blocks around the motion of each tool and remembers what is on.
+
+    Parameters
+    ----------
+    form : Form
+    values : mapping
+        What stands for braces in blocks.
+    texts : mapping
+        Blocks of the steps that a user gives: ``work_offset``, ``header``, ``footer``.
+    findings : Findings
+    """
+
+    form: Form
+    values: Mapping[str, str]
+    texts: Mapping[str, Blocks]
+    findings: Findings
+    offset: int = 1  #: length register
+    retracted: bool = False  #: the next motion comes from the height of the retract
+    spindle: Blocks = ()  #: blocks that turn the spindle; none while it stands
+    coolant: Blocks = ()  #: the same for the coolant
+    begun: bool = False  #: the blocks of `begin` hold
+    _tip_control: bool = False
+    _functions: bool = False
+    _moved: bool = False  # the tool has been used
+    _stopped: dict[str, Blocks] = field(default_factory=dict)  # what a tool change has switched off, as it was on
+    _stopped_line: int = 0
+
+    def start(self) -> list[str]:
+        """Blocks before everything else."""
+        return self._expand(self.form.table.program.start)
+
+    def begin(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
+        """Blocks before the next motion of a tool; what a tool change stopped goes on again."""
+        self._moved = self.begun = True
+        own = self.form.mode.begin
+        blocks = [block for was_on in self._stopped.values() for block in was_on]
+        if self._stopped:
+            text = f"{' and '.join(self._stopped)} not given again behind a tool change: on as before"
+            self.findings.add("CS331", "warning", self._stopped_line, text)
+        self.spindle = self._stopped.get("spindle", self.spindle)
+        self.coolant = self._stopped.get("coolant", self.coolant)
+        self._stopped = {}
+        steps = self.form.table.program.begin if own is None else own
+        return [*blocks, *self._expand(steps, rotary if self.retracted else _NO_ROTARY)]
+
+    def end_tool(self, line: int = 0) -> list[str]:
+        """Blocks behind the last motion of a tool; `line` is that of the statement that asks for them."""
+        self._stopped_line, self.begun = line, False
+        steps = self.form.table.program.tool_end
+        if not self._moved:  # a program begins with a tool change, as a rule
+            steps = tuple(step for step in steps if step in _STEPS)
+        self._moved = False
+        return self._expand(steps)
+
+    def go_home(self) -> list[str]:
+        """Blocks that bring the tool to the height of the retract with spindle and coolant on."""
+        self._moved = self.begun = False
+        return self._expand([step for step in self.form.table.program.tool_end if step in _STEPS.keys() - _RUNNING_ON])
+
+    def pause(self) -> list[str]:
+        """Blocks that switch tool tip control off where the tool stands, for words that it does not allow."""
+        return self._expand(("{functions_off}", "{tip_control_off}"))
+
+    def end(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
+        """Blocks behind everything else."""
+        return [*self.end_tool(), *self._expand(self.form.table.program.end, rotary)]
+
+    def turn(self, blocks: Blocks) -> None:
+        """Take note of the blocks that turn the spindle, or of none where it stops."""
+        self.spindle = blocks
+        self._stopped.pop("spindle", None)
+
+    def cool(self, blocks: Blocks) -> None:
+        """Take note of the blocks that let the coolant flow, or of none where it stops."""
+        self.coolant = blocks
+        self._stopped.pop("coolant", None)
+
+    def _expand(self, steps: Sequence[str], rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
+        """Blocks of steps; what is no step is a block itself."""
+        given = {f"{{{name}}}": blocks for name, blocks in (*self.texts.items(), *rotary.items())}
+        blocks: list[str] = []
+        for step in steps:
+            if step in _STEPS:
+                blocks += _STEPS[step](self)
+            elif step in given:
+                blocks += given[step]
+            else:
+                blocks.append(step.format(**self.values))
+        return blocks
+
+    def _retract(self) -> list[str]:
+        blocks = [] if self.retracted else [block.format(**self.values) for block in self.form.table.program.retract]
+        self.retracted = bool(self.form.table.program.retract)
+        return blocks
+
+    def _tip_control_on(self) -> list[str]:
+        self._tip_control = self._functions = True
+        on = [block.format(offset=self.offset) for block in self.form.mode.on]
+        return [*self._extras("on", outside=True), *on, *self._extras("on", outside=False)]
+
+    def _functions_off(self) -> list[str]:
+        if not self._functions:
+            return []
+        self._functions = False
+        return self._extras("off", outside=False)
+
+    def _tip_control_off(self) -> list[str]:
+        self.begun = False
+        if not self._tip_control:
+            return []
+        self._tip_control = False
+        return [*self._functions_off(), *self.form.mode.off, *self._extras("off", outside=True)]
+
+    def _extras(self, side: str, *, outside: bool) -> list[str]:
+        extras = self.form.extras if side == "on" else self.form.extras[::-1]
+        return [
+            block.format(**self.values)
+            for extra in extras
+            if extra.outside is outside
+            for block in getattr(extra, side)
+        ]
+
+    def _spindle_off(self) -> list[str]:
+        return self._stop("spindle", self.form.table.words.spindle_off)
+
+    def _coolant_off(self) -> list[str]:
+        return self._stop("coolant", self.form.table.words.coolant.get("OFF", ()))
+
+    def _stop(self, what: str, blocks: Blocks) -> list[str]:
+        was_on: Blocks = getattr(self, what)
+        if not was_on:
+            return []
+        self._stopped[what] = was_on
+        setattr(self, what, ())
+        return list(blocks)
+
+
+_STEPS: Mapping[str, Callable[[Operation], list[str]]] = {
+    "{retract}": Operation._retract,
+    "{tip_control_on}": Operation._tip_control_on,
+    "{functions_off}": Operation._functions_off,
+    "{tip_control_off}": Operation._tip_control_off,
+    "{spindle_off}": Operation._spindle_off,
+    "{coolant_off}": Operation._coolant_off,
+}
