@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,6 +46,14 @@ MACHINE, KINEMATICS, AXES = "xyzac-trt", "xyzac-trt-kins", "XYZAC"
 SERVO_SECONDS = 0.001
 #: mm/s
 FASTEST = 500
+#: velocity and acceleration of linear and rotary axes, mm or degrees, and seconds
+LINEAR, ROTARY = (FASTEST, 3000.0), (360.0, 3000.0)
+#: those of a machine of a usual size, for comparisons of time
+STATED = {
+    **dict.fromkeys("XYZ", (FASTEST, 1000.0)),
+    "A": (120.0, 400.0),
+    "C": (180.0, 500.0),
+}
 #: G64's tolerance over that of the smoothing, as the table of the control writes it
 BLEND = 0.1
 #: distance of the points that the original motion is sampled at, mm
@@ -70,8 +79,8 @@ LINEAR_UNITS = mm
 ANGULAR_UNITS = deg
 DEFAULT_LINEAR_VELOCITY = 50
 MAX_LINEAR_VELOCITY = {fastest}
-DEFAULT_LINEAR_ACCELERATION = 3000
-MAX_LINEAR_ACCELERATION = 3000
+DEFAULT_LINEAR_ACCELERATION = {acceleration:g}
+MAX_LINEAR_ACCELERATION = {acceleration:g}
 [EMCMOT]
 EMCMOT = motmod
 SERVO_PERIOD = {period:.0f}
@@ -173,16 +182,31 @@ finish("done")
 """
 
 
-def write_configuration(folder: Path, text: bytes, seconds: float) -> None:
-    """Everything that the controller reads."""
-    ini = INI.format(folder=folder, kinematics=KINEMATICS, period=SERVO_SECONDS * 1e9, fastest=FASTEST)
+Dynamics = Mapping[str, tuple[float, float]]
+
+
+def write_configuration(folder: Path, text: bytes, seconds: float, dynamics: Dynamics | None = None) -> None:
+    """Everything that the controller reads; `dynamics` says how fast each axis may go and speed up."""
+    dynamics = dynamics or {**dict.fromkeys("XYZ", LINEAR), **dict.fromkeys("AC", ROTARY)}
+    ini = INI.format(
+        folder=folder,
+        kinematics=KINEMATICS,
+        period=SERVO_SECONDS * 1e9,
+        fastest=FASTEST,
+        acceleration=dynamics["X"][1],
+    )
     limits = dict(zip(load_machine(MACHINE).names, load_machine(MACHINE).limits.tolist(), strict=True))
     for joint, letter in enumerate(AXES):
-        turning = letter in limits
         low, high = limits.get(letter, (-2000.0, 2000.0))
-        kind, velocity = ("ANGULAR", 360) if turning else ("LINEAR", FASTEST)
+        velocity, acceleration = dynamics[letter]
         ini += AXIS.format(
-            letter=letter, joint=joint, kind=kind, low=low, high=high, velocity=velocity, acceleration=3000
+            letter=letter,
+            joint=joint,
+            kind="ANGULAR" if letter in limits else "LINEAR",
+            low=low,
+            high=high,
+            velocity=velocity,
+            acceleration=acceleration,
         )
     (folder / "headless.ini").write_text(ini)
     (folder / "headless.hal").write_text(HAL.format(kinematics=KINEMATICS))
@@ -194,11 +218,11 @@ def write_configuration(folder: Path, text: bytes, seconds: float) -> None:
     drive.chmod(0o755)
 
 
-def run_controller(text: bytes, seconds: float) -> tuple[str, Floats, float]:
+def run_controller(text: bytes, seconds: float, dynamics: Dynamics | None = None) -> tuple[str, Floats, float]:
     """What became of a program, the commands to the motors while it fed (m, 5), and the seconds of motion."""
     with tempfile.TemporaryDirectory(prefix="linuxcnc-") as name:
         folder = Path(name)
-        write_configuration(folder, text, seconds)
+        write_configuration(folder, text, seconds, dynamics)
         user: list[str] = []
         if os.geteuid() == 0:
             for path in (folder, *folder.iterdir()):

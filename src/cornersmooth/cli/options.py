@@ -336,7 +336,7 @@ table = click.option(
 )
 law = click.option(
     "--law",
-    type=click.Choice(["direct_exact_stop", "direct_velocity_jump", *METHODS]),
+    type=click.Choice(["direct_exact_stop", "direct_velocity_jump", *METHODS, "as_written"]),
     default=DEFAULT_METHOD,
     show_default=True,
     help="Motion that --csv writes.",
@@ -348,6 +348,25 @@ limits_machine = click.option(
     metavar="NAME|FILE",
     help="Keep the limits of this machine's five axes, too: a name that 'cornersmooth machines' lists (its numbers are "
     "examples), or a TOML file with [dynamics.X] and so on.",
+)
+
+text = click.option(
+    "--text",
+    type=click.Path(),
+    metavar="NC",
+    help="Plan this NC text, too, as its control would run it: its lines, digits and feeds.",
+)
+text_machine = click.option(
+    "--text-machine", type=str, metavar="NAME|FILE", help="Machine whose rotary words --text has, if it has such."
+)
+block_time = click.option(
+    "--block-time", type=Duration(), default=0.0, help="Shortest time that the control takes for one block of --text."
+)
+look_ahead = click.option(
+    "--look-ahead",
+    type=click.IntRange(min=1),
+    metavar="BLOCKS",
+    help="Blocks within which the control must be able to stop; all of --text by default.",
 )
 
 _LIMITS = {

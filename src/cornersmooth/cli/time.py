@@ -21,6 +21,7 @@ _TITLES = {
     "direct_exact_stop": "direct, exact stop",
     "direct_velocity_jump": "direct, velocity jump",
     **{name: f"smoothed, {name}" for name in METHODS},
+    "as_written": "as written",
 }
 LAWS = tuple(_TITLES)
 
@@ -37,6 +38,11 @@ LAWS = tuple(_TITLES)
 @options.axis_length
 @options.limits
 @options.limits_machine
+@options.text
+@options.control
+@options.text_machine
+@options.block_time
+@options.look_ahead
 @options.shape
 @options.allocation
 @options.weights
@@ -66,8 +72,11 @@ def command(source: str, **given: Any) -> int:
       cornersmooth time part.cls -e 0.04 --csv motion.csv --plot motion.svg
       cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
       cornersmooth time part.cls -e 0.04 --report times.html
+      cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
     """
     form = options.picture_form(given["plot"])
+    if given["law"] == "as_written" and not given["text"]:
+        raise click.UsageError("--law as_written: name the text with --text")
     for path in given["reports"]:
         if not path.lower().endswith(".html"):
             raise click.UsageError(f"--report {path}: let the name end in .html")
@@ -92,7 +101,7 @@ def command(source: str, **given: Any) -> int:
     if given["plot"]:
         from cornersmooth.report.timeplot import draw
 
-        picture = draw({_TITLES[name]: compared.laws[name] for name in LAWS[1:]}, form)
+        picture = draw({_TITLES[name]: law for name, law in compared.laws.items() if name != LAWS[0]}, form)
         with open_output(target_of(given["plot"])) as output:
             output.stream.write(picture)
     if given["as_json"]:
@@ -107,13 +116,22 @@ def command(source: str, **given: Any) -> int:
 
 def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
     from cornersmooth.cl import read
-    from cornersmooth.feedrate import compare
+    from cornersmooth.feedrate import BlockLimits, compare, plan_text
+    from cornersmooth.verify import read_nc
 
     machine = options.machine_of(given)
     limits, settings = options.limits_of(given), options.settings_of(given)
     program = read(data, name=name, **options.reading_of(given))
     with progress_bar(given["quiet"]) as progress:
-        return compare(program, settings, limits, machine=machine, progress=progress)
+        compared = compare(program, settings, limits, machine=machine, progress=progress)
+        if not given["text"]:
+            return compared
+        how = options.reading_back_of({**given, "machine": given["text_machine"], "no_tcp": False})
+        how |= {"tolerance": settings.tolerance, "axis_length": settings.axis_length}
+        nc = read_nc(given["text"], **how)
+        blocks = BlockLimits(given["block_time"], given["look_ahead"])
+        law = plan_text(nc, limits, name=given["text"], blocks=blocks, settings=settings, machine=machine)
+        return compared.with_text(law)
 
 
 def _tables(compared: Comparison) -> Iterator[str]:

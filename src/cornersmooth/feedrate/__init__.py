@@ -8,10 +8,12 @@ from cornersmooth.feedrate.compare import Comparison, compare
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.timelaw import States, TimeLaw
+from cornersmooth.feedrate.written import BlockLimits, plan_text
 
 __all__ = [
     "AxisLimits",
     "AxisPeaks",
+    "BlockLimits",
     "Comparison",
     "Limits",
     "States",
@@ -20,4 +22,5 @@ __all__ = [
     "compare",
     "direct",
     "plan",
+    "plan_text",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,9 @@ SCHEMA = "cornersmooth-time/1"
 
 #: rows of `Comparison.laws`, in this order
 BASELINES = ("direct_exact_stop", "direct_velocity_jump")
+
+#: row of a text
+AS_WRITTEN = "as_written"
 
 #: states looked at together for peaks
 _TOGETHER = 65536
@@ -80,7 +83,7 @@ class Comparison:
         Of the smoothing; its `method` is replaced by each method in turn.
     limits : Limits
     laws : mapping of str to TimeLaw
-        The two `BASELINES`, and every method by its name.
+        The two `BASELINES`, every method by its name, and `AS_WRITTEN` where there is a text.
     machine : Machine or None
         Whose axes keep their limits.
     """
@@ -91,6 +94,10 @@ class Comparison:
     laws: Mapping[str, TimeLaw]
     machine: Machine | None = None
 
+    def with_text(self, law: TimeLaw) -> Comparison:
+        """Return the same with the time law of an NC text (`cornersmooth.feedrate.plan_text`)."""
+        return replace(self, laws={**self.laws, AS_WRITTEN: law})
+
     @property
     def seconds(self) -> dict[str, float]:
         """Total times, s."""
@@ -98,11 +105,12 @@ class Comparison:
 
     @property
     def saving_percent(self) -> dict[str, dict[str, float]]:
-        """Time saved by each method against each baseline, %."""
+        """Time saved by each method, and by the text, against each baseline, %."""
         seconds = self.seconds
         return {
-            method: {base: 100.0 * (1.0 - seconds[method] / seconds[base]) for base in BASELINES if seconds[base]}
-            for method in METHODS
+            name: {base: 100.0 * (1.0 - seconds[name] / seconds[base]) for base in BASELINES if seconds[base]}
+            for name in self.laws
+            if name not in BASELINES
         }
 
     @property

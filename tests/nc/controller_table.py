@@ -1,0 +1,126 @@
+"""How long LinuxCNC's whole controller takes for a text, and how far what it executes is from the CL path.
+
+    python tests/nc/controller_table.py [FOLDER]
+
+Prints one table: each path unsmoothed, and as the program writes it for LinuxCNC. The axes of the machine have the
+limits of `linuxcnc_controller.STATED`, the feed is 1800 mm/min; time is counted in servo cycles, so the load of this
+computer does not matter. FOLDER holds the real CL files of the tests; without it the sample alone is run.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from linuxcnc_controller import MACHINE, SERVO_SECONDS, STATED, Floats, deviations, original, run_controller, tool
+
+from cornersmooth.cl import read
+from cornersmooth.kinematics import load_machine
+from cornersmooth.model import Move, Program
+from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+
+SAMPLE = Path(__file__).parents[2] / "samples" / "impeller.cls"
+#: files of the folder, and how many of their poses are run
+FILES = (("hecc_point_zigzag.csv", 120), ("hust_5x_impeller_yelun.cls", 52))
+#: one pass of the sample, between two rapids
+FIRST, LAST = 4, 80
+FEED, AXIS_LENGTH = 1800.0, 10.0
+TOLERANCES = (0.01, 0.04)
+#: what the unsmoothed program tells G64, mm
+BLENDS = (0.001, 0.002, 0.003)
+#: how far rotary axes may leave the tool axis between two points of an unsmoothed program, as mm at the axis point
+LOOSE = 0.5
+
+
+@dataclass(frozen=True)
+class Executed:
+    """What the controller did."""
+
+    word: str
+    seconds: float
+    tip: float
+    axis_point: float
+    jerk: float
+
+
+def paths(folder: Path | None) -> dict[str, Program]:
+    """Programs of feed moves only, all with one feed."""
+    sample = read(SAMPLE.read_bytes(), name=SAMPLE.name)
+    found = {SAMPLE.name: _feeding(sample, FIRST, LAST)}
+    for name, count in FILES if folder else ():
+        program = read((folder / name).read_bytes(), name=name)
+        found[name] = _feeding(program, 0, count)
+    return found
+
+
+def _feeding(program: Program, first: int, last: int) -> Program:
+    part = slice(first, last)
+    assert (program.kind[part][1:] == Move.LINEAR).all()
+    return Program.from_poses(program.tip[part], program.axis[part], feed=FEED, source=program.source)
+
+
+def unsmoothed(program: Program, blend: float) -> bytes:
+    """The poses themselves in rotary words, nothing between them."""
+    kept = replace(program, keep=np.ones(len(program), np.uint8))
+    return _text(kept, Settings(tolerance=LOOSE, lines="dense", blend_share=blend / LOOSE))
+
+
+def ours(program: Program, tolerance: float, lines: str) -> bytes:
+    """What the program writes."""
+    return _text(program, Settings(tolerance=tolerance, axis_length=AXIS_LENGTH, lines=lines))
+
+
+def _text(program: Program, settings: Settings) -> bytes:
+    form = choose_form("linuxcnc", machine=load_machine(MACHINE))
+    stream = io.BytesIO()
+    write(smooth(program, fit_settings(settings, form, program.units)), stream, form=form)
+    return stream.getvalue()
+
+
+def execute(program: Program, text: bytes) -> Executed:
+    """Run the text and measure what the axes did from the first pose on."""
+    word, joints, _ = run_controller(text, 900.0, STATED)
+    if not len(joints):
+        return Executed(word, np.nan, np.nan, np.nan, np.nan)
+    tip, axis = tool(joints)
+    poses = np.concatenate((tip, tip + AXIS_LENGTH * axis), axis=1)
+    cuts = original(program, AXIS_LENGTH)
+    begin = _arrival(poses, cuts[0][0])
+    tip_error, axis_error = deviations(poses[begin:], cuts)
+    jerk = np.diff(joints[begin:, 3:], n=3, axis=0) / SERVO_SECONDS**3
+    seconds = (len(joints) - begin) * SERVO_SECONDS
+    return Executed(word, seconds, tip_error, axis_error, float(np.sqrt((jerk**2).mean())))
+
+
+def _arrival(poses: Floats, start: Floats) -> int:
+    """First sample that is as near to the start as it gets: the tool comes from elsewhere with the same feed."""
+    away = np.linalg.norm(poses - start, axis=1)
+    near = int(np.argmax(away < 0.1))
+    return near + int(np.argmin(away[near : near + 400]))
+
+
+def main(arguments: list[str]) -> int:
+    """Print the table."""
+    print("| path | text | lines | time s | tip mm | axis point mm | rms jerk of rotary axes deg/s3 |")
+    print("|---|---|---|---|---|---|---|")
+    complete = True
+    for name, program in paths(Path(arguments[0]) if arguments else None).items():
+        texts = {f"unsmoothed, G64 P{blend:g}": unsmoothed(program, blend) for blend in BLENDS}
+        for tolerance in TOLERANCES:
+            for lines in ("dense", "long"):
+                texts[f"-e {tolerance:g} --lines {lines}"] = ours(program, tolerance, lines)
+        for label, text in texts.items():
+            did = execute(program, text)
+            complete &= did.word == "done"
+            numbers = f"{did.seconds:.1f} | {did.tip:.4f} | {did.axis_point:.4f} | {did.jerk:.0f}"
+            print(f"| {name} | {label} | {len(text.splitlines())} | {numbers} |", flush=True)
+    return 0 if complete else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
