@@ -137,6 +137,7 @@ class Batches:
             self._lacking(0, len(task.original.pose) - 1, None, 0)
             return
         nc = Elements.joined(held)
+        held.clear()
         self.elements = len(nc)
         holes: HoleRuns = divide_at_holes(task.original, nc, task.axis_length)
         self.problems += holes.problems

@@ -237,6 +237,7 @@ class Elements:
     @classmethod
     def joined(cls, parts: Sequence[Elements]) -> Elements:
         """Put parts of a text together, at least one; what holds for all elements is that of the last."""
+        parts = [part for part in parts if len(part)] or parts[-1:]
         if len(parts) == 1:
             return parts[0]
         start = np.cumsum([0, *map(len, parts)]).tolist()

@@ -21,8 +21,8 @@ _BEYOND_VISIBLE = 3.0
 #: a tip that creeps goes at most so many times the room of the feed: `SHORT_STEPS` and two of which the room is two
 _CREEPING = (SHORT_STEPS + 2) / 2
 
-#: roundings that are looked at one by one in a batch
-_MOST_SINGLE = 5000
+#: elements that are looked at one by one in a run of wrong ones; none of those behind them is better
+_MOST_SINGLE = 50
 
 
 def check_feeds(distances: Distances, found: Findings) -> None:
@@ -52,7 +52,12 @@ def check_feeds(distances: Distances, found: Findings) -> None:
             own = tuple(np.full(len(among), column[k]) for column in (said, per_revolution, room))
             good[k] = bool(_same(own[0], own[1], own[2], feed, mode, among).any())
     wrong = np.flatnonzero(~good)
-    for k in wrong[:_MOST_SINGLE].tolist():
+    follows = np.diff(wrong, prepend=-2) == 1
+    in_a_row = 0
+    for k, joined in zip(wrong.tolist(), follows.tolist(), strict=True):
+        in_a_row = in_a_row + 1 if joined and not good[k - 1] else 0
+        if in_a_row >= _MOST_SINGLE:
+            continue
         among = _alike(match, int(element[k]), int(start[k]), int(end[k]))
         own = tuple(np.full(len(among), column[k]) for column in (said, per_revolution, room))
         if _same(own[0], own[1], own[2], feed, mode, among).any():
