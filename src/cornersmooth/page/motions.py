@@ -13,10 +13,11 @@ from cornersmooth.verify import NcProgram, deviation_along
 from cornersmooth.verify.elements import Element
 from cornersmooth.verify.polyline import written_at
 
-#: points on every curve or arc, and on every line of short texts and of long ones
-_ON_CURVES, _ON_LINES, _ON_MANY_LINES = 8, 2, 1
+#: points on every line and on every curve or arc: so many in all, between the least and the most of each
+_POINTS = 6000
+_ON_LINES, _ON_CURVES = (2, 16), (8, 32)
 
-#: elements from which a text is long
+#: elements from which lines have a point each
 _MANY = 100_000
 
 #: steps to the nearest point of a move
@@ -127,10 +128,13 @@ def written_path(
 ) -> WrittenPath:
     """Points of a text that was read, each with its place on the original and its deviation."""
     bent = np.isin(nc.kind, (Element.ARC, Element.CURVE))
-    lines = _ON_LINES if len(nc) < _MANY else _ON_MANY_LINES
-    samples = _ON_CURVES if bent.any() else lines
+    share_of_each = _POINTS // max(len(nc), 1)
+    lines = int(np.clip(share_of_each, *_ON_LINES)) if len(nc) < _MANY else 1
+    samples = lines
+    if bent.any():  # a multiple, so that points on lines are among those that are measured
+        samples *= -(-int(np.clip(share_of_each, *_ON_CURVES)) // lines)
     rapid = nc.kind == Element.RAPID
-    pieces = np.where(rapid, 1, np.where(bent, samples, min(samples, lines)))
+    pieces = np.where(rapid, 1, np.where(bent, samples, lines))
     pieces[:1] = 1
     element = np.repeat(np.arange(len(nc)), pieces)
     share = (np.arange(len(element)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1) / pieces[element]

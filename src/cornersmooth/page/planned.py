@@ -99,14 +99,17 @@ def feed_seconds(written: WrittenPath, rapid: float) -> Floats:
     return np.cumsum(60.0 * step / feed)
 
 
-def speeds_along(planned: Planned, name: str, steps: Floats) -> Floats:
-    """Lowest and highest speed, mm/min, between neighbouring places (k + 1,) on the original: (2 k,); NaN in rapids."""
+def speeds_along(planned: Planned, name: str, steps: Floats, order: int = 1) -> Floats:
+    """Lowest and highest speed, mm/min, between neighbouring places (k + 1,) on the original: (2 k,); NaN in rapids.
+
+    With `order` 2 acceleration along the path, mm/s².
+    """
     law, (coordinate, way) = planned.laws[name], planned.ways[name]
     count = len(steps) - 1
     # the map may be vertical where the original is only turned: a little slope keeps it one to one
     looks = np.interp(np.linspace(0.0, count, count * _LOOKS, endpoint=False), np.arange(count + 1), steps)
     at = np.interp(looks, way + 1e-9 * np.arange(len(way)), coordinate)
-    speed = _path_speed(law, at, law.times_at(at)).reshape(count, _LOOKS)
+    speed = _path_speed(law, at, law.times_at(at), order).reshape(count, _LOOKS)
     found = np.empty((count, 2))
     low, high = np.nan_to_num(speed, nan=np.inf), np.nan_to_num(speed, nan=-np.inf)
     early = low.argmin(axis=1) < high.argmax(axis=1)
@@ -115,9 +118,9 @@ def speeds_along(planned: Planned, name: str, steps: Floats) -> Floats:
     return np.where(np.isfinite(found), found, np.nan).ravel()
 
 
-def speeds_over(law: TimeLaw, times: Floats) -> Floats:
-    """Speed, mm/min, at times (k,) s; NaN in rapids and after the end."""
-    speed = _path_speed(law, law.kinematics(times)[0], times)
+def speeds_over(law: TimeLaw, times: Floats, order: int = 1) -> Floats:
+    """Speed, mm/min, at times (k,) s; NaN in rapids and after the end. With `order` 2 acceleration, mm/s²."""
+    speed = _path_speed(law, law.kinematics(times)[0], times, order)
     return np.where(times <= law.total, speed, np.nan)
 
 
@@ -133,8 +136,8 @@ def axis_loads(law: TimeLaw, times: Floats) -> tuple[tuple[str, ...], Floats]:
     return tuple(law.machine_axes.names[index] for index in own), np.where(feeding, load, np.nan)
 
 
-def _path_speed(law: TimeLaw, at: Floats, times: Floats) -> Floats:
-    speed = 60.0 * law.kinematics(times)[1]
+def _path_speed(law: TimeLaw, at: Floats, times: Floats, order: int) -> Floats:
+    speed = (60.0 if order == 1 else 1.0) * law.kinematics(times)[order]
     path = law.path
     if not len(path):
         return speed

@@ -284,8 +284,12 @@ def _add_charts(
             pack.add(f"{scale}_{name}", np.repeat(_highest(values, where, steps), 2), "f4")
         times = np.linspace(0.0, last, 2 * count, endpoint=False)
         for name in planned.laws:
-            speeds = speeds_along(planned, name, steps) if scale == "way" else speeds_over(planned.laws[name], times)
-            pack.add(f"{scale}_speed_{name}", speeds, "f4")
+            for key, order in (("speed", 1), ("accel", 2)):
+                if scale == "way":
+                    values = speeds_along(planned, name, steps, order)
+                else:
+                    values = speeds_over(planned.laws[name], times, order)
+                pack.add(f"{scale}_{key}_{name}", values, "f4")
         # the machine follows the text; its axes along the way are taken when the text is there
         law = written_law if written_law is not None else planned.laws.get("local", planned.laws.get("direct"))
         if law is not None and law.machine_axes is not None:

@@ -39,12 +39,16 @@ class Charts {
         top: 1.15 * this.meta.tolerance,
       },
     ]);
-    const speeds = this.meta.charts.speeds.map((name) => ({
+    /** @param {string} key */
+    const laws = (key) => this.meta.charts.speeds.map((name) => ({
       name: `${name} ${told(this.meta.totals[name], "s", 4)}`,
-      key: `speed_${name}`,
+      key: `${key}_${name}`,
       colour: LAW_COLOURS[name] ?? PLAIN,
     }));
-    if (speeds.length) charts.push({ title: "planned speed", unit: "mm/min", series: speeds });
+    if (this.meta.charts.speeds.length) {
+      charts.push({ title: "planned speed", unit: "mm/min", series: laws("speed") });
+      charts.push({ title: "acceleration along the path", unit: "mm/s²", series: laws("accel") });
+    }
     const axes = this.meta.charts.axes ?? [];
     if (axes.length) {
       const series = axes.map((name, i) => ({ name, key: `axis_${name}`, colour: AXIS_COLOURS[i] }));
@@ -76,7 +80,7 @@ class Charts {
         height: CHART_HEIGHT,
         cursor: { sync: { key: "cornersmooth" }, drag: { x: true, y: false, dist: 6 }, points: { size: 6 } },
         legend: { live: true },
-        scales: { x: { time: false }, y: { range: (/** @type {any} */ _, /** @type {number} */ low, /** @type {number} */ high) => [Math.min(low ?? 0, 0), Math.max(1.05 * (high ?? 1), chart.top ?? 0)] } },
+        scales: { x: { time: false }, y: { range: (/** @type {any} */ _, /** @type {number} */ low, /** @type {number} */ high) => [Math.min(1.05 * (low ?? 0), 0), Math.max(1.05 * (high ?? 1), chart.top ?? 0)] } },
         series: [{ label: unit, value: (/** @type {any} */ _, /** @type {number} */ value) => told(value, unit, 5) }, ...series],
         axes: [{ ...axis, size: 26 }, { ...axis, size: 58 }],
         hooks: {

@@ -1,0 +1,92 @@
+"""The figures of the paper (10, 11, 14 to 16) as pages, made from the samples.
+
+python docs/make_pages.py [FOLDER]
+
+Figures 10 and 11 show the deviation of Table 1 at two tolerances, 14 and 15 speed and acceleration on an impeller blade
+with direct and smoothed motion, 16 the errors of the machined surface.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+OUT = ROOT / "build" / "pages"
+
+#: ``cornersmooth`` of the interpreter that runs this
+COMMAND = (sys.executable, "-m", "cornersmooth")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One page.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    sample : str
+    commands : tuple of tuple of str
+        Words behind ``cornersmooth``; ``IN``, ``NC`` and ``PAGE`` stand for the files.
+    """
+
+    name: str
+    sample: str
+    commands: tuple[tuple[str, ...], ...]
+
+
+LIMITS = ("--feed", "1800", "--accel", "1000", "--jerk", "5000", "--period", "2ms")
+PAPER = ("--method", "zhang2016", "-f", "g6.2", "--feed", "1800")
+
+FIGURES = (
+    Figure(
+        "figure10",
+        "paper_table1.csv",
+        (("smooth", "IN", "-e", "0.078", *PAPER, "-o", "NC", "--report", "PAGE", "--force"),),
+    ),
+    Figure(
+        "figure11",
+        "paper_table1.csv",
+        (("smooth", "IN", "-e", "0.15", *PAPER, "-o", "NC", "--report", "PAGE", "--force"),),
+    ),
+    Figure(
+        "figure14_15",
+        "impeller.cls",
+        (("time", "IN", "-e", "0.04", "-H", "12", *LIMITS, "--report", "PAGE", "--force"),),
+    ),
+    Figure(
+        "figure16",
+        "impeller.cls",
+        (
+            ("smooth", "IN", "-e", "0.04", "-H", "12", "-o", "NC", "--force", "-q"),
+            ("surface", "IN", "NC", "-e", "0.04", "-H", "12", "--stations", "140", "--report", "PAGE", "--force"),
+        ),
+    ),
+)
+
+
+def make(figure: Figure, folder: Path) -> Path:
+    """Run the commands of a figure; return its page."""
+    page = folder / f"{figure.name}.html"
+    files = {"IN": ROOT / "samples" / figure.sample, "NC": folder / f"{figure.name}.nc", "PAGE": page}
+    for words in figure.commands:
+        given = [str(files.get(word, word)) for word in words]
+        subprocess.run([*COMMAND, *given], check=True, stdout=subprocess.DEVNULL)
+    return page
+
+
+def main(folder: Path) -> int:
+    """Make all pages and say where they are."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for figure in FIGURES:
+        page = make(figure, folder)
+        sys.stdout.write(f"{os.path.relpath(page)}: {page.stat().st_size / 1e6:.2f} MB\n")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else OUT))
