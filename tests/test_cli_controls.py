@@ -159,8 +159,8 @@ def test_frame_of_the_text(tmp_path: Path) -> None:
     footer.write_text("G91 G28 Z0.\n")
     options = ("--header", header, "--footer", footer, "--program-name", "O0815", "--block-numbers")
     lines = lines_of(*options)
-    assert lines[1:5] == ["N10 O0815", "N20 G21 G90 G94 G17 G40 G49 G80", "N30 G91 G28 Z0.", "N40 G90"]
-    assert lines[5:7] == ["N50 (O0815 IN G21)", "N60 G54"]
+    assert lines[1:5] == ["O0815", "N10 G21 G90 G94 G17 G40 G49 G80", "N20 G91 G28 Z0.", "N30 G90"]
+    assert lines[5:7] == ["N40 (O0815 IN G21)", "N50 G54"]
     assert [line.partition(" ")[2] for line in lines[-3:-1]] == ["G91 G28 Z0.", "M30"]
 
 

@@ -143,11 +143,11 @@ class Shelf:
 
 
 def _merged(base: Table, changes: Table) -> Table:
-    """Return a table with changes: tables and lists of named tables are merged, ``false`` takes a table out."""
+    """Return a table with changes: tables and lists of named tables are merged, ``false`` takes one out."""
     result = dict(base)
     for key, value in changes.items():
         old = result.get(key)
-        if value is False and isinstance(old, dict):
+        if value is False and isinstance(old, dict | list):
             del result[key]
         elif isinstance(old, dict) and isinstance(value, dict):
             result[key] = _merged(old, value)

@@ -167,10 +167,10 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 def test_name_numbers_header_and_footer() -> None:
     frame = Frame("O4711", block_numbers=True, header=("({program} {units})",), footer=("G91 G28 Z0.", "G90"))
     lines = lines_of(choose_form("fanuc"), CL, frame=frame)
-    assert lines[:3] == ["%", "N10 O4711", "N20 G21 G90 G94 G17 G40 G49 G80"]
-    assert lines[3:6] == ["N30 G91 G28 Z0.", "N40 G90", "N50 (O4711 G21)"]
-    numbers = [int(line.split()[0][1:]) for line in lines[1:-1]]
-    assert numbers == list(range(10, 10 * len(lines) - 10, 10))
+    assert lines[:3] == ["%", "O4711", "N10 G21 G90 G94 G17 G40 G49 G80"]
+    assert lines[3:6] == ["N20 G91 G28 Z0.", "N30 G90", "N40 (O4711 G21)"]
+    numbers = [int(line.split()[0][1:]) for line in lines[2:-1]]
+    assert numbers == list(range(10, 10 * len(lines) - 20, 10))
     assert [line.partition(" ")[2] for line in lines[-5:-1]] == ["G49", "G91 G28 Z0.", "G90", "M30"]
     with pytest.raises(SettingsError, match=r"unknown braces; use \{program\}, \{units\}"):
         lines_of(choose_form("fanuc"), CL, frame=Frame(header=("{date}",)))

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
 
-from nc.writing import codes, text_of_cl
+from cornersmooth.cl import read
+from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.kinematics import load_machine
+from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from nc.writing import codes, lines_of, text_of_cl
 
 HEAD = ["%", "O0001", "G21 G90 G94 G17 G40 G49 G80", "G91 G28 Z0.", "G90"]
 TAIL = ["M30", "%"]
@@ -236,3 +244,29 @@ def test_fragments_say_what_is_missing() -> None:
     """No tool, no spindle, a first move at feed: each is counted."""
     _, written = text_of_cl("UNITS/MM\nFEDRAT/100,MMPM\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
     assert codes(written, fragment=False) == {"CS333": 1, "CS334": 1, "CS335": 1}
+
+
+def test_compensation_without_words_for_it_is_refused() -> None:
+    cl = "UNITS/MM\nLOADTL/1\nRAPID\nGOTO/0,0,9\nCUTCOM/LEFT\nFEDRAT/100,MMPM\nGOTO/9,0,0\nFINI\n"
+    with pytest.raises(InputError, match=r"part\.cls:5: error: heidenhain is given no cutter compensation"):
+        lines_of(choose_form("heidenhain"), cl)
+
+
+def test_several_tools_have_no_common_length_where_it_counts() -> None:
+    cl = "UNITS/MM\nLOADTL/1\nRAPID\nGOTO/0,0,9\nLOADTL/2\nRAPID\nGOTO/9,0,0\nFINI\n"
+    head, table = load_machine("head-ac"), load_machine("table-ac")
+    assert lines_of(choose_form("fanuc", machine=table, tcp=False), cl)
+    assert lines_of(choose_form("fanuc", machine=head, tcp=False), cl.replace("LOADTL/2\n", ""))
+    with pytest.raises(SettingsError, match=r"part\.cls:5: error: 2 tools, and head-ac has one tool_length"):
+        lines_of(choose_form("fanuc", machine=head, tcp=False), cl)
+
+
+@pytest.mark.parametrize(
+    ("axis", "machine", "count"), [("0,0,1", "", 0), ("0.6,0,0.8", "", 1), ("0.6,0,0.8", "table-ac", 0)]
+)
+def test_a_tilted_first_pose_is_said_where_the_text_cannot_turn_the_tool_before(axis, machine, count) -> None:
+    cl = f"UNITS/MM\nMULTAX\nLOADTL/1\nRAPID\nGOTO/0,0,9,{axis}\nFEDRAT/100,MMPM\nGOTO/9,0,0\nFINI\n"
+    program = read(cl.encode(), name="part.cls")
+    form = choose_form("fanuc", machine=load_machine(machine) if machine else None)
+    written = write(smooth(program, fit_settings(Settings(), form, program.units)), io.BytesIO(), form=form)
+    assert codes(written, fragment=False).get("CS337", 0) == count

@@ -44,8 +44,8 @@ def lines_of(form: Form, cl: str, *, frame: Frame | None = None) -> list[str]:
     return lines
 
 
-#: what is said of fragments that load no tool, start no spindle or begin at feed
-OF_FRAGMENTS = ("CS333", "CS334", "CS335")
+#: what is said of fragments that load no tool, start no spindle, begin at feed or tilted
+OF_FRAGMENTS = ("CS333", "CS334", "CS335", "CS337")
 
 
 def codes(written: Written, *, fragment: bool = True) -> dict[str, int]:

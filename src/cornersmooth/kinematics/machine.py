@@ -184,6 +184,11 @@ class Machine:
         """``"table-table"``, ``"table-head"`` or ``"head-head"``."""
         return "-".join(axis.carrier for axis in self.axes)
 
+    @property
+    def swings_the_tool(self) -> bool:
+        """Whether a rotary axis in the head moves the tip by the length of the tool."""
+        return any(axis.carrier == "head" for axis in self.axes)
+
     def describe(self) -> str:
         """Text of a few lines for people."""
         lines = [f"{self.name}: {self.description}" if self.description else self.name]
@@ -197,7 +202,7 @@ class Machine:
             )
         if self.preferred is not None:
             lines.append(f"  starts with {self.preferred[0]} {'positive' if self.preferred[1] > 0 else 'negative'}")
-        if any(axis.carrier == "head" for axis in self.axes):
+        if self.swings_the_tool:
             lines.append(f"  tool length {self.tool_length:g} mm")
         lines += [f"  {item.describe()}" for item in self.dynamics]
         return "\n".join(lines)

@@ -129,6 +129,8 @@ class Mode:
         Addresses of vector or point; rotary addresses come from the machine.
     on, off : tuple of str
         Blocks before the motion and behind it; with ``{offset}``, the length register.
+    within_on, within_off : tuple of str
+        Blocks that stand within these: the latter before the retract.
     begin : tuple of str or None
         In place of `ProgramTable.begin`.
     motion : Motion
@@ -144,6 +146,8 @@ class Mode:
     motion: Motion
     circles: bool
     timed_turns: bool
+    within_on: Blocks = ()
+    within_off: Blocks = ()
     begin: Blocks | None = None
 
 
@@ -220,6 +224,8 @@ class TextStyle:
         First words by which a comment would be an order to the control; they get a mark before them.
     block_number : str
         With ``{number}``; empty where blocks have none unless asked for.
+    unnumbered : str
+        Regular expression of what begins a line without number besides ``%``; empty for none.
     number_start, number_step, number_last : int
         After the last the first follows again; 0 for no last.
     longest_block : int
@@ -234,6 +240,7 @@ class TextStyle:
     comment: tuple[str, str] = ("(", ")")
     comment_orders: Blocks = ()
     block_number: str = ""
+    unnumbered: str = ""
     number_start: int = 10
     number_step: int = 10
     number_last: int = 0

@@ -46,7 +46,17 @@ _SHELF = Shelf(
 )
 
 _FORM_KEYS = ("description", "curve", *get_args(Orientation))
-_MODE_KEYS = ("words", "on", "off", "begin", "circles", "timed_turns", *(item.name for item in fields(Motion)))
+_MODE_KEYS = (
+    "words",
+    "on",
+    "off",
+    "within_on",
+    "within_off",
+    "begin",
+    "circles",
+    "timed_turns",
+    *(item.name for item in fields(Motion)),
+)
 _PLANES = {"xy": 17, "zx": 18, "yz": 19}
 _FEED_MODES = {
     "per_minute": int(FeedMode.PER_MINUTE),
@@ -267,6 +277,8 @@ def _mode(entry: Table, motion: Table, where: str) -> Mode:
         words=_blocks(entry.get("words", []), f"{where}.words"),
         on=_blocks(entry.get("on", []), f"{where}.on"),
         off=_blocks(entry.get("off", []), f"{where}.off"),
+        within_on=_blocks(entry.get("within_on", []), f"{where}.within_on"),
+        within_off=_blocks(entry.get("within_off", []), f"{where}.within_off"),
         begin=_blocks(entry["begin"], f"{where}.begin") if "begin" in entry else None,
         motion=_record(Motion, {**motion, **{key: value for key, value in entry.items() if key in own}}, where),
         circles=_flag(entry.get("circles", False), f"{where}.circles"),

@@ -87,6 +87,14 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
         vectors = [name for name, other in form.table.forms.items() if "vector" in other.modes]
         hint = f"use -f {vectors[0]}" if vectors else "name your machine with --machine"
         _refuse_tilt(form, program, settings, tilt, text, hint)
+    if form.orientation == "machine" and form.machine is not None and form.machine.swings_the_tool:
+        loads = [statement for statement in program.statements if statement.word in ("LOADTL", "LOAD", "TURRET")]
+        tools = {tuple(statement.args[:2]) for statement in loads}
+        if len(tools) > 1:
+            what = f"{len(tools)} tools, and {form.machine.name} has one tool_length that goes into every position"
+            hint = "write a file for each tool, or let the control keep the tool tip"
+            line = next(one.line for one in loads if tuple(one.args[:2]) != tuple(loads[0].args[:2]))
+            raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
     if form.rotary and form.curves and len(program.arcs):
         turn = np.zeros(len(program))
         pose = program.arcs.pose

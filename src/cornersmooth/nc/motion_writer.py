@@ -23,6 +23,9 @@ from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
 
+#: cosine of the angle from Z beyond which a tool is tilted
+_UPRIGHT = 1.0 - 1e-6
+
 #: a pose that no program has
 _NOWHERE = 1 << 62
 
@@ -255,6 +258,7 @@ class MotionWriter:
             yield from self._blocks(self.operation.begin(self.writer.rotary_blocks(first)))
         if self.operation.retracted:
             self.operation.retracted = False
+            self._warn_of_tilt(int(run.move[0]))
             yield from self._blocks(self.writer.approach(first))
             if not run.rapid[0]:
                 text = "the first motion of a tool is a feed move: it feeds down from the height of the retract"
@@ -262,6 +266,12 @@ class MotionWriter:
         self._warn_of_standing_still(run)
         self._position = self._last = run.ticks[-1]
         yield self.writer.text(run, dwell)
+
+    def _warn_of_tilt(self, pose: int) -> None:
+        """Say that the control turns the tool on its own behind a retract: the text cannot turn it before."""
+        if not self.writer.form.rotary and self.program.axis[pose][2] < _UPRIGHT:
+            text = "the first motion of a tool turns it to a tilted axis; see that it is free to, or name the machine"
+            self.findings.add("CS337", "warning", int(self.program.line[pose]), text)
 
     def _warn_of_standing_still(self, run: Run) -> None:
         """Say once that a tool moves that was not loaded, and for each tool that it cuts while the spindle stands."""

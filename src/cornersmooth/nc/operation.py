@@ -122,13 +122,13 @@ class Operation:
     def _tip_control_on(self) -> list[str]:
         self._tip_control = self._functions = True
         on = [block.format(offset=self.offset) for block in self.form.mode.on]
-        return [*self._extras("on", outside=True), *on, *self._extras("on", outside=False)]
+        return [*self._extras("on", outside=True), *on, *self.form.mode.within_on, *self._extras("on", outside=False)]
 
     def _functions_off(self) -> list[str]:
         if not self._functions:
             return []
         self._functions = False
-        return self._extras("off", outside=False)
+        return [*self._extras("off", outside=False), *self.form.mode.within_off]
 
     def _tip_control_off(self) -> list[str]:
         self.begun = False

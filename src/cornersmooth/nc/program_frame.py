@@ -152,7 +152,7 @@ class FramedText:
         parts = []
         number, step, last = self.next_number, self.layout.number_step, self.layout.number_last
         for line in lines:
-            if line in (b"%\n", b"\n"):
+            if line in (b"%\n", b"\n") or (self.layout.unnumbered and re.match(self.layout.unnumbered, line.decode())):
                 parts.append(line)
             else:
                 parts.append(b"%b%d%b%b" % (head, number, tail, line))

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from cornersmooth.errors import InputError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.control import Words
@@ -254,6 +255,14 @@ class StatementWriter:
         if words[:1] in (["OFF"], ["NOMORE"]):
             self._compensated = False
             return list(self.words.compensation_off) or None
+        if not self.words.compensation_left and words[:1] in (["LEFT"], ["RIGHT"]):
+            raise InputError(
+                "CS336",
+                f"{self.form.control} is given no cutter compensation, and the path would be cut without it",
+                "let the CAM system put the cutter's radius into the path",
+                file=self.program.source.name,
+                line=statement.line,
+            )
         planes = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
         side = {"LEFT": self.words.compensation_left, "RIGHT": self.words.compensation_right}.get((words or [""])[0])
         register = whole_number(numbers or [float(self.operation.offset)])

@@ -69,6 +69,7 @@ ISO_WORDS: Mapping[str, IsoWords] = {
     "haas": IsoWords(
         {43.0: "G43", 234.0: "G234", 49.0: ""},
         {"angles": ("G234",), "machine": ("", "G43"), "vector": ("G234",)},
+        unsaid=frozenset((("coolant", 7.0),)),
         dwell=1000.0,
     ),
     "linuxcnc": IsoWords(
