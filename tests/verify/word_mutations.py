@@ -21,6 +21,10 @@ from cornersmooth.nc import fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
+from cornersmooth.verify.block_tables import read_lines
+from cornersmooth.verify.reader import Reader
+from cornersmooth.verify.style import Style
+from cornersmooth.verify.word_check import WordCheck
 from nc.cases import RUNNABLE, Case
 
 from .form_mutations import EPS, PLACE, H, program_of
@@ -111,6 +115,12 @@ class Mutant:
     text: str = ""
     end: str = "\n"
 
+    def found(self, named: list[tuple[int, str]]) -> bool:
+        """Whether what is named is what should be."""
+        if self.where is None:
+            return not named
+        return any(self.where[0] <= line <= self.where[1] for line, _ in named)
+
 
 @dataclass
 class Score:
@@ -120,13 +130,14 @@ class Score:
     right: Counter[str] = field(default_factory=Counter)
     wrong: list[tuple[str, Mutant, list[tuple[int, str]]]] = field(default_factory=list)
 
-    def take(self, case: Case, mutant: Mutant, named: list[tuple[int, str]]) -> None:
-        """Judge one."""
+    def take(self, case: Case, mutant: Mutant) -> None:
+        """Judge one; what is found while the text is read needs no measuring."""
         self.judged[mutant.kind] += 1
-        if mutant.where is None:
-            good = not named
-        else:
-            good = any(mutant.where[0] <= line <= mutant.where[1] for line, _ in named)
+        named: list[tuple[int, str]] = []
+        good = mutant.where is not None and mutant.found(named_by_words(case, mutant.lines, mutant.end))
+        if not good:
+            named = named_in(case, mutant.lines, mutant.end)
+            good = mutant.found(named)
         self.right[mutant.kind] += good
         if not good:
             self.wrong.append((str(case), mutant, named[:3]))
@@ -157,6 +168,26 @@ def named_in(case: Case, lines: list[str], end: str = "\n") -> list[tuple[int, s
     except InputError as error:
         return [(error.line, f"{error.code} {error.what}")]
     return [(problem.nc_line, f"{problem.code} {problem.text}") for problem in found.problems]
+
+
+def named_by_words(case: Case, lines: list[str], end: str = "\n") -> list[tuple[int, str]]:
+    """What is wrong, as far as it is seen while the text is read; `verify` names that and what it measures."""
+    data = (end.join(lines) + end).encode("latin-1")
+    style = style_of(case)
+    reader = Reader(None, style, style.steps(data))
+    check = WordCheck(style.control, style.dialect.lexer, EPS)
+    try:
+        for _ in reader.chunks(check.watch(read_lines(data, None, style.dialect.lexer))):
+            pass
+    except InputError as error:
+        return [(error.line, error.what)]
+    return [(problem.nc_line, problem.text) for problem in (*check.problems, *reader.problems)]
+
+
+@cache
+def style_of(case: Case) -> Style:
+    """How the text of a case is read."""
+    return Style.of(case.control, case.choose().machine, tcp=case.tcp, tolerance=EPS, axis_length=H)
 
 
 class Text:
@@ -387,7 +418,7 @@ def judged(cases: list[Case], each: int, most: int | None = None, told: Callable
             assert named_in(case, text_of(case)) == []
             if told is not None:
                 told(f"{place} of {len(chosen)} mutants judged, {len(score.wrong)} wrongly; next: {case}")
-        score.take(case, mutant, named_in(case, mutant.lines, mutant.end))
+        score.take(case, mutant)
     return score
 
 

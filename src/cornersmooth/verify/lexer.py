@@ -37,6 +37,8 @@ class Lexer:
     begins: re.Pattern[bytes]
     #: names of words that make a block move the tool or belong to a curve
     places: frozenset[str] = frozenset()
+    #: names of words that are worth something else without a decimal point: read on their own, to be complained of
+    points: frozenset[str] = frozenset()
 
     def line(self, text: bytes, number: int, name: str | None) -> Line:
         """Take one line apart.
@@ -87,7 +89,13 @@ class Lexer:
     def motion(self, line: Line) -> Columns | None:
         """Columns of a motion block; None where the line is something else."""
         given = {word.name: word for word in line.words}
-        return self.block(given) if len(given) == len(line.words) else None
+        if len(given) < len(line.words) or any(map(self.without_point, line.words)):
+            return None
+        return self.block(given)
+
+    def without_point(self, word: Word) -> bool:
+        """Whether a number may be counted in the least increment of the control; zero is zero in any case."""
+        return word.name in self.points and word.value != 0.0 and "." not in word.text
 
     def block(self, given: Mapping[str, Word]) -> Columns | None:
         """Columns of a block with such words; None where they are no motion block."""

@@ -233,9 +233,6 @@ class WordCheck:
             return rules
         for word, rule in zip(words, rules, strict=True):
             if rule is not None:
-                if self._without_point(word):
-                    text = f"{word} without a decimal point: the control may count it in its least increment"
-                    self._wrong(NOT_LISTED, number, text)
                 continue
             fitting = [rule for rule in self.list.words if rule.pattern.fullmatch(word)]
             if fitting and not fitting[0].never:
@@ -244,12 +241,12 @@ class WordCheck:
                 self._wrong(NOT_LISTED, number, f"{word} is not on the list of words for this control")
         return rules
 
-    def _without_point(self, word: str) -> bool:
-        return word[0] in self.list.points and "." not in word and word[1:2] != "" and word[1:].lstrip("-+").isdigit()
-
     def _places(self, line: Line, words: list[str], rules: list[WordRule | None], before: str) -> None:
         """Complain of words that are not in their place."""
         number = line.number
+        for spelt in filter(self.lexer.without_point, line.words):
+            text = f"{spelt.text} without a decimal point: the control may count it in its least increment"
+            self._wrong(NOT_LISTED, number, text)
         names = [word.name for word in line.words if word.name not in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
             self._wrong(NOT_LISTED, number, f"{name} stands twice in one block")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from cornersmooth.verify.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, Dialect, State
 from cornersmooth.verify.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.verify.word_list import word_list
 from cornersmooth.verify.words import MOTION_CODES, NURBS, Columns, Line, Word
 
 #: letters whose words are events
@@ -98,7 +99,7 @@ class Iso(Dialect):
 
     def __init__(self, name: str, rotary: str = "") -> None:
         self.iso = ISO_WORDS[name]
-        super().__init__(_LinuxLexer(rotary) if self.iso.semicolon else _IsoLexer(rotary), rotary)
+        super().__init__((_LinuxLexer if self.iso.semicolon else _IsoLexer)(rotary, word_list(name).points), rotary)
         self.controls, self.unsaid, self.curves_need = self.iso.controls, self.iso.unsaid, self.iso.curves_need
 
     def words(self, line: Line, state: State) -> None:
@@ -184,6 +185,8 @@ class _IsoLexer(Lexer):
     ----------
     rotary : str
         Addresses of the rotary axes; empty without a machine.
+    points : frozenset of str
+        See `Lexer.points`.
     """
 
     word = re.compile(rf"([A-Z])[ \t]*({NUMBER})|(<[^>]*>)")
@@ -191,8 +194,8 @@ class _IsoLexer(Lexer):
     comment = re.compile(r"\(([^)]*)\)|;[ \t]*$")
     begins = re.compile(rb"\n[ /]*(?:N\d+ *)?G")
 
-    def __init__(self, rotary: str) -> None:
-        self._rotary = rotary
+    def __init__(self, rotary: str, points: frozenset[str]) -> None:
+        self._rotary, self.points = rotary, points
         # beside rotary words K is a knot, and I J stand on arcs only
         self.letters = frozenset("GXYZFRPIJK" + (rotary or "UVW"))
         self.places = frozenset("XYZK" + (rotary or "IJUVW"))
