@@ -23,7 +23,7 @@ from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.reader import Reader
-from cornersmooth.verify.style import Style
+from cornersmooth.verify.reading_options import ReadingOptions
 from cornersmooth.verify.word_check import WordCheck
 from nc.cases import RUNNABLE, Case
 
@@ -173,11 +173,11 @@ def named_in(case: Case, lines: list[str], end: str = "\n") -> list[tuple[int, s
 def named_by_words(case: Case, lines: list[str], end: str = "\n") -> list[tuple[int, str]]:
     """What is wrong, as far as it is seen while the text is read; `verify` names that and what it measures."""
     data = (end.join(lines) + end).encode("latin-1")
-    style = style_of(case)
-    reader = Reader(None, style, style.steps(data))
-    check = WordCheck(style.control, style.dialect.lexer, EPS)
+    options = options_of(case)
+    reader = Reader(None, options, options.steps(data))
+    check = WordCheck(options.control, options.dialect.lexer, EPS)
     try:
-        for _ in reader.chunks(check.watch(read_lines(data, None, style.dialect.lexer))):
+        for _ in reader.chunks(check.watch(read_lines(data, None, options.dialect.lexer))):
             pass
     except InputError as error:
         return [(error.line, error.what)]
@@ -185,9 +185,9 @@ def named_by_words(case: Case, lines: list[str], end: str = "\n") -> list[tuple[
 
 
 @cache
-def style_of(case: Case) -> Style:
+def options_of(case: Case) -> ReadingOptions:
     """How the text of a case is read."""
-    return Style.of(case.control, case.choose().machine, tcp=case.tcp, tolerance=EPS, axis_length=H)
+    return ReadingOptions.of(case.control, case.choose().machine, tcp=case.tcp, tolerance=EPS, axis_length=H)
 
 
 class Text:
