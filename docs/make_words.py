@@ -47,6 +47,8 @@ def roles(entry: dict[str, Any], kind: str) -> str:
         said.append(f"at most {entry['share']:g} ε")
     if entry.get("before"):
         said.append("before an arc")
+    if entry.get("high"):
+        said.append("only behind a retract")
     if entry.get("retract"):
         said.append("before the first motion, between two tools or at the end")
     if entry.get("never"):

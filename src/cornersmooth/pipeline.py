@@ -250,7 +250,7 @@ def _users_blocks(frame: Frame | None, form: Form, program: Program, settings: S
     if frame is None:
         return []
     units, blend = form.table.layout.units[program.units], blend_word(settings.tolerance / program.mm_per_unit)
-    texts = (*frame.header, *frame.footer)
+    texts = (*frame.header, *frame.footer, *(("work offset",) if frame.work_offset == "" else ()))
     return [text.replace("{units}", units).replace("{blend}", blend).replace("{program}", "") for text in texts]
 
 

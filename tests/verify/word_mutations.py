@@ -91,6 +91,7 @@ INSERTED = {
         "feed of words": ["M136", "M103 F50"],
     },
 }
+RETRACT = re.compile(r"G28|G53|M91|SUPA")
 DWELL = {
     "iso": "G91,G55,M5,M30,G0,G49,G20,X5.,G92 X0.,T5 M6,F5.,Q5".split(","),
     "siemens": "G91,G55,M5,M30,G0,L100,TRAFOOF,G700,D0,SUPA,X5,T5".split(","),
@@ -206,7 +207,8 @@ class Text:
         ]
 
     def _is_motion(self, line: str) -> bool:
-        return bool(PLACE.search(line) or "PO[" in line) and "(" not in line.replace("=(", "") and "FROM" not in line
+        moves = bool(PLACE.search(line) or "PO[" in line) and "(" not in line.replace("=(", "") and "FROM" not in line
+        return moves and not RETRACT.search(line)
 
     def _is_straight(self, k: int) -> bool:
         line = self.lines[k] if k < len(self.lines) else ""
@@ -281,12 +283,20 @@ def _heads(text: Text, rng: np.random.Generator, each: int) -> Iterator[Mutant]:
         if line.startswith(("G21 ", "G90 ", "G20 ", "G71")):
             for word in line.split():
                 left = " ".join(other for other in line.split() if other != word)
+                if word in text.lines[:first]:  # it is said again behind the retract
+                    continue
                 yield Mutant(f"head word lost: {_name(word)}", text.replaced(k, left), (1, first + 2), word)
             yield Mutant("safe line lost", text.replaced(k), (1, first + 2))
         if re.match(r"G64 ", line):
             yield Mutant("path control lost", text.replaced(k), (1, first + 2))
             yield Mutant("tolerance word beyond its share", text.replaced(k, "G64 P5. Q0"), (k + 1, k + 1))
             yield Mutant("tolerance word beyond its share", text.replaced(k, "G64"), (k + 1, k + 1))
+    for k, line in enumerate(text.lines):
+        if RETRACT.search(line):
+            yield Mutant("retract lost", text.replaced(k), (k - 1, len(text.lines)), line)
+    offsets = [k for k, line in enumerate(text.lines) if re.search(r"\bG54\b|DATUM SETTING", line)]
+    for k in offsets[:1]:
+        yield Mutant("work offset lost", text.replaced(k), (k, first + 3), text.lines[k])
     off = [k for k in text.statements if re.search(r"^G49$|TRAFOOF|RESET TCPM", text.lines[k]) and k > text.motion[-1]]
     for k in off:
         yield Mutant("tip control on at the end", text.replaced(k), (k - 1, len(text.lines)), text.lines[k])

@@ -42,7 +42,7 @@ class WordCheck:
     tolerance : float
         ε in units of the text.
     trusted : iterable of str
-        Blocks that belong where they stand because the user says so.
+        Blocks that belong where they stand because the user says so; names of states that the text leaves to him.
     """
 
     def __init__(self, control: str, lexer: Lexer, tolerance: float, trusted: Iterable[str] = ()) -> None:
@@ -51,6 +51,8 @@ class WordCheck:
         self.problems: list[Problem] = []
         #: blocks taken on trust: line and text
         self.trusted: list[tuple[int, str]] = []
+        trusted = tuple(trusted)
+        self._left = set(trusted)
         self._own = {_text(words) for words in map(self._words_of, trusted) if words}
         self._blocks = 0
         self._begun = 0
@@ -63,6 +65,7 @@ class WordCheck:
         self._before = ""
         self._then: tuple[WordRule, int] | None = None
         self._retract = 0
+        self._high = False
         self._arc: tuple[str, int] | None = None
         self._code = -1.0
         self._weights: dict[float, tuple[int, int]] = {}
@@ -100,7 +103,7 @@ class WordCheck:
             if name in table.columns:
                 self._count_weights(table, name, codes)
         linear = ~np.all([np.isnan(table.column(name)) for name in sorted(_LINEAR)], axis=0)
-        if (self._changed or self._retract or self._arc) and linear.any():
+        if (self._changed or self._high or self._retract or self._arc) and linear.any():
             row = int(np.argmax(linear))
             given = known[known <= row]
             self._moved(int(table.line[row]), float(codes[given[-1]]) if len(given) else self._code)
@@ -200,10 +203,15 @@ class WordCheck:
             word, _ = self._state[state]
             if not self._is_off(state, word):
                 self._wrong(NOT_ESTABLISHED, last, f"{state}: {word} still holds at the end")
+        if not self._high and any(rule.high for rule in self.list.words if not self._shadowed(rule)):
+            self._wrong(NOT_ESTABLISHED, last, "the tool is not retracted at the end")
         total = sum(count for count, _ in self._weights.values())
         for value, (count, line) in self._weights.items():
             if count < _SELDOM * total:
                 self._wrong(NOT_LISTED, line, f"a weight of {value:g} on a curve, where all others have other weights")
+
+    def _shadowed(self, rule: WordRule) -> bool:
+        return any(self.list.shadows(other, rule) for other in self.list.words)
 
     def _is_off(self, state: str, word: str) -> bool:
         return any(rule.state == state and rule.off and rule.pattern.fullmatch(word) for rule in self.list.words)
@@ -281,8 +289,10 @@ class WordCheck:
                     self._wrong(NOT_LISTED, number, f"{word} is more than {rule.share:g} of the tolerance")
             if rule.then is not None:
                 self._then = (rule, number)
+            if rule.high and not self._high:
+                self._wrong(NOT_LISTED, number, f"{word} without a retract before it")
             if rule.retract:
-                self._retract = number
+                self._retract, self._high = number, True
             if rule.after is not None or word.startswith("TOOL CALL "):
                 self._retract = 0
 
@@ -317,12 +327,12 @@ class WordCheck:
 
     def _moved(self, number: int, code: float) -> None:
         """Look at what holds where the tool moves."""
-        self._changed = False
+        self._changed = self._high = False
         if self._first is None:
             self._first = {state: word for state, (word, _) in self._state.items()}
             for state, rules in self.list.heads().items():
                 spoken = {word for word in self._said if any(rule.pattern.fullmatch(word) for rule in rules)}
-                if not spoken:
+                if not spoken and state not in self._left:
                     wanted = " or ".join(_shown(rule.pattern) for rule in rules)
                     self._wrong(NOT_ESTABLISHED, number, f"{state}: {wanted} must be said before the first motion")
             self._retract, self._arc = 0, None

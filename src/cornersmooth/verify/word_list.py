@@ -20,7 +20,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     ``needs``: a word that must stand in the same block, of whose state it may say more. ``must``: the same, for a word
     that is nothing without. ``alone``: no other words may stand beside it. ``before``: ``"arc"``. ``after``: a word
     that must have been said since the last time. ``then``, ``behind``: the next block, the block before. ``share``:
-    what the number in brackets may be of the tolerance. ``never``: the control has no such word.
+    what the number in brackets may be of the tolerance. ``never``: the control has no such word. ``high``: only behind
+    a retract; a control with such a word wants the tool high at the end, too.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but the approach of
     another tool.
@@ -59,6 +60,7 @@ class WordRule:
     behind: re.Pattern[str] | None = None
     share: float | None = None
     never: bool = False
+    high: bool = False
     retract: bool = False
 
 

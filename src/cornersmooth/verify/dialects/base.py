@@ -92,7 +92,7 @@ class Dialect:
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """Decimals of the tip and of the second triple, from a sample of the text; None without any."""
         tip, second = 0, None
-        for _, other, fraction in self.digits.findall(_COMMENT.sub(b"", text)):
+        for _, other, fraction in self.digits.findall(_COMMENT.sub(b"", text).upper()):
             if other:
                 second = max(second or 0, len(fraction))
             else:
