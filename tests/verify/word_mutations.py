@@ -261,7 +261,9 @@ def _points(text: Text, rng: np.random.Generator, each: int) -> Iterator[Mutant]
     if text.case.control not in ("fanuc", "mitsubishi", "haas"):
         return
     for k in _some(rng, text.motion, 2 * each):
-        words = list(re.finditer(r"(?<![A-Z0-9])[XYZABCIJKUVW]-?(\d+)\.\d*", text.lines[k]))
+        words = list(re.finditer(r"(?<![A-Z0-9])[XYZABCIJKUVW]-?(0*[1-9]\d*)\.\d*", text.lines[k]))
+        if not words:  # zero is zero in any increment
+            continue
         match = words[int(rng.integers(len(words)))]
         cut = match.start() + match[0].index(".")
         new = text.lines[k][:cut] + text.lines[k][match.end() :]
