@@ -74,6 +74,7 @@ def test_functions_of_the_control_are_asked_for_by_name() -> None:
 def test_comments_may_be_left_out() -> None:
     data = CL.replace(b"LOADTL/3", b"PPRINT SAID\nLOADTL/3")
     assert "(SAID)" in lines_of(data=data)
+    assert [line for line in lines_of(data=data) if line.startswith("(CORNERSMOOTH ")]
     assert not [line for line in lines_of("--no-comments", data=data) if "(" in line]
 
 
@@ -160,7 +161,8 @@ def test_frame_of_the_text(tmp_path: Path) -> None:
     options = ("--header", header, "--footer", footer, "--program-name", "O0815", "--block-numbers")
     lines = lines_of(*options)
     assert lines[1:5] == ["O0815", "N10 G21 G90 G94 G17 G40 G49 G80", "N20 G91 G28 Z0.", "N30 G90"]
-    assert lines[5:7] == ["N40 (O0815 IN G21)", "N50 G54"]
+    assert lines[5].startswith("N40 (CORNERSMOOTH ")
+    assert lines[7:9] == ["N60 (O0815 IN G21)", "N70 G54"]
     assert [line.partition(" ")[2] for line in lines[-3:-1]] == ["G91 G28 Z0.", "M30"]
 
 

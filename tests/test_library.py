@@ -59,7 +59,8 @@ def test_the_documented_examples_keep_the_tolerance(tmp_path, monkeypatch, toler
     assert names["result"].verification.passed
     one, steps = io.BytesIO(), (tmp_path / "part.nc").read_bytes()
     cornersmooth.postprocess(SAMPLE, one, Settings(tolerance=tolerance))
-    assert one.getvalue() == steps
+    lines = one.getvalue().splitlines()
+    assert [line for line in lines if not line.startswith((b"(CORNERSMOOTH ", b"(SHA256"))] == steps.splitlines()
 
 
 @pytest.mark.corpus

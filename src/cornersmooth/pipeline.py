@@ -6,6 +6,7 @@ will be written, how the text is to be read back) is put together here.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -15,13 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth import nc, smoothing
+from cornersmooth import __version__, nc, smoothing
 from cornersmooth.cl import read
 from cornersmooth.errors import Finding, InputError, PromiseError
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
 from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
+from cornersmooth.provenance import Provenance
 from cornersmooth.report import report
 from cornersmooth.settings import Settings
 from cornersmooth.verify import CONTROLS, Verification, Verifier, useful_processes
@@ -42,6 +44,8 @@ class Result:
     program : Program
     smoothed : SmoothProgram
     form : Form
+    frame : Frame
+        What stands around the motion, with what the text says of how it was made.
     written : Written
     verification : Verification or None
         None where the text was not read back.
@@ -58,6 +62,7 @@ class Result:
     program: Program
     smoothed: SmoothProgram
     form: Form
+    frame: Frame
     written: Written
     verification: Verification | None
     unverified: str
@@ -188,6 +193,8 @@ def postprocess(
             program = replace(program, feed=np.where(np.isnan(program.feed), feed, program.feed))
     with _timed(seconds, "smooth"):
         smoothed = smooth(program, settings, form=form, progress=_stage(progress, "smoothing"))
+    provenance = _provenance(source, program, smoothed.settings, form)
+    frame = replace(frame or Frame(), provenance=provenance.lines())
     with (
         open_output(target, hold=not unverified or require_verified, replace=may_replace) as output,
         ExitStack() as stack,
@@ -227,10 +234,34 @@ def postprocess(
     path = path_of(target)
     if output.rejected and path is not None:
         path += REJECTED
-    result = Result(program, smoothed, form, written, verification, unverified, findings, seconds, path)
+    result = Result(program, smoothed, form, frame, written, verification, unverified, findings, seconds, path)
     if output.rejected:
         raise _rejection(result, "breaks its promise" if broken else "is not verified")
     return result
+
+
+def _provenance(
+    source: Program | bytes | str | os.PathLike[str], program: Program, settings: Settings, form: Form
+) -> Provenance:
+    """What the text says of how it was made."""
+    digest = ""
+    if isinstance(source, bytes):
+        digest = hashlib.sha256(source).hexdigest()
+    elif not isinstance(source, Program):
+        with open(source, "rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    return Provenance(
+        version=__version__,
+        tolerance=settings.tolerance,
+        axis_length=settings.axis_length,
+        method=settings.method,
+        control=form.control,
+        form=form.name,
+        machine=form.machine.name if form.machine is not None and form.rotary else "",
+        tcp=form.orientation != "machine",
+        source=program.source.name,
+        sha256=digest,
+    )
 
 
 def _remarks(program: Program, settings: Settings) -> Iterator[Finding]:
@@ -245,22 +276,21 @@ def _remarks(program: Program, settings: Settings) -> Iterator[Finding]:
         yield Finding("CS182", "warning", 0, f"the tolerance {settings.tolerance:g} mm is larger than the whole path")
 
 
-def _users_blocks(frame: Frame | None, form: Form, program: Program, settings: Settings) -> list[str]:
+def _users_blocks(frame: Frame, form: Form, program: Program, settings: Settings) -> list[str]:
     """Blocks that the user wants before and behind the motion, as far as they are words: comments may be anything."""
-    if frame is None:
-        return []
-    units, blend = form.table.layout.units[program.units], blend_word(settings.tolerance / program.mm_per_unit)
+    units = form.table.layout.units[program.units]
+    blend = blend_word(settings.blend_share * settings.tolerance / program.mm_per_unit)
     texts = (*frame.header, *frame.footer, *(("work offset",) if frame.work_offset == "" else ()))
     return [text.replace("{units}", units).replace("{blend}", blend).replace("{program}", "") for text in texts]
 
 
-def _verified(verifier: Verifier, form: Form, frame: Frame | None) -> tuple[Verification | None, str]:
+def _verified(verifier: Verifier, form: Form, frame: Frame) -> tuple[Verification | None, str]:
     """What verification found, or why the text could not be read: the user's own words may be any."""
     try:
         found = verifier.result()
     except InputError as failure:
         own = form.table.own
-        if not own and (frame is None or not (frame.header or frame.footer)):
+        if not (own or frame.header or frame.footer):
             raise
         return None, f"{failure.what}, NC line {failure.line}"
     unsure = [f"{block}, NC line {line}" for line, block in found.trusted[:_TRUSTED_TOLD]]

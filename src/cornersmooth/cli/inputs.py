@@ -40,7 +40,7 @@ def find_inputs(named: tuple[str, ...], patterns: tuple[str, ...]) -> list[Input
     Raises
     ------
     SettingsError
-        CS223: a folder without any such file.
+        CS224: a folder without any such file.
     """
     found = []
     for name in named:
@@ -48,7 +48,7 @@ def find_inputs(named: tuple[str, ...], patterns: tuple[str, ...]) -> list[Input
             inside = _inside(name, patterns or PATTERNS)
             if not inside:
                 wanted = ", ".join(patterns or PATTERNS)
-                raise SettingsError("CS223", f"no file in {name} is like {wanted}", "name others with --glob")
+                raise SettingsError("CS224", f"no file in {name} is like {wanted}", "name others with --glob")
             found += inside
         else:
             found.append(Input(name, "stdin" if name == STANDARD else _stem(os.path.basename(name))))

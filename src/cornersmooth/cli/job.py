@@ -253,7 +253,7 @@ def _picture(job: Job, result: Result, contents: dict[str, Any]) -> bytes:
     title = f"{os.path.basename(result.program.source.name)}\n{verdict(contents)}"
     tolerance = result.smoothed.settings.verified_tolerance
     form = os.path.splitext(job.plot)[1].lower().lstrip(".")
-    nc = read_written(result, job.frame)
+    nc = read_written(result, result.frame)
     return draw_path(result.program, nc, result.smoothed, title, form, tolerance=tolerance)
 
 
@@ -272,7 +272,7 @@ def _write_report(
         from cornersmooth.page import result_page
 
         limits = Limits() if job.feed is None else Limits(feed=job.feed)
-        texts = iter([result_page(result, source=source, frame=job.frame, limits=limits, tool=job.tool)])
+        texts = iter([result_page(result, source=source, frame=result.frame, limits=limits, tool=job.tool)])
     with open_output(target_of(path), replace=may_replace) as output:
         for text in texts:
             output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8

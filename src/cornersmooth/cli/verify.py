@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import os
+import stat
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +14,7 @@ import click
 from cornersmooth.cli import options
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
 from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
@@ -49,9 +53,11 @@ def command(source: str, text: str, **given: Any) -> int:
     Tip and axis point must stay within the tolerance of their paths, in order; rapids, statements, feeds and exact
     poses must be where the CL file has them. Shares no code with what smooths and writes.
 
+    A text that cornersmooth has written says in its head how; options say it of other texts, and otherwise.
+
     \b
     Examples:
-      cornersmooth verify part.cls part.nc -e 0.04
+      cornersmooth verify part.cls part.nc
       cornersmooth verify part.cls part.nc -e 0.04 -H 25 --report found.json --report poses.csv
       cornersmooth verify part.cls part.mpf -e 0.04 --control siemens
       cornersmooth verify part.cls part.ngc -e 0.04 --control linuxcnc --machine xyzac-trt
@@ -65,13 +71,14 @@ def command(source: str, text: str, **given: Any) -> int:
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     form = _check_outputs(source, text, given)
+    data, name = read_input(source)
+    nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
+    remark = _take_over(given, nc, data)
     own = options.control_of(given).own
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
     how = {**measures, **options.reading_back_of(given)}
-    data, name = read_input(source)
     program = read(data, name=name, **options.reading_of(given))
     pages = [path for path in given["reports"] if path.lower().endswith(".html")]
-    nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     if given["plot"] or given["verbose"] or pages:  # it is looked at more than once
         nc = readable_twice(nc)
     trusted = [
@@ -95,6 +102,8 @@ def command(source: str, text: str, **given: Any) -> int:
         picture = draw_deviation(deviation_along(program, nc, **how), given["tolerance"], form)
         with open_output(target_of(given["plot"])) as output:
             output.stream.write(picture)
+    if remark:
+        click.echo(f"{text}: warning: {remark}", err=True)
     for line in _problems(found, name, given["verbose"]):
         click.echo(line, err=True)
     if not given["quiet"]:
@@ -104,6 +113,34 @@ def command(source: str, text: str, **given: Any) -> int:
             for line in _along(found, deviation_along(program, nc, **how)):
                 click.echo(line)
     return 0 if found.passed else 1
+
+
+def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source: bytes) -> str:
+    """Take what the text says of how it was made for options that were not given; return what is strange about it."""
+    from cornersmooth.kinematics import machine_names
+    from cornersmooth.nc import control_names
+    from cornersmooth.provenance import HEAD, read_provenance
+
+    head = nc if isinstance(nc, bytes) else b""
+    if not isinstance(nc, bytes):
+        with contextlib.suppress(OSError):  # who reads it all says why
+            if stat.S_ISREG(os.stat(nc).st_mode):
+                with open(nc, "rb") as file:
+                    head = file.read(HEAD)
+    made = read_provenance(head)
+    if made is None:
+        return ""
+    context = click.get_current_context()
+    said: dict[str, Any] = {"tolerance": made.tolerance, "axis_length": made.axis_length, "no_tcp": not made.tcp}
+    said |= {"control": made.control} if made.control in control_names() else {}
+    said |= {"machine": made.machine or None} if made.machine in ("", *machine_names()) else {}
+    typed = click.core.ParameterSource.COMMANDLINE
+    given |= {name: value for name, value in said.items() if context.get_parameter_source(name) != typed}
+    if made.machine and not given["machine"]:
+        raise SettingsError("CS225", f"the text is for the machine {made.machine}", "name its file with --machine")
+    if made.sha256 and made.sha256 != hashlib.sha256(source).hexdigest():
+        return "it was made from another CL file, or that has changed since: its SHA-256 is another"
+    return ""
 
 
 def _check_outputs(source: str, text: str, given: dict[str, Any]) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Program
+from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.control import Blocks, TextStyle
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
@@ -41,9 +42,11 @@ class Frame:
     header, footer : tuple of str
         Lines behind the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``.
     comments : bool
-        Whether what the CL file says in words is written.
+        Whether what the CL file says in words is written, and `provenance`.
     work_offset : str or None
         Such as ``G54``, or the number of a preset; None for that of the control's table, empty for none.
+    provenance : tuple of str
+        What the text is made of, for comments before the header.
     """
 
     program: str | None = None
@@ -52,6 +55,7 @@ class Frame:
     footer: tuple[str, ...] = ()
     comments: bool = True
     work_offset: str | None = None
+    provenance: tuple[str, ...] = ()
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
         """What stands for braces in the blocks around the motion and in those of extras.
@@ -97,9 +101,14 @@ class Frame:
                 raise SettingsError("CS216", f"{form.control} has no step for a {name}", f'write "{{{name}}}" into it')
         return {
             "work_offset": tuple(block.format(work_offset=offset) for block in blocks),
-            "header": tuple(_filled(self.header, values)),
+            "header": (*self._told(form.table.layout), *_filled(self.header, values)),
             "footer": tuple(_filled(self.footer, values)),
         }
+
+    def _told(self, layout: TextStyle) -> Blocks:
+        """Comments that say what the text is made of."""
+        texts = self.provenance if self.comments else ()
+        return tuple(line for text in texts for line in comment_lines(text, layout.comment, layout.comment_orders))
 
     def start(self, stream: Stream, form: Form) -> FramedText:
         """One text, nothing written yet."""

@@ -1,0 +1,95 @@
+"""What a text was made of and how, as comments in its head: enough to verify it without being told again."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+#: how much of a text may hold its head
+HEAD = 1 << 13
+
+_WORDS = re.compile(r"CORNERSMOOTH (?P<version>\S+): (?P<words>[^\r\n)]*)", re.IGNORECASE)
+_HASH = re.compile(r"\bSHA256=([0-9a-f]{64})\b", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """How a text was made.
+
+    Parameters
+    ----------
+    version : str
+        Of the program.
+    tolerance, axis_length : float, mm
+        ε and H.
+    method, control, form : str
+    machine : str
+        Empty for none.
+    tcp : bool
+        Whether the control keeps the tool tip.
+    source : str
+        Name of the CL file, without its folder.
+    sha256 : str
+        Of the CL file, in hexadecimal digits; empty where it is not known.
+    """
+
+    version: str
+    tolerance: float
+    axis_length: float
+    method: str
+    control: str
+    form: str
+    machine: str = ""
+    tcp: bool = True
+    source: str = ""
+    sha256: str = ""
+
+    def lines(self) -> tuple[str, ...]:
+        """Texts of the comments."""
+        words = {
+            "E": f"{self.tolerance:.9g}",
+            "H": f"{self.axis_length:.9g}",
+            "METHOD": self.method,
+            "CONTROL": self.control,
+            "FORM": self.form,
+            **({"MACHINE": self.machine} if self.machine else {}),
+            **({} if self.tcp else {"TCP": "no"}),
+        }
+        first = f"CORNERSMOOTH {self.version}: " + " ".join(f"{key}={_word(value)}" for key, value in words.items())
+        second = " ".join(([f"SHA256={self.sha256}"] if self.sha256 else []) + [f"CL={self.source}"])
+        return first, second
+
+
+def read_provenance(text: bytes) -> Provenance | None:
+    """How a text was made, as its head says; None where it says nothing that can be understood.
+
+    Parameters
+    ----------
+    text : bytes
+        The beginning of an NC text.
+    """
+    head = text[:HEAD].decode("latin-1")
+    found = _WORDS.search(head)
+    if found is None:
+        return None
+    words = dict(word.partition("=")[::2] for word in found["words"].split())
+    digest = _HASH.search(head, found.end())
+    try:
+        return Provenance(
+            version=found["version"],
+            tolerance=float(words["E"]),
+            axis_length=float(words["H"]),
+            method=words["METHOD"],
+            control=words["CONTROL"],
+            form=words["FORM"],
+            machine=words.get("MACHINE", ""),
+            tcp=words.get("TCP") != "no",
+            sha256=digest[1].lower() if digest else "",
+        )
+    except (KeyError, ValueError):
+        return None
+
+
+def _word(text: str) -> str:
+    """Name in the characters of a word."""
+    return re.sub(r"[^\w.+-]", "_", text, flags=re.ASCII)
