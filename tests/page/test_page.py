@@ -284,3 +284,11 @@ def test_surface_command(tmp_path):
     assert done.returncode == 2
     assert b"--tool 10,5" in done.stderr
     assert run("surface", source, nc, "--tool", "x").returncode == 2
+
+
+def test_a_path_without_any_feed_move_has_a_page():
+    path = "TOOL PATH/{name},TOOL,T\n$$ {comment}\nRAPID\nGOTO/0,0,20,0,0,1\nRAPID\nGOTO/9,0,20\nEND-OF-PATH\n"
+    meta, arrays = values_of(page_of(smoothed(path)))
+    assert meta["kept"] is True
+    assert not np.isfinite(arrays["w_off"]).any()
+    assert len(arrays["c_line"]) == 0

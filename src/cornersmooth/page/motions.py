@@ -145,13 +145,16 @@ def written_path(
     row[along.element[own] * samples + np.round(along.fraction[own] * samples).astype(np.int64) - 1] = own
     at = row[element * samples + np.round(share * samples).astype(np.int64) - 1]
     there = at >= 0
-    pose = np.where(there, along.pose[at], 0)
+    rows = at[there]
+    pose = np.zeros(len(element), np.int64)
+    pose[there] = along.pose[rows]
     place = np.full(len(element), np.nan)
     start = original.way[np.maximum(pose - 1, 0)]
-    place[there] = (start + along.share[at] * (original.way[pose] - start))[there]
+    place[there] = start[there] + along.share[rows] * (original.way[pose] - start)[there]
     way = _continued(place, tip, original)
     pose = np.where(there, pose, np.minimum(np.searchsorted(original.way, way), len(program) - 1))
-    tip_off, axis_off = np.where(there, along.tip[at], np.nan), np.where(there, along.axis_point[at], np.nan)
+    tip_off, axis_off, angle_off = np.full((3, len(element)), np.nan)
+    tip_off[there], axis_off[there], angle_off[there] = along.tip[rows], along.axis_point[rows], along.angle[rows]
     straight = np.flatnonzero(there & (program.kind[pose] == Move.LINEAR))
     place = along.share[at[straight]]
     for off, height in ((tip_off, 0.0), (axis_off, axis_length)):
@@ -169,7 +172,7 @@ def written_path(
         way=way,
         tip_off=tip_off,
         axis_off=axis_off,
-        angle_off=np.where(there, along.angle[at], np.nan),
+        angle_off=angle_off,
         feed=np.where(nc.per_revolution[element], np.nan, nc.feed[element]),
         curvature=_curvature(tip, end, rapid[element]),
         cl_line=program.line[pose],
