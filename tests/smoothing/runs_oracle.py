@@ -14,9 +14,9 @@ from oracle.motion import unit
 Floats = NDArray[np.float64]
 
 
-def through(*runs: Floats) -> Polylines:
+def through(*runs: Floats, step: float = 1e-5) -> Polylines:
     """Runs through points (n, 6), each."""
-    return Polylines.through(np.concatenate(runs), np.array([len(run) for run in runs]))
+    return Polylines.through(np.concatenate(runs), np.array([len(run) for run in runs]), step)
 
 
 def random_runs(seed: int, count: int, corners: int, axis_length: float, *, tame: bool = False) -> Polylines:

@@ -90,9 +90,13 @@ def rng_like(size: int) -> np.ndarray:
 
 def test_straight_run_stays_a_line() -> None:
     tip = np.outer(np.array([0.0, 1, 1.5, 4, 4.001, 9]), [1.0, 2, -1])
-    curves = solve_runs(through(np.hstack((tip, tip + np.array([0, 0, H])))), (0.01, 0.01), H)
+    curves = solve_runs(through(np.hstack((tip, tip + np.array([0, 0, H]))), step=1e-5), (0.01, 0.01), H)
     assert curves.kept.all()
-    assert max(curves.tip_bound[0], curves.axis_bound[0]) < 1e-9
+    assert max(curves.tip_bound[0], curves.axis_bound[0]) < 1e-5  # the parameter is the length but for its steps
+    assert np.linalg.norm(np.cross(curves.control[:, :3], tip[-1] / np.linalg.norm(tip[-1])), axis=1).max() < 1e-10
+    np.testing.assert_allclose(
+        curves.control[:, 3:] - curves.control[:, :3], [[0, 0, H]] * len(curves.control), atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("tolerance", [0.001, 0.01, 0.15])
@@ -122,7 +126,7 @@ def test_random_runs_keep_their_tolerance(
 ) -> None:
     tolerance = 10**exponent
     lines = random_runs(seed, 6, corners, axis_length)
-    lines = Polylines.through(lines.point + shift, lines.count)
+    lines = Polylines.through(lines.point + shift, lines.count, tolerance / 100)
     curves = solve_runs(lines, (tolerance, 0.9 * tolerance), axis_length)
     assert curves.kept.all()
     for run in range(len(lines.count)):
@@ -225,7 +229,7 @@ def test_translation_rotation_and_scaling_commute() -> None:
     for other, back in (
         (solve_runs(through(turned), (0.01, 0.01), H), lambda c: np.hstack((c[:, :3] @ q, c[:, 3:] @ q))),
         (solve_runs(through(shifted), (0.01, 0.01), H), lambda c: c - np.tile([12.0, -34.0, 56.0], 2)),
-        (solve_runs(through(2.5 * points), (0.025, 0.025), 2.5 * H), lambda c: c / 2.5),
+        (solve_runs(through(2.5 * points, step=2.5e-5), (0.025, 0.025), 2.5 * H), lambda c: c / 2.5),
     ):
         assert len(other.control) == len(plain.control)
         np.testing.assert_allclose(back(other.control), plain.control, rtol=0, atol=1e-6 * np.abs(points).max())

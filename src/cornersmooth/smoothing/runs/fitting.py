@@ -23,8 +23,8 @@ STRIDE = 8
 #: control points beside a new knot that are fitted anew
 REACH = 10
 
-#: rounds of refining, and the shortest span over the tolerance
-ROUNDS, SHORTEST = 30, 0.02
+#: rounds of refining, and the shortest span that is split, steps
+ROUNDS, SHORTEST = 30, 8
 
 #: reach of a sharp corner over ε and its turn: with 6 the corner alone would be ε off (docs/method.md, c = 1/6)
 _CORNER = 3.5
@@ -72,7 +72,7 @@ def fit(lines: Polylines, tolerances: tuple[float, float]) -> Fit:
         samples = Samples.of(splines, lines, pieces)
         control = _least_squares(splines, windows, samples, control)
         off[active] = _largest(splines, samples, control, tolerances)[active]
-        bad = active & (off > CLOSE) & (splines.width > SHORTEST * min(tolerances))
+        bad = active & (off > CLOSE) & (splines.width > SHORTEST)
         if not bad.any():
             break
         splines, control, active, off = _refine(lines, splines, control, off, np.flatnonzero(bad), corner)
@@ -86,7 +86,7 @@ def first_knots(lines: Polylines) -> Splines:
     chosen = (place == 0) | (place == last) | (place == 1) | (place == last - 1)
     chosen |= (place % STRIDE == 1) & (place < last - STRIDE // 2)
     first, end = lines.first[:-1], lines.first[1:] - 1
-    middles = np.stack(((lines.s[first] + lines.s[first + 1]) / 2.0, (lines.s[end] + lines.s[end - 1]) / 2.0), axis=1)
+    middles = np.stack((lines.s[first] + lines.s[first + 1], lines.s[end] + lines.s[end - 1]), axis=1) // 2.0
     run = np.concatenate((row[chosen], np.repeat(np.arange(len(first)), 2)))
     knot = np.concatenate((lines.s[chosen], middles.reshape(-1)))
     order = np.lexsort((knot, run))
@@ -162,7 +162,7 @@ def _largest(splines: Splines, samples: Samples, control: Floats, tolerances: tu
 
 
 def _corner_reach(lines: Polylines, tolerances: tuple[float, float]) -> Floats:
-    """(n,) how far from each pose a knot should stand where its corner is sharp, mm."""
+    """(n,) how far from each pose a knot should stand where its corner is sharp, steps."""
     reach = np.full(len(lines.s), np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = np.diff(lines.point, axis=0) / np.diff(lines.s)[:, None]
@@ -196,7 +196,7 @@ def _refine(
     near_low, near_high = at_low < 0.35 * width, at_high < 0.35 * width
     middle = ~(near_low | near_high)
     new_run += [run[near_low], run[near_high], run[middle]]
-    new_knot += [(low + at_low)[near_low], (high - at_high)[near_high], ((low + high) / 2.0)[middle]]
+    new_knot += [np.round(low + at_low)[near_low], np.round(high - at_high)[near_high], ((low + high) // 2.0)[middle]]
     return _insert(lines, splines, control, off, np.concatenate(new_run), np.concatenate(new_knot))
 
 

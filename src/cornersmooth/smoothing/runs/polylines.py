@@ -9,6 +9,9 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.runs.ranges import starts
 
+#: steps of the shortest segment: knots stand between its ends
+_LEAST = 4
+
 
 @dataclass(frozen=True)
 class Polylines:
@@ -20,25 +23,33 @@ class Polylines:
         Tip and axis point.
     count : (r,) int64
         Poses of each run, at least 2.
-    s : (n,) float64, mm
-        Length from the start of the run, by m(D) = √((|D_A|² + |D_B|²)/2): pure rotations count (design 3.2).
+    s : (n,) float64
+        Length from the start of the run in steps of `step`, whole numbers, by m(D) = √((|D_A|² + |D_B|²)/2): pure
+        rotations count (design 3.2).
+    step : float, mm
+        Poses and knots stand at whole steps, so that knots can be written with few digits. It is small beside ε, so
+        the parameter is the length but for what nobody can see.
     """
 
     point: Floats
     count: Ints
     s: Floats
+    step: float
 
     @classmethod
-    def through(cls, point: Floats, count: Ints) -> Polylines:
+    def through(cls, point: Floats, count: Ints, step: float) -> Polylines:
         """Measure the runs; neighbouring poses of a run are distinct."""
         first = starts(count)[:-1]
-        step = np.zeros(len(point))
-        step[1:] = np.sqrt((np.diff(point, axis=0) ** 2).sum(axis=1) / 2.0)
-        step[first] = 0.0
-        along = np.cumsum(step)
-        if len(count):  # lengths are summed anew in every run, so that none has the rounding of those before it
-            along -= np.repeat(along[first], count)
-        return cls(point, count, along)
+        length = np.zeros(len(point))
+        length[1:] = np.sqrt((np.diff(point, axis=0) ** 2).sum(axis=1) / 2.0) / step
+        length[first] = 0.0
+        along = np.cumsum(length)
+        along -= np.repeat(along[first], count)
+        # rounded, and at least `_LEAST` steps for every segment
+        place = _LEAST * np.arange(len(point))
+        whole = np.maximum.accumulate(np.round(along) - place + np.repeat(_floors(along, first, count), count)) + place
+        whole -= np.repeat(whole[first], count)
+        return cls(point, count, whole, step)
 
     @property
     def first(self) -> Ints:
@@ -66,3 +77,10 @@ class Polylines:
         """What keeps the runs apart on one scale."""
         ends = self.s[self.first[1:] - 1]
         return np.concatenate(([0.0], np.cumsum(ends[:-1] + 1.0)))
+
+
+def _floors(along: Floats, first: Ints, count: Ints) -> Floats:
+    """What lifts every run above those before it, so that a running maximum begins anew in each."""
+    ends = np.round(along[first + count - 1]) + _LEAST * count
+    lifts: Floats = np.concatenate(([0.0], np.cumsum(ends[:-1] + 1.0)))
+    return lifts

@@ -22,7 +22,7 @@ class Pieces:
         Span of the spline that the piece lies in.
     segment : (p,) int64
         Pose that the segment of the original motion starts from.
-    low, high : (p,) float64, mm
+    low, high : (p,) float64, steps
         Lengths s at both ends.
     """
 
@@ -69,7 +69,7 @@ class Samples:
     Parameters
     ----------
     piece, span : (m,) int64
-    s : (m,) float64, mm
+    s : (m,) float64, steps
     basis : (m, 4) float64
     target : (m, 6) float64, mm
         Point of the original motion.

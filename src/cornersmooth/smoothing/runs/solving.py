@@ -23,6 +23,9 @@ CORE, BESIDE = 192, 24
 #: spans solved at once
 BATCH = 16384
 
+#: step of the parameter over the tolerance
+STEP = 0.01
+
 #: share of the tolerance that the samples may use, and the least share that they are left
 SHARE, LEAST_SHARE = 0.97, 0.55
 

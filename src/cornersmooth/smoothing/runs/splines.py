@@ -21,8 +21,8 @@ class Splines:
 
     Parameters
     ----------
-    knot : (k,) float64, mm
-        Distinct knots of all runs, ascending in each.
+    knot : (k,) float64
+        In steps, see `Polylines`. Distinct knots of all runs, ascending in each.
     count : (r,) int64
         Knots of each run, at least 2.
     """
@@ -67,7 +67,7 @@ class Splines:
 
     @cached_property
     def width(self) -> Floats:
-        """(spans,) mm."""
+        """(spans,) steps."""
         widths: Floats = self.knot[self.span_knot + 1] - self.knot[self.span_knot]
         return widths
 
@@ -87,7 +87,7 @@ class Splines:
 
     @cached_property
     def greville(self) -> Floats:
-        """(controls,) mm: mean of the three inner knots of each control point; a line has its control points there."""
+        """(controls,) steps: mean of the three inner knots of each control point; a line has its control points there."""
         begin = np.arange(len(self.control_run)) + 4 * self.control_run
         means: Floats = (self._extended[begin + 1] + self._extended[begin + 2] + self._extended[begin + 3]) / 3.0
         return means
