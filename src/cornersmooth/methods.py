@@ -61,6 +61,14 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 "both segments cut at the same fraction, one parameter for both curves",
                 "cornersmooth.smoothing.proportional",
             ),
+            Method(
+                "global",
+                "one pair of curves for a whole run of corners, as smooth as the tolerance allows",
+                "cornersmooth.smoothing.global_runs",
+                prescribed=MappingProxyType(
+                    {"shape": "paper", "allocation": "half", "weights": (1.0, 1.0), "orientation_tolerance": None}
+                ),
+            ),
         )
     }
 )

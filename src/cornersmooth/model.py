@@ -304,6 +304,7 @@ class Status(IntEnum):
     DUPLICATE = 6  #: repeats the pose before it
     TOO_SHORT = 7  #: no room for a transition, or less than the output can show
     FEED_PER_REVOLUTION = 8  #: the output form has no curves at a feed per revolution
+    IN_RUN = 9  #: rounded together with its neighbours, by the curves of `SmoothProgram.runs`
 
 
 class LimitedBy(IntEnum):
@@ -370,9 +371,53 @@ class Corners:
 
     @property
     def smoothed(self) -> Bools:
-        """(k,) bool."""
+        """(k,) bool: rows with a transition of their own."""
         smoothed: Bools = self.status == Status.SMOOTHED
         return smoothed
+
+    @property
+    def rounded(self) -> Bools:
+        """(k,) bool: smoothed rows, and those that the curve of a run rounds."""
+        rounded: Bools = self.smoothed | (self.status == Status.IN_RUN)
+        return rounded
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Pairs of cubic B-splines, tip and axis point, that each replace a whole run of segments: r runs in path order.
+
+    Poses and knots stand at whole steps of the parameter s, which is the six-dimensional length (design 3.2) but for
+    the rounding to `step`. Knots of a run start at 0; the first and the last stand four-fold in its knot vector, so a
+    run with m + 1 knots has m + 3 control points.
+
+    Parameters
+    ----------
+    pose : (n,) int64
+        The distinct poses of all runs, first and last of each included; those two are passed exactly.
+    count : (r,) int64
+        Poses of each run.
+    s : (n,) float64, steps
+    step : float, mm
+    knot : (k,) float64, steps
+        Distinct knots of all runs.
+    knot_count : (r,) int64
+    control : (c, 6) float64, mm
+    tip_bound, axis_bound : (r,) float64, mm
+        Proven bounds of the deviation at common parameters: of the tip, and of b = tip + H·axis.
+    """
+
+    pose: Ints
+    count: Ints
+    s: Floats
+    step: float
+    knot: Floats
+    knot_count: Ints
+    control: Floats
+    tip_bound: Floats
+    axis_bound: Floats
+
+    def __len__(self) -> int:
+        return len(self.count)
 
 
 @dataclass(frozen=True)
@@ -388,9 +433,12 @@ class SmoothProgram:
         What it was made with.
     findings : tuple of Finding
         Those of the reader and those of the smoothing.
+    runs : Runs or None
+        Curves of whole runs; their corners have the status `Status.IN_RUN`.
     """
 
     program: Program
     corners: Corners
     settings: Settings
     findings: tuple[Finding, ...] = ()
+    runs: Runs | None = None

@@ -45,6 +45,9 @@ __all__ = [
 #: curve styles without weights
 _POLYNOMIAL = ("poly", "spl")
 
+#: curve styles that hold curves through whole runs of corners
+_LONG: tuple[str, ...] = ()
+
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
 _TURNING = ("bspline", "poly")
 
@@ -80,6 +83,12 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
         The form cannot hold what the settings ask for.
     """
     tolerance = settings.tolerance
+    if settings.method == "global" and form.curves and form.curve not in _LONG:
+        raise SettingsError(
+            "CS224",
+            f"{form.control} form {form.name} has no curves through whole runs of corners",
+            "use --method proportional, or a form of lines",
+        )
     if form.curve in _POLYNOMIAL and (settings.weights != (1.0, 1.0) or settings.shape != "paper"):
         raise SettingsError(
             "CS217",

@@ -52,7 +52,7 @@ def report(
     from cornersmooth import __version__
 
     program, corners = smoothed.program, smoothed.corners
-    done = corners.smoothed
+    done, runs = corners.rounded, smoothed.runs
     chains = program.chains
     worst = worst_corners(smoothed, dense=dense)
     summary: dict[str, Any] = {
@@ -64,17 +64,22 @@ def report(
         "not_smoothed": {
             STATUS_NAMES[status]: count
             for status in Status
-            if status != Status.SMOOTHED and (count := int((corners.status == status).sum()))
+            if status not in (Status.SMOOTHED, Status.IN_RUN) and (count := int((corners.status == status).sum()))
         },
         "sharp": sharp_count(corners),
-        "max_tip_error_mm": worst.tip_error,
-        "max_axis_error_mm": worst.axis_error,
+        "max_tip_error_mm": max(worst.tip_error, _largest(runs.tip_bound) if runs is not None else 0.0),
+        "max_axis_error_mm": max(worst.axis_error, _largest(runs.axis_bound) if runs is not None else 0.0),
         "max_orientation_error_deg": float(np.degrees(_largest(corners.orientation_error))),
         "length_mm": _feed_length(smoothed),
         "blocks_in": int(np.count_nonzero(program.kind != Move.FROM)),
         "blocks_out": blocks_out,
         "seconds": dict(seconds or {}),
     }
+    if runs is not None:
+        summary["runs"] = len(runs)
+        summary["run_poses"] = len(runs.pose)
+        summary["control_points"] = len(runs.control)
+        summary["control_points_per_pose"] = len(runs.control) / max(len(runs.pose), 1)
     summary |= construction_of(smoothed.settings.method).report_summary(corners)
     contents: dict[str, Any] = {
         "schema": SCHEMA,

@@ -23,6 +23,7 @@ STATUS_NAMES = {
     Status.DUPLICATE: "duplicate",
     Status.TOO_SHORT: "too_short",
     Status.FEED_PER_REVOLUTION: "feed_per_revolution",
+    Status.IN_RUN: "in_run",
 }
 LIMIT_NAMES = {
     LimitedBy.NOTHING: "",
@@ -127,7 +128,7 @@ class WorstCorners:
 def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = True) -> WorstCorners:
     """Find the `count` worst corners; most corners are settled by what bounds their errors."""
     corners = smoothed.corners
-    rows = np.flatnonzero(corners.smoothed)
+    rows = np.flatnonzero(corners.rounded)
     bound = np.maximum(corners.tip_error[rows], corners.axis_error[rows])
     order = np.argsort(-bound, kind="stable")
     rows, bound = rows[order], bound[order]

@@ -282,7 +282,7 @@ def _arcs(program: Program) -> ArcSummary:
 def _corners(program: Program, settings: Settings) -> CornerSummary:
     corners = smooth(program, settings).corners
     turn = _tip_turn(program, corners)
-    done = corners.smoothed
+    done = corners.rounded
     return CornerSummary(
         tolerance_mm=settings.tolerance,
         axis_length_mm=settings.axis_length,
@@ -295,7 +295,8 @@ def _corners(program: Program, settings: Settings) -> CornerSummary:
         not_smoothed={
             STATUS_NAMES[status]: count
             for status in Status
-            if status != Status.SMOOTHED and (count := int(np.count_nonzero(corners.status == status)))
+            if status not in (Status.SMOOTHED, Status.IN_RUN)
+            and (count := int(np.count_nonzero(corners.status == status)))
         },
         deviation_mm=Spread.of(np.maximum(corners.tip_error, corners.axis_error)[done]),
     )

@@ -17,6 +17,8 @@ from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.corner_table import Remainders
+from cornersmooth.smoothing.runs.lines import polylines_of, run_lines
+from cornersmooth.smoothing.runs.ranges import ranges
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 from cornersmooth.vectors import unit
 
@@ -73,6 +75,41 @@ class _Batch:
     move: Ints
 
 
+@dataclass(frozen=True)
+class _RunLines:
+    """Lines of whole runs, m in path order, and how many of them each pose of the program has."""
+
+    pose: Ints
+    tip: Floats
+    axis: Floats
+    count: Ints
+    inside: Bools
+
+    @classmethod
+    def of(cls, smoothed: SmoothProgram) -> _RunLines:
+        program, runs, n = smoothed.program, smoothed.runs, len(smoothed.program)
+        if runs is None:
+            nothing = np.zeros((0, 3))
+            return cls(np.zeros(0, np.int64), nothing, nothing, np.zeros(n, np.int64), np.zeros(n, np.bool_))
+        height = smoothed.settings.axis_length
+        pose, tip, axis = run_lines(
+            runs, polylines_of(runs, program.tip, program.tip + height * program.axis), smoothed.settings
+        )
+        count = np.bincount(pose, minlength=n)
+        return cls(pose, tip, axis, count, count > 0)
+
+    def replace(self, counts: Ints) -> Ints:
+        """Counts of rows with those of the runs in their places."""
+        return np.where(self.inside, self.count, counts)
+
+    def fill(self, batch: _Batch) -> None:
+        """Put the lines of the runs into their rows."""
+        here = np.flatnonzero(self.inside[batch.poses])
+        begin, end = np.searchsorted(self.pose, (batch.poses[0], batch.poses[-1] + 1))
+        rows = ranges(batch.first[here], batch.last[here] - batch.first[here])
+        batch.tip[rows], batch.other[rows] = self.tip[begin:end], self.axis[begin:end]
+
+
 def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses.
 
@@ -95,6 +132,8 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
         halves[corners.smoothed]
     )
     arc_counts = _arc_row_counts(smoothed, circles)
+    runs = _RunLines.of(smoothed)
+    counts = runs.replace(counts)
     for batch in _batches(smoothed, counts, arc_counts, poses):
         sharp = (segments.row[batch.poses] < 0) & (batch.last > batch.first)
         at = batch.last[sharp] - 1
@@ -102,6 +141,7 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
         _fill_divided(smoothed, segments, batch)
         _fill_transitions(smoothed, segments, batch, halves)
         arc = _fill_arcs(smoothed, batch, arc_counts, circles)
+        runs.fill(batch)
         yield Rows(batch.tip, batch.other, batch.move, *_no_curves(len(batch.tip)), arc=arc)
 
 

@@ -105,14 +105,14 @@ def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints
         _divide(settings, segments, poses[~joins], norm(turn)[~joins])
 
 
-def _turn_limit(settings: Settings, half_turn: Floats) -> Floats:
+def turn_limit(settings: Settings, half_turn: Floats, tolerance: float) -> Floats:
     """Largest change of axis in one line inside a segment whose axis turns by twice `half_turn`, rad.
 
-    Two things set it, each given half of `Settings.interpolation_tolerance` at distance H: controls turn vectors
+    Two things set it, each given half of `tolerance` (mm) at distance H: controls turn vectors
     linearly or on the great circle, which differ by up to θ³/54; and the ruled motion turns fastest in the middle of
     its segment, so that equal shares of a line's parameter and of the original's differ by up to θ²·tan(half_turn)/4.
     """
-    share = settings.interpolation_tolerance / 2.0 / settings.axis_length
+    share = tolerance / 2.0 / settings.axis_length
     limit = np.full_like(half_turn, math.cbrt(54.0 * share))
     tangent = np.tan(np.minimum(half_turn, math.radians(60)))
     steep = tangent > 0.0
@@ -138,7 +138,9 @@ def _divide(settings: Settings, segments: Segments, poses: Ints, chord: Floats) 
     high = np.arctan((2.0 * segments.axis_exit[pose] - 1.0) * np.tan(half))
     turn = high - low
     as_one = turn**2 / 4.0 * np.abs(np.tan((low + high) / 2.0)) + turn**3 / 54.0
-    lines = np.ceil(turn / _turn_limit(settings, np.maximum(np.abs(low), np.abs(high))) - 1e-9)
+    lines = np.ceil(
+        turn / turn_limit(settings, np.maximum(np.abs(low), np.abs(high)), settings.interpolation_tolerance) - 1e-9
+    )
     if settings.axis_step is None:
         lines[as_one <= share] = 1
     segments.lines[pose] = np.clip(lines, 1, _MOST_LINES).astype(np.int64)
@@ -177,7 +179,7 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     ):
         half = np.arcsin(np.minimum(np.sqrt(square(turn)) / (2.0 * settings.axis_length), 1.0))
         turned = 2.0 * half * reach + corners.orientation_error[rows]  # on this side of the middle
-        by_turn = np.maximum(by_turn, turned * more_turn / _turn_limit(settings, half))
+        by_turn = np.maximum(by_turn, turned * more_turn / turn_limit(settings, half, settings.interpolation_tolerance))
     graded = np.maximum(number, np.ceil(by_turn**1.5 - 1e-9))
     even = np.maximum(np.ceil(1.5 * by_chord), np.ceil(by_turn - 1e-9))
     chosen = np.where(even < graded, -np.maximum(even, 1.0), np.maximum(graded, 1.0))

@@ -49,7 +49,7 @@ class Polylines:
         place = _LEAST * np.arange(len(point))
         whole = np.maximum.accumulate(np.round(along) - place + np.repeat(_floors(along, first, count), count)) + place
         whole -= np.repeat(whole[first], count)
-        return cls(point, count, whole, step)
+        return cls(point, count, whole.astype(np.float64), step)
 
     @property
     def first(self) -> Ints:

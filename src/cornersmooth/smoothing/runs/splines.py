@@ -87,7 +87,7 @@ class Splines:
 
     @cached_property
     def greville(self) -> Floats:
-        """(controls,) steps: mean of the three inner knots of each control point; a line has its control points there."""
+        """(controls,) steps: mean of the three inner knots of each control point; those of a line stand there."""
         begin = np.arange(len(self.control_run)) + 4 * self.control_run
         means: Floats = (self._extended[begin + 1] + self._extended[begin + 2] + self._extended[begin + 3]) / 3.0
         return means

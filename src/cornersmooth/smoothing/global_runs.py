@@ -1,0 +1,149 @@
+"""`method="global"`: one pair of cubic B-splines for a whole run of corners (design 3.6, docs/global.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from cornersmooth.errors import Finding
+from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing.neighbours import find_neighbours
+from cornersmooth.smoothing.proportional import Proportional
+from cornersmooth.smoothing.runs.lines import TURNING, points_at
+from cornersmooth.smoothing.runs.polylines import Polylines
+from cornersmooth.smoothing.runs.ranges import ranges, spread, starts
+from cornersmooth.smoothing.runs.solving import STEP, RunCurves, solve_runs
+from cornersmooth.smoothing.transition import place_corners
+from cornersmooth.vectors import angle_between, norm
+
+#: corners that a run ends at: what keeps the pose, or what no curve within ε can follow
+ENDS_RUN = (
+    Status.REVERSAL,
+    Status.AXIS_STEP,
+    Status.FEED_CHANGE,
+    Status.KEPT,
+    Status.FEED_PER_REVOLUTION,
+)
+
+
+class GlobalRuns(Proportional):
+    """Corners of a run are rounded together; those of runs that cannot be are rounded one by one."""
+
+    def smooth(
+        self, program: Program, settings: Settings, progress: Callable[[int, int], None] | None = None
+    ) -> SmoothProgram:
+        """Round every corner by itself, then replace whole runs by one pair of curves."""
+        corners = place_corners(program, settings, self)
+        pose, count = find_runs(program, settings, corners)
+        if not len(count):
+            return SmoothProgram(program, corners, settings, program.findings)
+        point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
+        tolerances = settings.tip_tolerance, settings.axis_point_tolerance - TURNING * settings.tolerance
+        lines = Polylines.through(point, count, STEP * min(tolerances))
+        curves = solve_runs(lines, tolerances, settings.axis_length, progress)
+        runs = _kept(curves, pose)
+        findings = program.findings
+        if not curves.kept.all():
+            first = int(pose[lines.first[:-1][~curves.kept][0]])
+            findings = (*findings, _one_by_one(program, first, curves, count))
+        return SmoothProgram(program, _with_runs(corners, runs, curves, len(program)), settings, findings, runs)
+
+
+def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[Ints, Ints]:
+    """Poses of the runs that have a corner to round, repeated poses left out, and their number in each run."""
+    around = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
+    chains = program.chains
+    pose = ranges(chains[:, 0], chains[:, 1] - chains[:, 0] + 1)
+    chain, place = spread(chains[:, 1] - chains[:, 0] + 1)
+    distinct = ~around.duplicate[pose] | (place == 0)
+    pose, chain = pose[distinct], chain[distinct]
+    status = np.full(len(program), Status.KEPT, np.uint8)
+    status[corners.pose] = corners.status
+    inner = np.zeros(len(pose), np.bool_)
+    inner[1:-1] = (chain[1:-1] == chain[:-2]) & (chain[1:-1] == chain[2:])
+    joins = inner & ~np.isin(status[pose], ENDS_RUN)
+    bent = joins & np.isin(status[pose], (Status.SMOOTHED, Status.TOO_SHORT))
+    # a run is a row of segments whose inner poses all join; segment i leads from pose i to pose i + 1
+    segment = np.flatnonzero(chain[1:] == chain[:-1])
+    if not len(segment):
+        return pose[:0], pose[:0]
+    begins = ~joins[segment]
+    run = np.cumsum(begins) - 1
+    first = segment[begins]
+    number = np.bincount(run)
+    wanted = np.bincount(run, bent[segment]) > 0
+    return pose[ranges(first[wanted], number[wanted] + 1)], number[wanted] + 1
+
+
+def _kept(curves: RunCurves, pose: Ints) -> Runs:
+    """The runs that keep their tolerances."""
+    lines, splines, kept = curves.lines, curves.splines, curves.kept
+    poses = np.repeat(kept, lines.count)
+    return Runs(
+        pose=pose[poses],
+        count=lines.count[kept],
+        s=lines.s[poses],
+        step=lines.step,
+        knot=splines.knot[np.repeat(kept, splines.count)],
+        knot_count=splines.count[kept],
+        control=curves.control[kept[splines.control_run]],
+        tip_bound=curves.tip_bound[kept],
+        axis_bound=curves.axis_bound[kept],
+    )
+
+
+def _with_runs(corners: Corners, runs: Runs, curves: RunCurves, poses: int) -> Corners:
+    """Corners with those of the runs marked, and what is known of them."""
+    run, place = spread(runs.count)
+    inner = np.flatnonzero((place > 0) & (place < runs.count[run] - 1))
+    row_of = np.full(poses, -1, np.int64)
+    row_of[corners.pose] = np.arange(len(corners))
+    rows = row_of[runs.pose[inner]]
+    status, limited_by = corners.status.copy(), corners.limited_by.copy()
+    status[rows], limited_by[rows] = Status.IN_RUN, LimitedBy.TOLERANCE
+    values = {name: getattr(corners, name).copy() for name in ("tip_error", "axis_error", "orientation_error")}
+    tip, axis, turn = _at_poses(curves)
+    known = np.repeat(curves.kept, curves.lines.count)
+    for name, found in (("tip_error", tip), ("axis_error", axis), ("orientation_error", turn)):
+        values[name][rows] = found[known][inner]
+    trim_in, trim_out = corners.trim_in.copy(), corners.trim_out.copy()
+    trim_in[rows] = trim_out[rows] = 0.0
+    return replace(
+        corners,
+        status=status,
+        limited_by=limited_by,
+        trim_in=trim_in,
+        trim_out=trim_out,
+        axis_trim_in=trim_in,
+        axis_trim_out=trim_out,
+        **values,
+    )
+
+
+def _at_poses(curves: RunCurves) -> tuple[Floats, Floats, Floats]:
+    """Deviation of tip and axis point (mm) and of the axis (rad) at the poses of all runs, at common parameters."""
+    lines, splines = curves.lines, curves.splines
+    run, _ = spread(lines.count)
+    base = starts(splines.knot[splines.first[1:] - 1].astype(np.int64) + 1)[:-1]
+    keys = splines.knot + np.repeat(base, splines.count)
+    knot = np.searchsorted(keys, lines.s + base[run], side="right") - 1
+    knot = np.clip(knot, splines.first[run], splines.first[run + 1] - 2)
+    tip, axis = points_at(curves.control, splines, knot - run, lines.s)
+    lever = lines.point[:, 3:] - lines.point[:, :3]
+    size = norm(lever)[:, None]
+    off = tip - lines.point[:, :3]
+    top = off + size * axis - lever
+    return norm(off), norm(top), angle_between(axis, lever / size)
+
+
+def _one_by_one(program: Program, pose: int, curves: RunCurves, count: Ints) -> Finding:
+    kept: Bools = curves.kept
+    corners = int((count[~kept] - 2).sum())
+    text = "the curves of a run were not proved to keep the tolerance; its corners are rounded one by one"
+    return Finding("CS230", "note", int(program.line[pose]), text, corners)
+
+
+CONSTRUCTION = GlobalRuns()
