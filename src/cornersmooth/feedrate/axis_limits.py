@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.feedrate import bezier_halves
+from cornersmooth.feedrate.cubics import cubics, curved, stalling
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.motion import derivatives
@@ -106,7 +107,7 @@ def find_limit_coefficients(
     """
     if not len(path):
         return None
-    steady = ~_stalling(path)
+    steady = ~(_stalling(path) | stalling(path))
     vectors = [
         (AxisLimits(_tip, *limits.vector_limits[0]), ~path.turning),
         (AxisLimits(_tool_axis, *limits.vector_limits[1]), ~path.turning & steady),
@@ -123,18 +124,16 @@ def find_limit_coefficients(
     given = [(orders, bounds, where) for orders, bounds, where in given if np.isfinite(bounds).any()]
     if not given:
         return None
-    curved = (path.kind == Kind.CURVE) & ~path.turning
+    bent = curved(path) & ~path.turning
     asked = np.logical_or.reduce([where for _, _, where in given])
-    count = np.where(
-        asked, np.where(close, 2 * POLE_INTERVALS, np.where(curved, bezier_halves.INTERVALS, INTERVALS)), 1
-    )
+    count = np.where(asked, np.where(close, 2 * POLE_INTERVALS, np.where(bent, bezier_halves.INTERVALS, INTERVALS)), 1)
     begin = np.concatenate(([0], np.cumsum(count)))
     total = int(begin[-1])
     width, cap = np.repeat(path.length, count), np.full(total, np.inf)
     rows = np.zeros((5, total))
     for curve in (True, False):
         for near in (True, False):
-            chosen = np.flatnonzero(asked & (curved == curve) & (close == near))
+            chosen = np.flatnonzero(asked & (bent == curve) & (close == near))
             for at in range(0, len(chosen), _TOGETHER // 8 if near else _TOGETHER):
                 element = chosen[at : at + (_TOGETHER // 8 if near else _TOGETHER)]
                 graded = _around(*machine_axes.closest(element)) if machine_axes is not None and near else None
@@ -202,13 +201,9 @@ def _borders(path: Path, element: Ints, curve: bool, given: Floats | None) -> tu
     if not curve:
         borders = np.tile(np.linspace(0.0, 1.0, INTERVALS + 1), (len(element), 1)) if given is None else given
         return borders, np.diff(borders, axis=1)
-    half = (path.span[element, 0] > 0.0).astype(np.int64)
-    corners = path.corners
-    if corners is None:
-        raise ValueError("a direct path has no curves")
-    tip, _ = bezier_halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
-    borders = bezier_halves.interval_borders(half) if given is None else given
-    lengths = bezier_halves.interval_lengths(tip, borders)
+    found = cubics(path, element)
+    borders = bezier_halves.interval_borders(found.half) if given is None else given
+    lengths = bezier_halves.interval_lengths(found.tip, borders)
     return borders, lengths / lengths.sum(axis=1, keepdims=True)
 
 

@@ -7,6 +7,8 @@ the corner, so that short transitions far from the origin keep their digits.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from cornersmooth.feedrate.limits import Limits
@@ -62,6 +64,14 @@ def half_curves(points: Floats, weights: Floats, half: Ints) -> Floats:
     return powers
 
 
+def polynomial(points: Floats) -> Floats:
+    """Powers of t (g, 4, 4), as in `half_curves`, of cubics with the Bézier points (g, 4, 3)."""
+    powers = np.zeros((len(points), 4, 4))
+    powers[:, :, :3] = _TO_POWERS @ points
+    powers[:, 0, 3] = 1.0
+    return powers
+
+
 def corner_halves(
     program: Program, corners: Corners, rows: Ints, half: Ints, axis_length: float
 ) -> tuple[Floats, Floats]:
@@ -114,6 +124,7 @@ def _size(vectors: Floats) -> Floats:
 def interval_borders(half: Ints) -> Floats:
     """(g, INTERVALS + 1) parameters t that divide the halves, dense towards u = ½."""
     borders: Floats = np.where(half[:, None] == 0, _PROGRESS, 1.0 - _PROGRESS[::-1])
+    borders[half > 1] = np.linspace(0.0, 1.0, INTERVALS + 1)  # a cubic that is no half of a transition
     return borders
 
 
@@ -225,14 +236,14 @@ def axis_vectors(tip: Floats, axis_point: Floats, t: Floats) -> Floats:
 
 
 def curvature_limits(
-    program: Program, corners: Corners, rows: Ints, half: Ints, speed: Floats, limits: Limits, axis_length: float
+    curves: Callable[[Ints], tuple[Floats, Ints]], speed: Floats, limits: Limits
 ) -> tuple[Ints, Floats, Floats]:
     """Where curvature asks for less than the feed.
 
     Parameters
     ----------
-    rows, half : (g,) int64
-        Corner and half of each curve.
+    curves : callable
+        Powers of the tip's curves and which halves they are, for some of g curves.
     speed : (g,) float64, mm/s
 
     Returns
@@ -245,9 +256,9 @@ def curvature_limits(
         v² at most, per part.
     """
     which, shares, bounds = [], [], []
-    for group in _groups(np.arange(len(rows))):
-        tip, _ = corner_halves(program, corners, rows[group], half[group], axis_length)
-        borders = interval_borders(half[group])
+    for group in _groups(np.arange(len(speed))):
+        tip, half = curves(group)
+        borders = interval_borders(half)
         # a look at the borders alone leaves few curves that need the careful one
         rough = curvature(tip, borders).max(axis=1)
         turning_back = _turns_back(tip, borders)

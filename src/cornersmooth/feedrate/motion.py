@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cornersmooth.feedrate import arcs, bezier_halves, taylor
+from cornersmooth.feedrate import arcs, taylor
+from cornersmooth.feedrate.cubics import cubics, curved
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Floats, Ints
 from cornersmooth.vectors import norm
@@ -55,11 +56,11 @@ def taylor_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floa
     """
     count = len(element)
     tip, lever, speed = np.zeros((taylor.ORDERS, count, 3)), np.zeros((taylor.ORDERS, count, 3)), np.zeros((3, count))
-    kind = path.kind[element]
-    rows = np.flatnonzero(kind == Kind.CURVE)
+    curve = curved(path)[element]
+    rows = np.flatnonzero(curve)
     if len(rows):
         tip[:, rows], lever[:, rows], speed[:, rows] = _curves(path, element[rows], share[rows])
-    rows = np.flatnonzero(kind != Kind.CURVE)
+    rows = np.flatnonzero(~curve)
     if len(rows):
         tip[:, rows], lever[:, rows], speed[:, rows] = _lines(path, element[rows], share[rows])
     return tip, taylor.normalised(lever), speed
@@ -67,14 +68,10 @@ def taylor_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floa
 
 def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Floats]:
     """Taylor series in t of tip and lever on halves of transitions, and of the speed of the coordinate."""
-    corners = path.corners
-    if corners is None:
-        raise ValueError("a direct path has no curves")
-    half = (path.span[element, 0] > 0.0).astype(np.int64)
-    powers = bezier_halves.corner_halves(path.program, corners, path.corner[element], half, path.settings.axis_length)
+    found = cubics(path, element)
     shifts = np.stack([t**k for k in range(taylor.ORDERS)])
     curves = []
-    for curve in powers:
+    for curve in (found.tip, found.axis_point):
         around = np.zeros((taylor.ORDERS, len(t), 4))
         for k in range(taylor.ORDERS):
             for power in range(k, taylor.ORDERS):
@@ -82,7 +79,7 @@ def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Float
         curves.append(taylor.divide(around[..., :3], around[..., 3:]))
     tip, axis_point = curves
     lever = axis_point - tip
-    tip[0] += path.program.tip[corners.pose[path.corner[element]]]  # halves are relative to the corner
+    tip[0] += found.origin
     gone = taylor.derivative(tip)
     squared = taylor.dot(gone, gone)
     turning = path.turning[element]

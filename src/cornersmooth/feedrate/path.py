@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import arcs, bezier_halves
 from cornersmooth.feedrate.bezier_halves import STANDSTILL
+from cornersmooth.feedrate.cubics import RunPieces, along_runs
 from cornersmooth.feedrate.limits import Limits
-from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Status
+from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.vectors import angle_between, norm
@@ -33,6 +34,7 @@ class Kind(IntEnum):
     LINE = 0
     CURVE = 1
     ARC = 2
+    PIECE = 3  #: of the curve of a whole run
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Path:
     move : (m,) int64
         Pose that the move ends in; with it go feed and CL line.
     corner : (m,) int64
-        Row of `corners` for curves, else -1.
+        Row of `corners` for curves, of `run_pieces` for pieces of runs, else -1.
     span : (m, 2) float64
         Part of the segment (fractions of the move) or of the curve (parameter u).
     axis_span : (m, 2) float64
@@ -65,6 +67,8 @@ class Path:
     rapid : (m,) bool
     junction_speed : (m + 1,) float64
         Largest speed at the start of element i, and at the end of the last: 0 for a stop, inf for none.
+    run_pieces : RunPieces or None
+        The curves of whole runs.
     """
 
     program: Program
@@ -81,18 +85,25 @@ class Path:
     speed: Floats
     rapid: Bools
     junction_speed: Floats
+    run_pieces: RunPieces | None = None
 
     def __len__(self) -> int:
         return len(self.length)
 
 
 def build_path(
-    program: Program, corners: Corners | None, settings: Settings, limits: Limits, *, stop_everywhere: bool = False
+    program: Program,
+    corners: Corners | None,
+    settings: Settings,
+    limits: Limits,
+    *,
+    runs: Runs | None = None,
+    stop_everywhere: bool = False,
 ) -> Path:
     """Elements of the direct path (`corners` None) or of the smoothed one.
 
     Corners that stay sharp are passed with a change of velocity of at most ``accel · period``, reversals with a stop;
-    with `stop_everywhere` every move ends with a stop.
+    with `stop_everywhere` every move ends with a stop. The curves of `runs` replace the segments that they belong to.
 
     Raises
     ------
@@ -171,7 +182,7 @@ def build_path(
     changes = turning[keep]
     slowest[1:][changes[1:] != changes[:-1]] = 0.0
     slowest[:1] = 0.0
-    return Path(
+    path = Path(
         program=program,
         corners=corners,
         settings=settings,
@@ -187,6 +198,12 @@ def build_path(
         rapid=np.repeat(rapid, 3)[keep],
         junction_speed=np.concatenate((slowest, [0.0])),
     )
+    if runs is None or not len(runs):
+        return path
+    feeds = np.zeros(n)
+    inside = moves[np.isin(moves, runs.pose)]
+    feeds[inside] = _feeds(program, inside, limits)
+    return along_runs(path, runs, feeds, limits.angular_limits[0])
 
 
 def line_axes(

@@ -61,7 +61,9 @@ def plan(
         The machine does not reach a tool axis.
     """
     limits = Limits() if limits is None else limits
-    path = build_path(smooth_program.program, smooth_program.corners, smooth_program.settings, limits)
+    path = build_path(
+        smooth_program.program, smooth_program.corners, smooth_program.settings, limits, runs=smooth_program.runs
+    )
     return plan_path(path, limits, axes=axes, machine=machine, resolution=resolution, progress=progress)
 
 

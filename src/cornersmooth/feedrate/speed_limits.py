@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.feedrate import arcs, bezier_halves
+from cornersmooth.feedrate.cubics import cubics, curved
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Floats, Ints
@@ -45,23 +46,19 @@ def find_speed_limits(path: Path, limits: Limits) -> SpeedLimits:
     if len(arc):
         bound = limits.centripetal_accel / arcs.curvature(path.program, path.move[arc])
         cap[arc] = np.minimum(cap[arc], bound)
-    curve = np.flatnonzero((path.kind == Kind.CURVE) & ~path.turning)
+    curve = np.flatnonzero(curved(path) & ~path.turning)
     which, share, interval_cap = (
         np.zeros(0, np.int64),
         np.zeros((0, bezier_halves.INTERVALS)),
         np.zeros((0, bezier_halves.INTERVALS)),
     )
     if len(curve) and path.corners is not None:
-        half = (path.span[curve, 0] > 0.0).astype(np.int64)
-        which, share, interval_cap = bezier_halves.curvature_limits(
-            path.program,
-            path.corners,
-            path.corner[curve],
-            half,
-            path.speed[curve],
-            limits,
-            path.settings.axis_length,
-        )
+
+        def tips(some: Ints) -> tuple[Floats, Ints]:
+            found = cubics(path, curve[some])
+            return found.tip, found.half
+
+        which, share, interval_cap = bezier_halves.curvature_limits(tips, path.speed[curve], limits)
         which = curve[which]
 
     # one slot for the junction before each element, then its intervals

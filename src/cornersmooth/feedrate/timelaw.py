@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.feedrate import arcs, bezier_halves
+from cornersmooth.feedrate.cubics import cubics, curved
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.path import Kind, Path, line_axes
@@ -221,10 +222,11 @@ def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats, Flo
     tip, axis, kappa = np.empty((len(element), 3)), np.empty((len(element), 3)), np.zeros(len(element))
     kind = path.kind[element]
     share = local / np.maximum(path.length[element], np.finfo(np.float64).tiny)
-    rows = np.flatnonzero(kind == Kind.CURVE)
+    curve = curved(path)[element]
+    rows = np.flatnonzero(curve)
     if len(rows):
         tip[rows], axis[rows], kappa[rows] = _curve_poses(path, element[rows], local[rows], share[rows])
-    rows = np.flatnonzero(kind != Kind.CURVE)
+    rows = np.flatnonzero(~curve)
     which, share = element[rows], share[rows]
     start, end = path.start[which], path.move[which]
     span, axis_span = path.span[which], path.axis_span[which]
@@ -243,13 +245,11 @@ def shares_at(path: Path, element: Ints, local: Floats) -> Floats:
     """Where (m,) a coordinate `local` from each element's start lies: share of the length, or parameter t on curves."""
     share = local / np.maximum(path.length[element], np.finfo(np.float64).tiny)
     corners = path.corners
-    rows = np.flatnonzero((path.kind[element] == Kind.CURVE) & ~path.turning[element])
+    rows = np.flatnonzero(curved(path)[element] & ~path.turning[element])
     if corners is not None and len(rows):
         distinct, which = np.unique(element[rows], return_inverse=True)
-        half = (path.span[distinct, 0] > 0.0).astype(np.int64)
-        height = path.settings.axis_length
-        tip_half, _ = bezier_halves.corner_halves(path.program, corners, path.corner[distinct], half, height)
-        share[rows] = bezier_halves.parameters_at(tip_half, half, which, local[rows])
+        found = cubics(path, distinct)
+        share[rows] = bezier_halves.parameters_at(found.tip, found.half, which, local[rows])
     return share
 
 
@@ -257,10 +257,8 @@ def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tup
     corners = path.corners
     if corners is None:
         raise ValueError("a direct path has no curves")
-    program, height = path.program, path.settings.axis_length
     distinct, which = np.unique(element, return_inverse=True)
-    half = (path.span[distinct, 0] > 0.0).astype(np.int64)
-    tip_half, axis_half = bezier_halves.corner_halves(program, corners, path.corner[distinct], half, height)
+    tip_half, axis_half, half, origin = cubics(path, distinct)
     t = np.where(path.turning[element], share, 0.0)
     moving = np.flatnonzero(~path.turning[element])
     t[moving] = bezier_halves.parameters_at(tip_half, half, which[moving], local[moving])
@@ -268,6 +266,6 @@ def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tup
     axis = bezier_halves.axis_vectors(tip_half[which], axis_half[which], t[:, None])[:, 0]
     kappa = bezier_halves.curvature(tip_half[which], t[:, None])[:, 0]
     row, half = path.corner[element], half[which]
-    own = construction_of(path.settings.method).axes(program, corners, path.settings, row, 0.5 * (half + t))
+    own = construction_of(path.settings.method).axes(path.program, corners, path.settings, row, (half + t) / 2.0)
     axis = axis if own is None else own
-    return tip + program.tip[corners.pose[row]], axis, kappa
+    return tip + origin[which], axis, kappa
