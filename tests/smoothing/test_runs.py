@@ -158,7 +158,9 @@ def test_smoothest_is_what_a_general_solver_finds() -> None:
     windows = Windows.of(splines, splines.span_first[:-1], np.diff(splines.span_first))
     radius = np.full((len(samples.s), 2), 0.05)
     control = rough.control.copy()
-    control[windows.control] = smoothest(splines, windows, samples, control, radius, (0.05, 0.05), 1e-4)
+    control[windows.control] = smoothest(
+        splines, windows, samples, control, radius, (0.05, 0.05), np.ones(len(splines.width)), 1e-4
+    )
     assert over(deviations(samples, splines, control), (0.05, 0.05)).max() <= 1.0
     free = np.flatnonzero(windows.free)
     basis = np.zeros((len(samples.s), len(control)))

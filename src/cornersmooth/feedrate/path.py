@@ -201,7 +201,7 @@ def build_path(
     if runs is None or not len(runs):
         return path
     feeds = np.zeros(n)
-    inside = moves[np.isin(moves, runs.pose)]
+    inside = moves[np.isin(moves, np.delete(runs.pose, np.cumsum(runs.count) - runs.count))]
     feeds[inside] = _feeds(program, inside, limits)
     return along_runs(path, runs, feeds, limits.angular_limits[0])
 

@@ -26,8 +26,11 @@ REACH = 10
 #: rounds of refining, and the shortest span that is split, steps
 ROUNDS, SHORTEST = 30, 8
 
-#: reach of a sharp corner over ε and its turn: with 6 the corner alone would be ε off (docs/method.md, c = 1/6)
-_CORNER = 3.5
+#: reach of a sharp corner over ε and its turn: with 6 a transition of its own would be ε off (docs/method.md, c = 1/6)
+_CORNER = 6.5
+
+#: where a second knot stands beside a sharp corner, over the first: without it the curve could not swing out
+WINGS = 2.2
 
 #: weight of the third derivative, which settles what samples leave open
 _RIDGE = 1e-6
@@ -196,7 +199,14 @@ def _refine(
     near_low, near_high = at_low < 0.35 * width, at_high < 0.35 * width
     middle = ~(near_low | near_high)
     new_run += [run[near_low], run[near_high], run[middle]]
-    new_knot += [np.round(low + at_low)[near_low], np.round(high - at_high)[near_high], ((low + high) // 2.0)[middle]]
+    new_knot += [
+        np.round(low + at_low)[near_low],
+        np.round(high - at_high)[near_high],
+        ((low + high) // 2.0)[middle],
+    ]
+    far_low, far_high = near_low & (WINGS * at_low < 0.45 * width), near_high & (WINGS * at_high < 0.45 * width)
+    new_run += [run[far_low], run[far_high]]
+    new_knot += [np.round(low + WINGS * at_low)[far_low], np.round(high - WINGS * at_high)[far_high]]
     return _insert(lines, splines, control, off, np.concatenate(new_run), np.concatenate(new_knot))
 
 

@@ -1,6 +1,6 @@
 """The smoothest spline within the tolerances: a primal-dual interior-point method on all windows at once.
 
-Minimised is ∫|C‴|² where |deviation| ≤ radius at every sample: a convex quadratic objective with convex quadratic
+Minimised is ∫w·|C‴|² where |deviation| ≤ radius at every sample: a convex quadratic objective with convex quadratic
 constraints (Boyd and Vandenberghe, Convex Optimization, 11.7). The matrix of a step has 3 by 3 blocks on seven
 diagonals. Tip and axis point share the knots and nothing else, so they are solved one after the other. Every iterate
 keeps the constraints, so the last one does, whenever it ends.
@@ -8,7 +8,7 @@ keeps the constraints, so the last one does, whenever it ends.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -63,6 +63,7 @@ def smoothest(
     control: Floats,
     radius: Floats,
     tolerances: tuple[float, float],
+    weight: Floats,
     gap: float,
     tried: Floats | None = None,
 ) -> Floats:
@@ -72,6 +73,8 @@ def smoothest(
     ----------
     control : (controls, 6) float64, mm
         Of the splines; they keep the radii.
+    weight : (spans,) float64
+        Of the squared third derivative in each span.
     gap : float
         Bound of what is left to gain, over the objective, that ends the steps.
     tried : (controls, 6) float64, mm, optional
@@ -86,15 +89,14 @@ def smoothest(
     near = Gather(np.repeat(windows.local, number), samples.basis[rows], len(windows.control))
     width = splines.width[windows.span]
     smooth = Gather(windows.local, splines.third[windows.span], len(windows.control))
-    mean = np.bincount(span_window, width) / windows.count
-    weight = width * mean[span_window] ** 5
+    own_weight = width * weight[windows.span]
     moved = control[windows.control].copy()
     for part, tolerance in enumerate(tolerances):
         own = slice(3 * part, 3 * part + 3)
         task = Task(
             near,
             smooth,
-            weight,
+            own_weight,
             radius[rows, part] / tolerance,
             windows.free,
             np.repeat(span_window, number),
@@ -111,6 +113,8 @@ def smoothest(
             moved[:, own] += tolerance * share[windows.window][:, None] * way
             off += share[task.sample_window][:, None] * step
         jerk = smooth.apply(moved[:, own]) / tolerance
+        cost = np.bincount(span_window, own_weight * _square(jerk), minlength=task.windows)
+        task = replace(task, weight=own_weight / np.where(cost > 0.0, cost, 1.0)[span_window])
         moved[:, own] += tolerance * _solve(task, off, jerk, gap, COLD if tried is None else WARM)
     return moved
 

@@ -23,6 +23,10 @@ CORE, BESIDE = 192, 24
 #: spans solved at once
 BATCH = 16384
 
+#: spans on either side that the weight of a span looks at, its power of the mean square of C‴, and the least mean over
+#: the largest of the run
+NEIGHBOURS, POWER, LEAST_MEAN = 3, 5.0 / 6.0, 1e-12
+
 #: step of the parameter over the tolerance
 STEP = 0.01
 
@@ -32,7 +36,9 @@ SHARE, LEAST_SHARE = 0.97, 0.55
 #: share of the tolerance between the first curve and the bounds, so that there is a way to go
 ROOM = 0.02
 
-#: gaps of the rounds: a first look shows which pieces have to be given less
+#: gaps of the rounds: a first look shows which pieces have to be given less, and how smooth the curve can be; so many
+#: rounds are of all windows
+FULL = 2
 GAPS = (0.3, 0.05, 0.05, 0.05, 0.05, 0.1, 0.1)
 
 #: parts of the way from the fit to the solution that are tried where pieces are not proved otherwise, and the number
@@ -101,17 +107,17 @@ def solve_runs(
     unproven = np.ones(len(pieces.span), np.bool_)
     for number, gap in enumerate(GAPS):
         tried = control.copy() if number else None
-        _solve(
-            splines, windows, todo, samples, rough.control, tried, control, radius * limits, tolerances, gap, progress
-        )
+        weight = even_weights(splines, control)
+        radii = radius * limits
+        _solve(splines, windows, todo, samples, rough.control, tried, control, radii, tolerances, weight, gap, progress)
         rows = np.flatnonzero(unproven)
         proven[rows] = bounds(splines, control, lines, _some(pieces, rows), axis_length, tolerances)
         over = proven / limits
         failed = (over > 1.0).any(axis=1)
-        if number and not failed.any():
+        if number >= FULL - 1 and not failed.any():
             break
         radius = _tighten(samples, radius, over, start_off)
-        todo = _touched(windows, pieces.span[failed]) if number else todo
+        todo = _touched(windows, pieces.span[failed]) if number >= FULL - 1 else todo
         unproven = np.zeros(len(splines.span_run), np.bool_)
         again = windows.begin[todo], windows.count[todo]
         for begin, count in zip(*again, strict=True):
@@ -130,6 +136,31 @@ def solve_runs(
     np.maximum.at(worst, run, proven)
     tip, axis = worst[:, 0], worst[:, 1]
     return RunCurves(lines, splines, control, tip, axis, (tip <= limits[0]) & (axis <= limits[1]))
+
+
+def even_weights(splines: Splines, control: Floats) -> Floats:
+    """(spans,) weights of |C‴|² that give calm and sharp places their say.
+
+    Where the jerk limits it, a machine passes with v ~ |C‴|^(-1/3), so its time is ∫|C‴|^(1/3): the weights are those
+    of its quadratic model at the curve known so far, |C‴|^(-5/3), with the mean over neighbouring spans.
+    """
+    third = np.zeros((len(splines.span_run), control.shape[1]))
+    for k in range(4):
+        third += splines.third[:, k, None] * control[splines.span_control + k]
+    run, width = splines.span_run, splines.width
+    own = width * np.square(third).sum(axis=1)
+    total, length = own.copy(), width.copy()
+    for shift in range(1, NEIGHBOURS + 1):
+        same = np.where(run[shift:] == run[:-shift], 1.0 - shift / (NEIGHBOURS + 1.0), 0.0)
+        for sums, values in ((total, own), (length, width)):
+            sums[shift:] += same * values[:-shift]
+            sums[:-shift] += same * values[shift:]
+    mean = total / length
+    largest = np.zeros(len(splines.count))
+    np.maximum.at(largest, run, mean)
+    relative = mean / np.where(largest > 0.0, largest, 1.0)[run]
+    weights: Floats = np.maximum(relative, LEAST_MEAN) ** (-POWER)
+    return weights
 
 
 def _cut(splines: Splines) -> Windows:
@@ -168,6 +199,7 @@ def _solve(
     control: Floats,
     radius: Floats,
     tolerances: tuple[float, float],
+    weight: Floats,
     gap: float,
     progress: Callable[[int, int], None] | None,
 ) -> None:
@@ -177,7 +209,7 @@ def _solve(
     for number in np.unique(batch):
         rows = todo[batch == number]
         some = Windows.of(splines, windows.begin[rows], windows.count[rows])
-        moved = smoothest(splines, some, samples, start, radius, tolerances, gap, tried)
+        moved = smoothest(splines, some, samples, start, radius, tolerances, weight, gap, tried)
         own = _own(splines, some)
         control[some.control[own]] = moved[own]
         if progress is not None:
