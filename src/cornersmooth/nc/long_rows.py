@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,7 +31,7 @@ _LARGEST_STEP = 0.08
 def coarse_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Iterator[Rows]:
     """Dense rows without those that only the chord tolerance asks for."""
     settings = smoothed.settings.but(chord_tolerance=_COARSE)
-    return dense_rows(SmoothProgram(smoothed.program, smoothed.corners, settings), circles)
+    return dense_rows(replace(smoothed, settings=settings), circles)
 
 
 def line_limits(settings: Settings, machine: Machine | None, largest_turn: float) -> LineLimits:

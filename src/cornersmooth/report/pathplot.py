@@ -56,7 +56,7 @@ def draw_path(
         *written.tip[cutting].T, c=off[cutting], s=1.5, cmap="viridis", vmin=0.0, vmax=tolerance, label="written"
     )
     corners = smoothed.corners
-    sharp = ~corners.smoothed & ~np.isin(corners.status, (Status.STRAIGHT, Status.DUPLICATE))
+    sharp = ~corners.rounded & ~np.isin(corners.status, (Status.STRAIGHT, Status.DUPLICATE))
     view.scatter(*program.tip[corners.pose[sharp]].T, color="#d55e00", marker="D", s=18, label="sharp corners")
     view.set_aspect("equal")
     _box(view, written.tip[cutting])

@@ -22,7 +22,7 @@ _IDLE = (Status.STRAIGHT, Status.DUPLICATE)
 
 def sharp_count(corners: Corners) -> int:
     """Number of corners that stay as they are although the path turns."""
-    return int(np.count_nonzero(~corners.smoothed & ~np.isin(corners.status, _IDLE)))
+    return int(np.count_nonzero(~corners.rounded & ~np.isin(corners.status, _IDLE)))
 
 
 def sharp_corners(smoothed: SmoothProgram) -> list[dict[str, Any]]:
@@ -31,7 +31,7 @@ def sharp_corners(smoothed: SmoothProgram) -> list[dict[str, Any]]:
     The turn is that of the tip path, or of the axis-point path where the tip goes straight on.
     """
     corners = smoothed.corners
-    rows = np.flatnonzero(~corners.smoothed & ~np.isin(corners.status, _IDLE))[:_LISTED]
+    rows = np.flatnonzero(~corners.rounded & ~np.isin(corners.status, _IDLE))[:_LISTED]
     table = corner_table(smoothed, rows)
     tip, axis = np.asarray(table["tip_angle_deg"], np.float64), np.asarray(table["axis_angle_deg"], np.float64)
     turn = np.where(tip < _STRAIGHT_ON, axis, tip)
