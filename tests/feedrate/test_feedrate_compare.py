@@ -109,9 +109,15 @@ def test_limits_on_real_files(corpus: Path, name: str) -> None:
 def test_contents(chain: Callable[[int], Program]) -> None:
     calls: list[tuple[str, int, int]] = []
     compared = compare(chain(2), Settings(tolerance=0.05), progress=lambda *call: calls.append(call))
-    assert {name for name, _, _ in calls} == {"direct_velocity_jump", "zhang2016", "proportional"}
+    assert {name for name, _, _ in calls} == {"direct_velocity_jump", "zhang2016", "proportional", "global"}
     contents = json.loads(json.dumps(compared.as_dict(), allow_nan=False))
-    assert list(contents["seconds"]) == ["direct_exact_stop", "direct_velocity_jump", "zhang2016", "proportional"]
+    assert list(contents["seconds"]) == [
+        "direct_exact_stop",
+        "direct_velocity_jump",
+        "zhang2016",
+        "proportional",
+        "global",
+    ]
     saved = contents["saving_percent"]["proportional"]["direct_exact_stop"]
     seconds = contents["seconds"]
     assert saved == pytest.approx(100 * (1 - seconds["proportional"] / seconds["direct_exact_stop"]))

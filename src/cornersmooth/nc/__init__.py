@@ -46,7 +46,7 @@ __all__ = [
 _POLYNOMIAL = ("poly", "spl")
 
 #: curve styles that hold curves through whole runs of corners
-_LONG: tuple[str, ...] = ()
+_LONG = ("g6.2", "bspline")
 
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
 _TURNING = ("bspline", "poly")
@@ -83,9 +83,9 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
         The form cannot hold what the settings ask for.
     """
     tolerance = settings.tolerance
-    if settings.method == "global" and form.curves and form.curve not in _LONG:
+    if settings.method == "global" and form.curves and (form.rotary or form.curve not in _LONG):
         raise SettingsError(
-            "CS224",
+            "CS227",
             f"{form.control} form {form.name} has no curves through whole runs of corners",
             "use --method proportional, or a form of lines",
         )

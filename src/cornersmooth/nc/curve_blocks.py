@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cornersmooth.model import Bools, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.run import Run
 from cornersmooth.text import format_number
 
@@ -80,9 +82,12 @@ class KnotBlocks(NoCurves):
 
     def __init__(self, weight_decimals: int, blank: bytes = b" ") -> None:
         self._decimals, self._blank = weight_decimals, blank
+        self._any = RotaryKnotBlocks(weight_decimals, blank)  # curves with knots of their own
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
         """Knots."""
+        if run.spline is not None:
+            return self._any.add_prefixes(run, table, chosen)
         curved = run.curve > 0
         chosen[curved] = len(table) - 1 + run.curve[curved]
         first, *others = (knot + self._blank for knot in self._knots)
@@ -91,6 +96,9 @@ class KnotBlocks(NoCurves):
 
     def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
         """Weights, and the last knots."""
+        if run.spline is not None:
+            self._any.add_suffixes(run, table, chosen)
+            return
         curved = run.curve > 0
         values, which = _weights(run, curved)
         word = self._blank + b"R"
@@ -148,7 +156,9 @@ class SplineBlocks(NoCurves):
         self._open = False  # the last block was on a spline
 
     def prepare(self, run: Run) -> Run:
-        """Leave out the first control points."""
+        """Leave out the first control points; for curves with knots of their own, find the intervals of the others."""
+        if run.spline is not None:
+            run = replace(run, spline=_intervals(run.spline, run.curve))
         return run.only(run.curve != 1)
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
@@ -164,13 +174,36 @@ class SplineBlocks(NoCurves):
     def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
         """Knot intervals and weights."""
         curved = run.curve > 0
+        if run.spline is not None:
+            pairs, which = np.unique(run.spline[curved, :2], axis=0, return_inverse=True)
+            chosen[curved] = len(table) + which.reshape(-1)
+            for interval, weight in pairs.tolist():
+                table.append(f" PL={self._number(interval)} PW={self._number(weight)}\n".encode())
+            return
         values, which = _weights(run, curved)
         base = len(table)
         for interval in self._intervals:
-            for value in values:
-                weight = format_number(value, self._decimals, trim=True).rstrip(".").encode()
-                table.append(b" PL=" + interval + b" PW=" + weight + b"\n")
+            table += [b" PL=" + interval + b" PW=" + self._number(value).encode() + b"\n" for value in values]
         chosen[curved] = base + (run.curve[curved] - 2) * len(values) + which
+
+    def _number(self, value: float) -> str:
+        return format_number(value, self._decimals, trim=True).rstrip(".")
+
+
+def _intervals(spline: Floats, curve: NDArray[np.int8]) -> Floats:
+    """`Run.spline` with the interval u[j+2] − u[j+1] in place of the knot u[j] of each control point j."""
+    last = np.flatnonzero(spline[:, 2] > 0.0)
+    final = np.zeros(len(spline))
+    if len(last):  # the last knot of the curve that each row belongs to
+        final = spline[last[np.minimum(np.searchsorted(last, np.arange(len(spline))), len(last) - 1)], 2]
+    ahead = []
+    for shift in (1, 2):
+        following = np.append(spline[shift:, 0], np.zeros(shift))
+        number = np.append(curve[shift:], np.zeros(shift, np.int8))
+        ahead.append(np.where(number == curve + shift, following, final))
+    found = spline.copy()
+    found[:, 0] = ahead[1] - ahead[0]
+    return found
 
 
 def _weights(run: Run, curved: Bools) -> tuple[list[float], Ints]:

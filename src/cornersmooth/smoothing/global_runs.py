@@ -28,6 +28,10 @@ ENDS_RUN = (
     Status.FEED_PER_REVOLUTION,
 )
 
+#: degrees: where the axis turns by more in a segment, output in curves (which cannot change F inside one) has no run.
+#: Between two control points so far apart nothing but the curve itself tells where the tool is.
+STEEPEST = 30.0
+
 
 class GlobalRuns(Proportional):
     """Corners of a run are rounded together; those of runs that cannot be are rounded one by one."""
@@ -53,7 +57,10 @@ class GlobalRuns(Proportional):
 
 
 def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[Ints, Ints]:
-    """Poses of the runs that have a corner to round, repeated poses left out, and their number in each run."""
+    """Poses of the runs that have a corner to round, repeated poses left out, and their number in each run.
+
+    Runs in which the axis turns steeply are left to rounding corner by corner where the output is curves.
+    """
     around = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
     chains = program.chains
     pose = ranges(chains[:, 0], chains[:, 1] - chains[:, 0] + 1)
@@ -75,6 +82,9 @@ def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[I
     first = segment[begins]
     number = np.bincount(run)
     wanted = np.bincount(run, bent[segment]) > 0
+    if not settings.round_feed_changes:
+        turn = angle_between(program.axis[pose[segment]], program.axis[pose[segment + 1]])
+        wanted &= np.bincount(run, turn > np.radians(STEEPEST)) == 0
     return pose[ranges(first[wanted], number[wanted] + 1)], number[wanted] + 1
 
 
@@ -143,7 +153,7 @@ def _one_by_one(program: Program, pose: int, curves: RunCurves, count: Ints) -> 
     kept: Bools = curves.kept
     corners = int((count[~kept] - 2).sum())
     text = "the curves of a run were not proved to keep the tolerance; its corners are rounded one by one"
-    return Finding("CS230", "note", int(program.line[pose]), text, corners)
+    return Finding("CS226", "note", int(program.line[pose]), text, corners)
 
 
 CONSTRUCTION = GlobalRuns()

@@ -19,6 +19,7 @@ from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.corner_table import Remainders
 from cornersmooth.smoothing.runs.lines import polylines_of, run_lines
 from cornersmooth.smoothing.runs.ranges import ranges
+from cornersmooth.smoothing.runs.sections import SectionRows, section_rows
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 from cornersmooth.vectors import unit
 
@@ -37,7 +38,7 @@ class Rows:
         Pose whose move the row belongs to; lines after the middle of a transition are of the next. Never decreasing.
         Feed, kind and the place of statements follow from it.
     curve : (r,) int8
-        0 for the end of a line; 1 to 5 for a control point of a transition.
+        0 for the end of a line; 1 to 5 for a control point of a transition, from 1 on for one of a section of a run.
     joined : (r,) bool
         First control points that are the end of the row before, with no line between.
     weights : (r, 2) float64 or None
@@ -48,7 +49,7 @@ class Rows:
     rate : (r,) float64 or None
         Moves per minute (inverse time) of rows that are timed so, NaN for the others; None where none is.
     spline : (r, 3) float64 or None
-        Of control points of curves that are not the five-point curve: knot, weight and, in the last row of a curve, the
+        Of control points where not all curves are five-point curves: knot, weight and, in the last row of a curve, the
         last knot.
     """
 
@@ -110,6 +111,50 @@ class _RunLines:
         batch.tip[rows], batch.other[rows] = self.tip[begin:end], self.axis[begin:end]
 
 
+@dataclass(frozen=True)
+class _RunSections:
+    """Control points of whole runs, and how many of them each pose of the program has."""
+
+    rows: SectionRows | None
+    count: Ints
+    inside: Bools
+
+    @classmethod
+    def of(cls, smoothed: SmoothProgram) -> _RunSections:
+        runs, n = smoothed.runs, len(smoothed.program)
+        if runs is None:
+            return cls(None, np.zeros(n, np.int64), np.zeros(n, np.bool_))
+        rows = section_rows(runs, smoothed.program)
+        inside = np.zeros(n, np.bool_)
+        inside[runs.pose] = True
+        inside[runs.pose[np.cumsum(runs.count) - runs.count]] = False
+        count = np.bincount(rows.move, minlength=n)
+        return cls(rows, count, inside | (count > 0))
+
+    def replace(self, counts: Ints) -> Ints:
+        """Counts of rows with those of the runs in their places."""
+        return np.where(self.inside, self.count, counts)
+
+    def fill(self, batch: _Batch, curve: NDArray[np.int8], joined: Bools) -> Floats | None:
+        """Put the control points of the runs into their rows; returns `Rows.spline` of all curves."""
+        if self.rows is None:
+            return None
+        here = np.flatnonzero(self.inside[batch.poses])
+        begin, end = np.searchsorted(self.rows.move, (batch.poses[0], batch.poses[-1] + 1))
+        at = ranges(batch.first[here], batch.last[here] - batch.first[here])
+        spline = np.ones((len(curve), 3))
+        spline[:, 0] = np.where(curve == len(KNOTS), KNOTS[-1], 0.0)
+        spline[:, 2] = curve == len(KNOTS)
+        batch.tip[at], batch.other[at] = self.rows.points[begin:end, :3], self.rows.points[begin:end, 3:]
+        curve[at], joined[at] = self.rows.number[begin:end], self.rows.number[begin:end] == 1
+        spline[at, 0], spline[at, 2] = self.rows.knot[begin:end], self.rows.last_knot[begin:end]
+        return spline
+
+
+#: knots that go with the control points of a transition; the last four are 1
+KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5)
+
+
 def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses.
 
@@ -134,6 +179,7 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
     arc_counts = _arc_row_counts(smoothed, circles)
     runs = _RunLines.of(smoothed)
     counts = runs.replace(counts)
+    segments.lines[runs.inside] = 1
     for batch in _batches(smoothed, counts, arc_counts, poses):
         sharp = (segments.row[batch.poses] < 0) & (batch.last > batch.first)
         at = batch.last[sharp] - 1
@@ -163,6 +209,9 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
     counts = np.where(segments.has_line, segments.lines, 0) + np.where(segments.row >= 0, 5, 0)
     counts[segments.skip] = 0
     arc_counts = _arc_row_counts(smoothed)
+    sections = _RunSections.of(smoothed)
+    counts = sections.replace(counts)
+    segments.lines[sections.inside] = 1
     for batch in _batches(smoothed, counts, arc_counts, poses):
         row = segments.row[batch.poses]
         if divide:
@@ -186,7 +235,8 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
             line = segments.has_line[pose]
             joined[first] = ~line
             batch.tip[first[line] - 1], batch.other[first[line] - 1] = tip_curve[line, 0], axis_curve[line, 0]
-        yield Rows(batch.tip, batch.other, batch.move, curve, joined, weights)
+        spline = sections.fill(batch, curve, joined)
+        yield Rows(batch.tip, batch.other, batch.move, curve, joined, weights, spline=spline)
 
 
 def _no_curves(count: int) -> tuple[NDArray[np.int8], Bools]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.arcs import circles
 from cornersmooth.verify.elements import Element, Problem
-from cornersmooth.verify.splines import CurveTable, interval_curves, knot_curves, poly_curves, spl_curves
+from cornersmooth.verify.splines import CurveTable, cut_long, interval_curves, knot_curves, poly_curves, spl_curves
 from cornersmooth.verify.words import BSPLINE, NURBS, POLY, SPL, Table
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"
@@ -115,7 +115,7 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
     element_rows = placed
     if not (straight | is_arc).all():
         before = np.array((*modal.tip, *modal.second))
-        curves = _curves(table, six, placed, code, before, _TIP + letters, problems)
+        curves, cut = cut_long(_curves(table, six, placed, code, before, _TIP + letters, problems))
         element_rows = placed & (straight | is_arc)
         element_rows[curves.row] = True
     rows = np.flatnonzero(element_rows)
@@ -126,6 +126,8 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
         ends[curved] = curves.end
     feed = held.fill(table.column("F"), modal.feed)
     end = six if ends is rows and len(rows) == len(six) else six.take(ends, axis=0)
+    if len(curves) and cut.any():  # between its knots a curve does not end in a control point
+        end[curved[cut]] = curves.control[np.cumsum(curves.points)[cut] - 1]
     rapid = code[rows] == 0
     kind = np.where(rapid, np.uint8(Element.RAPID), np.uint8(Element.LINE))
     if is_arc.any():

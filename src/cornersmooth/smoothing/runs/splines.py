@@ -133,3 +133,14 @@ class Splines:
                 values = (1.0 - share) * values[:, :-1] + share * values[:, 1:]
             rows.append(values[:, 0])
         return np.stack(rows, axis=1)
+
+    def blossom(self, span: Ints, arguments: Floats, control: Floats) -> Floats:
+        """(m, d) blossoms of the spans' cubics at three arguments (m, 3) each, from control points (controls, d)."""
+        k = self.around(span)
+        values = control[self.span_control[span][:, None] + np.arange(4)]
+        for level in range(3):
+            begin, end = k[:, level:3], k[:, 3 : 6 - level]
+            share = ((arguments[:, level, None] - begin) / (end - begin))[:, :, None]
+            values = (1.0 - share) * values[:, :-1] + share * values[:, 1:]
+        blossoms: Floats = values[:, 0]
+        return blossoms

@@ -1,0 +1,188 @@
+"""Curves of whole runs as they are written: read back with scipy's splines, measured densely, joints looked at."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+import cornersmooth
+from oracle.chains import Chain, cl_text, random_chains
+from oracle.command import run
+from oracle.motion import unit
+
+SAMPLES = Path(__file__).parents[1] / "samples"
+FORMS = {"fanuc": ("g6.2", "XYZUVW"), "siemens": ("bspline", ("X", "Y", "Z", "XH=", "YH=", "ZH="))}
+H = 10.0
+#: pieces of a segment of the original
+PARTS = 60
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A written curve, or a line as a curve of degree 1: knots and control points (k, 6)."""
+
+    knots: np.ndarray
+    points: np.ndarray
+    degree: int
+
+    def __call__(self, shares: np.ndarray) -> np.ndarray:
+        low, high = self.knots[0], self.knots[-1]
+        return BSpline(self.knots, self.points, self.degree)(low + shares * (high - low))
+
+
+def stretches(text: str, control: str) -> list[list[Stretch]]:
+    """Feed motion between rapids."""
+    words = FORMS[control][1]
+    held = dict.fromkeys(words, np.nan)
+    runs: list[list[Stretch]] = []
+    position, knots, points, intervals = np.full(6, np.nan), [], [], []
+
+    def close() -> None:
+        nonlocal knots, points, intervals
+        if control == "siemens" and points:
+            first = [i for i, step in enumerate(intervals[1:], 1) if step == 0 and intervals[i - 1] == 0]
+            for begin, end in zip([0, *first], [*first, len(intervals)], strict=True):
+                own = points[begin : end + 1]  # the first control point is where the block before ended
+                inner = np.concatenate(([0.0] * 3, np.cumsum(intervals[begin:end])))
+                runs[-1].append(Stretch(np.append(inner, [inner[-1]] * 2)[: len(own) + 4], np.array(own), 3))
+        elif points:
+            runs[-1].append(Stretch(np.array(knots), np.array(points), 3))
+        knots, points, intervals = [], [], []
+
+    for line in text.splitlines():
+        numbers = {word: re.search(rf"(?:^|\s){re.escape(word)}(-?[\d.]+)", line) for word in words}
+        curve = (
+            re.search(r"\bPL=([\d.]+)", line) if control == "siemens" else re.match(r"(?:G6\.2 P4 )?K([\d.]+)", line)
+        )
+        if line.startswith("G6.2"):
+            close()
+        if curve and control == "fanuc":
+            knots.append(float(curve[1]))
+        if not any(numbers.values()):
+            if not curve:
+                close()
+            continue
+        held |= {word: float(found[1]) for word, found in numbers.items() if found}
+        here = np.array(list(held.values()))
+        if curve:
+            if control == "siemens":
+                points = points or [position]
+                intervals.append(float(curve[1]))
+            points.append(here)
+        else:
+            close()
+            if line.startswith("G0 ") or not runs:
+                runs.append([])
+            elif not np.isnan(position).any():
+                runs[-1].append(Stretch(np.array([0.0, 0, 1, 1]), np.array([position, here]), 1))
+        position = here
+    close()
+    return [run for run in runs if run]
+
+
+def farthest(places: np.ndarray, path: np.ndarray) -> float:
+    """Largest distance of places (m, d) from a polyline (n, d), each piece looked at by all places."""
+    best = np.full(len(places), np.inf)
+    for start, end in itertools.pairwise(path):
+        way = end - start
+        size = way @ way
+        share = np.clip((places - start) @ way / size, 0, 1) if size else np.zeros(len(places))
+        best = np.minimum(best, np.linalg.norm(places - start - share[:, None] * way, axis=1))
+    return float(best.max())
+
+
+def dense(stretch: Stretch) -> tuple[np.ndarray, np.ndarray]:
+    """Tips and points at H on the axis, closely."""
+    six = stretch(np.linspace(0, 1, 8 * max(4, len(stretch.points))))
+    return six[:, :3], six[:, :3] + H * unit(six[:, 3:] - six[:, :3])
+
+
+def original(chain: Chain) -> np.ndarray:
+    """Points at H on the axis of the ruled motion, closely."""
+    axis, share = unit(chain.axis), np.linspace(0, 1, PARTS + 1)[:, None]
+    top = chain.tip + H * axis
+    tips = np.concatenate([a + share * (b - a) for a, b in zip(chain.tip[:-1], chain.tip[1:], strict=True)])
+    ends = np.concatenate([a + share * (b - a) for a, b in itertools.pairwise(top)])
+    return tips + H * unit(ends - tips)
+
+
+@pytest.mark.parametrize("control", FORMS)
+@pytest.mark.parametrize("tolerance", [0.003, 0.05])
+def test_random_chains_keep_the_tolerance(control: str, tolerance: float, tmp_path: Path) -> None:
+    chains = [chain for chain in random_chains(31, 18, corners=6) if np.ptp(chain.tip, axis=0).any()]
+    options = ["--control", control, "-f", FORMS[control][0], "--method", "global", "-e", str(tolerance)]
+    out = tmp_path / "o.nc"
+    result = run("smooth", "-", "-o", out, "-q", *options, data=cl_text(chains)[0])
+    assert result.returncode == 0, result.stderr.decode()  # verified, too
+    written = stretches(out.read_text(), control)
+    assert len(written) == len(chains)
+    for stretch_list, chain in zip(written, chains, strict=True):
+        tops = original(chain)
+        turn = np.linalg.norm(np.diff(unit(chain.axis), axis=0), axis=1).max()
+        slack = H * (2.0 * turn / PARTS) ** 2 / 8  # of the sampled original
+        for stretch in stretch_list:
+            tip, top = dense(stretch)
+            assert farthest(tip, chain.tip) <= tolerance
+            assert farthest(top, tops) <= tolerance + slack
+    long = sum(len(stretch.points) > 5 for stretch_list in written for stretch in stretch_list)
+    assert long > 0.3 * len(chains)
+
+
+@pytest.mark.parametrize("control", FORMS)
+def test_sections_meet_smoothly_and_are_few(control: str, tmp_path: Path) -> None:
+    out = tmp_path / "o.nc"
+    options = ["--control", control, "-f", FORMS[control][0], "--method", "global"]
+    result = run("smooth", SAMPLES / "impeller.cls", "-o", out, *options, "-q")
+    assert result.returncode == 0, result.stderr.decode()
+    text = out.read_text()
+    assert text.count("\n") <= 1.3 * 610
+    joined = 0
+    for curves in stretches(text, control):
+        for one, other in itertools.pairwise(curves):
+            if one.degree == other.degree == 3:
+                joined += 1
+                ends = [BSpline(s.knots, s.points, 3).derivative(1)(s.knots[at]) for s, at in ((one, -1), (other, 0))]
+                size = np.linalg.norm(ends[0])
+                # the written digits leave this much
+                assert np.linalg.norm(ends[1] - ends[0]) < 0.02 * size
+    assert joined >= 6
+
+
+def test_sections_are_the_curve_of_the_run() -> None:
+    from cornersmooth.smoothing.runs.sections import SPANS, section_rows
+
+    program = cornersmooth.read(SAMPLES / "impeller.cls")
+    smoothed = cornersmooth.smooth(program, cornersmooth.Settings(method="global", round_feed_changes=False))
+    runs = smoothed.runs
+    assert runs is not None
+    rows = section_rows(runs, program)
+    begin = np.flatnonzero(rows.number == 1)
+    assert len(begin) > len(runs)
+    assert rows.number.max() <= SPANS + 3 + 4
+    gone, run_of, at = 0.0, 0, 0
+    first = np.concatenate(([0], np.cumsum(runs.knot_count)))
+    for start, end in zip(begin, np.append(begin[1:], len(rows.number)), strict=True):
+        knots = np.concatenate((rows.knot[start:end], [rows.last_knot[end - 1]] * 4)) * 1000.0
+        np.testing.assert_allclose(knots, np.round(knots), atol=1e-6)  # three decimals hold them
+        section = BSpline(knots, rows.points[start:end], 3)
+        own = runs.knot[first[run_of] : first[run_of + 1]]
+        control = runs.control[at : at + len(own) + 2]
+        whole = BSpline(np.concatenate(([own[0]] * 3, own, [own[-1]] * 3)), control, 3)
+        u = np.linspace(0, knots[-1], 50)
+        for order in range(3):
+            np.testing.assert_allclose(
+                section.derivative(order)(u) if order else section(u),
+                whole.derivative(order)(gone + u) if order else whole(gone + u),
+                rtol=1e-9,
+                atol=1e-9 * np.abs(whole.derivative(order)(gone + u) if order else 1.0).max(),
+            )
+        gone += knots[-1]
+        if gone >= own[-1]:
+            at, run_of, gone = at + len(own) + 2, run_of + 1, 0.0
+    assert run_of == len(runs)
