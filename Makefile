@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: run test check bench format clean
+.PHONY: run test check bench controller format clean
 
 run: $(STAMP)  ## install into .venv, smooth the samples, show what came out
 	$(BIN)/python samples/show.py
@@ -18,6 +18,9 @@ check: $(STAMP)  ## lint, format and types
 
 bench: $(STAMP)  ## time the whole command beside a plain C program
 	$(BIN)/python benchmarks/bench.py
+
+controller: $(STAMP)  ## time texts on LinuxCNC's whole controller
+	$(BIN)/python tests/nc/controller_table.py $(CORNERSMOOTH_CORPUS)
 
 format: $(STAMP)
 	$(BIN)/ruff check --fix .

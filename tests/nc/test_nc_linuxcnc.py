@@ -221,7 +221,7 @@ def test_comments_do_nothing(tmp_path: Path) -> None:
 
 
 def test_numbers_of_blocks_and_long_lines_are_accepted(tmp_path: Path) -> None:
-    poses = b"".join(b"GOTO/%d,%d,0\n" % (number, number % 2) for number in range(4000))
+    poses = b"".join(b"GOTO/%d,%d,0\n" % (number, number % 2) for number in range(10000))
     header = ("(" + 246 * "x" + ")",)
     text = written(SHORT + poses + b"FINI\n", "xyzac-trt", frame=Frame(block_numbers=True, header=header))
     assert "N99990 " in text

@@ -205,7 +205,7 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findi
     rows = coarse_rows(smoothed, circles.blocks) if long else dense_rows(smoothed, circles.blocks)
     if form.rotary:
         return rotary_rows(rows, smoothed, form, findings, long=long)
-    return long_rows(rows, smoothed) if long else rows
+    return long_rows(rows, smoothed, form) if long else rows
 
 
 def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:

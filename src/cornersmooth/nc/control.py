@@ -292,12 +292,16 @@ class LineStyle:
     lines : {"dense", "long"}
     curve_share, line_share, blend_share : float
         Those of `Settings` where lines are long.
+    lag : float
+        By how many times ε the axis point may lag behind the tip where the control rounds corners of lines by itself,
+        as `cornersmooth.smoothing.long_lines.lags` estimates it; 0 where it does no such thing.
     """
 
     lines: str = "dense"
     curve_share: float = 0.5
     line_share: float = 1.0
     blend_share: float = 0.1
+    lag: float = 0.0
 
 
 @dataclass(frozen=True)

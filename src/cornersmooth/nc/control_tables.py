@@ -66,6 +66,7 @@ _FEED_MODES = {
 #: keys whose values are tables
 _TABLES = (
     "digits",
+    "lines",
     "program",
     "layout",
     "layout.units",
@@ -76,6 +77,7 @@ _TABLES = (
     "motion",
 )
 _MOST_DIGITS = 9
+_MOST_LAG = 100.0
 #: what stands in braces in blocks of the program, names of steps among it
 _PROGRAM_BRACES: Table = {"program": "O1", "units": "G21", "blend": "0.001"} | dict.fromkeys(STEPS, "")
 #: what stands in braces in blocks
@@ -258,6 +260,8 @@ def _lines(table: Table) -> LineStyle:
     for name in ("curve_share", "line_share", "blend_share"):
         if not 0.0 < getattr(lines, name) <= 1.0:
             raise _SHELF.wrong(f"lines.{name} is {getattr(lines, name)}", "give a part of 1")
+    if not 0.0 <= lines.lag <= _MOST_LAG:
+        raise _SHELF.wrong(f"lines.lag is {lines.lag}", f"give a number up to {_MOST_LAG:g}")
     return lines
 
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.kinematics import tool_axis
-from cornersmooth.kinematics.machine import Machine
 from cornersmooth.model import Ints, SmoothProgram
+from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows, dense_rows
@@ -34,8 +34,10 @@ def coarse_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Iterato
     return dense_rows(replace(smoothed, settings=settings), circles)
 
 
-def line_limits(settings: Settings, machine: Machine | None, largest_turn: float) -> LineLimits:
+def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> LineLimits:
     """What lines with tool vectors, or with rotary words of a machine (at most `largest_turn` degrees), must keep."""
+    machine = form.machine if form.rotary else None
+    lag = form.table.lines.lag
     step = _LARGEST_STEP if machine is None else largest_turn
     if settings.axis_step is not None:
         step = min(step, math.radians(settings.axis_step) if machine is None else settings.axis_step)
@@ -44,10 +46,12 @@ def line_limits(settings: Settings, machine: Machine | None, largest_turn: float
         step,
         settings.axis_length,
         unit if machine is None else lambda words: tool_axis(machine, words),
+        settings.blend_share * settings.tolerance,
+        lag * settings.tolerance if lag else math.inf,
     )
 
 
-def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram) -> Iterator[Rows]:
+def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:
     """Rows with tool vectors at which long lines end; arcs stay as they are."""
     chunks = deque(rows)
     if not chunks:
@@ -60,7 +64,7 @@ def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram) -> Iterator[Rows]:
         arc = np.concatenate(none)
     chunks.clear()
     start, at_pose = segments_of_rows(move)
-    limits = line_limits(smoothed.settings, None, 0.0)
+    limits = line_limits(smoothed.settings, form)
     for begin in range(0, max(len(move) - 1, 1), _CHUNK):
         here = slice(begin, begin + _CHUNK + 1)  # the last row of a chunk is the start of the next
         part = vertices(smoothed, tip[here], axis[here], axis[here], move[here], start[here], at_pose[here])

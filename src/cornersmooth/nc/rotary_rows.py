@@ -71,7 +71,7 @@ def rotary_rows(
         findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
     largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
     start, at_pose = segments_of_rows(move)
-    limits = line_limits(settings, machine, largest_turn)
+    limits = line_limits(settings, form, largest_turn)
     timed = _timed_cuts(path.angles, move, program) if form.orientation == "machine" else None
     inserted, first_inserted, unsolved = 0, 0, []
     for begin in range(0, max(len(move) - 1, 1), _CHUNK):

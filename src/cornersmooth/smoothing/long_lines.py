@@ -30,6 +30,9 @@ _PASSED_BY = (Status.SMOOTHED, Status.STRAIGHT, Status.DUPLICATE, Status.TOO_SHO
 #: mm by which the parameter goes on while a word changes by one
 _PER_WORD = 1e-3
 
+#: rounds of adding vertices where the axis point would lag
+_ROUNDS = 4
+
 #: share of ε that is used: the rest is for what turns between two points at which the original is known
 _USED = 0.98
 
@@ -72,6 +75,9 @@ class LineLimits:
     axis_length : float, mm
     axis_of : callable
         Unit tool axes (m, 3) of words (m, d).
+    blend, lag : float, mm
+        How far the tip may be off a corner of lines that the control rounds by itself, and how far the axis point may
+        lag behind the tip there by the estimate of `lags`.
     """
 
     tip: float
@@ -79,6 +85,8 @@ class LineLimits:
     turn: float
     axis_length: float
     axis_of: Callable[[Floats], Floats]
+    blend: float = 0.0
+    lag: float = np.inf
 
 
 def segments_of_rows(move: Ints) -> tuple[Ints, Bools]:
@@ -188,7 +196,50 @@ def fewest_lines(rows: Vertices, limits: LineLimits) -> Ints:
         good = _reaches(rows, limits, at, target)
         near = np.where(good, target, near)
         beyond = np.where(good, np.where(target == stop, stop + 1, beyond), target)
-    return np.flatnonzero(kept)
+    return _without_lag(rows, limits, np.flatnonzero(kept))
+
+
+def lags(tip: Floats, lever: Floats, blend: float) -> Floats:
+    """Estimate of how far the axis point lags behind the tip where a control rounds the corners of lines by itself.
+
+    It starts with a line before it has ended the one before. Half of the shorter line is the most that both run
+    together, so a change of the axis point's way per way of the tip by κ is worth up to κ·l/4. Where the tip itself
+    turns, by δ (the difference of its unit tangents), the control keeps it within `blend`: then κ·blend/δ is the most.
+    Where the tip runs straight on, nothing else bounds what the rotary axes do.
+
+    Parameters
+    ----------
+    tip, lever : (v, 3) float64, mm
+        Vertices; H times the tool axis there.
+    blend : float, mm
+
+    Returns
+    -------
+    (v,) float64, mm
+        0 at both ends, and beside lines on which the tip stands still.
+    """
+    found = np.zeros(len(tip))
+    way = np.diff(tip, axis=0)
+    length = norm(way)
+    moving = length > 0.0
+    per = np.where(moving, length, 1.0)[:, None]
+    turn, change = norm(np.diff(way / per, axis=0)), norm(np.diff(np.diff(lever, axis=0) / per, axis=0))
+    together = np.minimum(length[1:], length[:-1]) / 4.0
+    rounded = np.divide(blend, turn, out=np.full_like(turn, np.inf), where=turn > 0.0)
+    found[1:-1] = np.where(moving[1:] & moving[:-1], change * np.minimum(together, rounded), 0.0)
+    return found
+
+
+def _without_lag(rows: Vertices, limits: LineLimits, kept: Ints) -> Ints:
+    """Rows beside vertices at which the axis point would lag too far are vertices too: short lines bound it."""
+    for _ in range(_ROUNDS if np.isfinite(limits.lag) and len(kept) > 2 else 0):
+        lever = limits.axis_length * limits.axis_of(rows.words[kept])
+        far = kept[lags(rows.tip[kept], lever, limits.blend) > limits.lag]
+        more = np.unique(np.concatenate((kept, far - 1, far + 1)))
+        if len(more) == len(kept):
+            break
+        kept = more
+    return kept
 
 
 def _reaches(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
