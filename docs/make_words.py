@@ -50,7 +50,7 @@ def roles(entry: dict[str, Any], kind: str) -> str:
     if entry.get("high"):
         said.append("only behind a retract")
     if entry.get("retract"):
-        said.append("before the first motion, between two tools or at the end")
+        said.append("before the first motion, before an approach or at the end")
     if entry.get("never"):
         said.append("refused")
     return "; ".join(said) or ("anywhere" if kind == "word" else "")

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import importlib.util
+import io
 from pathlib import Path
 
 import pytest
 
+from cornersmooth.cl import read
+from cornersmooth.nc import fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
+from cornersmooth.verify.block_tables import read_lines
+from cornersmooth.verify.word_check import WordCheck
 from cornersmooth.verify.word_list import word_list
 from nc.cases import CHOSEN, Case
 
 from .form_mutations import EPS, H, program_of
-from .word_mutations import judged, named_in, text_of
+from .word_mutations import judged, named_in, options_of, text_of
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONTROLS = ("fanuc", "mitsubishi", "haas", "linuxcnc", "generic", "siemens", "heidenhain")
@@ -45,6 +52,19 @@ def test_blocks_of_the_user_are_taken_on_trust_and_named() -> None:
     assert found.problems == ()
     lines[place] = "G8 P1"
     assert {line for line, _ in named_in(case, lines)} >= {place + 1, place + 2}
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_going_home_and_coming_back_is_no_mistake(control: str) -> None:
+    text = b"LOADTL/2\nFEDRAT/MMPM,500.\nRAPID\nGOTO/0,0,9,0,0,1\nGOTO/0,0,0\nGOTO/10,0,0\nGOHOME\nGOTO/0,10,0\nFINI\n"
+    case = next(case for case in CHOSEN if case.control == control and case.tcp)
+    form, program = case.choose(), read(text, name="home.cls")
+    stream = io.BytesIO()
+    write(smooth(program, fit_settings(Settings(), form, "mm")), stream, form=form)
+    check = WordCheck(control, options_of(case).dialect.lexer, 0.01)
+    lines = list(check.watch(read_lines(stream.getvalue(), None, check.lexer)))
+    assert len(lines) > 5
+    assert check.problems == []
 
 
 def test_the_tables_in_the_docs_are_those_of_the_lists() -> None:

@@ -66,6 +66,8 @@ class WordCheck:
         self._then: tuple[WordRule, int] | None = None
         self._retract = 0
         self._high = False
+        #: states that an approach establishes again
+        self._approach = {rule.state for rule in self.list.words if rule.off} | {"work offset"}
         self._arc: tuple[str, int] | None = None
         self._code = -1.0
         self._weights: dict[float, tuple[int, int]] = {}
@@ -322,6 +324,8 @@ class WordCheck:
             ]
             self._state[rule.state] = (" ".join([word, *beside]), number)
             self._changed = True
+            if not rule.off and rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
+                self._retract = 0
             if rule.before and self._first is not None and word != self._first.get(rule.state):
                 self._arc = (word, number)
 

@@ -23,8 +23,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     what the number in brackets may be of the tolerance. ``never``: the control has no such word. ``high``: only behind
     a retract; a control with such a word wants the tool high at the end, too.
 ``[[block]]``
-    A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but the approach of
-    another tool.
+    A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
+    which work offset or tool length are said again.
 """
 
 from __future__ import annotations
