@@ -392,7 +392,75 @@ GOTO/-0.0112,0.0246,0.0000,0.9512436,-0.3081481,-0.0134286
     allocation="fair",
 )
 
+#: two cycles in one hole, a second tool between them; the way back from the first is also the next move
+TWO_CYCLES_IN_A_HOLE = Alarm(
+    Case("fanuc", "g1"),
+    0.01,
+    10.0,
+    """GOTO/25,50,25
+CYCLE/DRILL,FEDTO,5,MMPM,1700,RAPTO,3,RTRCTO,25,DWELL,0.5
+GOTO/25,50,0
+CYCLE/OFF
+COOLNT/ON
+LOADTL/18
+SPINDL/5942,RPM,CLW
+RAPID
+GOTO/25,50,25
+CYCLE/DRILL,FEDTO,20,MMPM,800,RAPTO,3,RTRCTO,25
+GOTO/25,50,0
+CYCLE/OFF
+""",
+)
+
+#: a cycle that is not carried out, and words behind it where the tool never went
+NOT_TAPPED = Alarm(
+    Case("haas", "g1", "table-ac"),
+    0.01,
+    10.0,
+    """GOTO/7,2,46
+CYCLE/TAP,FEDTO,12.5,MMPM,200,RAPTO,3,RTRCTO,25
+GOTO/7,2,21
+GOTO/-23,-31,-33
+CYCLE/OFF
+LOADTL/29
+SPINDL/900,RPM,CLW
+RAPID
+GOTO/7,2,46
+CYCLE/DEEP,FEDTO,15,MMPM,373,RAPTO,3,RTRCTO,25
+GOTO/-23,-31,-33
+GOTO/7,2,21
+CYCLE/OFF
+LOADTL/3
+RAPID
+GOTO/7,2,46
+CYCLE/TAP,FEDTO,12.5,MMPM,200,RAPTO,3,RTRCTO,25
+GOTO/7,2,21
+CYCLE/OFF
+LOADTL/4
+SPINDL/950,RPM,CLW
+RAPID
+GOTO/7,2,86
+""",
+)
+
+#: a tool that is loaded and moves nothing has no offset
+LAST_TOOL = Alarm(
+    Case("fanuc", "g1", "table-ac", tcp=False),
+    0.01,
+    10.0,
+    """GOTO/0,0,0,0,0,1
+FEDRAT/MMPM,100
+GOTO/5,0,0
+LOADTL/2
+SPINDL/900,RPM,CLW
+SPINDL/OFF
+""",
+)
+
 ALARMS = {
+    "two cycles in a hole": TWO_CYCLES_IN_A_HOLE,
+    "not tapped": NOT_TAPPED,
+    "last tool": LAST_TOOL,
     "creeping": CREEPING,
     "dwell at the pole": DWELL_AT_THE_POLE,
     "feed at the pole": FEED_AT_THE_POLE,
@@ -447,3 +515,24 @@ def test_time_of_a_standing_tip_is_still_compared(factor: float) -> None:
         wrong = [*lines[:k], f"{words} F{factor * float(rate):.4f}", *lines[k + 1 :]]
         found = STANDING.verified("\n".join(wrong)).problems
         assert [(problem.code, problem.nc_line) for problem in found] == [("CS541", k + 1)]
+
+
+def test_cycles_of_one_hole_are_told_apart() -> None:
+    """The first is as deep as it should be, not the deepest; its dwell is its own."""
+    lines = TWO_CYCLES_IN_A_HOLE.text.splitlines()
+    first, second = (
+        next(k for k, line in enumerate(lines) if f" Z{depth} " in line) for depth in ("-5.0000", "-20.0000")
+    )
+    for k, old, new, code in (
+        (first, "-5.0000", "-6.0000", "CS562"),
+        (second, "-20.0000", "-19.0000", "CS562"),
+        (first, "F1700.", "F1600.", "CS541"),
+    ):
+        wrong = [*lines[:k], lines[k].replace(old, new), *lines[k + 1 :]]
+        found = TWO_CYCLES_IN_A_HOLE.verified("\n".join(wrong)).problems
+        assert (code, k + 1) in [(problem.code, problem.nc_line) for problem in found]
+    dwell = lines.index("G4 P500")
+    found = TWO_CYCLES_IN_A_HOLE.verified("\n".join(lines[:dwell] + lines[dwell + 1 :])).problems
+    assert [problem.code for problem in found] == ["CS556"]
+    moved = [*lines[:dwell], *lines[dwell + 1 : second + 1], lines[dwell], *lines[second + 1 :]]
+    assert "CS556" in [problem.code for problem in TWO_CYCLES_IN_A_HOLE.verified("\n".join(moved)).problems]

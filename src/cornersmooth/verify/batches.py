@@ -104,6 +104,10 @@ class Batches:
         self.stops = Stops()
         #: move of the hole that an element belongs to
         self.holes: dict[int, int] = {}
+        #: move behind a run of holes that ends where an element of them does
+        self.shared: dict[int, int] = {}
+        #: moves of holes at whose bottom the tool waits, and ms
+        self.dwells: list[tuple[int, float]] = []
         self.elements = 0
 
     def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
@@ -142,6 +146,8 @@ class Batches:
         holes: HoleRuns = divide_at_holes(task.original, nc, task.axis_length)
         self.problems += holes.problems
         self.holes.update(holes.element_move)
+        self.shared.update(holes.shared)
+        self.dwells += holes.dwells
         for move_first, move_last, first, last in holes.parts:
             if move_last < move_first and last < first:
                 continue

@@ -42,11 +42,14 @@ class Drilling:
     feed : float
         mm/min or mm/rev; NaN for the feed in force.
     per_revolution : bool
+    dwell : float, ms
+        At the bottom; 0 for none.
     """
 
     depth: float = math.nan
     feed: float = math.nan
     per_revolution: bool = False
+    dwell: float = 0.0
 
 
 def drilling(args: tuple[float | str, ...], program: Program) -> Drilling:
@@ -84,7 +87,8 @@ def drilling(args: tuple[float | str, ...], program: Program) -> Drilling:
         return Drilling()
     feeds = [(values[name] * scale, turn) for name, (scale, turn) in _FEEDS.items() if name in values]
     feed, per_revolution = feeds[0] if len(feeds) == 1 else (math.nan, False)
-    return Drilling(depth * program.mm_per_unit, feed, per_revolution)
+    dwell = float(round(1000.0 * values.get("DWELL", 0.0)))
+    return Drilling(depth * program.mm_per_unit, feed, per_revolution, dwell)
 
 
 def drillings(program: Program, poses: list[int]) -> list[Drilling]:
@@ -117,12 +121,19 @@ class HoleRuns:
         Moves and elements between the runs of holes, all included.
     element_move : dict of int to int
         Move of the hole that an element belongs to.
+    shared : dict of int to int
+        Move as far as which words behind an element may stand: the element leaves the last hole and ends where that
+        move does, or the holes from it to that move are not drilled.
+    dwells : list of (int, float)
+        Moves of the holes at whose bottom the tool waits, and for how many ms.
     problems : list of Problem
         CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside a hole, CS564 a feed that is not a hole's.
     """
 
     parts: list[tuple[int, int, int, int]] = field(default_factory=list)
     element_move: dict[int, int] = field(default_factory=dict)
+    shared: dict[int, int] = field(default_factory=dict)
+    dwells: list[tuple[int, float]] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
 
 
@@ -139,17 +150,24 @@ def divide_at_holes(original: Original, nc: Elements, axis_length: float) -> Hol
     all_cycles = drillings(original.program, original.pose[hole].tolist())
     move = element = used = 0
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        start = search.start(first, element) if first > move else element
+        cycles = all_cycles[used : used + stop - first]
+        used += stop - first
+        start = search.start(first, element, cycles[0]) if first > move else element
         if first > move:
             found.parts.append((move, first - 1, element, start - 1))
         groups, element = search.consume(first, stop, start)
-        cycles = all_cycles[used : used + stop - first]
-        used += stop - first
         if stop < moves:
             groups[-1], element = search.give_back(stop, groups[-1], cycles[-1], element)
+            if element < elements and search.exact(stop, np.array([element]))[0]:
+                found.shared[element] = stop
+        if all(nc.kind[k] == Element.RAPID for k in groups[-1]):
+            before = [k for group in groups[:-1] for k in group]
+            found.shared[max(before, default=max(start - 1, 0))] = stop - 1
         for k, group in enumerate(groups):
             found.element_move.update(dict.fromkeys(group, first + k))
             found.problems += search.check(first + k, group, cycles[k])
+            if group and cycles[k].dwell:
+                found.dwells.append((first + k, cycles[k].dwell))
         # the move out of the last hole starts wherever the tool has been left
         loose = stop < moves and original.program.kind[original.pose[stop]] != Move.RAPID
         move = stop - 1 if loose else stop
@@ -186,13 +204,18 @@ class _Search:
         on = (beside <= self.room) & (turned * self.axis_length <= 2 * self.room)
         return np.where(on, height, np.nan)
 
-    def start(self, hole: int, element: int) -> int:
-        """First element of a run of holes: behind the pose before it, where the text goes over to the first hole."""
+    def start(self, hole: int, element: int, cycle: Drilling) -> int:
+        """First element of a run of holes: behind the pose before it, where the text goes over to the first hole.
+
+        There need be nothing at a hole whose cycle cannot be carried out.
+        """
         reached = None
         for begin in range(element, len(self.nc), _WINDOW):
             window = np.arange(begin, min(begin + _WINDOW, len(self.nc)))
             for k in window[self.exact(hole - 1, window)].tolist():
                 reached = k if reached is None else reached
+                if np.isnan(cycle.depth):
+                    return int(reached) + 1
                 if k + 1 < len(self.nc) and not np.isnan(self.heights(hole, np.array([k + 1]))[0]):
                     return int(k) + 1
         return element if reached is None else int(reached) + 1
@@ -221,7 +244,9 @@ class _Search:
         deepest = -1
         if feeds and not np.isnan(cycle.depth):
             height = self.heights(move - 1, np.array(feeds))
-            deepest = feeds[int(np.argmin(height))]
+            # the next cycle may go into the same hole: the first to be deep enough ends this one
+            done = height <= self.room - cycle.depth
+            deepest = feeds[int(np.argmax(done) if done.any() else np.argmin(height))]
         behind = np.array([k for k in group if k > deepest], np.int64)
         same = behind[self.exact(move, behind)] if len(behind) else behind
         if not len(same):

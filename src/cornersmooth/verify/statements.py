@@ -138,7 +138,8 @@ class _Asking:
         offset = next((number for number in registers if number is not None), numbers[0])
         self.tool, self.offset = numbers[0], offset if _whole(offset) else numbers[0]
         self.say("tool", self.tool)
-        self.say("offset", self.offset)
+        if len(self.moving) and statement.pose <= self.moving[-1]:  # nothing moves with a tool that comes last
+            self.say("offset", self.offset)
 
     def select(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """Bring the next tool near."""
@@ -220,13 +221,25 @@ class _Asking:
             self.say("stop", 0.0)
 
 
-def asked(program: Program, places: Sequence[float], end: float) -> list[Token]:
-    """What the CL statements ask for; `places` are where they stand, `end` the length of the path, mm."""
+def asked(program: Program, places: Sequence[float], end: float, dwells: Sequence[Token] = ()) -> list[Token]:
+    """What the CL statements ask for.
+
+    Parameters
+    ----------
+    program : Program
+    places : sequence of float, mm
+        Where the statements stand along the path.
+    end : float, mm
+        Length of the path.
+    dwells : sequence of Token
+        What the cycles of holes ask for, in order.
+    """
     asking = _Asking(program)
     for statement, place in zip(program.statements, places, strict=True):
         asking.take(statement, place)
     line = max((item.line for item in program.statements if item.word in ("FINI", "END")), default=0)
-    return [*asking.tokens, Token("end", 30.0, end, line)]
+    tokens = sorted([*dwells, *asking.tokens], key=lambda token: token.place) if dwells else asking.tokens
+    return [*tokens, Token("end", 30.0, end, line)]
 
 
 def _behind(statement: Statement, word: str) -> float | None:

@@ -26,7 +26,7 @@ from cornersmooth.verify.reader import CONTROL_WORDS, Reader
 from cornersmooth.verify.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.source import Source, readable_twice
-from cornersmooth.verify.statements import asked, compare, said
+from cornersmooth.verify.statements import Token, asked, compare, said
 from cornersmooth.verify.task import Task
 from cornersmooth.verify.wide_search import way_apart
 from cornersmooth.verify.word_check import WordCheck
@@ -269,12 +269,26 @@ class _Measured:
         moves = len(original.pose)
         end = float(length[-1]) if moves else 0.0
         there = length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0
-        theirs = asked(program, np.where(move >= 0, there, _BEFORE).tolist(), end)
-        known = dict(self.lengths)
-        known |= {element: float(length[original.trail.last[move]]) for element, move in self.batches.holes.items()}
-        known |= self.batches.stops.lengths()
+
+        def length_at(move: int) -> float:
+            return float(length[original.trail.last[move]])
+
+        dwells = [
+            Token("dwell", time, length_at(move), int(program.line[original.pose[move]]))
+            for move, time in self.batches.dwells
+        ]
+        theirs = asked(program, np.where(move >= 0, there, _BEFORE).tolist(), end, dwells)
+        known = self.lengths | self.batches.stops.lengths()
+        known |= {element: length_at(move) for element, move in self.batches.holes.items()}
         first = self.batches.stops.first
-        places = [known.get(event.element - 1, _BEFORE if event.element - 1 < first else 0.0) for event in self.events]
+
+        def place(element: int) -> float:
+            return known.get(element, _BEFORE if element < first else 0.0)
+
+        # the way back from the last hole may be the CL file's next move; at holes that are not drilled nothing moves
+        for element, behind in self.batches.shared.items():
+            self.rooms[element] = self.rooms.get(element, 0.0) + abs(length_at(behind) - place(element))
+        places = [place(event.element - 1) for event in self.events]
         rooms = [self.rooms.get(event.element - 1, 0.0) for event in self.events]
         apart: Callable[[float, float], float] = partial(way_apart, self.task.path)
         return compare(theirs, said(self.events, places, rooms), self.margin, unsaid, apart)
