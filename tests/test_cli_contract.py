@@ -236,6 +236,18 @@ def test_wrong_usage_is_two(small: Path, tmp_path: Path, args: list[str]) -> Non
     assert only(tmp_path, "small.cls")
 
 
+def test_errors_of_usage_are_one_line(small: Path) -> None:
+    for args in (
+        ["smooth"],
+        ["smooth", small, "--nope"],
+        ["smooth", small, "-e", "abc"],
+        ["verify", small],
+        ["polish"],
+    ):
+        said = run(*args).stderr.decode()
+        assert re.fullmatch(r"error: .+; .+\n", said), said
+
+
 def test_unknown_command_is_two() -> None:
     assert run_process("polish").returncode == USAGE
 

@@ -90,7 +90,9 @@ def run(args: list[str] | None, ending: Ending) -> int:
         click.echo(helping.ctx.get_help() if helping.ctx else "", err=True)
         return 2
     except click.UsageError as wrong:
-        wrong.show()
+        where = f"{wrong.ctx.command_path} --help" if wrong.ctx else "cornersmooth --help"
+        text = wrong.format_message().rstrip(".")
+        click.echo(f"error: {text}{'' if '; ' in text else f'; {where} shows the options'}", err=True)
         return 2
     except click.ClickException as wrong:
         click.echo(f"error: {wrong.format_message()}", err=True)

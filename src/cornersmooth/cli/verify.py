@@ -180,7 +180,8 @@ def _summary(found: Verification) -> Iterator[str]:
     from cornersmooth.report.verdict import kept_text
 
     yield kept_text(found.to_dict())
-    yield f"{'result':<18}{'passed' if found.passed else f'FAILED: {found.problem_count} problems'}"
+    failed = f"FAILED: {found.problem_count} problem{'s' * (found.problem_count != 1)}"
+    yield f"{'result':<18}{'passed' if found.passed else failed}"
     yield f"{'tolerance':<18}{found.tolerance:g} mm, axis point at {found.axis_length:g} mm"
     yield f"{'tip':<18}{_place(found.tip, 'mm')}"
     yield f"{'axis point':<18}{_place(found.axis_point, 'mm')}"
