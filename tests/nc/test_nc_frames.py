@@ -66,7 +66,7 @@ ENDS = {
         ["M9", "FUNCTION RESET TCPM", "L Z-1 R0 FMAX M91", "M5", "M30", "END PGM CORNERSMOOTH MM"],
     ),
     "linuxcnc": (
-        ["(CORNERSMOOTH)", SAFE, "G64 P0.00500 Q0", "G53 G0 Z0"],
+        ["(CORNERSMOOTH)", SAFE, "G64 P0.01250 Q0", "G53 G0 Z0"],
         ["G53 G0 Z0", "G49", "M5", "G0 A0.00000 C0.00000", "M2"],
     ),
     "mitsubishi": (["%", "O0001", SAFE, *UP], [*UP, "G49", "M5", "M30", "%"]),
