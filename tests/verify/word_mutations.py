@@ -356,7 +356,7 @@ def _standing(text: Text, word: str) -> bool:
     if word in ("G49", "TRAFOOF", "FUNCTION RESET TCPM", "M129"):
         on = {"iso": "G43|G234", "siemens": "TRAORI", "heidenhain": "TCPM F"}[text.family]
         return not re.search(on, said)
-    return word in ("ORIMKS", "ORIAXES", "G64", "G93") and re.search(rf"\b{word}\b", said) is not None
+    return word in ("ORIMKS", "ORIAXES", "G64", "G93", "G5 P10000") and re.search(rf"\b{word}\b", said) is not None
 
 
 def _behind(text: Text, rng: np.random.Generator, each: int) -> Iterator[Mutant]:
