@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import cornersmooth
+from cornersmooth.errors import InputError
 from oracle.chains import Chain, cl_text
 from oracle.judge import judge, not_passed, runs_of
 from oracle.library import write
@@ -31,6 +32,7 @@ FORMS: tuple[Form, ...] = ("g1", "g6.2")
 UP = [0.0, 0.0, 1.0]
 TILTED = [0.6, 0.0, 0.8]
 OPPOSITE = [0.0, 0.0, -1.0]
+NEARLY_OPPOSITE = [0.0, math.sin(math.radians(174.9)), math.cos(math.radians(174.9))]
 STEEP = [math.sin(math.radians(89.99)), 0.0, math.cos(math.radians(89.99))]
 
 
@@ -139,13 +141,23 @@ def test_no_pose_at_all_is_an_error(form: Form) -> None:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("moves", [True, False])
 def test_axis_flip_passes_every_pose(form: Form, moves: bool) -> None:
-    """Between opposite axes there is no ruled motion; the poses themselves must be there, and no corner at the flip."""
+    """Between axes far apart there is no ruled motion; the poses must be there, and no corner at the flip."""
     tips = [[0, 0, 0], [10, 0, 0], [20 if moves else 10, 0, 0], [30, 5, 0]]
-    one = chain(tips, [UP, UP, OPPOSITE, OPPOSITE])
+    one = chain(tips, [UP, UP, NEARLY_OPPOSITE, NEARLY_OPPOSITE])
     written = write(cl_text([one])[0], form, EPS, H)[0]
     (path,) = runs_of(written, H, EPS)
     assert not not_passed(written, path, one.tip, one.original.axis, H)
     assert not any(isinstance(block, Curve) for block in written.blocks)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("moves", [True, False])
+def test_flip_between_opposite_axes_is_refused(form: Form, moves: bool) -> None:
+    tips = [[0, 0, 0], [10, 0, 0], [20 if moves else 10, 0, 0], [30, 5, 0]]
+    text, lines = cl_text([chain(tips, [UP, UP, OPPOSITE, OPPOSITE])])
+    with pytest.raises(InputError) as caught:
+        write(text, form, EPS, H)
+    assert (caught.value.code, caught.value.line) == ("CS183", lines[0][2])
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -174,7 +186,13 @@ pose = st.tuples(coordinate, coordinate, coordinate, st.integers(0, len(AXES) - 
 def test_any_chain_of_a_coarse_grid(poses: list[tuple[float, float, float, int]], form: Form, tolerance: float) -> None:
     one = chain([[x, y, z] for x, y, z, _ in poses], [AXES[which] for *_, which in poses])
     steps = np.sum(one.axis[1:] * one.axis[:-1], axis=1)
-    if (steps < 1e-9).any():  # no ruled motion between axes 90 degrees apart and more: poses only
+    if (steps < math.cos(math.radians(175))).any():  # nor a way round
+        text, lines = cl_text([one])
+        with pytest.raises(InputError) as caught:
+            write(text, form, tolerance, H)
+        flip = 1 + int(np.argmax(steps < math.cos(math.radians(175))))
+        assert (caught.value.code, caught.value.line) == ("CS183", lines[0][flip])
+    elif (steps < 1e-9).any():  # no ruled motion between axes 90 degrees apart and more: poses only
         written = write(cl_text([one])[0], form, tolerance, H)[0]
         for path in runs_of(written, H, tolerance):
             ends = one.tip[[0, -1]], one.original.axis[[0, -1]]

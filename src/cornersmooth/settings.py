@@ -174,6 +174,12 @@ class Settings:
 #: decimals of a weight that every control keeps (FANUC IS-B, reference manual B-63324EN/03 4.17)
 WEIGHT_DECIMALS = 3
 
+#: A feed move whose tool axis turns by more (degrees) is refused. Between opposite axes there is no great circle. Near
+#: them there is one, but it hangs on the last digits: in the middle of the turn, an error of the axes at both ends is
+#: 1/cos(θ/2) times as large, that is 11 times at 170 degrees, 23 times at 175, 57 times at 178 and 1146 times at 179.9.
+#: Half a unit of the fourth decimal, which some CL files have, is a tenth of a degree there at 175, and 6 at 179.9.
+FLIP_ANGLE = 175.0
+
 #: closed bounds of the numeric settings
 BOUNDS: dict[str, tuple[float, float]] = {
     "tolerance": (1e-6, 10.0),

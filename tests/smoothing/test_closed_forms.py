@@ -165,7 +165,7 @@ def test_orientation_tolerance_is_kept_and_said():
 
 def test_reversals_and_flips_stay_sharp():
     tips = np.array([[0, 0, 0], [10, 0, 0], [0, 0, 0], [0, 10, 0], [0, 20, 1]], float)
-    axes = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, -1]], float)
+    axes = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0.1, -1]], float)
     corners = smooth(Program.from_poses(tips, axes), Settings()).corners
     assert corners.status.tolist() == [Status.REVERSAL, Status.SMOOTHED, Status.AXIS_STEP]
 

@@ -9,11 +9,15 @@ from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.rotary import rapid_moves
+from cornersmooth.settings import FLIP_ANGLE
+from cornersmooth.smoothing.axis_steps import axis_steps
 
 
 def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings: Findings) -> None:
     """Note what a user of the form should know of the program."""
     _arcs(circles, smoothed.program, findings)
+    if not form.rotary:  # rotary words say which way to turn
+        _flips(smoothed.program, findings)
     if form.orientation == "machine":
         _feeds(smoothed.program, findings)
     if form.curve == "bspline":
@@ -28,6 +32,17 @@ def _arcs(circles: Circles, program: Program, findings: Findings) -> None:
         rows = np.flatnonzero(chosen)
         if len(rows):
             findings.add(code, "note", int(program.line[program.arcs.pose[rows[0]]]), text, len(rows))
+
+
+def _flips(program: Program, findings: Findings) -> None:
+    """Rapids whose axis turns by nearly half a turn; feed moves that do so are refused before."""
+    poses, _ = axis_steps(program, rapid_moves(program.kind), FLIP_ANGLE)
+    if len(poses):
+        text = (
+            f"the tool axis turns by more than {FLIP_ANGLE:g} deg in a rapid; which way a control turns is not "
+            "defined: keep clear of the part there, or insert a pose in between"
+        )
+        findings.add("CS326", "warning", int(program.line[poses[0]]), text, len(poses))
 
 
 def _feeds(program: Program, findings: Findings) -> None:

@@ -13,7 +13,8 @@ from cornersmooth.errors import Finding
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, LimitedBy, Move, Program, Status
 from cornersmooth.report.corners import STATUS_NAMES
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
+from cornersmooth.smoothing.axis_steps import axis_step_findings
+from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import angle_between, dot, norm
 
 SCHEMA: Final = "cornersmooth-info/1"
@@ -204,7 +205,7 @@ def describe(program: Program, tolerance: float, axis_length: float) -> Info:
         axis=_axis(program, segments),
         arcs=_arcs(program),
         corners=_corners(program, settings),
-        findings=program.findings,
+        findings=(*program.findings, *axis_step_findings(program, settings)),
     )
 
 
@@ -280,7 +281,8 @@ def _arcs(program: Program) -> ArcSummary:
 
 
 def _corners(program: Program, settings: Settings) -> CornerSummary:
-    corners = smooth(program, settings).corners
+    # a program with a move that smoothing refuses is described all the same
+    corners = construction_of(settings.method).smooth(program, settings).corners
     turn = _tip_turn(program, corners)
     done = corners.rounded
     return CornerSummary(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from cornersmooth.model import Program, SmoothProgram
 from cornersmooth.settings import Settings
+from cornersmooth.smoothing.axis_steps import axis_step_findings, refuse_flips
 from cornersmooth.smoothing.construction import construction_of
 
 __all__ = ["smooth"]
@@ -31,6 +33,13 @@ def smooth(
     -------
     SmoothProgram
         Also where nothing can be rounded; every corner has a status that says why not.
+
+    Raises
+    ------
+    InputError
+        CS183: the tool axis turns by nearly half a turn in one feed move.
     """
     settings = Settings() if settings is None else settings
-    return construction_of(settings.method).smooth(program, settings, progress)
+    refuse_flips(program)
+    smoothed = construction_of(settings.method).smooth(program, settings, progress)
+    return replace(smoothed, findings=(*smoothed.findings, *axis_step_findings(program, settings)))

@@ -1,0 +1,80 @@
+"""Moves in which the tool axis turns far: which way round it goes, and whether that is defined at all."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cornersmooth.errors import Finding, InputError
+from cornersmooth.model import Bools, Floats, Ints, Move, Program
+from cornersmooth.settings import FLIP_ANGLE, Settings
+from cornersmooth.vectors import dot, norm
+
+#: angles nearer to a limit are at the limit, degrees
+_ROUNDING = 1e-9
+
+
+def axis_steps(program: Program, moves: Bools, limit: float) -> tuple[Ints, Floats]:
+    """Moves that turn the tool axis by more than a limit.
+
+    Parameters
+    ----------
+    program : Program
+        n poses.
+    moves : (n,) bool
+        Poses whose moves are asked about. The first pose and a FROM have no move, and nothing moves from a FROM.
+    limit : float, degrees
+
+    Returns
+    -------
+    pose : (k,) int64
+        Poses that those moves end in, ascending.
+    turn : (k,) float64, degrees
+        Angle between the axes at both ends; accurate up to 180 degrees.
+    """
+    axis, stated = program.axis, program.kind == Move.FROM
+    far = moves[1:] & ~stated[1:] & ~stated[:-1]
+    far &= dot(axis[1:], axis[:-1]) < math.cos(math.radians(limit)) + _ROUNDING  # a first look: the cosine is coarse
+    pose = 1 + np.flatnonzero(far)
+    here, there = axis[pose - 1], axis[pose]
+    turn = np.degrees(2.0 * np.arctan2(norm(there - here), norm(there + here)))
+    beyond = turn > limit + _ROUNDING
+    return pose[beyond], turn[beyond]
+
+
+def refuse_flips(program: Program) -> None:
+    """Refuse a feed move, line or arc, whose axis turns by more than `cornersmooth.settings.FLIP_ANGLE`.
+
+    Raises
+    ------
+    InputError
+        CS183, at the first such move.
+    """
+    pose, turn = axis_steps(program, _feed_moves(program), FLIP_ANGLE)
+    if len(pose):
+        raise InputError(
+            "CS183",
+            f"the tool axis turns by {turn[0]:.4g} deg in one move; which way a control turns is not defined",
+            "insert a pose in between",
+            file=program.source.name,
+            line=int(program.line[pose[0]]) or None,
+        )
+
+
+def axis_step_findings(program: Program, settings: Settings) -> tuple[Finding, ...]:
+    """Feed moves whose axis turns by more than `Settings.max_axis_step`: no corner beside them is rounded."""
+    pose, turn = axis_steps(program, _feed_moves(program), settings.max_axis_step)
+    if not len(pose):
+        return ()
+    text = (
+        f"the tool axis turns by more than {settings.max_axis_step:g} deg in one move, by {turn.max():.4g} deg at "
+        "most; corners beside it stay sharp, insert poses in between"
+    )
+    return (Finding("CS184", "warning", int(program.line[pose[0]]), text, len(pose)),)
+
+
+def _feed_moves(program: Program) -> Bools:
+    """Poses that are reached in a cut: (n,) bool."""
+    moves: Bools = (program.kind == Move.LINEAR) | (program.kind == Move.ARC)
+    return moves
