@@ -178,10 +178,8 @@ function wireSwitches(view, recolour) {
       view.touch();
     });
   };
-  wire("show-original", (on) => (view.original.visible = on));
-  wire("show-written", (on) => {
-    view.written.visible = on;
-  });
+  wire("show-original", (on) => (view.wanted.original = on));
+  wire("show-written", (on) => (view.wanted.written = on));
   wire("show-rapids", (on) => (view.rapids.visible = on));
   wire("show-tool", (on) => (view.wanted.tool = on));
   if (view.surface) {

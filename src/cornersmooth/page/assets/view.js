@@ -1,9 +1,15 @@
 // The view in three dimensions.
 
 /** More segments than this are drawn as thin lines. */
-const MOST_WIDE = 150000;
+const MOST_WIDE = 20000;
 const MOST_WHISKERS = 1500;
 const MOST_RIBS = 20000;
+/** Chords of a path, and ribs, while the picture changes, if drawing everything is slow. */
+const MOST_MOVING = 6000;
+const MOST_MOVING_RIBS = 1500;
+/** Milliseconds that a slow picture takes, and of rest before everything is drawn again. */
+const SLOW = 50;
+const REST = 250;
 /** Milliseconds of a flight to a corner. */
 const FLIGHT = 450;
 
@@ -31,30 +37,26 @@ class View {
     this.wide = /** @type {InstanceType<typeof THREE.LineMaterial>[]} */ ([]);
     this.height = meta.axis_length;
     this.bounds = this.boundsOf();
-    this.wanted = { tool: true };
+    this.wanted = { tool: true, original: true, written: true };
     /** @type {"surface" | "whiskers" | "none"} */
     this.axes = "surface";
     this.drawn = 0;
     this.waiting = false;
+    this.measured = false;
     this.flight = 0;
     const { o_tip: tip, o_move: move } = arrays;
-    const cuts = [];
-    const rapids = [];
-    for (let i = 1; i < move.length; i++) {
-      if (move[i] === 2) cuts.push(i);
-      else if (move[i] === 1) rapids.push(i);
-    }
-    this.original = this.line(tip, cuts, 1.4);
     this.rapids = new THREE.LineSegments(
-      pairs(tip, rapids),
+      pairs(tip, chords(move.length, (i) => move[i] === 1)),
       new THREE.LineDashedMaterial({ color: 0xc08020, dashSize: this.bounds.radius / 60, gapSize: this.bounds.radius / 90 }),
     );
     this.rapids.computeLineDistances();
     this.rapids.visible = false;
-    this.segments = this.writtenSegments();
-    this.written = this.line(arrays.w_tip, this.segments);
-    this.written.renderOrder = 2;
-    this.ribs = this.buildRibs();
+    this.fine = this.buildPaths(1, MOST_RIBS);
+    const points = Math.max(move.length, arrays.w_rapid.length);
+    this.rough = points > MOST_WIDE ? this.buildPaths(Math.ceil(points / MOST_MOVING), MOST_MOVING_RIBS) : null;
+    /** Whether drawing everything is slow; of a long path that is thought until it was measured. */
+    this.slow = this.rough !== null;
+    this.rest = 0;
     this.whiskers = this.buildWhiskers();
     this.markers = this.buildMarkers();
     this.ring = this.buildRing();
@@ -69,8 +71,8 @@ class View {
     this.spot.visible = false;
     this.spot.frustumCulled = false;
     this.spot.renderOrder = 6;
-    this.original.renderOrder = 1;
-    this.scene.add(this.original, this.rapids, this.ribs, this.whiskers, this.written, this.markers, this.ring, this.tool, this.spot);
+    for (const paths of [this.fine, this.rough]) if (paths) this.scene.add(paths.original, paths.ribs, paths.written);
+    this.scene.add(this.rapids, this.whiskers, this.markers, this.ring, this.tool, this.spot);
     if (this.surface) this.scene.add(this.surface);
     this.setAxes(this.axes);
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -97,52 +99,57 @@ class View {
     return sphere;
   }
 
-  /** Ends of the segments that cut: index of the point each leads to. */
-  writtenSegments() {
-    const rapid = this.arrays.w_rapid;
-    const ends = [];
-    for (let i = 1; i < rapid.length; i++) if (!rapid[i]) ends.push(i);
-    return ends;
+  /**
+   * Both paths and the ruled surface that the tool axis sweeps over its length H.
+   * @param {number} every points to a chord @param {number} most ribs of the surface, about
+   */
+  buildPaths(every, most) {
+    const { o_tip, o_move: move, w_tip, w_rapid: rapid } = this.arrays;
+    const width = every === 1 ? 1 : 0;
+    const original = this.line(o_tip, chords(move.length, (i) => move[i] === 2, every), 1.4 * width, false);
+    original.renderOrder = 1;
+    const segments = chords(rapid.length, (i) => !rapid[i], every);
+    const written = this.line(w_tip, segments, 3 * width, true);
+    written.renderOrder = 2;
+    const strips = chords(rapid.length, (i) => !rapid[i], Math.max(1, Math.ceil(rapid.length / most)));
+    return { original, written, segments, ...this.buildRibs(strips) };
   }
 
   /**
-   * Segments that lead to some points, in a colour each if no width is given.
-   * @param {Values} tip @param {number[]} ends @param {number} [width] pixels
+   * Some segments of a path.
+   * @param {Values} tip @param {number[]} ends as of `chords` @param {number} width pixels; thin if not above 1 @param {boolean} coloured
    */
-  line(tip, ends, width) {
-    const coloured = width === undefined;
+  line(tip, ends, width, coloured) {
     const geometry = pairs(tip, ends);
-    const blank = new Float32Array(ends.length * 6);
-    if (ends.length > MOST_WIDE) {
+    const blank = new Float32Array(ends.length * 3);
+    if (width <= 1 || ends.length > 2 * MOST_WIDE) {
       if (coloured) geometry.setAttribute("color", new THREE.BufferAttribute(blank, 3));
       return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: coloured }));
     }
     const wide = new THREE.LineSegmentsGeometry();
     wide.setPositions(/** @type {Float32Array} */ (geometry.getAttribute("position").array));
     if (coloured) wide.setColors(blank);
-    const material = new THREE.LineMaterial({ linewidth: width ?? 3, vertexColors: coloured });
+    const material = new THREE.LineMaterial({ linewidth: width, vertexColors: coloured });
     this.wide.push(material);
     return new THREE.LineSegments2(wide, material);
   }
 
-  /** The ruled surface that the tool axis sweeps over its length H. */
-  buildRibs() {
-    const { w_tip: tip, w_axis: axis, w_rapid: rapid } = this.arrays;
-    const count = rapid.length;
-    const step = Math.max(1, Math.ceil(count / MOST_RIBS));
-    this.ribPoints = /** @type {number[]} */ ([]);
-    for (let i = 0; i < count; i++) {
-      const last = i + 1 === count || rapid[i + 1];
-      if (i % step === 0 || rapid[i] || last) this.ribPoints.push(i);
-    }
-    const position = new Float32Array(this.ribPoints.length * 6);
+  /** Strips between the tool axes at the ends of chords. @param {number[]} ends */
+  buildRibs(ends) {
+    const { w_tip: tip, w_axis: axis } = this.arrays;
+    const ribPoints = /** @type {number[]} */ ([]);
     const index = /** @type {number[]} */ ([]);
-    this.ribPoints.forEach((i, k) => {
+    for (let k = 0; k < ends.length; k += 2) {
+      if (ribPoints[ribPoints.length - 1] !== ends[k]) ribPoints.push(ends[k]);
+      const n = 2 * ribPoints.push(ends[k + 1]) - 4;
+      index.push(n, n + 1, n + 2, n + 2, n + 1, n + 3);
+    }
+    const position = new Float32Array(ribPoints.length * 6);
+    ribPoints.forEach((i, k) => {
       for (let j = 0; j < 3; j++) {
         position[6 * k + j] = tip[3 * i + j];
         position[6 * k + 3 + j] = tip[3 * i + j] + (this.height * axis[3 * i + j]) / 32767;
       }
-      if (k && !rapid[i]) index.push(2 * k - 2, 2 * k - 1, 2 * k, 2 * k, 2 * k - 1, 2 * k + 1);
     });
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
@@ -151,7 +158,7 @@ class View {
     const material = new THREE.MeshBasicMaterial({
       vertexColors: true, transparent: true, opacity: 0.3, side: THREE.DoubleSide, depthWrite: false,
     });
-    return new THREE.Mesh(geometry, material);
+    return { ribs: new THREE.Mesh(geometry, material), ribPoints };
   }
 
   buildWhiskers() {
@@ -239,16 +246,22 @@ class View {
 
   /** @param {Float32Array} colours three numbers for each written point */
   setColours(colours) {
-    const { segments } = this;
-    const flat = new Float32Array(segments.length * 6);
-    segments.forEach((end, k) => {
-      // a segment has the colour of the point it leads to at both ends where kinds meet, so that none bleeds
-      flat.set(colours.subarray(3 * end, 3 * end + 3), 6 * k);
-      flat.set(colours.subarray(3 * end, 3 * end + 3), 6 * k + 3);
-    });
-    if (this.written instanceof THREE.LineSegments2) this.written.geometry.setColors(flat);
-    else attribute(this.written, "color").copyArray(flat).needsUpdate = true;
-    for (const [object, points] of /** @type {[any, number[]][]} */ ([[this.ribs, this.ribPoints], [this.whiskers, this.whiskerPoints]])) {
+    const drawn = /** @type {[any, number[]][]} */ ([[this.whiskers, this.whiskerPoints]]);
+    for (const paths of [this.fine, this.rough]) {
+      if (!paths) continue;
+      const { segments, written, ribs, ribPoints } = paths;
+      const flat = new Float32Array(segments.length * 3);
+      for (let k = 0; k < segments.length; k += 2) {
+        // a segment has the colour of the point it leads to at both ends where kinds meet, so that none bleeds
+        const own = colours.subarray(3 * segments[k + 1], 3 * segments[k + 1] + 3);
+        flat.set(own, 3 * k);
+        flat.set(own, 3 * k + 3);
+      }
+      if (written instanceof THREE.LineSegments2) written.geometry.setColors(flat);
+      else attribute(written, "color").copyArray(flat).needsUpdate = true;
+      drawn.push([ribs, ribPoints]);
+    }
+    for (const [object, points] of drawn) {
       const own = new Float32Array(points.length * 6);
       points.forEach((i, k) => {
         own.set(colours.subarray(3 * i, 3 * i + 3), 6 * k);
@@ -271,7 +284,7 @@ class View {
     /** @param {string} name */
     const colour = (name) => new THREE.Color(style.getPropertyValue(name).trim());
     this.scene.background = colour("--stage");
-    /** @type {any} */ (this.original.material).color = colour("--original");
+    for (const paths of [this.fine, this.rough]) if (paths) /** @type {any} */ (paths.original.material).color = colour("--original");
     /** @type {any} */ (this.spot.material).color = colour("--accent");
     /** @type {any} */ (this.ring.material).color = colour("--text");
     this.touch();
@@ -401,31 +414,75 @@ class View {
     this.touch();
   }
 
-  /** Draws soon; as often as it is asked, once a frame. */
+  /** Draws soon; as often as it is asked, once a frame. Where all is slow, roughly, and all of it after a rest. */
   touch() {
+    clearTimeout(this.rest);
+    if (this.rough && this.slow) this.rest = setTimeout(() => requestAnimationFrame(() => this.drawFully()), REST);
     if (this.waiting) return;
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
       this.controls.update();
-      const distance = this.camera.position.distanceTo(this.controls.target);
-      // close by, the tool and the surface of its axis would stand before the eye
-      this.tool.visible = this.wanted.tool && distance > 1.2 * this.height;
-      this.ribs.visible = this.axes === "surface" && this.written.visible && distance > 0.8 * this.height;
-      this.whiskers.visible = this.axes === "whiskers" && this.written.visible;
-      this.camera.near = Math.max(distance / 200, 1e-4);
-      this.camera.far = distance + 6 * this.bounds.radius;
-      this.camera.updateProjectionMatrix();
-      this.renderer.render(this.scene, this.camera);
-      this.drawn++;
+      this.draw(this.rough !== null && this.slow);
     });
+  }
+
+  /** Draws everything, and measures how long that takes; reading a pixel waits for the end. */
+  drawFully() {
+    const gl = this.renderer.getContext();
+    const begin = performance.now();
+    this.draw(false);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    // the first time buffers and programs are made, which is not counted
+    if (this.measured) this.slow = performance.now() - begin > SLOW;
+    else requestAnimationFrame(() => this.drawFully());
+    this.measured = true;
+  }
+
+  /** @param {boolean} roughly */
+  draw(roughly) {
+    const { wanted } = this;
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    for (const paths of [this.fine, this.rough]) {
+      if (!paths) continue;
+      const own = roughly === (paths === this.rough);
+      paths.original.visible = own && wanted.original;
+      paths.written.visible = own && wanted.written;
+      // close by, the tool and the surface of its axis would stand before the eye
+      paths.ribs.visible = paths.written.visible && this.axes === "surface" && distance > 0.8 * this.height;
+    }
+    this.tool.visible = wanted.tool && distance > 1.2 * this.height;
+    this.whiskers.visible = this.axes === "whiskers" && wanted.written;
+    this.camera.near = Math.max(distance / 200, 1e-4);
+    this.camera.far = distance + 6 * this.bounds.radius;
+    this.camera.updateProjectionMatrix();
+    this.renderer.render(this.scene, this.camera);
+    this.drawn++;
   }
 }
 
-/** Segments from the points before to these points. @param {Values} tip @param {number[]} ends */
+/**
+ * Chords of the stretches of a path: start, end, start, end, ...
+ * @param {number} count points @param {(i: number) => boolean} wanted whether the move to a point belongs to a stretch
+ * @param {number} [every] points to a chord; stretches keep their ends
+ */
+function chords(count, wanted, every = 1) {
+  const ends = /** @type {number[]} */ ([]);
+  let start = 0;
+  for (let i = 1; i < count; i++) {
+    if (!wanted(i)) start = i;
+    else if (i % every === 0 || i + 1 === count || !wanted(i + 1)) {
+      ends.push(start, i);
+      start = i;
+    }
+  }
+  return ends;
+}
+
+/** Segments between points. @param {Values} tip @param {number[]} ends as of `chords` */
 function pairs(tip, ends) {
-  const flat = new Float32Array(ends.length * 6);
-  ends.forEach((end, k) => flat.set(/** @type {Float32Array} */ (tip).subarray(3 * end - 3, 3 * end + 3), 6 * k));
+  const flat = new Float32Array(ends.length * 3);
+  ends.forEach((end, k) => flat.set(/** @type {Float32Array} */ (tip).subarray(3 * end, 3 * end + 3), 3 * k));
   return new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(flat, 3));
 }
 
