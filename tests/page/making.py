@@ -40,12 +40,19 @@ HOSTILE = (
 )
 
 
-def smoothed(path: str = PATH, *, name: str = "PART", comment: str = "none", source: str = "part.cls") -> Result:
+def smoothed(
+    path: str = PATH,
+    *,
+    name: str = "PART",
+    comment: str = "none",
+    source: str = "part.cls",
+    method: str = "proportional",
+) -> Result:
     """Run of a path in memory."""
     import io
 
     text = path.format(name=name, comment=comment).encode()
-    return postprocess(text, io.BytesIO(), Settings(tolerance=0.02), reading={"name": source})
+    return postprocess(text, io.BytesIO(), Settings(tolerance=0.02, method=method), reading={"name": source})
 
 
 def page_of(result: Result, **more: object) -> str:

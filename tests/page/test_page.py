@@ -141,6 +141,21 @@ def test_a_file_without_feeds_says_that_no_speed_is_planned():
     assert meta["timed"] is True
 
 
+def test_a_page_of_curves_for_whole_runs():
+    made = smoothed(method="global")
+    meta, arrays = values_of(page_of(made))
+    assert meta["verdict"].startswith("OK: within 0.02 mm everywhere; ")
+    assert dict(meta["facts"])["method"].startswith("global, ")
+    assert set(meta["charts"]["speeds"]) == {"direct", "local", "written"}
+    assert meta["totals"]["local"] < meta["totals"]["direct"]
+    assert 0.01 < np.nanmax(arrays["w_off"]) <= 0.02
+    assert sum(meta["corners"]["counts"].values()) == len(made.smoothed.corners)
+    kinds = [meta["corners"]["kinds"][kind] for kind in arrays["c_kind"]]
+    assert kinds[0] == "sharp"  # the reversal
+    assert set(kinds[1:]) == {"rounded"}
+    assert len(kinds) == 7
+
+
 def test_hostile_names_and_comments_are_text():
     made = smoothed(
         name=HOSTILE.replace("{", "{{").replace("}", "}}"),

@@ -78,11 +78,12 @@ def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, den
         off = np.where(np.isfinite(measured), measured, off)
     out = off > tolerance
     idle = np.isin(status, (Status.STRAIGHT, Status.DUPLICATE)) & ~out
-    sharp = ~corners.smoothed & ~idle & ~out
+    sharp = ~corners.rounded & ~idle & ~out
     kind = np.where(out, 0, np.where(sharp, 1, 1 + corners.limited_by.astype(np.int64)))
+    kind[~out & (status == Status.IN_RUN)] = len(KINDS) - 1
     counts = {name: int(np.count_nonzero((kind == index) & ~idle)) for index, name in enumerate(KINDS)}
     counts["straight"] = int(np.count_nonzero(idle))
-    rounded = np.flatnonzero(corners.smoothed & ~out)
+    rounded = np.flatnonzero(corners.rounded & ~out)
     rounded = rounded[np.argsort(-off[rounded], kind="stable")][:_MOST_ROUNDED]
     rows = np.concatenate((np.flatnonzero(out), np.flatnonzero(sharp), rounded))
     table = corner_table(smoothed, rows, dense=dense)
