@@ -207,6 +207,7 @@ def postprocess(
                 tolerance=smoothed.settings.verified_tolerance,
                 axis_length=smoothed.settings.axis_length,
                 trusted=_users_blocks(frame, form, program, smoothed.settings),
+                weights=provenance.weights,
                 processes=useful_processes() if processes is None else processes,
                 **back,
             )
@@ -261,6 +262,8 @@ def _provenance(
         tcp=form.orientation != "machine",
         source=program.source.name,
         sha256=digest,
+        # on more knots, as angles of rotary axes need them, the same curves have other weights
+        weights=None if settings.shape == "auto" or form.rotary else (1.0, *settings.weights),
     )
 
 

@@ -31,6 +31,8 @@ class Provenance:
         Name of the CL file, without its folder.
     sha256 : str
         Of the CL file, in hexadecimal digits; empty where it is not known.
+    weights : tuple of float or None
+        Those that control points of curves have; None where they may have any.
     """
 
     version: str
@@ -43,6 +45,7 @@ class Provenance:
     tcp: bool = True
     source: str = ""
     sha256: str = ""
+    weights: tuple[float, ...] | None = (1.0,)
 
     def lines(self) -> tuple[str, ...]:
         """Texts of the comments."""
@@ -54,10 +57,19 @@ class Provenance:
             "FORM": self.form,
             **({"MACHINE": self.machine} if self.machine else {}),
             **({} if self.tcp else {"TCP": "no"}),
+            **({"WEIGHTS": self._weights_word} if self._weights_word else {}),
         }
         first = f"CORNERSMOOTH {self.version}: " + " ".join(f"{key}={_word(value)}" for key, value in words.items())
         second = " ".join(([f"SHA256={self.sha256}"] if self.sha256 else []) + [f"CL={self.source}"])
         return first, second
+
+    @property
+    def _weights_word(self) -> str:
+        """Weights as they are written; nothing where all are 1."""
+        if self.weights is None:
+            return "any"
+        others = sorted(set(self.weights) - {1.0})
+        return ",".join(f"{weight:g}" for weight in (1.0, *others)) if others else ""
 
 
 def read_provenance(text: bytes) -> Provenance | None:
@@ -85,9 +97,14 @@ def read_provenance(text: bytes) -> Provenance | None:
             machine=words.get("MACHINE", ""),
             tcp=words.get("TCP") != "no",
             sha256=digest[1].lower() if digest else "",
+            weights=_weights(words.get("WEIGHTS", "1")),
         )
     except (KeyError, ValueError):
         return None
+
+
+def _weights(word: str) -> tuple[float, ...] | None:
+    return None if word == "any" else tuple(float(number) for number in word.split(","))
 
 
 def _word(text: str) -> str:

@@ -33,12 +33,17 @@ FINI
 NC = """%
 O0001
 G21 G90 G94 G17 G40 G49 G80
+G91 G28 Z0.
+G90
 T3 M6
+G54
 G43.5 H3
 G0 X0.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000
 G1 X9.9500 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000 F250.
 G1 X10.0000 Y0.0500 Z0.0000 I0.0000000 J0.0000000 K1.0000000
 G1 X10.0000 Y10.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000
+G91 G28 Z0.
+G90
 G49
 M30
 %
@@ -60,11 +65,11 @@ def test_command(files, tmp_path, capsys):
     assert told.err == ""
     # corner to chamfer: 0.05/sqrt(2)
     assert "passed" in told.out
-    assert "0.0353553 mm at CL line 6, NC line 8" in told.out
+    assert "0.0353553 mm at CL line 6, NC line 11" in told.out
     assert run(["verify", source, text, "-e", "0.03", "-q"]) == 1
     told = capsys.readouterr()
     assert told.out == ""
-    assert f"{source}:6: error: the tip leaves its path by 0.035355 mm (NC line 8)" in told.err
+    assert f"{source}:6: error: the tip leaves its path by 0.035355 mm (NC line 11)" in told.err
 
 
 def test_reports_and_refusals(files, tmp_path, capsys):
@@ -74,7 +79,7 @@ def test_reports_and_refusals(files, tmp_path, capsys):
     contents = json.loads(found.read_text())
     assert contents["schema"] == "cornersmooth-verification/1"
     assert contents["max_tip_deviation_mm"] == pytest.approx(0.05 / np.sqrt(2))
-    assert contents["where"]["max_tip_deviation_mm"] == {"cl_line": 6, "nc_line": 8}
+    assert contents["where"]["max_tip_deviation_mm"] == {"cl_line": 6, "nc_line": 11}
     table = list(csv.DictReader(rows.read_text().splitlines()))
     assert tuple(table[0]) == CSV_COLUMNS
     assert [float(row["tip_deviation_mm"]) for row in table] == pytest.approx([0, 0.0353553, 0], abs=1e-6)

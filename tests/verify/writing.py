@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-HEAD = ["%", "O0001", "(TEST)", "G21 G90 G94 G17 G40 G49 G80"]
-TAIL = ["G49", "M30", "%"]
+RETRACT = ["G91 G28 Z0.", "G90"]
+HEAD = ["%", "O0001", "(TEST)", "G21 G90 G94 G17 G40 G49 G80", *RETRACT, "G54"]
+TAIL = [*RETRACT, "G49", "M30", "%"]
 
 
 def unit(v):

@@ -73,7 +73,7 @@ def command(source: str, text: str, **given: Any) -> int:
     form = _check_outputs(source, text, given)
     data, name = read_input(source)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
-    remark = _take_over(given, nc, data)
+    remark, weights = _take_over(given, nc, data)
     own = options.control_of(given).own
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
     how = {**measures, **options.reading_back_of(given)}
@@ -84,7 +84,7 @@ def command(source: str, text: str, **given: Any) -> int:
     trusted = [
         line for path in given["trusted"] for line in read_input(path)[0].decode("utf-8", "replace").splitlines()
     ]
-    found = verify(program, nc, **how, words=not own, trusted=trusted, processes=useful_processes())
+    found = verify(program, nc, **how, words=not own, trusted=trusted, weights=weights, processes=useful_processes())
     _write_reports(program, found, [path for path in given["reports"] if path not in pages])
     if pages:
         from cornersmooth.page import verified_page
@@ -115,8 +115,18 @@ def command(source: str, text: str, **given: Any) -> int:
     return 0 if found.passed else 1
 
 
-def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source: bytes) -> str:
-    """Take what the text says of how it was made for options that were not given; return what is strange about it."""
+def _take_over(
+    given: dict[str, Any], nc: bytes | str | os.PathLike[str], source: bytes
+) -> tuple[str, tuple[float, ...] | None]:
+    """Take what the text says of how it was made for options that were not given.
+
+    Returns
+    -------
+    str
+        What is strange about it; empty for nothing.
+    tuple of float or None
+        Weights of its curves, where it says so.
+    """
     from cornersmooth.kinematics import machine_names
     from cornersmooth.nc import control_names
     from cornersmooth.provenance import HEAD, read_provenance
@@ -129,7 +139,7 @@ def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source
                     head = file.read(HEAD)
     made = read_provenance(head)
     if made is None:
-        return ""
+        return "", None
     context = click.get_current_context()
     said: dict[str, Any] = {"tolerance": made.tolerance, "axis_length": made.axis_length, "no_tcp": not made.tcp}
     said |= {"control": made.control} if made.control in control_names() else {}
@@ -139,8 +149,8 @@ def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source
     if made.machine and not given["machine"]:
         raise SettingsError("CS225", f"the text is for the machine {made.machine}", "name its file with --machine")
     if made.sha256 and made.sha256 != hashlib.sha256(source).hexdigest():
-        return "it was made from another CL file, or that has changed since: its SHA-256 is another"
-    return ""
+        return "it was made from another CL file, or that has changed since: its SHA-256 is another", made.weights
+    return "", made.weights
 
 
 def _check_outputs(source: str, text: str, given: dict[str, Any]) -> str:

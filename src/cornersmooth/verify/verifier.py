@@ -53,6 +53,7 @@ def verify(
     tcp: bool = True,
     words: bool = True,
     trusted: Sequence[str] = (),
+    weights: Sequence[float] | None = None,
     processes: int = 1,
 ) -> Verification:
     """Measure an NC text against the CL program it was made from.
@@ -72,6 +73,8 @@ def verify(
         not where nobody knows what they mean.
     trusted : sequence of str
         Blocks that belong where they stand because the user put them there: what they do is taken on trust.
+    weights : sequence of float, optional
+        Those that curves have, where that is known: any other is a problem, even if the curve stays within ε.
     processes : int
         Processes to work on long texts with, where the system can fork; the result does not depend on it.
 
@@ -102,6 +105,7 @@ def verify(
         tcp=tcp,
         words=words,
         trusted=trusted,
+        weights=weights,
         processes=processes,
     ) as verifier:
         return verifier.result()
@@ -133,11 +137,12 @@ class Verifier:
         tcp: bool = True,
         words: bool = True,
         trusted: Sequence[str] = (),
+        weights: Sequence[float] | None = None,
         processes: int = 1,
     ) -> None:
         _check_bounds(tolerance, axis_length)
         self._program, self._words, self._processes = program, words, processes
-        self._trusted = tuple(trusted)
+        self._trusted, self._weights = tuple(trusted), weights
         self._name = None if isinstance(nc, bytes) else str(nc)
         self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._source = Source(readable_twice(nc))
@@ -181,9 +186,8 @@ class Verifier:
             lever = float(rotary.levers(task.original.trail.tip).max(initial=0.0))
         reader = Reader(self._name, options, steps, lever)
         lines = read_lines(source.part(0, sys.maxsize), self._name, options.dialect.lexer)
-        check = WordCheck(
-            options.control, options.dialect.lexer, options.tolerance / self._program.mm_per_unit, self._trusted
-        )
+        room = options.tolerance / self._program.mm_per_unit
+        check = WordCheck(options.control, options.dialect.lexer, room, self._trusted, self._weights)
         text = _Text(reader.chunks(check.watch(lines) if self._words else lines), reader.events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
         problems = [*reader.problems, *check.problems]

@@ -25,10 +25,14 @@ _LINEAR: Final = frozenset("XYZ")
 #: words of which a block may have one
 _MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "BSPLINE", "POLY"))
 
-#: a weight that fewer than so many of all have is a mistake: a construction gives all its curves the same
-_SELDOM: Final = 0.15
+#: how far a weight may be from one that is asked for: half of the last decimal that controls keep
+_WEIGHT_ROOM: Final = 5e-4
 
-_WEIGHTS: Final = ("PW", "R")
+_WEIGHTS: Final = frozenset(("PW", "R"))
+
+#: weights complained of in one run of blocks
+_MOST_WEIGHTS: Final = 100
+
 _CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
 
 
@@ -43,9 +47,18 @@ class WordCheck:
         ε in units of the text.
     trusted : iterable of str
         Blocks that belong where they stand because the user says so; names of states that the text leaves to him.
+    weights : iterable of float, optional
+        Those that control points of curves have; None where they may have any.
     """
 
-    def __init__(self, control: str, lexer: Lexer, tolerance: float, trusted: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        control: str,
+        lexer: Lexer,
+        tolerance: float,
+        trusted: Iterable[str] = (),
+        weights: Iterable[float] | None = None,
+    ) -> None:
         self.list: WordList = word_list(control)
         self.lexer, self.tolerance = lexer, tolerance
         self.problems: list[Problem] = []
@@ -70,7 +83,7 @@ class WordCheck:
         self._approach = {rule.state for rule in self.list.words if rule.off} | {"work offset"}
         self._arc: tuple[str, int] | None = None
         self._code = -1.0
-        self._weights: dict[float, tuple[int, int]] = {}
+        self._weights = None if weights is None else np.array(tuple(weights))
         self._line = 0
 
     def watch(self, items: Iterable[Table | Line]) -> Iterator[Table | Line]:
@@ -101,9 +114,7 @@ class WordCheck:
         self._next_block("", int(table.line[0]))
         codes = table.column("G")
         known = np.flatnonzero(~np.isnan(codes))
-        for name in _WEIGHTS:
-            if name in table.columns:
-                self._count_weights(table, name, codes)
+        self._check_weights(table, codes)
         linear = ~np.all([np.isnan(table.column(name)) for name in sorted(_LINEAR)], axis=0)
         if (self._changed or self._high or self._retract or self._arc) and linear.any():
             row = int(np.argmax(linear))
@@ -112,13 +123,17 @@ class WordCheck:
         if len(known):
             self._code = float(codes[known[-1]])
 
-    def _count_weights(self, table: Table, name: str, codes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
-        column = table.columns[name]
-        rows = np.flatnonzero(~np.isnan(column) & ~np.isin(codes, (2.0, 3.0)))
-        values, first, count = np.unique(column[rows], return_index=True, return_counts=True)
-        for value, row, many in zip(values.tolist(), first.tolist(), count.tolist(), strict=True):
-            before, line = self._weights.get(value, (0, int(table.line[rows[row]])))
-            self._weights[value] = (before + many, line)
+    def _check_weights(self, table: Table, codes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+        """Complain of the first curve with a weight that none has; R of an arc is its radius."""
+        if self._weights is None:
+            return
+        for name in _WEIGHTS & table.columns.keys():
+            column = table.columns[name]
+            rows = np.flatnonzero(~np.isnan(column) & ~np.isin(codes, (2.0, 3.0)))
+            off = np.abs(column[rows, None] - self._weights).min(axis=1) > _WEIGHT_ROOM
+            for row in rows[off][:_MOST_WEIGHTS].tolist():
+                text = f"a weight of {column[row]:g}, which no curve of this text has"
+                self._wrong(NOT_LISTED, int(table.line[row]), text)
 
     def _block(self, line: Line) -> Line:
         """Look at a line on its own; of one that is taken on trust only what is understood goes on to the reader."""
@@ -135,24 +150,42 @@ class WordCheck:
         text = _text(words)
         self._line = line.number
         if text in self._own:
-            self.trusted.append((line.number, text))
-            self._blocks += 1
-            rules = self._fitting(words, text)
-            if len(rules) == len(words):
-                kept = [rule is not None and not rule.compared for rule in rules]
-                line = replace(line, words=tuple(word for word, keep in zip(line.words, kept, strict=True) if keep))
-            self._note(line, [said(word) for word in line.words])
-            return line
+            return self._users_block(line, words, text)
         if line.skipped:
             self._wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
-        if not self._start(line.number, text):
-            rules = self._rules(line.number, words, text)
-            before = self._next_block(text, line.number)
-            self._said |= set(words)
-            self._places(line, words, rules, before)
-            self._states(line.number, words, rules)
+        self._judge(line, words, text)
         self._blocks += 1
         self._note(line, words)
+        return line
+
+    def _judge(self, line: Line, words: list[str], text: str) -> None:
+        """Look at the words of a block and their places, and take over the states that they change."""
+        if self._start(line.number, text):
+            return
+        rules = self._rules(line.number, words, text)
+        before = self._next_block(text, line.number)
+        self._said |= set(words)
+        self._places(line, words, rules, before)
+        self._states(line.number, words, rules)
+
+    def _users_block(self, line: Line, words: list[str], text: str) -> Line:
+        """Look at a block that the user wants where it stands.
+
+        What it establishes counts. With a word that is not on the list, not in its place, or that the CL file would
+        have to ask for, the block is taken on trust, and the reader gets no more of it than is understood.
+        """
+        before = len(self.problems)
+        self._judge(line, words, text)
+        rules = self._fitting(words, text)
+        whole = len(rules) == len(words)
+        if line.skipped or len(self.problems) > before or any(rule is not None and rule.compared for rule in rules):
+            del self.problems[before:]
+            self.trusted.append((line.number, text))
+            if whole:
+                kept = [rule is not None and not rule.compared for rule in rules]
+                line = replace(line, words=tuple(word for word, keep in zip(line.words, kept, strict=True) if keep))
+        self._blocks += 1
+        self._note(line, [said(word) for word in line.words])
         return line
 
     def _note(self, line: Line, words: list[str]) -> None:
@@ -207,10 +240,6 @@ class WordCheck:
                 self._wrong(NOT_ESTABLISHED, last, f"{state}: {word} still holds at the end")
         if not self._high and any(rule.high for rule in self.list.words if not self._shadowed(rule)):
             self._wrong(NOT_ESTABLISHED, last, "the tool is not retracted at the end")
-        total = sum(count for count, _ in self._weights.values())
-        for value, (count, line) in self._weights.items():
-            if count < _SELDOM * total:
-                self._wrong(NOT_LISTED, line, f"a weight of {value:g} on a curve, where all others have other weights")
 
     def _shadowed(self, rule: WordRule) -> bool:
         return any(self.list.shadows(other, rule) for other in self.list.words)
