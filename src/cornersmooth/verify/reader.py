@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import MM_PER_UNIT, Units
+from cornersmooth.model import MM_PER_UNIT, Floats, Units
 from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.dialects import CONTROLS
 from cornersmooth.verify.dialects.base import HIGH_SPEED, INCREMENTAL
@@ -150,6 +150,8 @@ class Reader:
         self.placed = False
         self.blocks = 0
         self.left = False  # an axis stands at a position of the machine
+        #: where the last rapid on the way back has gone, NaN where that is not known, and its line
+        self.over: tuple[Floats, int] | None = None
 
     def chunks(self, items: Iterable[Table | Line]) -> Iterator[Elements]:
         """Take runs of motion blocks and other lines, and give out the path elements as they come."""
@@ -361,6 +363,11 @@ class Reader:
                 "CS503", "a feed move where not all of the position is known", hint, file=self.name, line=line
             )
         self.left = bool(unknown.all())
+        if gone.any():
+            row = int(np.flatnonzero(gone)[-1])
+            self.over = np.concatenate((run.tip[row], run.second[row])), int(run.line[row])
+        if not self.left:
+            self._check_approach(run, int(np.argmin(unknown)))
         if not gone.any():
             return run
         kept = ~gone
@@ -370,6 +377,18 @@ class Reader:
             if (value := getattr(run, key)) is not None
         }
         return replace(run, **rows, arc_element=(np.cumsum(kept) - 1)[run.arc_element])
+
+    def _check_approach(self, run: Executed, arrival: int) -> None:
+        """Complain where the tool does not come straight down: the last rapid of the way back must be over its end."""
+        if self.over is None:
+            return
+        (above, line), self.over = self.over, None
+        below = np.concatenate((run.tip[arrival], run.second[arrival]))
+        unknown = np.isnan(above)
+        aside = np.abs(above - below)[~unknown].max(initial=0.0) > 0.0
+        if aside or unknown[:3].sum() == 2:
+            text = "the last rapid of the way back from a retract is not over the position that it leads to"
+            self.problems.append(Problem("CS531", 0, line, text))
 
     def wrong(self, code: str, line: Line, text: str) -> None:
         """Note what breaks the rules of the control."""
