@@ -90,7 +90,7 @@ def test_what_smooth_says_holds_for_the_other_commands(part: Path, tmp_path: Pat
 def test_controls_and_machines_of_the_shop(part: Path) -> None:
     project(
         part,
-        "[smooth]\ncontrol = 'shop'\n[controls.shop]\nlike = 'siemens'\nlayout.tail = ['M17']\n"
+        "[smooth]\ncontrol = 'shop'\n[controls.shop]\nlike = 'siemens'\nprogram.end = ['M17']\n"
         "[machines.mill]\nlike = 'table-ac'\n",
     )
     assert run("smooth", part).stdout.splitlines()[-1] == b"M17"

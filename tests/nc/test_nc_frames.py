@@ -274,6 +274,6 @@ def test_blending_is_never_without_limit(tolerance: float, units: Units, word: s
     assert blend_word(0.1 * tolerance / MM_PER_UNIT[units]) == word
 
 
-def test_blending_is_a_tenth_of_the_tolerance() -> None:
+def test_blending_is_the_share_of_the_tolerance_that_the_table_says() -> None:
     form = Case("linuxcnc", "g1", "xyzac-trt").choose()
-    assert "G64 P0.00500 Q0" in lines_of(form, CL)
+    assert "G64 P0.01250 Q0" in lines_of(form, CL)  # 0.25 of it

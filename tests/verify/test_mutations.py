@@ -9,7 +9,7 @@ from cornersmooth.verify import verify
 
 from .judging import CALM_FEED, RUNS, Runs, Shared, calm_cut, edit, judge, repeated
 from .mutations import EPS, H, Mutant, mutants
-from .writing import HEAD, TAIL, chain_lines, encode, job, rapid
+from .writing import HEAD, RETRACT, TAIL, chain_lines, encode, job, rapid
 
 
 def named_in(program, lines):
@@ -23,7 +23,7 @@ def several(form, program, lines, runs):
     calm = [rapid(tip[0], axis[0], H, form), *chain_lines(tip[:3], axis[:3], EPS, H, form, CALM_FEED)]
     calm += [rapid(tip[i], axis[i], H, form) for i in range(3, len(tip))]
     body = lines[len(HEAD) : -len(TAIL)]
-    return [*HEAD, *body, *(runs - 1) * [*calm, *body], *TAIL]
+    return [*HEAD, *body, *(runs - 1) * [*calm, *RETRACT, *body], *TAIL]
 
 
 @pytest.mark.parametrize(("form", "seed"), [("g1", 0), ("g6.2", 0)])
