@@ -180,6 +180,9 @@ WEIGHT_DECIMALS = 3
 #: Half a unit of the fourth decimal, which some CL files have, is a tenth of a degree there at 175, and 6 at 179.9.
 FLIP_ANGLE = 175.0
 
+#: poses up to which `smooth` plans what it saves for its verdict: half a second of work; and with -v, some seconds
+MOST_TIMED_POSES, MOST_TIMED_POSES_VERBOSE = 200, 5000
+
 #: closed bounds of the numeric settings
 BOUNDS: dict[str, tuple[float, float]] = {
     "tolerance": (1e-6, 10.0),

@@ -225,6 +225,9 @@ def test_commands_write_pages(tmp_path):
     said = done.stderr.decode()
     assert said.startswith("OK: within 0.02 mm everywhere; 1 corner stays sharp, first :12 reversal 17")
     assert "part.cls:12 reversal 17" in said
+    # the page says the same words
+    assert values_of(page.read_text())[0]["verdict"] == said.splitlines()[0]
+    assert re.search(r"; (saves|takes) \d+\.\d s ", said.splitlines()[0])
     first = page.read_bytes()
     # a page of ours is replaced without being asked; anything else is not
     assert run("smooth", source, "-e", "0.02", "-o", nc, "--report", page, "--force").returncode == 0
@@ -238,8 +241,22 @@ def test_commands_write_pages(tmp_path):
     times = tmp_path / "times.html"
     assert run("time", source, "-e", "0.02", "--report", times, "-q").returncode == 0
     meta, _ = values_of(times.read_text())
-    assert meta["verdict"].startswith("proportional takes ") or "zhang2016 takes " in meta["verdict"]
+    assert meta["verdict"].startswith("global takes ")  # the fastest method
     assert run("time", source, "--report", tmp_path / "times.json").returncode == 2
+
+
+def test_the_time_of_long_paths_is_planned_on_demand(tmp_path):
+    source, nc = tmp_path / "long.cls", tmp_path / "long.nc"
+    rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(201))
+    source.write_text(f"TOOL PATH/LONG,TOOL,T\nFEDRAT/MMPM,1500.0\n{rows}END-OF-PATH\n")
+    verdicts = []
+    for more in ((), ("-v",), ("-q",)):
+        done = run("smooth", source, "-e", "0.02", "-o", nc, "--force", *more)
+        assert done.returncode == 0, done.stderr
+        verdicts.append(done.stderr.decode().split("\n")[0])
+    assert verdicts[0] == "OK: within 0.02 mm everywhere; no corner stays sharp"
+    assert re.fullmatch(re.escape(verdicts[0]) + r"; saves \d+\.\d s of \d+\.\d s", verdicts[1])
+    assert verdicts[2] == ""
 
 
 def test_a_text_off_the_path_is_broken_in_words(tmp_path):

@@ -14,6 +14,7 @@ from cornersmooth.errors import CornersmoothError, PromiseError, SettingsError
 from cornersmooth.output import ClosedPipe, make_folder, open_output, read_mark
 
 if TYPE_CHECKING:
+    from cornersmooth.feedrate import Limits
     from cornersmooth.nc import Form, Frame
     from cornersmooth.pipeline import Progress, Result
     from cornersmooth.settings import Settings
@@ -64,6 +65,8 @@ class Job:
         Picture of the path; empty for none.
     tool : Tool or None
         For pages, instead of that of the file.
+    plan_up_to : int
+        Poses up to which the time that is saved is planned.
     """
 
     source: str
@@ -82,6 +85,7 @@ class Job:
     skip_existing: bool = False
     plot: str = ""
     tool: Tool | None = None
+    plan_up_to: int = 0
 
 
 @dataclass
@@ -96,6 +100,8 @@ class Outcome:
     skipped: str = ""
     #: what of the text is not verified; empty for nothing
     unverified: str = ""
+    #: planned times of the direct path and of the written one, s
+    planned: tuple[float, float] | None = None
 
     @property
     def status(self) -> str:
@@ -236,6 +242,8 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         outcome.message = _say_rejected(name, result, broken)
     outcome.unverified = result.unverified
     contents = result.report()
+    if len(result.program) <= job.plan_up_to and result.verification is not None and result.verification.passed:
+        outcome.planned = _planned(job, result)
     for path in job.reports:
         _write_report(path, job, bool(may_replace[path]), source, result, contents)
     if job.plot:
@@ -257,6 +265,30 @@ def _picture(job: Job, result: Result, contents: dict[str, Any]) -> bytes:
     return draw_path(result.program, nc, result.smoothed, title, form, tolerance=tolerance)
 
 
+def _limits(job: Job) -> Limits:
+    from cornersmooth.feedrate import Limits
+
+    return Limits() if job.feed is None else Limits(feed=job.feed)
+
+
+def _planned(job: Job, result: Result) -> tuple[float, float] | None:
+    """Times of the direct path and of the written one, s; None for texts with curves, and without feeds."""
+    from cornersmooth.feedrate import direct, plan_text
+    from cornersmooth.page.pages import read_written
+
+    program, settings, machine = result.program, result.smoothed.settings, result.form.machine
+    if result.form.curve:
+        return None
+    machine = machine if machine is not None and machine.dynamics else None
+    try:
+        limits = _limits(job)
+        before = direct(program, limits, "velocity_jump", settings=settings, machine=machine)
+        text = read_written(result, result.frame)
+        return before.total, plan_text(text, limits, settings=settings, machine=machine).total
+    except CornersmoothError:
+        return None
+
+
 def _write_report(
     path: str, job: Job, may_replace: bool, source: bytes, result: Result, contents: dict[str, Any]
 ) -> None:
@@ -268,11 +300,9 @@ def _write_report(
     elif suffix == ".csv":
         texts = corners_csv(result.smoothed, dense=not result.form.curve)
     else:
-        from cornersmooth.feedrate import Limits
         from cornersmooth.page import result_page
 
-        limits = Limits() if job.feed is None else Limits(feed=job.feed)
-        texts = iter([result_page(result, source=source, frame=result.frame, limits=limits, tool=job.tool)])
+        texts = iter([result_page(result, source=source, frame=result.frame, limits=_limits(job), tool=job.tool)])
     with open_output(target_of(path), replace=may_replace) as output:
         for text in texts:
             output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8

@@ -76,11 +76,11 @@ def show_findings(source: str, contents: dict[str, Any], verbose: int) -> None:
         print_line(f"{source}: {len(ranked) - len(shown)} more findings; -v shows them")
 
 
-def show_verdict(contents: dict[str, Any]) -> None:
+def show_verdict(contents: dict[str, Any], planned: tuple[float, float] | None = None) -> None:
     """Print how it went, in one sentence."""
     from cornersmooth.report.verdict import verdict
 
-    console().print(verdict(contents), style="bold")
+    console().print(verdict(contents, planned), style="bold")
 
 
 def show_summary(contents: dict[str, Any], verbose: int) -> None:

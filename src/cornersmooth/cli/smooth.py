@@ -85,7 +85,7 @@ def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
         with progress_bar(quiet) as progress:
             outcome = run_job(jobs[0], progress)
         if outcome.contents and not quiet:
-            show_verdict(outcome.contents)
+            show_verdict(outcome.contents, outcome.planned)
         _tell(outcome, quiet, verbose)
         if outcome.contents and not quiet:
             show_summary(outcome.contents, verbose)
@@ -120,9 +120,11 @@ def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> No
 def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
     from cornersmooth.nc import fit_settings
+    from cornersmooth.settings import MOST_TIMED_POSES, MOST_TIMED_POSES_VERBOSE
 
     folder, output = given["directory"], given["output"]
-    if given["quiet"] and given["verbose"]:
+    quiet, verbose = given["quiet"], given["verbose"]
+    if quiet and verbose:
         raise click.UsageError("-q and -v exclude each other")
     if given["no_verify"] and given["require_verify"]:
         raise click.UsageError("--no-verify and --require-verify exclude each other")
@@ -172,6 +174,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 skip_existing=given["skip_existing"],
                 plot=given["plot"] or "",
                 tool=given["tool"],
+                plan_up_to=0 if quiet or folder else MOST_TIMED_POSES_VERBOSE if verbose else MOST_TIMED_POSES,
             )
         )
     by_target: dict[str, str] = {}
