@@ -223,7 +223,7 @@ def test_jumps_at_corners_keep_the_axes(chain: Callable[[int], Program]) -> None
 
 
 def test_refusals() -> None:
-    program = Program.from_poses([[0, 0, 0], [5, 0, 0]], [[0, 0, 1], [0, 0, -1]], feed=100.0)
+    program = Program.from_poses([[0, 0, 0], [5, 0, 0]], [[0, 0, 1], [0, 0.1, -1]], feed=100.0)
     smoothed = smooth(program, Settings())
     with pytest.raises(InputError, match="its limit is"):
         plan(smoothed, machine=load_machine("table-ac"))

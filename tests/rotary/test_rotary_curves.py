@@ -21,6 +21,7 @@ from cornersmooth.rotary.angle_curves import RotaryCurves, angle_allowance, rota
 from cornersmooth.rotary.nurbs_knots import SPANS, CurveGroup, refinement, weight_factors
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
+from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.segments import segments_of
 
 TOLERANCE = 0.01  # mm
@@ -429,7 +430,10 @@ def test_axis_that_turns_over(name: str, aside: float):
     axis[2] += aside * np.array([0.5, -0.3, 0.2])
     tip = np.array([[0, 0, 0], [10, 1, 0], [20, 0, 0], [30, 2, 0], [40, 1, 0.0]])
     chosen = choose_form("fanuc", "g6.2", machine=machine)
-    smoothed = smooth(Program.from_poses(tip, unit(axis)), fit_settings(reserved(), chosen, "mm"))
+    program, settings = Program.from_poses(tip, unit(axis)), fit_settings(reserved(), chosen, "mm")
+    with pytest.raises(InputError, match="turns by"):  # it is refused before it comes to that
+        smooth(program, settings)
+    smoothed = construction_of(settings.method).smooth(program, settings, None)
     curves = rotary(smoothed, machine)
     if aside < 1e-7:
         assert curves.inserted.unsolved.tolist() == [2]
