@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
 from collections.abc import Mapping
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
@@ -82,10 +83,10 @@ def result_page(
 
 
 def read_written(result: Result, frame: Frame | None = None) -> NcProgram:
-    """Read the text of a run of `postprocess`; one that went to a stream is made once more, with the same frame."""
+    """Read the text of a run of `postprocess`; what went to a stream or a pipe is made once more."""
     form, settings = result.form, result.smoothed.settings
     text: bytes | str
-    if result.path is None:
+    if result.path is None or not os.path.isfile(result.path):
         stream = io.BytesIO()
         write(result.smoothed, stream, form=form, frame=frame)
         text = stream.getvalue()
