@@ -363,7 +363,7 @@ def test_fini_ends_the_file() -> None:
         b"GOTO/1,2,3\nGOTO/4,5,6\r\n\x1a",
         b"\xef\xbb\xbfGOTO/1,2,3\n\n\nGOTO/4,5,6",
         "GOTO/1,2,3\nGOTO/4,5,6\n".encode("utf-16"),
-        gzip.compress(b"GOTO/1,2,3\nGOTO/4,5,6\n"),
+        gzip.compress(b"GOTO/1,2,3\nGOTO/4,5,6\n", mtime=0),
     ],
 )
 def test_line_ends_and_encodings(data: bytes) -> None:
