@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
-LISTS = HERE.parent / "src" / "cornersmooth" / "verify" / "word_lists"
+LISTS = HERE.parent / "src" / "cornersmooth" / "nc_reader" / "word_lists"
 PAGE = HERE / "verify.md"
 BEGIN, END = "<!-- made by make_words.py -->\n", "<!-- end -->\n"
 CONTROLS = ("fanuc", "mitsubishi", "haas", "linuxcnc", "generic", "siemens", "heidenhain")

@@ -22,11 +22,12 @@ from cornersmooth.errors import Finding, InputError, PromiseError
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
+from cornersmooth.nc_reader import CONTROLS
 from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
 from cornersmooth.provenance import Provenance
 from cornersmooth.report import report
 from cornersmooth.settings import Settings
-from cornersmooth.verify import CONTROLS, Verification, Verifier, useful_processes
+from cornersmooth.verify import Verification, Verifier, useful_processes
 
 #: blocks taken on trust that are told one by one
 _TRUSTED_TOLD = 3

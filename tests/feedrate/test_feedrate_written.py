@@ -15,9 +15,9 @@ from cornersmooth.feedrate import BlockLimits, Limits, TimeLaw, direct, plan_tex
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import NcProgram, read_nc
 from oracle.command import run
 
 SAMPLE = Path(__file__).parents[2] / "samples" / "impeller.cls"

@@ -189,8 +189,9 @@ def test_thinning_keeps_what_matters():
 
 
 def test_thinning_of_a_long_path_hides_no_corner_out_of_tolerance(monkeypatch):
+    from cornersmooth.nc_reader import read_nc
     from cornersmooth.page import scene as module
-    from cornersmooth.verify import read_nc, verify
+    from cornersmooth.verify import verify
 
     monkeypatch.setattr(module, "MOST_POINTS", 500)
     x = np.linspace(0.0, 600.0, 1201)

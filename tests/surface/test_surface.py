@@ -213,8 +213,8 @@ def brute_force(point, motion, tool, edge):
 @pytest.mark.parametrize("tolerance", [0.01, 0.04])
 @pytest.mark.parametrize("name", ["impeller", pytest.param("hecc_flank_nx", marks=pytest.mark.corpus)])
 def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance, request):
+    from cornersmooth.nc_reader import read_nc
     from cornersmooth.surface import original_cuts, written_cuts
-    from cornersmooth.verify import read_nc
 
     if name == "impeller":
         path, height = Path(__file__).parents[2] / "samples" / "impeller.cls", 12.0

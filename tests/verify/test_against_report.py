@@ -14,11 +14,12 @@ from cornersmooth.cl import read
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.model import Program
 from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.nc_reader import read_nc
 from cornersmooth.report import report
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.path_distance import path_distances
-from cornersmooth.verify import read_nc, verify
+from cornersmooth.verify import verify
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 

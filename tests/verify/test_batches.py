@@ -15,9 +15,10 @@ import pytest
 from cornersmooth.errors import InputError
 from cornersmooth.model import FeedMode, Move, Program, Statement
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
+from cornersmooth.nc_reader import reader
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import Verifier, Where, batches, reader, verifier, verify
+from cornersmooth.verify import Verifier, Where, batches, verifier, verify
 
 from .writing import unit, wavy
 
@@ -261,7 +262,7 @@ def test_text_from_a_pipe(used, tmp_path, processes):
 
 def test_text_is_read_by_one_thread_while_another_writes(used, tmp_path):
     """What is not there yet is waited for; nothing is read twice or left out."""
-    from cornersmooth.verify.source import GivenUp, Source
+    from cornersmooth.nc_reader.source import GivenUp, Source
 
     path = tmp_path / "growing"
     path.write_bytes(b"")

@@ -13,9 +13,10 @@ from cornersmooth.errors import CornersmoothError, InputError
 from cornersmooth.kinematics import Machine, load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import Form
+from cornersmooth.nc_reader import NcProgram, read_nc
+from cornersmooth.nc_reader.elements import Element
 from cornersmooth.settings import Settings
-from cornersmooth.verify import NcProgram, read_nc, verify
-from cornersmooth.verify.elements import Element
+from cornersmooth.verify import verify
 from cornersmooth.verify.polyline import written_at
 from nc.cases import CHOSEN, Case
 from nc.grammars import reader

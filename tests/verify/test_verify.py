@@ -10,7 +10,8 @@ import pytest
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Arcs, Move, Program
-from cornersmooth.verify import read_nc, verify
+from cornersmooth.nc_reader import read_nc
+from cornersmooth.verify import verify
 
 from .writing import HEAD, TAIL, corners, encode, job, place_g1, rapid, simple_text, unit
 

@@ -10,12 +10,12 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.nc import fit_settings, write
+from cornersmooth.nc_reader.block_tables import read_lines
+from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
-from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.word_check import WordCheck
-from cornersmooth.verify.word_list import word_list
 from nc.cases import CHOSEN, Case
 
 from .form_mutations import EPS, H, program_of

@@ -14,9 +14,10 @@ import pytest
 
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.nc_reader import read_nc
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import batches, read_nc, verify, workers
+from cornersmooth.verify import batches, verify, workers
 
 from .writing import wavy
 

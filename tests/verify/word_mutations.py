@@ -18,12 +18,12 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.nc import fit_settings, write
+from cornersmooth.nc_reader.block_tables import read_lines
+from cornersmooth.nc_reader.reader import Reader
+from cornersmooth.nc_reader.reading_options import ReadingOptions
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
-from cornersmooth.verify.block_tables import read_lines
-from cornersmooth.verify.reader import Reader
-from cornersmooth.verify.reading_options import ReadingOptions
 from cornersmooth.verify.word_check import WordCheck
 from nc.cases import RUNNABLE, Case
 

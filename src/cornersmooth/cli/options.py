@@ -500,14 +500,14 @@ def machine_of(given: Mapping[str, Any]) -> Machine | None:
 
 
 def reading_back_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Keyword arguments of `cornersmooth.verify.read_nc` for a text that somebody wrote.
+    """Keyword arguments of `cornersmooth.nc_reader.read_nc` for a text that somebody wrote.
 
     Raises
     ------
     SettingsError
         CS204: nobody knows how the control's text is read; or the control or the machine is unknown.
     """
-    from cornersmooth.verify import CONTROLS
+    from cornersmooth.nc_reader import CONTROLS
 
     control = control_of(given)
     if control.dialect not in CONTROLS:

@@ -55,9 +55,9 @@ def command(source: str, text: str, **given: Any) -> int:
       cornersmooth surface part.cls part.nc --tool 12,0,3 --report points.csv
     """
     from cornersmooth.cl import read
+    from cornersmooth.nc_reader import read_nc
     from cornersmooth.report.surface import surface_lines
     from cornersmooth.surface import measure_surface
-    from cornersmooth.verify import read_nc
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")

@@ -117,7 +117,7 @@ def command(source: str, **given: Any) -> int:
 def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
     from cornersmooth.cl import read
     from cornersmooth.feedrate import BlockLimits, compare, plan_text
-    from cornersmooth.verify import read_nc
+    from cornersmooth.nc_reader import read_nc
 
     machine = options.machine_of(given)
     limits, settings = options.limits_of(given), options.settings_of(given)

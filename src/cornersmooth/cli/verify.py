@@ -65,8 +65,8 @@ def command(source: str, text: str, **given: Any) -> int:
       cornersmooth verify part.cls part.nc -e 0.04 --report found.html
     """
     from cornersmooth.cl import read
+    from cornersmooth.nc_reader.source import readable_twice
     from cornersmooth.verify import deviation_along, useful_processes, verify
-    from cornersmooth.verify.source import readable_twice
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
@@ -87,8 +87,8 @@ def command(source: str, text: str, **given: Any) -> int:
     found = verify(program, nc, **how, words=not own, trusted=trusted, weights=weights, processes=useful_processes())
     _write_reports(program, found, [path for path in given["reports"] if path not in pages])
     if pages:
+        from cornersmooth.nc_reader import read_nc
         from cornersmooth.page import verified_page
-        from cornersmooth.verify import read_nc
 
         page = verified_page(
             program, read_nc(nc, **how), found, source=data, machine=how["machine"], tool=given["tool"]

@@ -14,9 +14,9 @@ from cornersmooth.feedrate.planner import Progress, plan_path
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Arcs, FeedMode, Floats, Move, Program, Source, Statement
+from cornersmooth.nc_reader.elements import Element, Event, NcProgram
 from cornersmooth.settings import Settings
 from cornersmooth.vectors import unit
-from cornersmooth.verify.elements import Element, Event, NcProgram
 
 #: what a motion block does, as a move
 _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Move.ARC, Element.CURVE: Move.LINEAR}
@@ -54,7 +54,7 @@ def written_program(nc: NcProgram, name: str) -> Program:
     Parameters
     ----------
     nc : NcProgram
-        As `cornersmooth.verify.read_nc` gives it.
+        As `cornersmooth.nc_reader.read_nc` gives it.
     name : str
         File name for messages.
     """
@@ -137,7 +137,7 @@ def plan_text(
     Parameters
     ----------
     nc : NcProgram
-        As `cornersmooth.verify.read_nc` gives it.
+        As `cornersmooth.nc_reader.read_nc` gives it.
     limits : Limits, optional
     name : str
         File name for messages.

@@ -14,12 +14,13 @@ from cornersmooth.feedrate import Comparison, Limits
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Program
 from cornersmooth.nc import Frame, choose_form, write
+from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.page.document import document
 from cornersmooth.page.scene import Story, Subject, scene
 from cornersmooth.report.verdict import kept_text, saving_text, times_text, verdict
 from cornersmooth.settings import Settings
 from cornersmooth.surface.tool import Tool
-from cornersmooth.verify import NcProgram, Verification, read_nc, verify
+from cornersmooth.verify import Verification, verify
 
 if TYPE_CHECKING:
     from cornersmooth.pipeline import Result

@@ -11,9 +11,9 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, direct, plan
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Statement
+from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.motions import OriginalPath, WrittenPath
 from cornersmooth.settings import Settings
-from cornersmooth.verify import NcProgram
 
 #: moves up to which a motion is planned: some 10 s of work
 MOST_MOVES = 100_000

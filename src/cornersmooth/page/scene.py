@@ -11,6 +11,7 @@ import numpy as np
 from cornersmooth.feedrate import Limits, TimeLaw
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Ints, Program, SmoothProgram
+from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.corners import KINDS, CornerList, measured_corners, smoothed_corners
 from cornersmooth.page.motions import OriginalPath, WrittenPath, original_path, written_path
 from cornersmooth.page.packing import Pack
@@ -18,7 +19,7 @@ from cornersmooth.page.planned import Planned, axis_loads, feed_seconds, plan_al
 from cornersmooth.page.thinning import thinned
 from cornersmooth.settings import Settings
 from cornersmooth.surface.tool import Tool, tools_of
-from cornersmooth.verify import NcProgram, Verification
+from cornersmooth.verify import Verification
 
 if TYPE_CHECKING:
     from cornersmooth.surface import SurfaceMap

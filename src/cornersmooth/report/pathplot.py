@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.model import Floats, Program, SmoothProgram, Status
+from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.motions import original_path, written_path
 from cornersmooth.page.thinning import thinned
 from cornersmooth.report.picture import new_figure, saved
-from cornersmooth.verify import NcProgram
 
 #: points drawn of each path
 _POINTS = 20_000

@@ -10,11 +10,11 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Bools, Floats, Program
+from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.surface.distance import distance_to_motion
 from cornersmooth.surface.envelope import EnvelopePoints, envelope_points
 from cornersmooth.surface.motion import original_cuts, written_cuts
 from cornersmooth.surface.tool import Tool
-from cornersmooth.verify import NcProgram, read_nc
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine

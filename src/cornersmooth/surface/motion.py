@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
+from cornersmooth.nc_reader import NcProgram
+from cornersmooth.nc_reader.elements import Element
 from cornersmooth.smoothing.arcs import arc_points
-from cornersmooth.verify import NcProgram
-from cornersmooth.verify.elements import Element
 from cornersmooth.verify.polyline import directions, written_at
 
 #: largest turn of an arc within one segment, rad: off the arc by its radius times 3e-7

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cornersmooth.model import Floats, Ints, Program
+from cornersmooth.nc_reader.elements import NcProgram
+from cornersmooth.nc_reader.reader import read_nc
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.distances import from_original, owner_fraction
-from cornersmooth.verify.elements import NcProgram
 from cornersmooth.verify.match import Match, match
 from cornersmooth.verify.nearest import gap_between, nearest_segments
 from cornersmooth.verify.polyline import written_at
-from cornersmooth.verify.reader import read_nc
 from cornersmooth.verify.task import Task
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, Move
+from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.verify.drilling import HoleRuns, divide_at_holes
-from cornersmooth.verify.elements import Element, Elements, Problem
 from cornersmooth.verify.guide import STRIDE, cut, guide
 from cornersmooth.verify.polyline import Polyline, directions
 from cornersmooth.verify.rapids import Rapids, fraction_along, moving_rapids

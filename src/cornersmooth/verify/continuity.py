@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.curves import CurveGroup, groups
+from cornersmooth.nc_reader.curves import CurveGroup, groups
+from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.verify.distances import Distances
-from cornersmooth.verify.elements import Element, Elements
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
 

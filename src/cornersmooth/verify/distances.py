@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.curves import CurveGroup
-from cornersmooth.verify.elements import Element
+from cornersmooth.nc_reader.curves import CurveGroup
+from cornersmooth.nc_reader.elements import Element
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import Gap, Metric, climb, gap_between, nearest_segments
 from cornersmooth.verify.polyline import directions, written_at

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
-from cornersmooth.verify.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.verify.polyline import Original, directions
 from cornersmooth.verify.rapids import digit_errors
 

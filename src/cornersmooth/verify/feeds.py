@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
+from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.rotary import SHORT_STEPS
 from cornersmooth.verify.distances import Distances
-from cornersmooth.verify.elements import Element, Elements, Problem
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.rapids import ARITHMETIC
-from cornersmooth.verify.rotary import SHORT_STEPS
 
 #: a rounding reaches at most so many times as far as its first vertex that is visibly off the line
 _BEYOND_VISIBLE = 3.0

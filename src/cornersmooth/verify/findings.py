@@ -8,7 +8,7 @@ from typing import Final, Self
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.elements import Problem
+from cornersmooth.nc_reader.elements import Problem
 
 #: neighbouring violations no farther apart on the original than this many segments are one problem
 _SAME_PROBLEM: Final = 3.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.curves import CurveGroup
+from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import gap_between, nearest_segments
 from cornersmooth.verify.polyline import directions, unit, written_at

@@ -14,9 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.assignment import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.batches import Batch
-from cornersmooth.verify.elements import Elements
 from cornersmooth.verify.guide import LONG, STRIDE, guide
 from cornersmooth.verify.nearest import nearest_from
 from cornersmooth.verify.polyline import CHORD_SHARE, Original, Polyline, Written, written_motion

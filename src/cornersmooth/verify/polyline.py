@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
-from cornersmooth.verify.arcs import arc_points
-from cornersmooth.verify.curves import CurveGroup, groups
-from cornersmooth.verify.elements import Element, Elements
+from cornersmooth.nc_reader.arcs import arc_points
+from cornersmooth.nc_reader.curves import CurveGroup, groups
+from cornersmooth.nc_reader.elements import Element, Elements
 
 #: how far, relative to the tolerance, a trail may stay off the motion it stands for
 CHORD_SHARE = 0.1

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
-from cornersmooth.verify.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.verify.polyline import Original, directions
 
 #: slack of arithmetic on coordinates that are a million times larger, mm

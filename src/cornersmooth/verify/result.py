@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.elements import Problem
+from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.verify.findings import Findings, Poses, Worst
 
 #: problems of one code that are kept

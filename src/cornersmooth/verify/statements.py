@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.model import Move, Program, Statement
-from cornersmooth.verify.elements import Event, Problem
+from cornersmooth.nc_reader.elements import Event, Problem
 
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only
 SPEED_DECIMALS = 0

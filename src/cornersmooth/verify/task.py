@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.model import Bools, Keep, Program
-from cornersmooth.verify.elements import Elements
+from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.polyline import Original, Polyline, original_motion
 
 #: last printed digits by which the next segment must be nearer to be taken

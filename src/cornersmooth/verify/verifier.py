@@ -16,16 +16,16 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Ints, Program, Units
+from cornersmooth.nc_reader.block_tables import read_lines
+from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
+from cornersmooth.nc_reader.reader import CONTROL_WORDS, Reader
+from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
+from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.settings import BOUNDS
 from cornersmooth.verify.batches import Batch, Batches
-from cornersmooth.verify.block_tables import read_lines
 from cornersmooth.verify.checks import Examined, examine
-from cornersmooth.verify.elements import Elements, Event, NcProgram, Problem
 from cornersmooth.verify.findings import Findings, Largest, Poses
-from cornersmooth.verify.reader import CONTROL_WORDS, Reader
-from cornersmooth.verify.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.verify.result import Verification
-from cornersmooth.verify.source import Source, readable_twice
 from cornersmooth.verify.statements import Token, asked, compare, said
 from cornersmooth.verify.task import Task
 from cornersmooth.verify.wide_search import way_apart

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.verify.elements import Problem
-from cornersmooth.verify.lexer import Lexer
-from cornersmooth.verify.word_list import WordList, WordRule, word_list
-from cornersmooth.verify.words import Line, Table, Word
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.word_list import WordList, WordRule, word_list
+from cornersmooth.nc_reader.words import Line, Table, Word
 
 #: code of words that are not on the list or not in their place, and of what is not established
 NOT_LISTED: Final = "CS571"

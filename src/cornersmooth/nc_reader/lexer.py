@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from cornersmooth.errors import InputError
-from cornersmooth.verify.words import Columns, Line, Word
+from cornersmooth.nc_reader.words import Columns, Line, Word
 
 #: a number as controls write it
 NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)"

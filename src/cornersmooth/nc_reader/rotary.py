@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.curves import basis, groups
-from cornersmooth.verify.elements import Curves, Element
-from cornersmooth.verify.execution import Executed, Modal
-from cornersmooth.verify.splines import CurveTable
+from cornersmooth.nc_reader.curves import basis, groups
+from cornersmooth.nc_reader.elements import Curves, Element
+from cornersmooth.nc_reader.execution import Executed, Modal
+from cornersmooth.nc_reader.splines import CurveTable
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine, RotaryAxis

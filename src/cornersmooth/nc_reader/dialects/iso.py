@@ -6,10 +6,10 @@ import re
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 
-from cornersmooth.verify.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, Dialect, State
-from cornersmooth.verify.lexer import NUMBER, Lexer, fixed, number_of
-from cornersmooth.verify.word_list import word_list
-from cornersmooth.verify.words import MOTION_CODES, NURBS, Columns, Line, Word
+from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, Dialect, State
+from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.nc_reader.word_list import word_list
+from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word
 
 #: letters whose words are events
 _EVENT_LETTERS = "TSMHD"

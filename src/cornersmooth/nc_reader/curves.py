@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.elements import Curves
+from cornersmooth.nc_reader.elements import Curves
 
 
 def basis(knot: Floats, order: int, u: Floats) -> Floats:

@@ -6,11 +6,11 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
-from cornersmooth.verify.lexer import Lexer
-from cornersmooth.verify.words import Columns, Line
+from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.words import Columns, Line
 
 if TYPE_CHECKING:
-    from cornersmooth.verify.execution import Modal
+    from cornersmooth.nc_reader.execution import Modal
 
 
 #: M words that act after the motion of their block: stops, spindle off, coolant off, end

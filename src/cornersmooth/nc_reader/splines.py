@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.elements import Problem
-from cornersmooth.verify.words import Table
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.words import Table
 
 #: FANUC: order of a curve whose first block has no P (B-63324EN/03 4.17)
 DEFAULT_ORDER = 4

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats
-from cornersmooth.verify.elements import Problem
-from cornersmooth.verify.words import Table
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.words import Table
 
 _PLANE_NORMAL = {17: (0.0, 0.0, 1.0), 18: (0.0, 1.0, 0.0), 19: (1.0, 0.0, 0.0)}
 _FULL_TURN = 2 * np.pi

@@ -8,10 +8,10 @@ import re
 import numpy as np
 import pytest
 
-from cornersmooth.verify import block_tables
-from cornersmooth.verify.dialects import dialect_of
-from cornersmooth.verify.line_patterns import LinePatterns, lines_of
-from cornersmooth.verify.words import Table
+from cornersmooth.nc_reader import block_tables
+from cornersmooth.nc_reader.dialects import dialect_of
+from cornersmooth.nc_reader.line_patterns import LinePatterns, lines_of
+from cornersmooth.nc_reader.words import Table
 
 NUMBERS = ["0.", "-0.", "5.", ".5", "-.25", "12.3456", "-123.4567", "0.3956870", "-1.0000000", "1234.5678", "7", "-42"]
 ODD = ["+1.5", "123456.789", "1-2", "", " 3.", "1..2", "1.5+1.5", "--1.5", "1.5E3"]

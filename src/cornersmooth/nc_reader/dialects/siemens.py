@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from cornersmooth.verify.dialects.base import AFTER_MOTION, Dialect, State
-from cornersmooth.verify.lexer import NUMBER, Lexer, fixed, number_of
-from cornersmooth.verify.words import BSPLINE, POLY, Columns, Line, Word
+from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect, State
+from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.nc_reader.words import BSPLINE, POLY, Columns, Line, Word
 
 #: names of words of several letters: vectors are I J K, second points U V W, as in `motion`
 _NAMES: Final = {

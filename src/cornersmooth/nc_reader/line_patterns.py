@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.words import Word
 from cornersmooth.text.eight_digits import DIGITS, LAST_DIGITS, Bytes, Words, join_digits, words_of
-from cornersmooth.verify.lexer import Lexer
-from cornersmooth.verify.words import Word
 
 #: line ends that must stand before and behind a chunk, so that words beyond its ends can be fetched
 MARGIN: Final = 24

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.verify import block_tables, read_nc
-from cornersmooth.verify.elements import Element
-
-from .writing import simple_text, wavy
+from cornersmooth.nc_reader import block_tables, read_nc
+from cornersmooth.nc_reader.elements import Element
+from verify.writing import simple_text, wavy
 
 HEAD = b"%\nO0001\nG21 G90 G94 G17 G40 G49 G80\n"
 CURVE = b"""G6.2 P4 K0. X0.0000 Y0.0000 Z0.0000 U0.0000 V0.0000 W10.0000 R1.

@@ -16,10 +16,10 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats
+from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.line_patterns import Group, LinePatterns, lines_of, merged
+from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.text import NumberError, parse_numbers
-from cornersmooth.verify.lexer import Lexer
-from cornersmooth.verify.line_patterns import Group, LinePatterns, lines_of, merged
-from cornersmooth.verify.words import Line, Table
 
 #: bytes read at a time
 CHUNK = 1 << 20

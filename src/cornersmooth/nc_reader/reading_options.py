@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.verify.dialects import Dialect, dialect_of
-from cornersmooth.verify.rotary import Rotary
+from cornersmooth.nc_reader.dialects import Dialect, dialect_of
+from cornersmooth.nc_reader.rotary import Rotary
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine

@@ -7,10 +7,10 @@ from functools import partial
 from typing import Final
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.verify.dialects.base import Dialect, State
-from cornersmooth.verify.dialects.heidenhain import Heidenhain
-from cornersmooth.verify.dialects.iso import ISO_WORDS, Iso
-from cornersmooth.verify.dialects.siemens import Siemens
+from cornersmooth.nc_reader.dialects.base import Dialect, State
+from cornersmooth.nc_reader.dialects.heidenhain import Heidenhain
+from cornersmooth.nc_reader.dialects.iso import ISO_WORDS, Iso
+from cornersmooth.nc_reader.dialects.siemens import Siemens
 
 __all__ = ["CONTROLS", "Dialect", "State", "dialect_of"]
 

@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from cornersmooth.verify.dialects.base import AFTER_MOTION, Dialect, State, values
-from cornersmooth.verify.lexer import NUMBER, Lexer, fixed, number_of
-from cornersmooth.verify.words import SPL, Columns, Line, Word
+from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect, State, values
+from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.nc_reader.words import SPL, Columns, Line, Word
 
 _VECTOR: Final = {"TX": "I", "TY": "J", "TZ": "K"}
 _PATHS: Final = ("L", "LN", "SPL")

@@ -13,10 +13,10 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Units
-from cornersmooth.verify.block_tables import read_lines
-from cornersmooth.verify.dialects import CONTROLS
-from cornersmooth.verify.dialects.base import HIGH_SPEED, INCREMENTAL
-from cornersmooth.verify.elements import (
+from cornersmooth.nc_reader.block_tables import read_lines
+from cornersmooth.nc_reader.dialects import CONTROLS
+from cornersmooth.nc_reader.dialects.base import HIGH_SPEED, INCREMENTAL
+from cornersmooth.nc_reader.elements import (
     Curves,
     Element,
     Elements,
@@ -27,10 +27,10 @@ from cornersmooth.verify.elements import (
     Second,
     settle,
 )
-from cornersmooth.verify.execution import Executed, Modal, execute
-from cornersmooth.verify.reading_options import DIGITS_SAMPLE, ReadingOptions, Steps
-from cornersmooth.verify.source import Source, readable_twice
-from cornersmooth.verify.words import MOTION_CODES, NURBS, Line, Table, table_of
+from cornersmooth.nc_reader.execution import Executed, Modal, execute
+from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions, Steps
+from cornersmooth.nc_reader.source import Source, readable_twice
+from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Line, Table, table_of
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
