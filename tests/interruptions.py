@@ -138,7 +138,11 @@ class Bench:
         lines = found.said.splitlines()
         if found.code not in (0, ends[one.how]):
             found.wrong.append(f"exit code {found.code}")
-        if found.code in (130, 143) and not (len(lines) == 1 and lines[0].startswith("interrupted")):
+        if found.code in (130, 143) and not (lines and lines[-1].startswith("interrupted")):
+            found.wrong.append("it does not say that it was interrupted")
+        # a batch has a line for each file that was done before, and warnings of those files
+        of_files = [line for line in lines[:-1] if one.batch and (line.startswith("done ") or ": warning: " in line)]
+        if found.code in (130, 143) and len(lines) != len(of_files) + 1:
             found.wrong.append("not one line")
         if "Traceback" in found.said or "Error" in found.said or "Exception" in found.said:
             found.wrong.append("Python is showing")
