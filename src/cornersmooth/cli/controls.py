@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from cornersmooth.cli import options
+from cornersmooth.cli.options import outputs
 
 #: what the modes of a form are called for people
 _MODES = {
@@ -22,7 +22,7 @@ _MODES = {
     epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]")
-@options.table
+@outputs.table
 def command(name: str | None, table: bool) -> int:
     """List the controls with their forms, or check and describe one.
 

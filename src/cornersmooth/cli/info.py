@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli import options
 from cornersmooth.cli.files import read_input
+from cornersmooth.cli.options import outputs, reading, smoothing
 from cornersmooth.cli.shop import ShopCommand
 
 if TYPE_CHECKING:
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid.",
 )
 @click.argument("source", metavar="IN")
-@options.tolerance
-@options.axis_length
-@options.reading
-@options.as_json
+@smoothing.tolerance
+@smoothing.axis_length
+@reading.reading_options
+@outputs.as_json
 def command(source: str, tolerance: float, axis_length: float, as_json: bool, **given: Any) -> int:
     """Say what the CL file IN holds: dialect, moves, lengths, turns, axis changes, arcs, statements, findings.
 
@@ -42,7 +42,7 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     from cornersmooth.report.info import describe, info_json
 
     data, name = read_input(source)
-    info = describe(read(data, name=name, **options.reading_of(given)), tolerance, axis_length)
+    info = describe(read(data, name=name, **reading.reading_of(given)), tolerance, axis_length)
     if as_json:
         click.echo(info_json(info), nl=False)
         return 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from cornersmooth.cli import options
+from cornersmooth.cli.options import outputs
 
 
 @click.command(
@@ -13,7 +13,7 @@ from cornersmooth.cli import options
     epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]")
-@options.table
+@outputs.table
 def command(name: str | None, table: bool) -> int:
     """List the machines that come with the program, or check and describe one.
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli import options
 from cornersmooth.cli.batch import Batch
 from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.files import STANDARD, check_path, read_input
 from cornersmooth.cli.inputs import Input, find_inputs
 from cornersmooth.cli.job import Job, Outcome, check, run_job
+from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import print_line, progress_bar, show_findings, show_summary, show_verdict
 from cornersmooth.cli.summary import check_summary, counts_line, line_of, write_summary
@@ -30,35 +30,35 @@ if TYPE_CHECKING:
     "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
 )
 @click.argument("inputs", nargs=-1, required=True, metavar="IN...")
-@options.tolerance
-@options.output
-@options.form
-@options.axis_length
-@options.directory
-@options.glob
-@options.skip_existing
-@options.summary
-@options.jobs
-@options.reports
-@options.plot_path
-@options.tool
-@options.writing
-@options.method
-@options.shape
-@options.allocation
-@options.weights
-@options.orientation_tolerance
-@options.reversal_angle
-@options.lines
-@options.chord_tolerance
-@options.axis_step
-@options.feed
-@options.reading
-@options.no_verify
-@options.require_verify
-@options.force
-@options.quiet
-@options.verbose
+@smoothing.tolerance
+@outputs.output
+@nc_text.form
+@smoothing.axis_length
+@outputs.directory
+@outputs.glob
+@outputs.skip_existing
+@outputs.summary
+@outputs.jobs
+@outputs.reports
+@outputs.plot_path
+@surface.tool
+@nc_text.writing_options
+@smoothing.method
+@smoothing.shape
+@smoothing.allocation
+@smoothing.weights
+@smoothing.orientation_tolerance
+@smoothing.reversal_angle
+@smoothing.lines
+@smoothing.chord_tolerance
+@smoothing.axis_step
+@reading.feed
+@reading.reading_options
+@nc_text.no_verify
+@nc_text.require_verify
+@outputs.force
+@outputs.quiet
+@outputs.verbose
 @click.pass_obj
 def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
     """Round the corners of the CL files IN and write NC text.
@@ -144,12 +144,12 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
         raise click.UsageError("standard input goes with no other input")
     reports = given["reports"]
     if given["plot"]:
-        options.picture_form(given["plot"])
+        outputs.picture_form(given["plot"])
         if len(files) > 1:
             raise click.UsageError("--plot is for a single input; --report out/{stem}.html goes with several")
     if len(files) > 1 and any("{stem}" not in path for path in reports):
         raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
-    settings, form, frame = options.settings_of(given), _form(given), _frame(given)
+    settings, form, frame = smoothing.settings_of(given), _form(given), _frame(given)
     fit_settings(settings, form, "mm")  # refuses wrong ones before any file is touched
     if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
         raise click.UsageError("--feed must be a positive number of mm/min")
@@ -161,7 +161,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 source=found.path,
                 target=target,
                 reports=tuple(path.replace("{stem}", found.stem) for path in reports),
-                reading=options.reading_of(given),
+                reading=reading.reading_of(given),
                 settings=settings,
                 form=form,
                 frame=frame,
@@ -195,9 +195,9 @@ def _form(given: dict[str, Any]) -> Form:
     """Form of the control."""
     from cornersmooth.nc import choose_form
 
-    machine = options.machine_of(given)
+    machine = nc_text.machine_of(given)
     return choose_form(
-        options.control_of(given), given["form"], machine=machine, tcp=not given["no_tcp"], extras=given["extras"]
+        nc_text.control_of(given), given["form"], machine=machine, tcp=not given["no_tcp"], extras=given["extras"]
     )
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli import options
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
@@ -29,18 +29,18 @@ _SUFFIXES = (".json", ".csv", ".html", ".png", ".svg", ".pdf")
 )
 @click.argument("source", metavar="IN")
 @click.argument("text", metavar="NC")
-@options.tolerance
-@options.axis_length
-@options.tool
-@options.stations
-@options.levels
-@options.control
-@options.machine
-@options.no_tcp
-@options.reading
-@options.surface_reports
-@options.force
-@options.quiet
+@smoothing.tolerance
+@smoothing.axis_length
+@surface.tool
+@surface.stations
+@surface.levels
+@nc_text.control
+@nc_text.machine
+@nc_text.no_tcp
+@reading.reading_options
+@outputs.surface_reports
+@outputs.force
+@outputs.quiet
 def command(source: str, text: str, **given: Any) -> int:
     """Measure the surface that the NC text NC leaves against that of the CL file IN.
 
@@ -65,9 +65,9 @@ def command(source: str, text: str, **given: Any) -> int:
         if os.path.splitext(path)[1].lower() not in _SUFFIXES:
             raise click.UsageError(f"--report {path}: let the name end in {', '.join(_SUFFIXES)}")
         check_path(path, [source, text], force=given["force"])
-    how = options.reading_back_of(given)
+    how = nc_text.reading_back_of(given)
     data, name = read_input(source)
-    program = read(data, name=name, **options.reading_of(given))
+    program = read(data, name=name, **reading.reading_of(given))
     tool = _tool(program, given["tool"])
     nc = read_nc(
         read_input(text)[0] if text == STANDARD else text,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli import options
 from cornersmooth.cli.files import check_path, read_input, target_of
+from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import progress_bar
 from cornersmooth.methods import METHODS
@@ -34,29 +34,29 @@ LAWS = tuple(_TITLES)
     "4 output cannot be written.",
 )
 @click.argument("source", metavar="IN")
-@options.tolerance
-@options.axis_length
-@options.limits
-@options.limits_machine
-@options.text
-@options.control
-@options.text_machine
-@options.block_time
-@options.look_ahead
-@options.shape
-@options.allocation
-@options.weights
-@options.orientation_tolerance
-@options.reversal_angle
-@options.reading
-@options.as_json
-@options.law
-@options.motion_csv
-@options.plot_motion
-@options.page_reports
-@options.tool
-@options.force
-@options.quiet
+@smoothing.tolerance
+@smoothing.axis_length
+@motion.limit_options
+@motion.limits_machine
+@motion.text
+@nc_text.control
+@motion.text_machine
+@motion.block_time
+@motion.look_ahead
+@smoothing.shape
+@smoothing.allocation
+@smoothing.weights
+@smoothing.orientation_tolerance
+@smoothing.reversal_angle
+@reading.reading_options
+@outputs.as_json
+@motion.law
+@motion.motion_csv
+@outputs.plot_motion
+@outputs.page_reports
+@surface.tool
+@outputs.force
+@outputs.quiet
 def command(source: str, **given: Any) -> int:
     """Plan the motion of the CL file IN directly and smoothed, under the same limits, and compare the times.
 
@@ -74,7 +74,7 @@ def command(source: str, **given: Any) -> int:
       cornersmooth time part.cls -e 0.04 --report times.html
       cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
     """
-    form = options.picture_form(given["plot"])
+    form = outputs.picture_form(given["plot"])
     if given["law"] == "as_written" and not given["text"]:
         raise click.UsageError("--law as_written: name the text with --text")
     for path in given["reports"]:
@@ -119,14 +119,14 @@ def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
     from cornersmooth.feedrate import BlockLimits, compare, plan_text
     from cornersmooth.nc_reader import read_nc
 
-    machine = options.machine_of(given)
-    limits, settings = options.limits_of(given), options.settings_of(given)
-    program = read(data, name=name, **options.reading_of(given))
+    machine = nc_text.machine_of(given)
+    limits, settings = motion.limits_of(given), smoothing.settings_of(given)
+    program = read(data, name=name, **reading.reading_of(given))
     with progress_bar(given["quiet"]) as progress:
         compared = compare(program, settings, limits, machine=machine, progress=progress)
         if not given["text"]:
             return compared
-        how = options.reading_back_of({**given, "machine": given["text_machine"], "no_tcp": False})
+        how = nc_text.reading_back_of({**given, "machine": given["text_machine"], "no_tcp": False})
         how |= {"tolerance": settings.tolerance, "axis_length": settings.axis_length}
         nc = read_nc(given["text"], **how)
         blocks = BlockLimits(given["block_time"], given["look_ahead"])

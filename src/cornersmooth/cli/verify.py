@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli import options
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
@@ -34,19 +34,19 @@ _PROBLEMS_SHOWN = 20
 )
 @click.argument("source", metavar="IN")
 @click.argument("text", metavar="NC")
-@options.tolerance
-@options.axis_length
-@options.control
-@options.machine
-@options.no_tcp
-@options.trusted
-@options.reading
-@options.found_reports
-@options.tool
-@options.plot_deviation
-@options.force
-@options.quiet
-@options.verbose
+@smoothing.tolerance
+@smoothing.axis_length
+@nc_text.control
+@nc_text.machine
+@nc_text.no_tcp
+@nc_text.trusted
+@reading.reading_options
+@outputs.found_reports
+@surface.tool
+@outputs.plot_deviation
+@outputs.force
+@outputs.quiet
+@outputs.verbose
 def command(source: str, text: str, **given: Any) -> int:
     """Measure the NC text NC against the CL file IN, whoever wrote it.
 
@@ -74,10 +74,10 @@ def command(source: str, text: str, **given: Any) -> int:
     data, name = read_input(source)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     remark, weights = _take_over(given, nc, data)
-    own = options.control_of(given).own
+    own = nc_text.control_of(given).own
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
-    how = {**measures, **options.reading_back_of(given)}
-    program = read(data, name=name, **options.reading_of(given))
+    how = {**measures, **nc_text.reading_back_of(given)}
+    program = read(data, name=name, **reading.reading_of(given))
     pages = [path for path in given["reports"] if path.lower().endswith(".html")]
     if given["plot"] or given["verbose"] or pages:  # it is looked at more than once
         nc = readable_twice(nc)
@@ -158,7 +158,7 @@ def _check_outputs(source: str, text: str, given: dict[str, Any]) -> str:
     for path in given["reports"]:
         if os.path.splitext(path)[1].lower() not in (".json", ".csv", ".html"):
             raise click.UsageError(f"--report {path}: let the name end in .json, .csv or .html")
-    form = options.picture_form(given["plot"])
+    form = outputs.picture_form(given["plot"])
     for path in (*given["reports"], given["plot"]):
         if path:
             check_path(path, [source, text], force=given["force"])

@@ -1,0 +1,117 @@
+"""Options about time: what a machine can do, and the motion that is planned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cornersmooth.cli.options.parameters import Duration, all_of
+from cornersmooth.methods import DEFAULT_METHOD, METHODS
+
+if TYPE_CHECKING:
+    from cornersmooth.feedrate import Limits
+
+_LIMITS = {
+    "feed": click.option(
+        "--feed", type=float, metavar="MM/MIN", help="Feed of all feed moves instead of the programmed ones."
+    ),
+    "accel": click.option(
+        "--accel", type=float, default=1000.0, show_default=True, metavar="MM/S2", help="Acceleration along the path."
+    ),
+    "jerk": click.option(
+        "--jerk", type=float, default=5000.0, show_default=True, metavar="MM/S3", help="Jerk along the path."
+    ),
+    "centripetal": click.option(
+        "--centripetal", type=float, metavar="MM/S2", help="Acceleration across the path. [default: that of --accel]"
+    ),
+    "period": click.option(
+        "--period",
+        type=Duration(),
+        default=0.002,
+        metavar="TIME",
+        help="Interpolation period, as in 2ms: at corners that stay sharp the velocity changes by at most accel times "
+        "period. [default: 2ms]",
+    ),
+    "rapid": click.option(
+        "--rapid", type=float, default=10000.0, show_default=True, metavar="MM/MIN", help="Speed of rapid moves."
+    ),
+    "rapid_accel": click.option(
+        "--rapid-accel", type=float, metavar="MM/S2", help="Acceleration of rapids. [default: that of --accel]"
+    ),
+    "rapid_jerk": click.option(
+        "--rapid-jerk", type=float, metavar="MM/S3", help="Jerk of rapids. [default: that of --jerk]"
+    ),
+    "angular_feed": click.option(
+        "--angular-feed",
+        type=float,
+        default=30.0,
+        show_default=True,
+        metavar="DEG/S",
+        help="Speed of moves that only turn the tool axis.",
+    ),
+    "angular_accel": click.option(
+        "--angular-accel", type=float, default=150.0, show_default=True, metavar="DEG/S2", help="Their acceleration."
+    ),
+    "angular_jerk": click.option(
+        "--angular-jerk", type=float, default=3000.0, show_default=True, metavar="DEG/S3", help="Their jerk."
+    ),
+    "vector_jerk": click.option(
+        "--vector-jerk", type=float, metavar="MM/S3", help="Jerk of the tip in any direction. [default: no limit]"
+    ),
+    "turn_speed": click.option(
+        "--turn-speed", type=float, metavar="DEG/S", help="Turning of the tool axis in all moves. [default: no limit]"
+    ),
+    "turn_accel": click.option(
+        "--turn-accel", type=float, metavar="DEG/S2", help="Its acceleration. [default: no limit]"
+    ),
+    "turn_jerk": click.option("--turn-jerk", type=float, metavar="DEG/S3", help="Its jerk. [default: no limit]"),
+}
+
+
+def limit_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options that say what a machine can do."""
+    return all_of(function, _LIMITS.values())
+
+
+def limits_of(given: dict[str, Any]) -> Limits:
+    """What the machine can do, as given."""
+    from cornersmooth.feedrate import Limits
+
+    return Limits(**{name: given[name] for name in _LIMITS})
+
+
+limits_machine = click.option(
+    "--machine",
+    type=str,
+    metavar="NAME|FILE",
+    help="Keep the limits of this machine's five axes, too: a name that 'cornersmooth machines' lists (its numbers are "
+    "examples), or a TOML file with [dynamics.X] and so on.",
+)
+text = click.option(
+    "--text",
+    type=click.Path(),
+    metavar="NC",
+    help="Plan this NC text, too, as its control would run it: its lines, digits and feeds.",
+)
+text_machine = click.option(
+    "--text-machine", type=str, metavar="NAME|FILE", help="Machine whose rotary words --text has, if it has such."
+)
+block_time = click.option(
+    "--block-time", type=Duration(), default=0.0, help="Shortest time that the control takes for one block of --text."
+)
+look_ahead = click.option(
+    "--look-ahead",
+    type=click.IntRange(min=1),
+    metavar="BLOCKS",
+    help="Blocks within which the control must be able to stop; all of --text by default.",
+)
+law = click.option(
+    "--law",
+    type=click.Choice(["direct_exact_stop", "direct_velocity_jump", *METHODS, "as_written"]),
+    default=DEFAULT_METHOD,
+    show_default=True,
+    help="Motion that --csv writes.",
+)
+motion_csv = click.option("--csv", type=click.Path(), help="Write the motion, a row every period.")

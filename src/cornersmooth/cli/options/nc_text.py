@@ -1,0 +1,121 @@
+"""Options about the NC text, its control and its machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cornersmooth.cli.options.parameters import all_of
+from cornersmooth.errors import SettingsError
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics import Machine
+    from cornersmooth.nc import Control
+
+form = click.option(
+    "-f",
+    "--form",
+    type=str,
+    metavar="g1|g6.2|...",
+    help="Dense lines, or curves in the control's own form; 'cornersmooth controls' lists them. [default: g1]",
+)
+control = click.option(
+    "--control",
+    type=str,
+    metavar="NAME|FILE",
+    default="fanuc",
+    show_default=True,
+    help="Control the NC text is for: a name that 'cornersmooth controls' lists, or a TOML file.",
+)
+machine = click.option(
+    "--machine",
+    type=str,
+    metavar="NAME|FILE",
+    help="The text has rotary words of this machine instead of tool vectors: a name that 'cornersmooth machines' "
+    "lists, or a TOML file.",
+)
+no_tcp = click.option(
+    "--no-tcp", is_flag=True, help="Positions of the machine's axes, for controls that do not keep the tool tip."
+)
+extras = click.option(
+    "--with",
+    "extras",
+    type=str,
+    metavar="NAME",
+    multiple=True,
+    help="Switch a function of the control on, such as cycle832; 'cornersmooth controls' lists them. May be repeated.",
+)
+program_name = click.option("--program-name", type=str, metavar="TEXT", help="Name or number of the NC program.")
+work_offset = click.option(
+    "--work-offset",
+    type=str,
+    metavar="WORD",
+    help="Work offset, such as G55, or the number of a preset; 'none' leaves it out. Default: G54, or preset 1.",
+)
+header = click.option(
+    "--header",
+    type=click.Path(),
+    metavar="FILE",
+    help="Lines to write behind the head; {program} and {units} are filled in.",
+)
+footer = click.option("--footer", type=click.Path(), metavar="FILE", help="Lines to write before the tail.")
+trusted = click.option(
+    "--trust",
+    "trusted",
+    type=click.Path(),
+    multiple=True,
+    metavar="FILE",
+    help="Lines that belong in the text because you put them there, as --header and --footer of smooth. Repeatable.",
+)
+block_numbers = click.option("--block-numbers", is_flag=True, help="Number the blocks.")
+no_comments = click.option("--no-comments", is_flag=True, help="Leave out what the CL file says in words.")
+no_verify = click.option(
+    "--no-verify", is_flag=True, help="Do not read the written text back and measure it before it takes its place."
+)
+require_verify = click.option(
+    "--require-verify", is_flag=True, help="Set a text aside that is not wholly verified, and end with 1."
+)
+
+
+def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every command that writes NC text, besides its form."""
+    return all_of(
+        function,
+        (control, machine, no_tcp, extras, program_name, work_offset, header, footer, block_numbers, no_comments),
+    )
+
+
+def control_of(given: Mapping[str, Any]) -> Control:
+    """Control of that name, of that file, or of the shop settings."""
+    from cornersmooth.nc import load_control
+
+    control: str | Control = given["control"]
+    return load_control(control) if isinstance(control, str) else control
+
+
+def machine_of(given: Mapping[str, Any]) -> Machine | None:
+    """Machine of that name, of that file, or of the shop settings; None where none is named."""
+    from cornersmooth.kinematics import load_machine
+
+    machine: str | Machine | None = given["machine"]
+    return load_machine(machine) if isinstance(machine, str) and machine else machine or None
+
+
+def reading_back_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Keyword arguments of `cornersmooth.nc_reader.read_nc` for a text that somebody wrote.
+
+    Raises
+    ------
+    SettingsError
+        CS204: nobody knows how the control's text is read; or the control or the machine is unknown.
+    """
+    from cornersmooth.nc_reader import CONTROLS
+
+    control = control_of(given)
+    if control.dialect not in CONTROLS:
+        raise SettingsError(
+            "CS204", f"{control.name} is like no control that can be read", 'say like = "fanuc" or another in it'
+        )
+    return {"control": control.dialect, "machine": machine_of(given), "tcp": not given["no_tcp"]}

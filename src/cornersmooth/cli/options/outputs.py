@@ -1,0 +1,95 @@
+"""Options about what is written where, and what is said."""
+
+from __future__ import annotations
+
+import os
+
+import click
+
+from cornersmooth.cli.options.parameters import Jobs
+
+output = click.option(
+    "-o", "--output", type=click.Path(), help="NC file, - for standard output. [default: - for a single input]"
+)
+directory = click.option(
+    "-d",
+    "--directory",
+    type=click.Path(),
+    help="Folder for the NC files of several inputs, made where missing; folders below an input stay folders.",
+)
+glob = click.option(
+    "--glob",
+    type=str,
+    metavar="PATTERN",
+    multiple=True,
+    help="Files to take from folders, as in '*.cls'. May be repeated. [default: names of CL files]",
+)
+skip_existing = click.option(
+    "--skip-existing", is_flag=True, help="Leave outputs that exist as they are, whatever they were made of."
+)
+summary = click.option("--summary", type=click.Path(), help="Write a row for each file of a batch: .json or .csv.")
+jobs = click.option(
+    "-j",
+    "--jobs",
+    type=Jobs(),
+    default=1,
+    is_flag=False,
+    flag_value=0,
+    help="Processes for several inputs; a bare -j takes all cores.",
+)
+reports = click.option(
+    "--report",
+    "reports",
+    type=click.Path(),
+    multiple=True,
+    help="Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} stands "
+    "for the input's name.",
+)
+found_reports = click.option(
+    "--report",
+    "reports",
+    type=click.Path(),
+    multiple=True,
+    help="Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
+    "repeated.",
+)
+page_reports = click.option(
+    "--report", "reports", type=click.Path(), multiple=True, help="Write a page to look at: .html. May be repeated."
+)
+surface_reports = click.option(
+    "--report",
+    "reports",
+    type=click.Path(),
+    multiple=True,
+    help="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be repeated.",
+)
+plot_path = click.option(
+    "--plot", type=click.Path(), help="Draw the path, its corners and its deviation: .png, .svg or .pdf."
+)
+plot_deviation = click.option(
+    "--plot",
+    type=click.Path(),
+    help="Draw the deviation along the path: .png, .svg or .pdf.",
+)
+plot_motion = click.option(
+    "--plot",
+    type=click.Path(),
+    help="Draw speed and acceleration over time: .png, .svg or .pdf.",
+)
+
+
+def picture_form(path: str | None) -> str:
+    """Form of the picture that a name asks for: png, svg or pdf."""
+    suffix = os.path.splitext(path or "picture.png")[1].lower().lstrip(".")
+    if suffix not in ("png", "svg", "pdf"):
+        raise click.UsageError(f"--plot {path}: let the name end in .png, .svg or .pdf")
+    return suffix
+
+
+as_json = click.option("--json", "as_json", is_flag=True, help="One JSON object instead of text to read.")
+table = click.option(
+    "--table", is_flag=True, help="Print the table of the name: what a TOML file of your own starts from."
+)
+force = click.option("--force", is_flag=True, help="Replace existing files.")
+quiet = click.option("-q", "--quiet", is_flag=True, help="Only errors.")
+verbose = click.option("-v", "--verbose", count=True, help="More: every finding, times of the stages.")

@@ -1,0 +1,98 @@
+"""Options of smoothing: one for every field of `cornersmooth.settings.Settings`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cornersmooth.cli.options.parameters import LENGTH, Weights
+from cornersmooth.methods import DEFAULT_METHOD, METHODS
+
+if TYPE_CHECKING:
+    from cornersmooth.settings import Settings
+
+tolerance = click.option(
+    "-e", "--tolerance", type=LENGTH, default=0.01, show_default=True, help="Largest deviation of the written path."
+)
+axis_length = click.option(
+    "-H",
+    "--axis-length",
+    type=LENGTH,
+    default=10.0,
+    show_default=True,
+    help="Distance from the tool tip to the second point that keeps the tolerance: the length of the cutting edge.",
+)
+method = click.option(
+    "--method",
+    type=click.Choice(list(METHODS)),
+    default=DEFAULT_METHOD,
+    show_default=True,
+    help="How the curves are made. " + "; ".join(f"{item.name}: {item.summary}" for item in METHODS.values()) + ".",
+)
+shape = click.option(
+    "--shape",
+    type=click.Choice(["paper", "auto"]),
+    default="paper",
+    show_default=True,
+    help="Weights of the curves: all 1 (or --weights), or chosen for every corner by its turn.",
+)
+allocation = click.option(
+    "--allocation",
+    type=click.Choice(["half", "fair"]),
+    default="half",
+    show_default=True,
+    help="How far curves reach: half of each segment, or as much as their neighbours leave.",
+)
+weights = click.option(
+    "--weights", type=Weights(), default=(1.0, 1.0), help="Weights w1,w2 of the curves, up to 3. [default: 1,1]"
+)
+orientation_tolerance = click.option(
+    "--orientation-tolerance", type=float, metavar="DEG", help="Largest deviation of the tool axis besides -e and -H."
+)
+reversal_angle = click.option(
+    "--reversal-angle",
+    type=float,
+    metavar="DEG",
+    default=170.0,
+    show_default=True,
+    help="Corners that turn by more stay sharp.",
+)
+lines = click.option(
+    "--lines",
+    type=click.Choice(["dense", "long"]),
+    help="Lines close to the curves, or as few as -e allows. [default: what suits the control]",
+)
+chord_tolerance = click.option(
+    "--chord",
+    "chord_tolerance",
+    type=LENGTH,
+    help="Distance between the written lines and the curve. [default: a tenth of -e]",
+)
+axis_step = click.option(
+    "--axis-step",
+    type=float,
+    metavar="DEG",
+    help="Largest change of the tool axis in one line beside a rounded corner.",
+)
+
+_SETTINGS = {
+    "tolerance": tolerance,
+    "axis_length": axis_length,
+    "method": method,
+    "shape": shape,
+    "allocation": allocation,
+    "weights": weights,
+    "orientation_tolerance": orientation_tolerance,
+    "reversal_angle": reversal_angle,
+    "lines": lines,
+    "chord_tolerance": chord_tolerance,
+    "axis_step": axis_step,
+}
+
+
+def settings_of(given: dict[str, Any]) -> Settings:
+    """How to smooth, as given; options that a command does not have keep their defaults."""
+    from cornersmooth.settings import Settings
+
+    return Settings(**{name: given[name] for name in _SETTINGS if name in given})

@@ -1,0 +1,20 @@
+"""Options about the tool and the metal it leaves."""
+
+from __future__ import annotations
+
+import click
+
+from cornersmooth.cli.options.parameters import ToolShape
+
+tool = click.option(
+    "--tool",
+    type=ToolShape(),
+    metavar="D[,R[,TAPER[,LENGTH]]]",
+    help="Shape of the tool: diameter, corner radius, taper in degrees, length. [default: that of the file]",
+)
+stations = click.option(
+    "--stations", type=click.IntRange(1, 1_000_000), default=2000, show_default=True, help="Places along the path."
+)
+levels = click.option(
+    "--levels", type=click.IntRange(1, 60), default=7, show_default=True, help="Points along the cutting edge."
+)
