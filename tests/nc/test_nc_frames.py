@@ -8,11 +8,12 @@ from dataclasses import replace
 import pytest
 
 from cornersmooth.errors import OutputError, SettingsError
+from cornersmooth.kinematics import load_machine
 from cornersmooth.model import MM_PER_UNIT, Units
-from cornersmooth.nc import Frame, choose_form, control_names
+from cornersmooth.nc import Frame, choose_form, control_names, load_control
 from cornersmooth.nc.control_tables import parse_control
-from cornersmooth.nc.program_frame import blend_word
-from nc.cases import RUNNABLE, Case
+from cornersmooth.nc.program_frame import blend_word, name_of_file
+from nc.cases import CHOSEN, RUNNABLE, Case
 from nc.writing import lines_of
 
 CL = (
@@ -227,7 +228,7 @@ def test_functions_are_switched_on_and_off(control: str, form: str, name: str, o
     [
         ("siemens", "g1", "cycle800", "siemens has no function 'cycle800'; choose one of cycle832"),
         ("siemens", "bspline", "cycle832", "cycle832 is not for siemens form bspline; use -f g1"),
-        ("heidenhain", "g1", "aicc", "heidenhain has no function 'aicc'; leave it out"),
+        ("heidenhain", "g1", "aicc", "heidenhain has no function 'aicc'; choose one of cycle32"),
         ("generic", "g1", "hpcc", "generic has no function 'hpcc'; leave it out"),
     ],
 )
@@ -235,6 +236,64 @@ def test_unknown_functions_are_refused(control: str, form: str, name: str, messa
     with pytest.raises(SettingsError) as refused:
         choose_form(control, form, extras=(name,))
     assert str(refused.value) == f"error: {message}"
+
+
+@pytest.mark.parametrize(
+    ("control", "stem", "name"),
+    [
+        ("fanuc", "part-0712", "O0712"),
+        ("fanuc", "blade", "O0001"),  # a number cannot be made of that
+        ("fanuc", "part5x", "O0001"),  # five axes, not a number
+        ("haas", "O31", "O0031"),
+        ("mitsubishi", "9001", "O0001"),  # locked by most builders
+        ("siemens", "blade 2.rough", "BLADE_2_ROUGH"),
+        ("heidenhain", "a-very-long-name-of-a-part", "A_VERY_LONG_NAME_OF_A_PA"),
+        ("linuxcnc", "(x)", "X"),
+        ("heidenhain", "---", "CORNERSMOOTH"),
+    ],
+)
+def test_the_name_of_the_program_is_that_of_the_file(control: str, stem: str, name: str) -> None:
+    table = load_control(control).program
+    assert (name_of_file(stem, table) or table.name) == name
+    assert re.fullmatch(table.name_pattern or ".*", name)
+
+
+def test_a_name_that_is_given_goes_before_that_of_the_file() -> None:
+    form = choose_form("fanuc", "g1")
+    assert lines_of(form, CL, frame=Frame(stem="part-12"))[1] == "O0012"
+    assert lines_of(form, CL, frame=Frame("O5", stem="part-12"))[1] == "O5"
+
+
+@pytest.mark.parametrize("control", [name for name in control_names() if name != "generic"])
+def test_the_operator_may_look_before_the_next_tool(control: str) -> None:
+    """An optional stop behind the retract, once, not before the first tool and not where the CL file stops anyway."""
+    form = next(case for case in CHOSEN if case.control == control and case.tcp).choose()
+    lines = without_numbers(lines_of(form, CL), control)
+    (place,) = (number for number, line in enumerate(lines) if line == "M1")
+    assert re.match(r"T4|TOOL CALL 4", lines[place + 1])
+    assert any(line in form.table.program.retract for line in lines[place - 4 : place])
+    for word, block in (("OPSTOP", "M1"), ("STOP", form.table.words.stop[0])):
+        again = without_numbers(lines_of(form, CL.replace("LOADTL/4", f"{word}\nLOADTL/4")), control)
+        assert [line for line in again if line in ("M1", block)] == [block]
+
+
+@pytest.mark.parametrize(
+    ("control", "name", "on", "off"),
+    [
+        ("haas", "g187", ["G187 P3 E0.00500"], ["G187"]),
+        (
+            "heidenhain",
+            "cycle32",
+            ["CYCL DEF 32.0 TOLERANCE", "CYCL DEF 32.1 T0.00500", "CYCL DEF 32.2 HSC-MODE:0 TA0.02865"],
+            ["CYCL DEF 32.0 TOLERANCE", "CYCL DEF 32.1"],
+        ),
+    ],
+)
+def test_high_speed_modes_stand_around_each_tool(control: str, name: str, on: list[str], off: list[str]) -> None:
+    machine = load_machine("table-bc") if control == "haas" else None
+    lines = without_numbers(lines_of(choose_form(control, "g1", machine=machine, extras=(name,)), CL), control)
+    own = [line for line in lines if line.startswith(("G187", "CYCL DEF 32"))]
+    assert own == 2 * [*on, *off]
 
 
 @pytest.mark.parametrize("control", control_names())

@@ -15,6 +15,9 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.model import SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.run import Run
+from cornersmooth.nc.spline_share import SplineShare
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
 from nc.grammars import reader
@@ -107,6 +110,32 @@ def test_single_splines_are_warned_of(count: int, said: int) -> None:
     smoothed = smooth(read(circle(count, 0.3), name="part.cls"), settings)
     found = write(smoothed, io.BytesIO(), form=form).findings
     assert sum(finding.count for finding in found if finding.code == "CS325") == said
+
+
+@pytest.mark.parametrize(
+    ("blocks", "said"),
+    [
+        ("....ssss......", 1),  # the review's own: four of ten
+        ("..ssss..ssss..", 1),  # the first has eight, the second four and no more to come
+        ("ssssss....ssssss", 0),
+        ("ssss.G..ssssss", 1),  # what comes behind a rapid is no spline of the same run
+        ("ssssssssssss..", 0),
+        ("sssss", 1),
+    ],
+)
+@pytest.mark.parametrize("step", [1, 3, 100])
+def test_spline_blocks_are_counted_in_windows_of_ten(blocks: str, said: int, step: int) -> None:
+    findings = Findings()
+    share = SplineShare(np.arange(100, 200), findings)
+    kinds = np.array(list(blocks))
+    for first in range(0, len(kinds), step):
+        part, move = kinds[first : first + step], np.arange(first, min(first + step, len(kinds)))
+        none = np.zeros(len(part))
+        share.take(Run(none[:, None], move, part == "G", none, none, (part == "s").astype(np.int8)))
+    share.end()
+    assert sum(finding.count for finding in findings.all()) == said
+    if said:
+        assert findings.all()[0].line >= 100 + blocks.index("s")
 
 
 def test_knots_of_neighbours_are_triple() -> None:

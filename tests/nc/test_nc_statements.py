@@ -154,6 +154,7 @@ def test_several_tools_have_their_own_lengths() -> None:
         "G90",
         "G49",
         "M5",
+        "M1",
         "T5 M6",
         "S700 M3",
         "G54",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -164,7 +165,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 reading=reading.reading_of(given),
                 settings=settings,
                 form=form,
-                frame=frame,
+                frame=replace(frame, stem="" if found.path == STANDARD else os.path.basename(found.stem)),
                 feed=given["feed"],
                 force=given["force"],
                 verify=not given["no_verify"],

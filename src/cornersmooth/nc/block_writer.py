@@ -22,6 +22,7 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.polynomial_blocks import bezier_points, curves_for
 from cornersmooth.nc.run import Run
+from cornersmooth.nc.spline_share import SplineShare
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.text import RowFormat, format_number, to_ticks
 
@@ -53,6 +54,7 @@ class BlockWriter:
     _arc_format: RowFormat = field(init=False)
     _curves: Curves = field(init=False)
     _blank: str = field(init=False)
+    _share: SplineShare | None = field(init=False)
 
     def __post_init__(self) -> None:
         motion = self.form.mode.motion
@@ -64,6 +66,7 @@ class BlockWriter:
         radius = f"{self._blank}{motion.radius}".encode()
         self._arc_format = self._row_format((*spaced[:3], radius), decimals[:3] + decimals[:1])
         self._curves = curves_for(self.form, self.program.units)
+        self._share = SplineShare(self.program.line, self.findings) if self.form.curve == "bspline" else None
 
     def _row_format(self, words: tuple[bytes, ...], decimals: tuple[int, ...]) -> RowFormat:
         motion = self.form.mode.motion
@@ -107,6 +110,8 @@ class BlockWriter:
     def end(self) -> list[str]:
         """Blocks that bring feed mode and plane back to where they were at the start."""
         words, blocks = self.statements.words, []
+        if self._share is not None:
+            self._share.end()
         if self._mode != FeedMode.PER_MINUTE:
             blocks += [words.feed_mode[key] for key in (int(FeedMode.PER_MINUTE),) if key in words.feed_mode]
             self._mode = FeedMode.PER_MINUTE
@@ -145,6 +150,8 @@ class BlockWriter:
     def text(self, run: Run, dwell: int = 0) -> bytes:
         """Text of a run that is not empty; `dwell` in milliseconds."""
         run = self._curves.prepare(run)
+        if self._share is not None:
+            self._share.take(run)
         prefix, prefix_id, extra = self._prefixes(run)
         suffix, suffix_id = self._suffixes(run, dwell)
         self.blocks += len(run) + extra

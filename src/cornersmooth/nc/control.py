@@ -161,7 +161,10 @@ class ProgramTable:
     Parameters
     ----------
     name : str
-        Name or number of the program where the user gives none.
+        Name or number of the program where neither the user nor the name of the CL file gives one.
+    file_name : str
+        The same from the name of the CL file, with ``{stem}``, its letters and digits in capitals with underscores
+        between, or ``{number}``, the digits that it ends in, four at least; empty where `name` is for all files.
     name_pattern : str
         Regular expression of the names that the control takes; empty for any.
     work_offset : str
@@ -178,11 +181,14 @@ class ProgramTable:
         Before the first motion of each tool, and after a retract.
     tool_end : tuple of str
         After the last motion of each tool.
+    between_tools : tuple of str
+        Behind `tool_end`, before another tool than the first, where the CL file does not stop there anyway.
     end : tuple of str
         After everything else, `tool_end` included.
     """
 
     name: str = "O0001"
+    file_name: str = ""
     name_pattern: str = ""
     work_offset: str = ""
     work_offset_pattern: str = ""
@@ -191,6 +197,7 @@ class ProgramTable:
     start: Blocks = ("{header}",)
     begin: Blocks = ("{tip_control_on}",)
     tool_end: Blocks = ("{tip_control_off}",)
+    between_tools: Blocks = ()
     end: Blocks = ("{footer}",)
 
 
@@ -273,10 +280,13 @@ class Extra:
         Whether they stand before tool tip control is switched on and behind its end, or within.
     forms : tuple of str
         Forms that they go with; empty for all.
+    warning : str
+        What is said to who asks for it; empty for nothing.
     """
 
     name: str = ""
     description: str = ""
+    warning: str = ""
     on: Blocks = ()
     off: Blocks = ()
     outside: bool = False

@@ -90,7 +90,8 @@ _BRACES: dict[str, Table] = {
     "compensation_right": {"register": 1},
     "on": {"offset": 1},
     "work_offset_block": {"work_offset": "G54"},
-    **dict.fromkeys(("start", "begin", "tool_end", "end", "retract"), _PROGRAM_BRACES),
+    "file_name": {"stem": "PART", "number": "0001"},
+    **dict.fromkeys(("start", "begin", "tool_end", "between_tools", "end", "retract"), _PROGRAM_BRACES),
     "block_number": {"number": 10},
 }
 #: the same in blocks of extras
@@ -190,7 +191,7 @@ def _program(table: Table) -> ProgramTable:
             re.compile(pattern)
         except re.error as error:
             raise _SHELF.wrong(f"program.{key} is {pattern!r}: {error}", "give a regular expression") from error
-    for key in ("start", "begin", "tool_end", "end", "retract"):
+    for key in ("start", "begin", "tool_end", "between_tools", "end", "retract"):
         for block in getattr(program, key):
             if any(f"{{{step}}}" in block and block != f"{{{step}}}" for step in STEPS):
                 raise _SHELF.wrong(f"program.{key}: {block!r} holds more than a step", "give the step alone")

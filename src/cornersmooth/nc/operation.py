@@ -45,6 +45,7 @@ class Operation:
     spindle: Blocks = ()  #: blocks that turn the spindle; none while it stands
     coolant: Blocks = ()  #: the same for the coolant
     begun: bool = False  #: the blocks of `begin` hold
+    halted: bool = False  #: the CL file has stopped the program since the last motion
     _tip_control: bool = False
     _functions: bool = False
     _moved: bool = False  # the tool has been used
@@ -58,6 +59,7 @@ class Operation:
     def begin(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks before the next motion of a tool; what a tool change stopped goes on again."""
         self._moved = self.begun = True
+        self.halted = False
         own = self.form.mode.begin
         blocks = [block for was_on in self._stopped.values() for block in was_on]
         if self._stopped:
@@ -69,12 +71,22 @@ class Operation:
         steps = self.form.table.program.begin if own is None else own
         return [*blocks, *self._expand(steps, rotary if self.retracted else _NO_ROTARY)]
 
-    def end_tool(self, line: int = 0) -> list[str]:
-        """Blocks behind the last motion of a tool; `line` is that of the statement that asks for them."""
+    def end_tool(self, line: int = 0, *, another: bool = False) -> list[str]:
+        """Blocks behind the last motion of a tool.
+
+        Parameters
+        ----------
+        line : int
+            That of the statement that asks for them.
+        another : bool
+            Whether another tool follows.
+        """
         self._stopped_line, self.begun = line, False
         steps = self.form.table.program.tool_end
         if not self._moved:  # a program begins with a tool change, as a rule
             steps = tuple(step for step in steps if step in _STEPS)
+        elif another and not self.halted:
+            steps = (*steps, *self.form.table.program.between_tools)
         self._moved = False
         return self._expand(steps)
 

@@ -13,13 +13,19 @@ import numpy as np
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Program
 from cornersmooth.nc.comments import comment_lines
-from cornersmooth.nc.control import Blocks, TextStyle
+from cornersmooth.nc.control import Blocks, ProgramTable, TextStyle
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
 
 #: decimals of that
 _BLEND_DECIMALS = 5
+
+#: characters of a name from that of a file: SINUMERIK takes 24
+_LONGEST_NAME = 24
+
+#: numbers of programs from names of files: FANUC's parameters NE8 and NE9 lock those from 8000 to 9999
+_HIGHEST_NUMBER = 7999
 
 
 class Stream(Protocol):
@@ -47,6 +53,8 @@ class Frame:
         Such as ``G54``, or the number of a preset; None for that of the control's table, empty for none.
     provenance : tuple of str
         What the text is made of, for comments before the header.
+    stem : str
+        Name of the CL file without its ending, for the program where `program` is None; empty for none.
     """
 
     program: str | None = None
@@ -56,6 +64,7 @@ class Frame:
     comments: bool = True
     work_offset: str | None = None
     provenance: tuple[str, ...] = ()
+    stem: str = ""
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
         """What stands for braces in the blocks around the motion and in those of extras.
@@ -72,7 +81,7 @@ class Frame:
             )
         turn = math.degrees(settings.blend_share * settings.tolerance / settings.axis_length)
         return {
-            "program": self.program or table.name,
+            "program": self.program or name_of_file(self.stem, table) or table.name,
             "units": form.table.layout.units[program.units],
             "blend": blend_word(settings.blend_share * settings.tolerance / program.mm_per_unit),
             "turn": format_number(max(turn, 10.0**-_BLEND_DECIMALS), _BLEND_DECIMALS),
@@ -115,6 +124,17 @@ class Frame:
         layout = form.table.layout
         number = layout.block_number or ("N{number} " if self.block_numbers else "")
         return FramedText(stream, number=number, layout=layout, next_number=layout.number_start)
+
+
+def name_of_file(stem: str, table: ProgramTable) -> str:
+    """Name or number of a program from the name of its CL file; empty where that gives none that the control takes."""
+    words = re.sub(r"[^A-Z0-9]+", "_", stem.upper()).strip("_")[:_LONGEST_NAME].rstrip("_")
+    digits = re.search(r"\d+$", stem)
+    number = int(digits[0]) if digits else 0
+    if not table.file_name or not words or ("{number}" in table.file_name and not 0 < number <= _HIGHEST_NUMBER):
+        return ""
+    name = table.file_name.format(stem=words, number=f"{number:04d}")
+    return name if re.fullmatch(table.name_pattern or ".*", name) else ""
 
 
 def blend_word(blend: float) -> str:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from cornersmooth.errors import InputError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
-from cornersmooth.nc.control import Words
+from cornersmooth.nc.control import Blocks, Words
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.holes import Cycle, read_cycle
@@ -133,7 +133,7 @@ class StatementWriter:
         offset = number if offset is None else offset
         if (number, offset) == (self.tool, self.operation.offset):  # CATIA loads a tool twice
             return self.comment(statement.text)
-        blocks = self.operation.end_tool(statement.line)
+        blocks = self.operation.end_tool(statement.line, another=number != self.tool)
         if number != self.tool:
             blocks += [block.format(tool=number) for block in self.words.tool_change]
         self.changed = True
@@ -232,6 +232,11 @@ class StatementWriter:
         if blocks is None:
             return None
         self.operation.cool(blocks)
+        return list(blocks)
+
+    def halt(self, blocks: Blocks) -> list[str]:
+        """STOP and OPSTOP."""
+        self.operation.halted = bool(blocks)
         return list(blocks)
 
     def delay(self, statement: Statement) -> list[str] | None:
@@ -359,8 +364,8 @@ _HANDLERS: dict[str, Handler] = {
     "DELAY": StatementWriter.delay,
     "CUTCOM": StatementWriter.compensation,
     "CYCLE": StatementWriter.hole_cycle,
-    "STOP": lambda writer, statement: list(writer.words.stop) or None,
-    "OPSTOP": lambda writer, statement: list(writer.words.optional_stop) or None,
+    "STOP": lambda writer, statement: writer.halt(writer.words.stop) or None,
+    "OPSTOP": lambda writer, statement: writer.halt(writer.words.optional_stop) or None,
     "GOHOME": StatementWriter.go_home,
     "END": StatementWriter.end,
     "INSERT": StatementWriter.insert,

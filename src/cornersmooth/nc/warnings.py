@@ -1,4 +1,4 @@
-"""What is said of a text before it is written: what the control does with arcs, feeds and single splines."""
+"""What is said of a text before it is written: what the control does with arcs, feeds and functions."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
         _flips(smoothed.program, findings)
     if form.orientation == "machine":
         _feeds(smoothed.program, findings)
-    if form.curve == "bspline":
-        _single_splines(smoothed, findings)
+    for extra in form.extras:
+        if extra.warning:
+            findings.add("CS339", "warning", 0, f"{extra.name}: {extra.warning}")
 
 
 def _arcs(circles: Circles, program: Program, findings: Findings) -> None:
@@ -51,15 +52,3 @@ def _feeds(program: Program, findings: Findings) -> None:
     if len(rows):
         text = "feed per revolution without tool tip control counts along the machine's axes; give feeds per minute"
         findings.add("CS323", "warning", int(program.line[rows[0]]), text, len(rows))
-
-
-def _single_splines(smoothed: SmoothProgram, findings: Findings) -> None:
-    """Corners without a rounded one beside them: their four blocks are less than the six among ten that are wanted."""
-    corners, program = smoothed.corners, smoothed.program
-    rounded = np.zeros(len(program), np.bool_)
-    rounded[corners.pose[corners.smoothed]] = True
-    single = corners.smoothed & ~rounded[corners.before] & ~rounded[corners.after]
-    rows = np.flatnonzero(single)
-    if len(rows):
-        text = "BSPLINE of a single corner: SINUMERIK wants six spline blocks among ten; -f poly has no such rule"
-        findings.add("CS325", "warning", int(program.line[corners.pose[rows[0]]]), text, len(rows))

@@ -40,6 +40,8 @@ class Token:
         How far the place is uncertain beyond what printed digits account for: rotary words near the pole.
     moment : int
         Tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts.
+    habit : bool
+        Whether posts write it on their own: an optional stop right before another tool.
     """
 
     kind: str
@@ -48,6 +50,7 @@ class Token:
     line: int
     room: float = 0.0
     moment: int = 0
+    habit: bool = False
 
 
 _NAMES = {
@@ -293,9 +296,18 @@ def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float
         elif event.letter in _PLAIN:
             number = round(value, SPEED_DECIMALS) if event.letter == "S" else value
             tokens.append(Token(_PLAIN[event.letter], number, place, line))
-        tokens[before:] = [replace(token, room=room, moment=moment) for token in tokens[before:]]
-        moment += any(token.kind in _PAUSES for token in tokens[before:])
+        habit = (event.letter, value) == ("M", 1.0) and _before_a_tool(speaking, k)
+        tokens[before:] = [replace(token, room=room, moment=moment, habit=habit) for token in tokens[before:]]
+        moment += any(token.kind in _PAUSES and not token.habit for token in tokens[before:])
     return tokens
+
+
+def _before_a_tool(speaking: Sequence[tuple[Event, float, float]], k: int) -> bool:
+    """Whether the next word is that of a tool, with no motion between; and there has been one before."""
+    event = speaking[k][0]
+    following = speaking[k + 1][0] if k + 1 < len(speaking) else None
+    changes = following is not None and following.letter == "T" and following.element == event.element
+    return changes and any(before.letter == "T" for before, _, _ in speaking[:k])
 
 
 #: letters whose words are tokens as they stand
@@ -331,6 +343,10 @@ def compare(
     unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
     found = [token for token in found if token.kind not in unsaid]
+    stops = [token for token in asked_for if token.kind == "stop" and token.value == 1.0]
+    found = [
+        token for token in found if not token.habit or any(not _away(stop.place, token, room, apart) for stop in stops)
+    ]
     end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
 
     def tidies(token: Token, kind: str) -> bool:

@@ -47,7 +47,12 @@ extras = click.option(
     multiple=True,
     help="Switch a function of the control on, such as cycle832; 'cornersmooth controls' lists them. May be repeated.",
 )
-program_name = click.option("--program-name", type=str, metavar="TEXT", help="Name or number of the NC program.")
+program_name = click.option(
+    "--program-name",
+    type=str,
+    metavar="TEXT",
+    help="Name or number of the NC program. [default: from the name of the CL file]",
+)
 work_offset = click.option(
     "--work-offset",
     type=str,

@@ -70,6 +70,8 @@ ISO_WORDS: Mapping[str, IsoWords] = {
     "haas": IsoWords(
         {43.0: "G43", 234.0: "G234", 49.0: ""},
         {"angles": ("G234",), "machine": ("", "G43"), "vector": ("G234",)},
+        silent=frozenset((187.0,)),
+        others="NOQPE",
         unsaid=frozenset((("coolant", 7.0),)),
         dwell=1000.0,
     ),
