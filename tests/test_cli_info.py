@@ -36,7 +36,7 @@ def test_lines_to_read_say_the_same():
     assert "impeller.cls: nx, mm" in text
     assert "18 rapid, 592 linear" in text
     assert "6, the longest 107 poses" in text
-    assert "250, 800, 1500 mm" in text
+    assert "250, 800, 1500 mm/min" in text
     assert "turns while cutting" in text
     assert "at 0.02 mm" in text
 

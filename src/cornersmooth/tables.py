@@ -1,11 +1,13 @@
 """Tables in TOML, those that come with the program and the user's own: found by name, read, their keys checked.
 
-A table may say ``like = NAME`` and then only what is different from that one, ``false`` for what it has not.
+A table may say ``like = NAME`` and then only what is different from that one, ``false`` for what it has not; and with
+``aliases = ["840d"]`` what else people call it. Capitals, blanks, hyphens and underscores in names do not count.
 """
 
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -44,7 +46,7 @@ class Shelf:
     package, folder : str
         Where those lie that come with the program.
     keys : tuple of str
-        Those that a table may have, ``like`` aside.
+        Those that a table may have, ``like`` and ``aliases`` aside.
     unknown, unreadable, unknown_key, wrong_value : str
         Codes of the errors that say that a name is unknown, that a file or its text cannot be read, that a key is
         unknown, and that a value is of a wrong kind.
@@ -63,6 +65,20 @@ class Shelf:
         """Names of the tables that come with the program, sorted."""
         files = (resources.files(self.package) / self.folder).iterdir()
         return tuple(sorted(item.name.removesuffix(".toml") for item in files if item.name.endswith(".toml")))
+
+    def aliases(self) -> dict[str, str]:
+        """Name of the table for each of its other names."""
+        folder = resources.files(self.package) / self.folder
+        tables = {name: tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8")) for name in self.names()}
+        return {alias: name for name, table in tables.items() for alias in table.get("aliases", ())}
+
+    def find(self, name: str) -> str:
+        """Return the name, as it is written, of the table that is called so; empty for none."""
+        known = self.names()
+        if name in known:
+            return name
+        called = {_plain(each): each for each in known} | {_plain(key): own for key, own in self.aliases().items()}
+        return called.get(_plain(name), "")
 
     def choose(self, name_or_path: str | Path) -> TableText:
         """Table of that name, or in that file.
@@ -93,13 +109,15 @@ class Shelf:
         SettingsError
             The name is unknown; the closest known one is named.
         """
-        known = self.names()
-        if name not in known:
-            close = closest(name, known)
-            advice = f"did you mean {close}? " if close else ""
+        found = self.find(name)
+        if not found:
+            known, aliases = self.names(), self.aliases()
+            close = closest(name.lower(), (*known, *aliases))
+            meant = f"{close}, which is {aliases[close]}" if close in aliases else close
+            advice = f"did you mean {meant}? " if close else ""
             hint = f"{advice}use a TOML file or one of {', '.join(known)}"
             raise SettingsError(self.unknown, f"unknown {self.kind} {name!r}", hint)
-        return (resources.files(self.package) / self.folder / f"{name}.toml").read_text(encoding="utf-8")
+        return (resources.files(self.package) / self.folder / f"{found}.toml").read_text(encoding="utf-8")
 
     def parse(self, text: str | Table) -> Parsed:
         """Table that a text holds, or one that was read already, on top of the one that it is like.
@@ -113,7 +131,8 @@ class Shelf:
             table = tomllib.loads(text) if isinstance(text, str) else dict(text)
         except tomllib.TOMLDecodeError as error:
             raise SettingsError(self.unreadable, f"not TOML: {error}", "correct the text") from error
-        self.check_keys(table, (*self.keys, "like"), "")
+        self.check_keys(table, (*self.keys, "like", "aliases"), "")
+        table.pop("aliases", None)
         like = table.pop("like", "")
         if not isinstance(like, str):
             raise self.wrong(f"like is {like!r}", f"name one of the built-in {self.kind}s")
@@ -121,7 +140,7 @@ class Shelf:
             return Parsed(table, "")
         base = self.parse(self.built_in(like)).table
         base.pop("name", None)
-        return Parsed(_merged(base, table), like)
+        return Parsed(_merged(base, table), self.find(like))
 
     def check_keys(self, table: Iterable[str], known: Sequence[str], where: str) -> None:
         """Refuse a key that is not known; `where` is what stands before it in the message.
@@ -169,6 +188,11 @@ def is_file(name_or_path: str | Path) -> bool:
     """Whether a file is meant: a path, or a text that ends in ``.toml`` or holds a path separator."""
     text = str(name_or_path)
     return isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or "\\" in text
+
+
+def _plain(name: str) -> str:
+    """Name without what people write in several ways."""
+    return re.sub(r"[\s_-]", "", name).lower()
 
 
 def closest(word: str, known: Sequence[str]) -> str:

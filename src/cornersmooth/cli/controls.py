@@ -35,7 +35,7 @@ def command(name: str | None, table: bool) -> int:
       cornersmooth controls siemens --table > mine.toml
       cornersmooth controls mine.toml
     """
-    from cornersmooth.nc import control_names, control_table, load_control
+    from cornersmooth.nc import control_aliases, control_names, control_table, load_control
 
     if table:
         if name is None:
@@ -43,8 +43,11 @@ def command(name: str | None, table: bool) -> int:
         click.echo(control_table(name), nl=False)
         return 0
     names = [name] if name else list(control_names())
+    aliases = control_aliases()
     for control in map(load_control, names):
         click.echo(f"{control.name}: {control.description}" if control.description else control.name)
+        if others := [alias for alias, own in aliases.items() if own == control.name and not control.own]:
+            click.echo(f"  also called {', '.join(others)}")
         for form in control.forms.values():
             click.echo(f"  -f {form.name}: {form.description}" if form.description else f"  -f {form.name}")
             click.echo(f"     with {', '.join(_MODES[mode] for mode in form.modes)}")

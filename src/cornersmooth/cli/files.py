@@ -4,11 +4,47 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import BinaryIO
 
 from cornersmooth import output
 from cornersmooth.errors import InputError, OutputError
 
 STANDARD = "-"
+
+
+#: lines of a text that a terminal is shown where nobody has asked for all of it
+_SHOWN = 20
+
+
+class Beginning:
+    """A stream that lets the first lines of a text through and counts the others.
+
+    Parameters
+    ----------
+    stream : binary stream
+
+    Attributes
+    ----------
+    held_back : int
+        Lines that were not let through.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream, self._left = stream, _SHOWN
+        self.held_back = 0
+
+    def write(self, data: bytes, /) -> int:
+        """Let through what belongs to the first lines."""
+        lines = data.splitlines(keepends=True)
+        shown = lines[: self._left]
+        self._stream.write(b"".join(shown))
+        self._left -= sum(line.endswith(b"\n") for line in shown)
+        self.held_back += sum(line.endswith(b"\n") for line in lines[len(shown) :])
+        return len(data)
+
+    def flush(self) -> None:
+        """Hand everything to the terminal."""
+        self._stream.flush()
 
 
 def read_input(path: str) -> tuple[bytes, str]:

@@ -73,12 +73,10 @@ def _motion(info: Info) -> Rows:
     yield "path", f"{motion.feed_length_mm:.6g} mm of lines at feed, {motion.rapid_length_mm:.6g} mm of rapids"
     low, high = (" ".join(f"{value:.6g}" for value in corner) for corner in (motion.box_min_mm, motion.box_max_mm))
     yield "box", f"{low} to {high} mm"
-    feeds = [
-        *(f"{value:g}" for value in motion.feeds_mm_per_min),
-        *(f"{value:g}/rev" for value in motion.feeds_mm_per_rev),
-    ]
+    by_unit = {"mm/min": motion.feeds_mm_per_min, "mm/rev": motion.feeds_mm_per_rev}
+    feeds = [", ".join(f"{value:g}" for value in values) + f" {unit}" for unit, values in by_unit.items() if values]
     missing = f"{motion.feed_moves_without_feed} moves without" if motion.feed_moves_without_feed else ""
-    yield "feeds", "; ".join(part for part in (", ".join(feeds) + " mm" * bool(feeds), missing) if part)
+    yield "feeds", "; ".join(part for part in (*feeds, missing) if part)
     yield "segments", _spread(motion.segment_length_mm, "mm")
     if info.arcs.count:
         yield "arcs", f"{info.arcs.count}, {info.arcs.helices} of them helices"

@@ -6,10 +6,11 @@ import hashlib
 import os
 import traceback
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
-from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.files import STANDARD, Beginning, check_path, read_input, target_of
 from cornersmooth.cli.fingerprint import fingerprint
+from cornersmooth.cli.show import more
 from cornersmooth.errors import CornersmoothError, PromiseError, SettingsError
 from cornersmooth.output import ClosedPipe, make_folder, open_output, read_mark
 
@@ -67,6 +68,8 @@ class Job:
         For pages, instead of that of the file.
     plan_up_to : int
         Poses up to which the time that is saved is planned.
+    beginning : bool
+        Whether standard output gets the first lines only.
     """
 
     source: str
@@ -86,6 +89,7 @@ class Job:
     plot: str = ""
     tool: Tool | None = None
     plan_up_to: int = 0
+    beginning: bool = False
 
 
 @dataclass
@@ -102,6 +106,8 @@ class Outcome:
     unverified: str = ""
     #: planned times of the direct path and of the written one, s
     planned: tuple[float, float] | None = None
+    #: lines that standard output did not get
+    held_back: int = 0
 
     @property
     def status(self) -> str:
@@ -220,10 +226,12 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         for path in (job.target, *job.reports):
             make_folder(os.path.dirname(path) or ".")
     may_replace = check(job, replace_target=replace_target)
+    target = target_of(job.target)
+    beginning = Beginning(cast(BinaryIO, target)) if job.beginning else None
     try:
         result = postprocess(
             source,
-            target_of(job.target),
+            cast(BinaryIO, beginning) if beginning is not None else target,
             job.settings,
             form=job.form,
             frame=job.frame,
@@ -240,6 +248,8 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         result = broken.result
         outcome.exit_code = broken.exit_code
         outcome.message = _say_rejected(name, result, broken)
+    if beginning is not None:
+        outcome.held_back = beginning.held_back
     outcome.unverified = result.unverified
     contents = result.report()
     if len(result.program) <= job.plan_up_to and result.verification is not None and result.verification.passed:
@@ -313,7 +323,7 @@ def _say_rejected(name: str, result: Result, broken: PromiseError) -> str:
     found = result.verification
     problems = found.problems[:_PROBLEMS_SHOWN] if found is not None else ()
     lines = [f"{name}:{problem.cl_line}: error: {problem.text} (NC line {problem.nc_line})" for problem in problems]
-    if found is not None and (more := found.problem_count - len(lines)) > 0:
-        lines.append(f"{name}: {more} more; a JSON report lists them")
+    if found is not None and (rest := found.problem_count - len(lines)) > 0:
+        lines.append(f"{name}: {more(rest, 'problem')}; a JSON report lists them")
     lines.append(f"{name}: error: {broken.what}")
     return "\n".join(lines)

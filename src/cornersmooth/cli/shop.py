@@ -136,6 +136,10 @@ def defaults(command: click.Command, shop: Shop, control: str | None) -> dict[st
     by_key = {key: option for option in settable(command) for key in keys(option)}
     if control is None:
         control = next((_control_of(file, command.name or "") for file in shop.files), None) or "fanuc"
+    if shop.files and not any(file.own("controls", control) for file in shop.files):
+        from cornersmooth.nc import find_control
+
+        control = find_control(control) or control
     values: dict[str, Any] = {}
     for file in reversed(shop.files):
         for table, key, value in file.options(command.name or "", control):

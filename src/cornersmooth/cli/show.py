@@ -20,6 +20,9 @@ NOT_VERIFIED = "CS509"
 _FINDINGS_SHOWN = 10
 _SHARP_SHOWN = 10
 
+#: room for the labels of the summary
+_LABEL = 14
+
 
 def console() -> Console:
     """Console on standard error; rich itself honours NO_COLOR and a missing terminal."""
@@ -73,7 +76,7 @@ def show_findings(source: str, contents: dict[str, Any], verbose: int) -> None:
         times = f" ({finding['count']} times)" if finding["count"] > 1 else ""
         print_line(f"{place}: {finding['severity']}: {finding['text']}{times}")
     if len(ranked) > len(shown):
-        print_line(f"{source}: {len(ranked) - len(shown)} more findings; -v shows them")
+        print_line(f"{source}: {more(len(ranked) - len(shown), 'finding')}; -v shows them")
 
 
 def show_verdict(contents: dict[str, Any], planned: tuple[float, float] | None = None) -> None:
@@ -85,50 +88,57 @@ def show_verdict(contents: dict[str, Any], planned: tuple[float, float] | None =
 
 def show_summary(contents: dict[str, Any], verbose: int) -> None:
     """Print the small table of one file, and its sharp corners."""
-    from rich.table import Table
+    from rich.text import Text
 
     from cornersmooth.report.verdict import sharp_text
     from cornersmooth.smoothing.construction import construction_of
 
     summary, settings = contents["summary"], contents["settings"]
     given = contents["input"]
-    table = Table(show_header=False, box=None, pad_edge=False)
-    table.add_column(style="bold")
-    table.add_column()
-    table.add_row("input", f"{given['name']}: {given['dialect']}, {given['poses']} poses, {given['units']}")
+    out = console()
+
+    def say(label: str, text: str) -> None:
+        out.print(Text.assemble((f"{label:<{_LABEL}}", "bold"), text))
+
+    say("input", f"{given['name']}: {given['dialect']}, {given['poses']} poses, {given['units']}")
     kept = ", ".join(f"{count} {reason}" for reason, count in summary["not_smoothed"].items())
-    table.add_row("corners", f"{summary['smoothed']} of {summary['corners']} rounded" + (f" ({kept})" if kept else ""))
-    table.add_row(
+    say("corners", f"{summary['smoothed']} of {summary['corners']} rounded" + (f" ({kept})" if kept else ""))
+    say(
         "limited by",
         f"tolerance at {summary['limited_by_tolerance']} corners, segment length at {summary['limited_by_segment']}",
     )
-    table.add_row(
+    say(
         "error",
         f"tip {summary['max_tip_error_mm']:.4f} mm, axis point {summary['max_axis_error_mm']:.4f} mm "
         f"(H {settings['axis_length']:g} mm), tolerance {settings['tolerance']:g} mm",
     )
-    table.add_row("tool axis", f"turned by up to {summary['max_orientation_error_deg']:.4f}° from the original")
+    say("tool axis", f"turned by up to {summary['max_orientation_error_deg']:.4f}° from the original")
     if text := construction_of(settings["method"]).summary_text(summary):
-        table.add_row(settings["method"], text)
+        say(settings["method"], text)
     if "verification" in contents:
         found = contents["verification"]
-        table.add_row(
+        say(
             "verified",
             f"{'passed' if found['passed'] else 'FAILED'}: tip {found['max_tip_deviation_mm']:.4f} mm, "
             f"axis point {found['max_axis_point_deviation_mm']:.4f} mm in the written text",
         )
     if "not_verified" in contents:
-        table.add_row("NOT VERIFIED", contents["not_verified"])
-    table.add_row("blocks", f"{summary['blocks_in']} in, {summary['blocks_out']} out")
+        say("NOT VERIFIED", contents["not_verified"])
+    say("blocks", f"{summary['blocks_in']} in, {summary['blocks_out']} out")
     if verbose:
         times = ", ".join(f"{stage} {value:.3f}" for stage, value in summary["seconds"].items())
-        table.add_row("seconds", times)
-    console().print(table)
+        say("seconds", times)
     shown = contents["sharp"] if verbose else contents["sharp"][:_SHARP_SHOWN]
     for corner in shown:
         print_line(f"{given['name']}{sharp_text(corner)}, stays sharp")
     if summary["sharp"] > len(shown):
-        print_line(f"{given['name']}: {summary['sharp'] - len(shown)} more stay sharp; --report part.html lists them")
+        rest = more(summary["sharp"] - len(shown), "sharp corner")
+        print_line(f"{given['name']}: {rest}; --report part.html lists them")
+
+
+def more(count: int, thing: str) -> str:
+    """Say that there are more: ``1 more finding``, ``2 more findings``."""
+    return f"{count:,} more {thing}{'s' * (count != 1)}"
 
 
 def print_line(text: str) -> None:

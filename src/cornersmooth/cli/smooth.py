@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from cornersmooth.cli.inputs import Input, find_inputs
 from cornersmooth.cli.job import Job, Outcome, check, run_job
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import print_line, progress_bar, show_findings, show_summary, show_verdict
+from cornersmooth.cli.show import more, print_line, progress_bar, show_findings, show_summary, show_verdict
 from cornersmooth.cli.summary import check_summary, counts_line, line_of, write_summary
 from cornersmooth.output import make_folder
 
@@ -83,8 +84,10 @@ def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
     quiet, verbose = given["quiet"], given["verbose"]
     if len(jobs) == 1 and not given["directory"]:
         check(jobs[0])
-        with progress_bar(quiet) as progress:
+        with progress_bar(quiet or (jobs[0].target == STANDARD and _to_terminal())) as progress:  # a bar eats lines
             outcome = run_job(jobs[0], progress)
+        if outcome.held_back and not quiet:
+            print_line(f"... {more(outcome.held_back, 'line')}; -o FILE writes them, -o - shows them all")
         if outcome.contents and not quiet:
             show_verdict(outcome.contents, outcome.planned)
         _tell(outcome, quiet, verbose)
@@ -175,6 +178,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 skip_existing=given["skip_existing"],
                 plot=given["plot"] or "",
                 tool=given["tool"],
+                beginning=not folder and not output and _to_terminal(),
                 plan_up_to=0 if quiet or folder else MOST_TIMED_POSES_VERBOSE if verbose else MOST_TIMED_POSES,
             )
         )
@@ -238,6 +242,10 @@ def _names(path: str) -> list[object]:
     except OSError:
         return [os.path.realpath(path)]
     return [os.path.realpath(path), (found.st_dev, found.st_ino)]
+
+
+def _to_terminal() -> bool:
+    return sys.stdout is not None and sys.stdout.isatty()
 
 
 def _stem(path: str) -> str:

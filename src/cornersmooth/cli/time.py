@@ -10,12 +10,13 @@ import click
 from cornersmooth.cli.files import check_path, read_input, target_of
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import progress_bar
+from cornersmooth.cli.show import print_line, progress_bar
 from cornersmooth.methods import METHODS
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Comparison
+    from cornersmooth.model import Program
 
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",
@@ -122,6 +123,8 @@ def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
     machine = nc_text.machine_of(given)
     limits, settings = motion.limits_of(given), smoothing.settings_of(given)
     program = read(data, name=name, **reading.reading_of(given))
+    if not given["quiet"]:
+        _tell_feeds(program, given["feed"])
     with progress_bar(given["quiet"]) as progress:
         compared = compare(program, settings, limits, machine=machine, progress=progress)
         if not given["text"]:
@@ -134,19 +137,35 @@ def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
         return compared.with_text(law)
 
 
+def _tell_feeds(program: Program, feed: float | None) -> None:
+    """Say that the CL file has no feed for some moves, and that of the command line is taken."""
+    import numpy as np
+
+    from cornersmooth.model import Move
+
+    without = np.flatnonzero(np.isnan(program.feed) & (program.kind != Move.RAPID))
+    if feed is None or not len(without):  # without any feed the planning itself refuses
+        return
+    place = f"{program.source.name}:{program.line[without[0]]}"
+    times = f" ({len(without)} times)" if len(without) > 1 else ""
+    print_line(f"{place}: warning: feed move without a feed in the CL file; planned with --feed {feed:g} mm/min{times}")
+
+
 def _tables(compared: Comparison) -> Iterator[str]:
     """Times and savings, then what was reached, then the places that lose most."""
+    from cornersmooth.feedrate import limiting
     from cornersmooth.feedrate.compare import peaks, slowest, stops, turning_seconds
     from cornersmooth.report.verdict import times_text
 
     settings, saving = compared.settings, compared.saving_percent
-    yield times_text(compared.seconds, [name for name in compared.laws if name not in LAWS[:2]])
+    names = [name for name in compared.laws if name not in LAWS[:2]]
+    yield times_text(compared.seconds, names, limiting(compared.laws[min(names, key=compared.seconds.__getitem__)]))
     yield f"tolerance {settings.tolerance:g} mm, axis point at {settings.axis_length:g} mm"
-    yield f"{'':<24}{'time s':>12}{'saved %':>20}{'stops':>10}{'turning s':>12}{'length mm':>14}"
-    yield f"{'':<24}{'':>12}{'of stops':>10}{'of jumps':>10}"
+    yield (f"{'':<24}{'time s':>12}{'saves % of':>15}{'saves % of':>15}{'stops':>10}{'turning s':>12}{'length mm':>14}")
+    yield f"{'':<24}{'':>12}{'exact stop':>15}{'velocity jump':>15}"
     for name, law in compared.laws.items():
         saved = saving.get(name, {})
-        parts = "".join(f"{saved[base]:>10.1f}" if base in saved else f"{'':>10}" for base in LAWS[:2])
+        parts = "".join(f"{saved[base]:>15.1f}" if base in saved else f"{'':>15}" for base in LAWS[:2])
         yield (
             f"{_TITLES[name]:<24}{law.total:>12.3f}{parts}{stops(law):>10}{turning_seconds(law):>12.3f}"
             f"{law.length:>14.3f}"

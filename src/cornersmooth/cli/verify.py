@@ -14,6 +14,7 @@ import click
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.show import more
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
 
@@ -182,7 +183,8 @@ def _problems(found: Verification, name: str, verbose: int) -> Iterator[str]:
         where = f" (NC line {problem.nc_line})" if problem.nc_line else ""
         yield f"{place}: error: {problem.text}{where}"
     if found.problem_count > len(shown):
-        yield f"{name}: {found.problem_count - len(shown)} more problems; -v shows more, a JSON report lists them"
+        rest = more(found.problem_count - len(shown), "problem")
+        yield f"{name}: {rest}; -v shows more, a JSON report lists them"
 
 
 def _summary(found: Verification) -> Iterator[str]:

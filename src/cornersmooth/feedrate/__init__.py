@@ -5,6 +5,7 @@ from __future__ import annotations
 from cornersmooth.feedrate.axis_limits import AxisLimits
 from cornersmooth.feedrate.axispeaks import AxisPeaks, axis_peaks
 from cornersmooth.feedrate.compare import Comparison, compare
+from cornersmooth.feedrate.limiting import limiting
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.timelaw import States, TimeLaw
@@ -21,6 +22,7 @@ __all__ = [
     "axis_peaks",
     "compare",
     "direct",
+    "limiting",
     "plan",
     "plan_text",
 ]

@@ -12,7 +12,14 @@ from cornersmooth.model import Ints, SmoothProgram, Units
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.circles import Circles, plan_circles
 from cornersmooth.nc.control import Control
-from cornersmooth.nc.control_tables import control_names, control_table, load_control, parse_control
+from cornersmooth.nc.control_tables import (
+    control_aliases,
+    control_names,
+    control_table,
+    find_control,
+    load_control,
+    parse_control,
+)
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.form_choice import check_program, choose_form
@@ -33,8 +40,10 @@ __all__ = [
     "Frame",
     "Written",
     "choose_form",
+    "control_aliases",
     "control_names",
     "control_table",
+    "find_control",
     "fit_settings",
     "load_control",
     "parse_control",

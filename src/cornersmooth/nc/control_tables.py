@@ -103,6 +103,16 @@ def control_names() -> tuple[str, ...]:
     return _SHELF.names()
 
 
+def control_aliases() -> dict[str, str]:
+    """Name of the control for each of its other names, such as that of a model."""
+    return _SHELF.aliases()
+
+
+def find_control(name: str) -> str:
+    """Return the name of the control that comes with the program and is called so; empty for none."""
+    return _SHELF.find(name)
+
+
 def load_control(name_or_path: str | Path) -> Control:
     """Control of that name, or described by that TOML file.
 

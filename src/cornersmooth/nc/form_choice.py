@@ -14,6 +14,7 @@ from cornersmooth.nc.control import Control, Extra, FormTable, Orientation
 from cornersmooth.nc.control_tables import load_control
 from cornersmooth.nc.form import ROTARY_SHARE, Form
 from cornersmooth.settings import Settings
+from cornersmooth.tables import closest
 from cornersmooth.vectors import norm
 
 
@@ -44,9 +45,12 @@ def choose_form(
         Unknown control or form, or a combination that the control cannot run.
     """
     table = control if isinstance(control, Control) else load_control(control)
-    name = next(iter(table.forms)) if form is None else form
+    name = next(iter(table.forms)) if form is None else form if form in table.forms else form.lower()
     if name not in table.forms:
-        raise SettingsError("CS211", f"{table.name} has no form {name!r}", f"choose one of {', '.join(table.forms)}")
+        close = closest(name, tuple(table.forms))
+        advice = f"did you mean {close}? " if close else ""
+        hint = f"{advice}choose one of {', '.join(table.forms)}"
+        raise SettingsError("CS211", f"{table.name} has no form {form!r}", hint)
     chosen = table.forms[name]
     if machine is None and not tcp and "machine" in chosen.modes:
         raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")

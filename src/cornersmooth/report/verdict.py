@@ -16,6 +16,10 @@ _LISTED = 100
 #: degrees below which the tip goes straight on
 _STRAIGHT_ON = 1.0
 
+#: limits that the sentence about times names
+_LIMITS_TOLD = 2
+_LEAST_TOLD = 0.005
+
 #: what is no corner of the path: it turns by less than shows, or repeats a pose
 _IDLE = (Status.STRAIGHT, Status.DUPLICATE)
 
@@ -92,11 +96,23 @@ def saving_text(direct: float, written: float) -> str:
     return f"saves {saved:.1f} s of {direct:.1f} s" if saved > 0.0 else f"takes {-saved:.1f} s more than {direct:.1f} s"
 
 
-def times_text(seconds: Mapping[str, float], names: Sequence[str]) -> str:
-    """Say what the methods save, from the planned times of `feedrate.Comparison`; methods are `names`."""
+def times_text(seconds: Mapping[str, float], names: Sequence[str], limits: Sequence[tuple[str, float]] = ()) -> str:
+    """Say what smoothing saves of the planned time, and what limits the motion then.
+
+    Parameters
+    ----------
+    seconds : mapping of str to float
+        Planned times, as `feedrate.Comparison` has them.
+    names : sequence of str
+        Methods, and the text as written, to choose the fastest from.
+    limits : sequence of (str, float), optional
+        Limits that the fastest reaches, and the part of the cutting time, as `feedrate.limiting` gives them.
+    """
     stops, jumps = seconds["direct_exact_stop"], seconds["direct_velocity_jump"]
     best = min(names, key=lambda name: seconds[name])
-    return (
-        f"{best} takes {seconds[best]:.1f} s; the direct path {jumps:.1f} s with jumps of velocity at its corners, "
-        f"{stops:.1f} s with stops"
-    )
+    saved = jumps - seconds[best]
+    share = f" ({100.0 * abs(saved) / jumps:.0f} %)" if jumps else ""
+    told = f"saves {saved:.1f} s of" if saved >= 0.0 else f"takes {-saved:.1f} s more than"
+    text = f"{best} {told} the {jumps:.1f} s of the direct path{share}, which takes {stops:.1f} s with stops at corners"
+    parts = [f"{name} {100.0 * part:.0f} %" for name, part in limits[:_LIMITS_TOLD] if part >= _LEAST_TOLD]
+    return text + (f"; limited by {', '.join(parts)} of the cutting time" if parts else "")

@@ -1,0 +1,184 @@
+"""Small habits of the command line: other names of controls, plurals, blanks, warnings, terminals."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from cornersmooth.cli.files import Beginning
+from cornersmooth.nc import control_aliases, control_names, load_control
+from oracle.command import DONE, SMALL, USAGE, command, environment, run
+
+SAMPLES = Path(__file__).resolve().parent.parent / "samples"
+IMPELLER = SAMPLES / "impeller.cls"
+
+
+@pytest.mark.parametrize(
+    ("name", "control"),
+    [
+        ("840d", "siemens"),
+        ("840D sl", "siemens"),
+        ("SINUMERIK", "siemens"),
+        ("tnc640", "heidenhain"),
+        ("TNC 640", "heidenhain"),
+        ("31i", "fanuc"),
+        ("31i-B5", "fanuc"),
+        ("Siemens", "siemens"),
+    ],
+)
+def test_controls_have_other_names(name: str, control: str) -> None:
+    assert load_control(name) == load_control(control)
+
+
+def test_other_names_mean_one_control() -> None:
+    aliases = control_aliases()
+    assert set(aliases.values()) == set(control_names())
+    assert not set(aliases) & set(control_names())
+
+
+def test_a_table_may_be_like_another_name(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('like = "840d"\n')
+    assert load_control(tmp_path / "mine.toml").dialect == "siemens"
+
+
+def test_settings_of_a_control_hold_for_its_other_names(tmp_path: Path) -> None:
+    (tmp_path / "cornersmooth.toml").write_text("[smooth.siemens]\nform = 'bspline'\n")
+    (tmp_path / "part.cls").write_bytes(SMALL)
+    assert b"BSPLINE" in run("smooth", tmp_path / "part.cls", "--control", "840d").stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--control", "tnc64"), "unknown control 'tnc64'; did you mean tnc640, which is heidenhain? "),
+        (("--control", "simens"), "did you mean siemens? "),
+        (("--machine", "table-bac"), "did you mean table-bc? "),
+        (
+            ("--control", "siemens", "-f", "bspine"),
+            "siemens has no form 'bspine'; did you mean bspline? ",
+        ),
+    ],
+)
+def test_the_nearest_name_is_told(options: tuple[str, ...], said: str) -> None:
+    result = run("smooth", IMPELLER, *options)
+    assert result.returncode == USAGE
+    assert said in result.stderr.decode()
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_single_file_may_go_to_a_folder(tmp_path: Path) -> None:
+    assert run("smooth", IMPELLER, "-d", tmp_path / "made" / "deep").returncode == DONE
+    assert [path.name for path in (tmp_path / "made" / "deep").iterdir()] == ["impeller.nc"]
+
+
+def test_one_is_not_several(tmp_path: Path) -> None:
+    out = tmp_path / "o.nc"
+    assert run("smooth", IMPELLER, "-o", out).returncode == DONE
+    out.write_bytes(out.read_bytes().replace(b"F250.", b"F251.", 1))
+    said = run("verify", IMPELLER, out).stdout.decode()
+    assert "FAILED: 1 problem\n" in said
+    assert "1 problem," in said
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("smooth", IMPELLER, "-v"),
+        ("info", IMPELLER),
+        ("time", SAMPLES / "paper_table1.csv", "--units", "mm", "--feed", "1800", "--machine", "table-ac"),
+        ("controls",),
+        ("machines", "table-ac"),
+        ("config",),
+        ("smooth", "--help"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_no_trailing_blanks_and_no_colours_in_pipes(words: tuple[object, ...]) -> None:
+    result = run(*words)
+    text = (result.stdout + result.stderr).decode()
+    assert text
+    assert [line for line in text.splitlines() if line != line.rstrip()] == []
+    assert "\x1b" not in text
+
+
+def warnings(*words: object) -> list[str]:
+    return [line for line in run("smooth", *words).stderr.decode().splitlines() if ": warning: " in line]
+
+
+def test_what_is_strange_is_warned_of(tmp_path: Path) -> None:
+    out = tmp_path / "o.nc"
+    one, part = tmp_path / "one.cls", tmp_path / "part.cls"
+    one.write_text("UNITS/MM\nFEDRAT/100,MMPM\nGOTO/0,0,0,0,0,1\n")
+    part.write_text("UNITS/MM\nRAPID\nGOTO/0,0,0,0,0,1\nFEDRAT/100,MMPM\nGOTO/1,0,0\nGOTO/1,1,0\n")
+    assert any("feeds are in mm per minute, the positions" in line for line in warnings(IMPELLER, "--units", "inch"))
+    assert any("nothing is cut" in line for line in warnings(one))
+    assert any("the tolerance 5 mm is larger than the whole path" in line for line in warnings(part, "-e", "5"))
+    assert not any("larger than" in line for line in warnings(part, "-e", "0.1", "-o", out))
+
+
+def test_time_says_what_is_saved_and_what_limits() -> None:
+    given = ("--units", "mm", "--feed", "1800", "-e", "0.15")
+    said = run("time", SAMPLES / "paper_table1.csv", *given).stdout.decode().splitlines()
+    assert " saves " in said[0]
+    assert " of the direct path (" in said[0]
+    assert "; limited by " in said[0]
+    assert said[0].endswith(" of the cutting time")
+    assert "saves % of" in said[2]
+    assert said[3].split() == ["exact", "stop", "velocity", "jump"]
+
+
+def test_time_takes_a_feed_where_the_file_has_none(tmp_path: Path) -> None:
+    part = tmp_path / "part.cls"
+    part.write_bytes(b"".join(line for line in SMALL.splitlines(keepends=True) if b"FEDRAT" not in line))
+    assert b"give a feed in mm/min for the whole program (--feed)" in run("time", part).stderr
+    result = run("time", part, "--feed", "900")
+    assert result.returncode == DONE
+    assert b"warning: feed move without a feed in the CL file; planned with --feed 900 mm/min" in result.stderr
+    (tmp_path / "whole.cls").write_bytes(SMALL)
+    assert run("time", tmp_path / "whole.cls", "--feed", "900").stderr == b""
+
+
+@pytest.mark.parametrize("size", [1, 7, 1000])
+def test_the_beginning_of_a_text(size: int) -> None:
+    text = b"".join(b"line %d\n" % number for number in range(30))
+    stream = io.BytesIO()
+    beginning = Beginning(stream)
+    for at in range(0, len(text), size):
+        beginning.write(text[at : at + size])
+    assert stream.getvalue() == b"".join(b"line %d\n" % number for number in range(20))
+    assert beginning.held_back == 10
+
+
+@pytest.mark.parametrize("options", [(), ("-o", "-")])
+def test_a_terminal_is_not_flooded(options: tuple[str, ...]) -> None:
+    leader, follower = pty.openpty()
+    process = subprocess.Popen(
+        command("smooth", IMPELLER, *options),
+        stdin=subprocess.DEVNULL,
+        stdout=follower,
+        stderr=follower,
+        env=environment(TERM="xterm"),
+    )
+    os.close(follower)
+    seen = b""
+    while True:
+        try:
+            part = os.read(leader, 65536)
+        except OSError:  # the other end is closed
+            break
+        if not part:
+            break
+        seen += part
+    os.close(leader)
+    assert process.wait() == DONE
+    lines = seen.decode().splitlines()
+    assert lines[0] == "%"
+    assert ("M30" in lines) == bool(options)
+    told = [line for line in lines if line.endswith("more lines; -o FILE writes them, -o - shows them all")]
+    assert (len(told) == 1) != bool(options)
+    assert (len(lines) > 2000) == bool(options)
