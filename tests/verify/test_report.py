@@ -66,11 +66,12 @@ def test_command(files, tmp_path, capsys):
     assert told.err == ""
     # corner to chamfer: 0.05/sqrt(2)
     assert "passed" in told.out
-    assert "0.0353553 mm at CL line 6, NC line 11" in told.out
+    assert "tip               0.0353553 mm (limit 0.04) at CL line 6, NC line 11" in told.out
+    assert "common pose       tip 0.0353553 mm (limit 0.08) at CL line 6, NC line 11" in told.out
     assert run(["verify", source, text, "-e", "0.03", "-q"]) == 1
     told = capsys.readouterr()
     assert told.out == ""
-    assert f"{source}:6: error: the tip leaves its path by 0.035355 mm (NC line 11)" in told.err
+    assert f"{text}:11: error: the tip leaves its path by 0.035355 mm (CL line 6)" in told.err
 
 
 def test_reports_and_refusals(files, tmp_path, capsys):

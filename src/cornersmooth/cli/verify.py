@@ -85,6 +85,8 @@ def command(source: str, text: str, **given: Any) -> int:
     trusted = [
         line for path in given["trusted"] for line in read_input(path)[0].decode("utf-8", "replace").splitlines()
     ]
+    if remark:  # first: what follows may be hard to understand without it
+        click.echo(f"{text}: warning: {remark}", err=True)
     found = verify(program, nc, **how, words=not own, trusted=trusted, weights=weights, processes=useful_processes())
     _write_reports(program, found, [path for path in given["reports"] if path not in pages])
     if pages:
@@ -103,9 +105,7 @@ def command(source: str, text: str, **given: Any) -> int:
         picture = draw_deviation(deviation_along(program, nc, **how), given["tolerance"], form)
         with open_output(target_of(given["plot"])) as output:
             output.stream.write(picture)
-    if remark:
-        click.echo(f"{text}: warning: {remark}", err=True)
-    for line in _problems(found, name, given["verbose"]):
+    for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
         click.echo(line, err=True)
     if not given["quiet"]:
         for line in _summary(found):
@@ -130,18 +130,13 @@ def _take_over(
     """
     from cornersmooth.kinematics import machine_names
     from cornersmooth.nc import control_names
-    from cornersmooth.provenance import HEAD, read_provenance
+    from cornersmooth.provenance import read_provenance
 
-    head = nc if isinstance(nc, bytes) else b""
-    if not isinstance(nc, bytes):
-        with contextlib.suppress(OSError):  # who reads it all says why
-            if stat.S_ISREG(os.stat(nc).st_mode):
-                with open(nc, "rb") as file:
-                    head = file.read(HEAD)
+    head = _head(nc)
     made = read_provenance(head)
-    if made is None:
-        return "", None
     context = click.get_current_context()
+    if made is None:
+        return _recognise(given, head, context), None
     said: dict[str, Any] = {"tolerance": made.tolerance, "axis_length": made.axis_length, "no_tcp": not made.tcp}
     said |= {"control": made.control} if made.control in control_names() else {}
     said |= {"machine": made.machine or None} if made.machine in ("", *machine_names()) else {}
@@ -152,6 +147,34 @@ def _take_over(
     if made.sha256 and made.sha256 != hashlib.sha256(source).hexdigest():
         return "it was made from another CL file, or that has changed since: its SHA-256 is another", made.weights
     return "", made.weights
+
+
+def _head(nc: bytes | str | os.PathLike[str]) -> bytes:
+    """Beginning of the text; empty where it cannot be read twice."""
+    from cornersmooth.provenance import HEAD
+
+    if isinstance(nc, bytes):
+        return nc[:HEAD]
+    with contextlib.suppress(OSError):  # who reads it all says why
+        if stat.S_ISREG(os.stat(nc).st_mode):
+            with open(nc, "rb") as file:
+                return file.read(HEAD)
+    return b""
+
+
+def _recognise(given: dict[str, Any], head: bytes, context: click.Context) -> str:
+    """Take the control that a text looks like, where none was named; return what is to be said of it."""
+    from cornersmooth.nc_reader.recognition import recognise_control
+
+    looks = recognise_control(head)
+    named = context.get_parameter_source("control") != click.core.ParameterSource.DEFAULT
+    if looks in ("", nc_text.control_of(given).dialect) or (named and looks == "fanuc"):  # others say its words, too
+        return ""
+    advice = f"it looks like {looks.capitalize()}: --control {looks}"
+    if named:
+        return advice
+    given["control"] = looks
+    return f"{advice} is taken"
 
 
 def _check_outputs(source: str, text: str, given: dict[str, Any]) -> str:
@@ -176,30 +199,36 @@ def _write_reports(program: Program, found: Verification, paths: list[str]) -> N
                 output.stream.write(part.encode("utf-8"))
 
 
-def _problems(found: Verification, name: str, verbose: int) -> Iterator[str]:
+def _problems(found: Verification, name: str, text: str, verbose: int) -> Iterator[str]:
+    """Problems with the place to edit first: that in the text, or in the CL file where the text has none."""
     shown = found.problems if verbose else found.problems[:_PROBLEMS_SHOWN]
     for problem in shown:
-        place = f"{name}:{problem.cl_line}" if problem.cl_line else name
-        where = f" (NC line {problem.nc_line})" if problem.nc_line else ""
-        yield f"{place}: error: {problem.text}{where}"
+        cl = f"CL line {problem.cl_line}" if problem.cl_line else ""
+        if problem.nc_line:
+            yield f"{text}:{problem.nc_line}: error: {problem.text}" + (f" ({cl})" if cl else "")
+        else:
+            yield f"{f'{name}:{problem.cl_line}' if cl else text}: error: {problem.text}"
     if found.problem_count > len(shown):
         rest = more(found.problem_count - len(shown), "problem")
-        yield f"{name}: {rest}; -v shows more, a JSON report lists them"
+        yield f"{text}: {rest}; -v shows more, a JSON report lists them"
 
 
 def _summary(found: Verification) -> Iterator[str]:
     """Label and text of everything measured."""
     from cornersmooth.report.verdict import kept_text
+    from cornersmooth.verify.deviation import TOGETHER
 
     yield kept_text(found.to_dict())
     failed = f"FAILED: {found.problem_count} problem{'s' * (found.problem_count != 1)}"
     yield f"{'result':<18}{'passed' if found.passed else failed}"
     yield f"{'tolerance':<18}{found.tolerance:g} mm, axis point at {found.axis_length:g} mm"
-    yield f"{'tip':<18}{_place(found.tip, 'mm')}"
-    yield f"{'axis point':<18}{_place(found.axis_point, 'mm')}"
+    one, both = found.tolerance, TOGETHER * found.tolerance
+    yield f"{'tip':<18}{_place(found.tip, 'mm', one)}"
+    yield f"{'axis point':<18}{_place(found.axis_point, 'mm', one)}"
     yield f"{'tool axis':<18}{_place(found.orientation, 'deg')}"
-    yield f"{'common pose':<18}tip {_place(found.together_tip, 'mm')}"
-    yield f"{'':<18}axis point {_place(found.together_axis_point, 'mm')}"
+    yield f"{'common pose':<18}tip {_place(found.together_tip, 'mm', both)}"
+    yield f"{'':<18}axis point {_place(found.together_axis_point, 'mm', both)}"
+    yield f"{'':<18}(tip and axis point measured from one pose of the other motion may be {TOGETHER:g} times as far)"
     yield f"{'tangent jump':<18}{_place(found.tangent_jump, 'deg')}"
     if found.curves:
         yield f"{'curvature jump':<18}{_place(found.curvature_jump, '1/mm')}"
@@ -218,6 +247,8 @@ def _along(found: Verification, along: Distribution) -> Iterator[str]:
     yield from along_lines(along, found.tolerance)
 
 
-def _place(where: Where, unit: str) -> str:
+def _place(where: Where, unit: str, limit: float | None = None) -> str:
+    """Value, the limit that it has, and where it is."""
+    allowed = f" (limit {limit:g})" if limit is not None else ""
     lines = f" at CL line {where.cl_line}, NC line {where.nc_line}" if where.nc_line else ""
-    return f"{where.value:.6g} {unit}{lines}"
+    return f"{where.value:.6g} {unit}{allowed}{lines}"
