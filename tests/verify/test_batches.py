@@ -258,35 +258,3 @@ def test_text_from_a_pipe(used, tmp_path, processes):
     assert verify(program, pipe, tolerance=TOLERANCE, processes=processes).passed
     writer.join()
     assert processes > 1 or used[-1] > 4
-
-
-def test_text_is_read_by_one_thread_while_another_writes(used, tmp_path):
-    """What is not there yet is waited for; nothing is read twice or left out."""
-    from cornersmooth.nc_reader.source import GivenUp, Source
-
-    path = tmp_path / "growing"
-    path.write_bytes(b"")
-    source = Source(path)
-    whole = b"".join(b"N%d G1 X%d\n" % (k, k) for k in range(900))
-
-    def fill():
-        with path.open("ab") as file:
-            for begin in range(0, len(whole), 999):
-                file.write(whole[begin : begin + 999])
-                file.flush()
-                time.sleep(0.001)
-        source.finish()
-
-    writer = threading.Thread(target=fill)
-    writer.start()
-    part_of = source.part(100, 10_000)
-    read = b"".join(iter(lambda: part_of.read(700), b""))
-    writer.join()
-    assert read == whole[100 : whole.rfind(b"\n", 0, 10_000) + 1]
-    part_of = source.part(100, 20_000)
-    assert b"".join(iter(lambda: part_of.read(700), b"")) == whole[100:]
-    assert source.size(0) == len(whole)
-    source.give_up()
-    with pytest.raises(GivenUp):
-        source.read(0, 10)
-    source.close()

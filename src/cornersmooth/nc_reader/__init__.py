@@ -18,7 +18,8 @@ Where is what:
 
 - what a text is: `source` (bytes), `reading_options` (control, machine, digits), `dialects` (grammar), `word_list`
 - bytes to tables: `lexer`, `words`, `block_tables`, `line_patterns`
-- tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `rotary`
+- tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `long_curves`, `rotary`;
+  `way_back` leads back from retracts
 - what comes out: `elements`; `curves` evaluates them
 """
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.arcs import circles
 from cornersmooth.nc_reader.elements import Element, Problem
-from cornersmooth.nc_reader.splines import CurveTable, cut_long, interval_curves, knot_curves, poly_curves, spl_curves
+from cornersmooth.nc_reader.long_curves import cut_long
+from cornersmooth.nc_reader.splines import CurveTable, interval_curves, knot_curves, poly_curves, spl_curves
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, POLY, SPL, Table
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import os
-import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, NoReturn
@@ -12,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import MM_PER_UNIT, Floats, Units
+from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.dialects import CONTROLS
 from cornersmooth.nc_reader.dialects.base import HIGH_SPEED, INCREMENTAL
@@ -30,7 +28,8 @@ from cornersmooth.nc_reader.elements import (
 from cornersmooth.nc_reader.execution import Executed, Modal, execute
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions, Steps
 from cornersmooth.nc_reader.source import Source, readable_twice
-from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Line, Table, table_of
+from cornersmooth.nc_reader.way_back import WayBack
+from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Line, Table, joined_tables
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -108,9 +107,9 @@ def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, n
     source = Source(readable_twice(data))
     try:
         source.finish()
-        reader = Reader(label, options, options.steps(source.read(0, DIGITS_SAMPLE)))
+        reader = Reader(label, options, options.steps(source.head(DIGITS_SAMPLE)))
         reader.comments = []
-        parts = list(reader.chunks(read_lines(source.part(0, sys.maxsize), label, options.dialect.lexer)))
+        parts = list(reader.chunks(read_lines(source, label, options.dialect.lexer)))
         return reader.program(parts)
     finally:
         source.close()
@@ -149,9 +148,7 @@ class Reader:
         #: whether the tool has been fed from a position that was known
         self.placed = False
         self.blocks = 0
-        self.left = False  # an axis stands at a position of the machine
-        #: where the last rapid on the way back has gone, NaN where that is not known, and its line
-        self.over: tuple[Floats, int] | None = None
+        self.way_back = WayBack(name)
 
     def chunks(self, items: Iterable[Table | Line]) -> Iterator[Elements]:
         """Take runs of motion blocks and other lines, and give out the path elements as they come."""
@@ -169,7 +166,7 @@ class Reader:
 
     def rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
-        if len(table) + len(self.waiting) > FEW_ROWS and (closed(table) or self._code in MOTION_CODES[:4]):
+        if len(table) + len(self.waiting) > FEW_ROWS and (table.closed or self._code in MOTION_CODES[:4]):
             self.flush()
         self.waiting.append(table)
         self.blocks += len(table)
@@ -194,7 +191,7 @@ class Reader:
         if not self.waiting:
             return
         factor = MM_PER_UNIT[self.units]
-        for table in _joined(self.waiting):
+        for table in joined_tables(self.waiting, FEW_ROWS):
             before = self.modal
             if self.memory.get(INCREMENTAL):
                 hint = "write G90 behind a position of the machine"
@@ -203,9 +200,9 @@ class Reader:
                 )
             run, self.modal = execute(table, before)
             approach: frozenset[int] = frozenset()
-            if self.left:
+            if self.way_back.open:
                 lines = set(run.line.tolist())
-                run = self._arrived(run)
+                run = self.way_back.arrive(run, self.problems)
                 approach = frozenset(lines.difference(run.line.tolist()))
                 if not len(run.kind):
                     continue
@@ -347,48 +344,8 @@ class Reader:
         self.modal = self.modal.but(**modes)
 
     def leave(self, axes: str) -> None:
-        """Say that axes go to positions of the machine: where they are in the part is not known any more."""
-        self.left = True
-        tip = tuple(math.nan if axis in axes else value for axis, value in zip("XYZ", self.modal.tip, strict=True))
-        self.modal = self.modal.but(tip=tip)
-
-    def _arrived(self, run: Executed) -> Executed:
-        """Leave out the rapids on the way back from positions of the machine, until all of the tip is known again."""
-        unknown = np.isnan(run.tip).any(axis=1)
-        gone = unknown & (run.kind == Element.RAPID)
-        if (unknown & ~gone).any():
-            line = int(run.line[np.argmax(unknown & ~gone)])
-            hint = "say X Y Z in rapid behind a position of the machine, before the first feed"
-            raise InputError(
-                "CS503", "a feed move where not all of the position is known", hint, file=self.name, line=line
-            )
-        self.left = bool(unknown.all())
-        if gone.any():
-            row = int(np.flatnonzero(gone)[-1])
-            self.over = np.concatenate((run.tip[row], run.second[row])), int(run.line[row])
-        if not self.left:
-            self._check_approach(run, int(np.argmin(unknown)))
-        if not gone.any():
-            return run
-        kept = ~gone
-        rows = {
-            key: value[kept]
-            for key in ("kind", "tip", "second", "line", "feed", "per_revolution", "feed_room")
-            if (value := getattr(run, key)) is not None
-        }
-        return replace(run, **rows, arc_element=(np.cumsum(kept) - 1)[run.arc_element])
-
-    def _check_approach(self, run: Executed, arrival: int) -> None:
-        """Complain where the tool does not come straight down: the last rapid of the way back must be over its end."""
-        if self.over is None:
-            return
-        (above, line), self.over = self.over, None
-        below = np.concatenate((run.tip[arrival], run.second[arrival]))
-        unknown = np.isnan(above)
-        aside = np.abs(above - below)[~unknown].max(initial=0.0) > 0.0
-        if aside or unknown[:3].sum() == 2:
-            text = "the last rapid of the way back from a retract is not over the position that it leads to"
-            self.problems.append(Problem("CS531", 0, line, text))
+        """Say that axes go to positions of the machine."""
+        self.modal = self.way_back.leave(self.modal, axes)
 
     def wrong(self, code: str, line: Line, text: str) -> None:
         """Note what breaks the rules of the control."""
@@ -462,33 +419,6 @@ def _nothing(steps: Steps) -> Elements:
         tip_step=steps.tip,
         second_step=steps.second,
     )
-
-
-def _joined(waiting: list[Table | tuple[int, dict[str, float]]]) -> Iterable[Table]:
-    """Neighbouring tables and single rows as one table; curves must not be cut between two of them."""
-    tables: list[Table] = []
-    rows: list[tuple[int, dict[str, float]]] = []
-    for item in waiting:
-        if isinstance(item, Table):
-            if rows:
-                tables.append(table_of(rows))
-                rows = []
-            tables.append(item)
-        else:
-            rows.append(item)
-    if rows:
-        tables.append(table_of(rows))
-    if all(closed(table) for table in tables) and sum(map(len, tables)) > FEW_ROWS * len(tables):
-        return tables
-    letters = sorted({letter for table in tables for letter in table.columns})
-    line = np.concatenate([table.line for table in tables])
-    return [Table(line, {name: np.concatenate([table.column(name) for table in tables]) for name in letters})]
-
-
-def closed(table: Table) -> bool:
-    """Whether a table starts with a G word, so that what stands before it ends no curve in it."""
-    first = table.columns.get("G")
-    return first is not None and not np.isnan(first[0])
 
 
 def _in_mm(run: Executed, factor: float, feed: float, *, points: bool) -> Executed:

@@ -6,7 +6,7 @@ them make up nearly all of a file and are read together; every other line is tak
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -70,6 +70,12 @@ class Table:
     def __len__(self) -> int:
         return len(self.line)
 
+    @property
+    def closed(self) -> bool:
+        """Whether it starts with a G word, so that what stands before it ends no curve in it."""
+        first = self.columns.get("G")
+        return first is not None and not np.isnan(first[0])
+
     def column(self, letter: str) -> Floats:
         """(r,) float64: the words of one letter, NaN where there is none."""
         found = self.columns.get(letter)
@@ -117,3 +123,27 @@ def table_of(rows: list[tuple[int, dict[str, float]]]) -> Table:
         np.array([number for number, _ in rows], np.int64),
         {letter: np.array([row.get(letter, np.nan) for _, row in rows]) for letter in letters},
     )
+
+
+def joined_tables(waiting: Sequence[Table | tuple[int, dict[str, float]]], few: int) -> list[Table]:
+    """Neighbouring tables and single rows as few tables, in order.
+
+    One, where a curve may go on from one table into the next, or where they have no more than `few` rows each.
+    """
+    tables: list[Table] = []
+    rows: list[tuple[int, dict[str, float]]] = []
+    for item in waiting:
+        if isinstance(item, Table):
+            if rows:
+                tables.append(table_of(rows))
+                rows = []
+            tables.append(item)
+        else:
+            rows.append(item)
+    if rows:
+        tables.append(table_of(rows))
+    if all(table.closed for table in tables) and sum(map(len, tables)) > few * len(tables):
+        return tables
+    letters = sorted({letter for table in tables for letter in table.columns})
+    line = np.concatenate([table.line for table in tables])
+    return [Table(line, {name: np.concatenate([table.column(name) for table in tables]) for name in letters})]

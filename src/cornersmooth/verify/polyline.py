@@ -34,7 +34,7 @@ class Trail:
     owner : (v,) int64
         What each vertex is reached by: index of the original move or of the path element.
     fraction : (v,) float64
-        Where on it, 1 at its end; for curves the parameter is `parameter`.
+        Where on it, 1 at its end; on a curve of the written motion its parameter at a knot, and elsewhere as for lines.
     last : (m,) int64
         Vertex at the end of each owner, counted from the trail's first owner.
     """
@@ -304,7 +304,7 @@ def written_motion(nc: Elements, first: int, last: int, tolerance: float, axis_l
 
 
 def written_at(nc: Elements, element: Ints, fraction: Floats) -> tuple[Floats, Floats]:
-    """Tip and unit axis (k, 3) on path elements, at a fraction of each (curves: of the parameter range)."""
+    """Tip and unit axis (k, 3) on path elements, at a fraction of each (curves: of the range of their parameter)."""
     before = np.maximum(element - 1, 0)
     tip = between(nc.tip, before, element, fraction)
     second = between(nc.second, before, element, fraction)

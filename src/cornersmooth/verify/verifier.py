@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sys
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
@@ -179,13 +178,13 @@ class Verifier:
         """Read and measure the text as far as it goes."""
         options, source = self._options, self._source
         task = Task.of(self._program, options.tolerance, options.axis_length)
-        steps = options.steps(source.read(0, DIGITS_SAMPLE))
+        steps = options.steps(source.head(DIGITS_SAMPLE))
         rotary = options.rotary(steps)
         lever = None
         if rotary is not None:
             lever = float(rotary.levers(task.original.trail.tip).max(initial=0.0))
         reader = Reader(self._name, options, steps, lever)
-        lines = read_lines(source.part(0, sys.maxsize), self._name, options.dialect.lexer)
+        lines = read_lines(source, self._name, options.dialect.lexer)
         room = options.tolerance / self._program.mm_per_unit
         check = WordCheck(options.control, options.dialect.lexer, room, self._trusted, self._weights)
         text = _Text(reader.chunks(check.watch(lines) if self._words else lines), reader.events)
