@@ -6,6 +6,7 @@ data of its parent without copying it.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import sys
@@ -67,6 +68,7 @@ class Helper:
         MemoryError
             The process has been ended from outside, which is what a system short of memory does.
         """
+        release_memory()
         return _received(self._connection)
 
     def end(self) -> None:
@@ -210,8 +212,18 @@ def _received(connection: Connection) -> Any:
     return found
 
 
+def release_memory() -> None:
+    """Give back what the allocator holds but nobody uses.
+
+    After a fork it would be copied by whichever process writes there first, and kept by the others.
+    """
+    if (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)) is not None:  # glibc has it
+        trim(0)
+
+
 def _forked(target: Callable[..., None], *args: Any, daemon: bool) -> BaseProcess:
     """Start a process that calls `target`; it has all that this one has."""
+    release_memory()
     with warnings.catch_warnings():  # newer Pythons warn of threads, of which only numpy's idle ones are left
         warnings.simplefilter("ignore", DeprecationWarning)
         process: BaseProcess = _CONTEXT.Process(target=_obeying, args=(target, args), daemon=daemon)
