@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,10 @@ class TextError(AssertionError):
     """The text breaks a rule of its control; the message starts with the line number."""
 
 
+#: tip (m,3) and tool direction (m,3) at shares (m,) of straight blocks, from the words (m,k) at their ends
+Straight = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
+
+
 @dataclass(frozen=True)
 class Piece:
     """One block's motion: `at` gives tip (m,3) and tool direction (m,3) at shares (m,) of it."""
@@ -37,40 +42,56 @@ class Piece:
     line: int
     rapid: bool
     at: Callable[[Floats], tuple[Floats, Floats]]
-    samples: int
+    samples: int  #: 0 for a straight block: its reader knows
     feed: float | None = None  #: as written, in the units of the text; None where the block has none
     mode: str = ""  #: block that selected the feed mode in force
+    ends: tuple[Floats, Floats] | None = None  #: words at the ends of a straight block
 
 
 @dataclass
 class Reading:
     """What a reader has understood so far."""
 
+    reader: Reader
     pieces: list[Piece] = field(default_factory=list)
     codes: list[str] = field(default_factory=list)
 
     def runs(self, axis_length: float) -> list[Path]:
         """Feed motion between rapids, as the oracle wants it: the end of the rapid first."""
-        runs: list[list[Path]] = []
-        for index, piece in enumerate(self.pieces):
-            shares = np.array([1.0]) if piece.rapid or not runs else np.linspace(0, 1, piece.samples + 1)[1:]
-            tip, direction = piece.at(shares)
-            path = Path(tip, tip + axis_length * unit(direction), np.full(len(tip), index))
-            if piece.rapid or not runs:
-                runs.append([path])
-            else:
-                runs[-1].append(path)
-        joined = [run[0].joined(*run[1:]) for run in runs]
-        return [run for run in joined if len(run) > 1]
+        straight = [index for index, piece in enumerate(self.pieces) if piece.ends is not None]
+        count = np.array([piece.samples for piece in self.pieces])
+        start, end = (np.array([self.pieces[index].ends[side] for index in straight]) for side in (0, 1))  # type: ignore[index]
+        if straight:
+            count[straight] = self.reader.samples(start, end)
+        rapid = np.array([piece.rapid for piece in self.pieces], dtype=bool)
+        rapid[:1] = True
+        count[rapid] = 1
+        first = np.cumsum(count) - count
+        owner = np.repeat(np.arange(len(count)), count)
+        share = (np.arange(len(owner)) - first[owner] + 1) / count[owner]
+        tip, direction = np.empty((2, len(owner), 3))
+        if straight:  # all of them at once: there are many
+            row = np.full(len(count), -1)
+            row[straight] = np.arange(len(straight))
+            rows = row[owner]
+            there = rows >= 0
+            tip[there], direction[there] = self.reader.along(start[rows[there]], end[rows[there]], share[there])
+        for index in np.flatnonzero([piece.ends is None for piece in self.pieces]):
+            here = slice(first[index], first[index] + count[index])
+            tip[here], direction[here] = self.pieces[index].at(share[here])
+        whole = Path(tip, tip + axis_length * unit(direction), owner)
+        bounds = [*first[rapid], len(owner)]
+        return [whole.slice(low, high) for low, high in pairwise(bounds) if high - low > 1]
 
 
 def great_circle(one: Floats, other: Floats, share: Floats) -> Floats:
-    """Unit vectors between two, evenly in the angle."""
-    angle = float(angle_between(one, other))
-    if angle < 1e-9 or angle > np.pi - 1e-6:
-        return unit(one + share[:, None] * (other - one))
-    weights = np.sin(np.stack((1 - share, share), axis=1) * angle) / np.sin(angle)
-    return weights @ np.stack((unit(one), unit(other)))
+    """Unit vectors (m,3) between two (m,3), evenly in the angle."""
+    angle = angle_between(one, other)
+    even = (angle >= 1e-9) & (angle <= np.pi - 1e-6)
+    sine = np.where(even, np.sin(angle), 1.0)
+    near = np.where(even, np.sin((1 - share) * angle) / sine, 1 - share)
+    far = np.where(even, np.sin(share * angle) / sine, share)
+    return unit(near[:, None] * unit(one) + far[:, None] * unit(other))
 
 
 def straight(one: Floats, other: Floats, share: Floats) -> Floats:
@@ -149,7 +170,7 @@ class Reader:
     def read(self, text: str, axis_length: float, limit: float) -> Reading:
         """Read a whole text; TextError where it breaks a rule."""
         codes = re.compile(self.codes)
-        reading, position = Reading(), None
+        reading, position = Reading(self), None
         self.step, self.axis_length = axis_step(axis_length, limit), axis_length
         self.limit, self.plane, self.mode, self.tip_control = limit, 17, self.modes[0], not self.on
         self.compensation, self.raised, self.over, self.wanted = False, False, None, ""
@@ -279,28 +300,36 @@ class Reader:
             return values[:, 3:] - values[:, :3]
         return tool_direction(self.machine, dict(zip(self.words[3:], values[:, 3:].T, strict=True)))
 
+    def along(self, start: Floats, end: Floats, share: Floats) -> tuple[Floats, Floats]:
+        """Tip and tool direction, (m,3), at shares (m,) of straight blocks between words (m,k)."""
+        if self.turn == "great circle":
+            return straight(start[:, :3], end[:, :3], share), great_circle(start[:, 3:], end[:, 3:], share)
+        values = straight(start, end, share)
+        if self.turn == "machine":
+            angles = dict(zip(self.words[3:], values[:, 3:].T, strict=True))
+            return tip_of(self.machine, values[:, :3], angles), self.direction(values)
+        return values[:, :3], self.direction(values)
+
+    def samples(self, start: Floats, end: Floats) -> NDArray[np.int64]:
+        """How many samples each straight block between words (m,k) needs, (m,)."""
+        if self.turn == "fixed":
+            return np.ones(len(start), dtype=np.int64)
+        if self.turn in ("angles", "machine"):
+            turn = np.radians(np.abs(end[:, 3:] - start[:, 3:]).max(axis=1))
+        elif self.turn == "point":
+            turn = angle_between(start[:, 3:] - start[:, :3], end[:, 3:] - end[:, :3])
+        else:
+            turn = angle_between(start[:, 3:], end[:, 3:])
+        least = np.where(turn > 0, 16, 1) if self.turn == "machine" else 1
+        return np.maximum(least, np.ceil(turn / self.step)).astype(np.int64)
+
     def piece(self, number: int, rapid: bool, start: Floats, end: Floats, feed: float | None = None) -> Piece:
         """Straight block."""
 
         def at(share: Floats) -> tuple[Floats, Floats]:
-            if self.turn == "great circle":
-                return straight(start[:3], end[:3], share), great_circle(start[3:], end[3:], share)
-            values = straight(start, end, share)
-            if self.turn == "machine":
-                angles = dict(zip(self.words[3:], values[:, 3:].T, strict=True))
-                return tip_of(self.machine, values[:, :3], angles), self.direction(values)
-            return values[:, :3], self.direction(values)
+            return self.along(*(np.broadcast_to(each, (len(share), len(each))) for each in (start, end)), share)
 
-        if self.turn == "fixed":
-            turn = 0.0
-        elif self.turn in ("angles", "machine"):
-            turn = np.radians(np.abs(end[3:] - start[3:]).max())
-        elif self.turn == "point":
-            turn = float(angle_between(start[3:] - start[:3], end[3:] - end[:3]))
-        else:
-            turn = float(angle_between(start[3:], end[3:]))
-        least = 16 if self.turn == "machine" and turn > 0 else 1
-        return Piece(number, rapid, at, max(least, int(np.ceil(turn / self.step))), feed, self.mode)
+        return Piece(number, rapid, at, 0, feed, self.mode, (start, end))
 
     def arc(self, number: int, clockwise: bool, start: Floats, end: Floats, radius: float) -> Piece:
         """Circular block in R form: the shorter way, the tool axis stays."""

@@ -39,6 +39,7 @@ class SplineRun:
     rapid: bool = False
     feed: float | None = None
     mode: str = ""
+    ends: None = None
 
     @property
     def knots(self) -> Floats:

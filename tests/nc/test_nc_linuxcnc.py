@@ -144,7 +144,7 @@ def test_tip_and_axis_by_its_own_formulas_keep_the_tolerance(
     control = reader("linuxcnc", "g1", machine, tcp)
     control.step, control.mode = 0.01, "G94"
     columns = [0, 1, 2, 3 if "ac" in machine else 4, 5]
-    reading, before = Reading(), None
+    reading, before = Reading(control), None
     for number, (kind, place) in enumerate(positions(written(cl, machine, tcp=tcp, tolerance=tolerance), tmp_path)):
         here = place[columns]
         reading.pieces.append(control.piece(number, kind == "rapid", here if before is None else before, here))

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import io
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
 
 import cornersmooth
 from cornersmooth.errors import SettingsError
@@ -180,34 +178,27 @@ def case(path, tolerance, height):
 
 
 def brute_force(point, motion, tool, edge):
-    """Least distance by a walk over all segments and a search around the best of them."""
+    """Least distance by a walk over all segments and ever finer walks along the best of them."""
 
-    def at(segment, share):
-        tip = motion.tip[segment, 0] + share * (motion.tip[segment, 1] - motion.tip[segment, 0])
-        axis = motion.axis[segment, 0] + share * (motion.axis[segment, 1] - motion.axis[segment, 0])
-        axis = axis / np.linalg.norm(axis)
+    def distances(segments, shares):
+        tip = motion.tip[segments, :1] + shares[..., None] * np.diff(motion.tip[segments], axis=1)
+        axis = motion.axis[segments, :1] + shares[..., None] * np.diff(motion.axis[segments], axis=1)
+        axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
         arm = point - tip
-        up = arm @ axis
-        out = np.linalg.norm(np.cross(arm, axis))
+        up = (arm * axis).sum(axis=-1)
+        out = np.linalg.norm(np.cross(arm, axis), axis=-1)
         # a ball of radius 2 with its flank up to the end of the edge
-        return max(np.hypot(out, min(up - 2.0, 0.0)) - 2.0, up - edge)
+        return np.maximum(np.hypot(out, np.minimum(up - 2.0, 0.0)) - 2.0, up - edge)
 
-    shares = np.linspace(0.0, 1.0, 5)
-    tip = motion.tip[:, :1] + shares[:, None] * np.diff(motion.tip, axis=1)
-    axis = motion.axis[:, :1] + shares[:, None] * np.diff(motion.axis, axis=1)
-    axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
-    arm = point - tip
-    up = (arm * axis).sum(axis=-1)
-    out = np.linalg.norm(np.cross(arm, axis), axis=-1)
-    coarse = np.maximum(np.hypot(out, np.minimum(up - 2.0, 0.0)) - 2.0, up - edge).min(axis=1)
-    best = np.inf
-    for k in np.argsort(coarse)[:12]:
-        walk = np.array([at(k, share) for share in np.linspace(0.0, 1.0, 41)])
-        middle = int(walk.argmin()) / 40
-        bounds = max(middle - 0.025, 0.0), min(middle + 0.025, 1.0)
-        found = minimize_scalar(partial(at, k), bounds=bounds, method="bounded", options={"xatol": 1e-9})
-        best = min(best, found.fun, walk.min())
-    return best
+    everywhere = distances(slice(None), np.linspace(0.0, 1.0, 5)[None])
+    best = np.argsort(everywhere.min(axis=1))[:12]
+    low, high = np.zeros(len(best)), np.ones(len(best))
+    for _ in range(8):
+        shares = np.linspace(low, high, 41, axis=1)
+        found = distances(best, shares)
+        middle, step = shares[np.arange(len(best)), found.argmin(axis=1)], (high - low) / 40
+        low, high = np.maximum(middle - step, 0.0), np.minimum(middle + step, 1.0)
+    return found.min()
 
 
 @pytest.mark.parametrize("tolerance", [0.01, 0.04])
