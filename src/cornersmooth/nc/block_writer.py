@@ -86,6 +86,14 @@ class BlockWriter:
         )
         return {"rotary_zero": (zero_block,), "rotary_start": (start_block,)}
 
+    def angles(self, ticks: Ints) -> Floats:
+        """(r, 2) degrees of rows of ticks, in the order of the machine's axes."""
+        machine = self.form.machine
+        assert machine is not None
+        order = [3 + self.form.other_words.index(name) for name in machine.names]
+        found: Floats = ticks[:, order] / 10.0**self.form.table.digits.angle
+        return found
+
     def approach(self, ticks: Ints) -> list[str]:
         """Blocks that bring the tool over a row of ticks, at the height where it is.
 

@@ -18,6 +18,7 @@ from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.holes import approaches, hole_moves, travel_height
 from cornersmooth.nc.operation import Operation
+from cornersmooth.nc.rewinds import rows_that_swing
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
@@ -163,7 +164,38 @@ class MotionWriter:
         before = len(run)
         run = self._moving(run)
         self._repeated += before - len(run)
-        yield from self._emit(run)
+        yield from self._emit_above(run)
+
+    def _emit_above(self, run: Run, dwell: int = 0) -> Iterator[bytes]:
+        """Write a run; where rotary axes swing the tool in a rapid, the tool goes up before."""
+        first = 0
+        for row in self._rewinds(run).tolist():
+            if row > first:
+                yield from self._emit(run.part(first, row), dwell)
+            yield from self._blocks(self.operation.go_home())
+            first = row
+        yield from self._emit(run.part(first, len(run)) if first else run, dwell)
+
+    def _rewinds(self, run: Run) -> Ints:
+        """Rows before which the tool goes up, so that rotary axes turn back there."""
+        form = self.writer.form
+        if not form.rotary or form.machine is None or not len(run) or not run.rapid.any():
+            return np.zeros(0, np.int64)
+        before = run.ticks[:1] if self._position is None else self._position[None]
+        angles = self.writer.angles(np.concatenate((before, run.ticks)))
+        rows = rows_that_swing(form.machine, angles, np.concatenate(([False], run.rapid))) - 1
+        if not len(rows):
+            return rows
+        line = int(self.program.line[run.move[rows[0]]])
+        if not self.operation.can_rewind():
+            text = (
+                "rotary axes swing the tilted tool in a rapid, and the control's table has no retract: keep clear there"
+            )
+            self.findings.add("CS340", "warning", line, text, len(rows))
+            return rows[:0]
+        text = "retract before a rapid in which rotary axes swing the tilted tool: they turn at its height"
+        self.findings.add("CS341", "note", line, text, len(rows))
+        return rows
 
     def _begins_at_stated(self, move: int) -> bool:
         """Whether a move is an arc from a stated position, met for the first time."""
@@ -199,7 +231,7 @@ class MotionWriter:
         run = replace(self._run(ticks, move), rapid=moves.rapid, dwell=moves.dwell)
         if not np.isnan(cycle.feed):
             run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
-        yield from self._emit(self._moving(run), cycle.dwell)
+        yield from self._emit_above(self._moving(run), cycle.dwell)
 
     def _over_holes(self, rows: Rows, part: slice, height: Floats) -> Iterator[bytes]:
         program = self.program
@@ -214,7 +246,7 @@ class MotionWriter:
             )
             yield from self._blocks(self.statements.comment(f"NOT DRILLED: HOLE AT {place}"))
             run = replace(self._run(ticks[index : index + 1], poses[index : index + 1]), rapid=np.ones(1, np.bool_))
-            yield from self._emit(self._moving(run))
+            yield from self._emit_above(self._moving(run))
 
     def _shifted(self, rows: Rows, part: slice, tips: Floats, own: Ints) -> Ints:
         """Ticks of tips reached with the orientation of rows, which `own` names for each of them."""

@@ -95,6 +95,10 @@ class Operation:
         self._moved = self.begun = False
         return self._expand([step for step in self.form.table.program.tool_end if step in _STEPS.keys() - _RUNNING_ON])
 
+    def can_rewind(self) -> bool:
+        """Whether there is a retract, above which rotary axes may turn as they like."""
+        return bool(self.form.table.program.retract)
+
     def pause(self) -> list[str]:
         """Blocks that switch tool tip control off where the tool stands, for words that it does not allow."""
         return self._expand(("{functions_off}", "{tip_control_off}"))

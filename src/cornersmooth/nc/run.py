@@ -53,6 +53,13 @@ class Run:
     def __len__(self) -> int:
         return len(self.ticks)
 
+    def part(self, first: int, stop: int) -> Run:
+        """Return rows from `first` to `stop`, the latter excluded."""
+        columns: dict[str, Any] = {
+            name: None if column is None else column[first:stop] for name, column in vars(self).items()
+        }
+        return Run(**columns)
+
     def only(self, chosen: Bools) -> Run:
         """Return the chosen rows."""
         columns: dict[str, Any] = {

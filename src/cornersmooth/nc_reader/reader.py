@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import MM_PER_UNIT, Units
+from cornersmooth.model import MM_PER_UNIT, Ints, Units
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.dialects import CONTROLS
 from cornersmooth.nc_reader.dialects.base import HIGH_SPEED, INCREMENTAL
@@ -217,6 +217,8 @@ class Reader:
             if self.rotary is not None:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
                 rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
+                if self.dialect.retracts:
+                    self._check_swings(rotary.swung(run, start), run)
                 run = rotary.resolve(run, start, inverse_time=before.inverse_time)
                 levers = self.rotary.levers(run.tip)
                 self.lever = max(self.lever, float(levers.max(initial=0.0, where=~np.isnan(levers))))
@@ -346,6 +348,11 @@ class Reader:
     def leave(self, axes: str) -> None:
         """Say that axes go to positions of the machine."""
         self.modal = self.way_back.leave(self.modal, axes)
+
+    def _check_swings(self, elements: Ints, run: Executed) -> None:
+        """Complain of rapids in which rotary axes lead the tool far round."""
+        text = "rotary axes swing the tilted tool in a rapid that is not above a retract"
+        self.problems += [Problem("CS537", 0, int(run.line[element]), text) for element in elements.tolist()]
 
     def wrong(self, code: str, line: Line, text: str) -> None:
         """Note what breaks the rules of the control."""

@@ -40,6 +40,9 @@ SHORT_STEPS = 3.0
 #: an axis that turns faster (deg/min) may make a block slower than its feed where the text times it (G93)
 FAST_TURN = 30_000.0
 
+#: degrees by which the way of the tool axis in a rapid may be longer than the shortest one: posts retract before
+LONGEST_DETOUR = 40.0
+
 #: near the pole, so many tolerances at the axis point, the first axis may turn ahead of time
 _POLE = 3.0
 
@@ -173,6 +176,25 @@ class Rotary:
             arc_element=last[run.arc_element],
         )
 
+    def swung(self, run: Executed, before: Modal) -> Ints:
+        """Rapids in which the axes lead the tool a long way round, as when they turn back: (k,) elements.
+
+        Parameters are those of `resolve`; what comes from where nobody knows is left out.
+        """
+        angles = np.vstack((before.second, run.second))[:, :2]
+        known = ~np.isnan(np.vstack((before.tip, run.tip))[:-1]).any(axis=1) & ~np.isnan(angles[:-1]).any(axis=1)
+        turn = np.abs(np.diff(angles, axis=0)).max(axis=1)
+        rows = np.flatnonzero((run.kind == Element.RAPID) & known & (turn > LONGEST_DETOUR / 2))
+        if not len(rows):
+            return rows
+        begin, end = self.directions(angles[rows]), self.directions(angles[rows + 1])
+        longest = np.zeros(len(rows))
+        for share in np.linspace(0.0, 1.0, 16)[1:-1].tolist():
+            between = self.directions(angles[rows] + share * (angles[rows + 1] - angles[rows]))
+            longest = np.maximum(longest, _apart(begin, between) + _apart(between, end))
+        found: Ints = rows[longest - _apart(begin, end) > LONGEST_DETOUR]
+        return found
+
     @property
     def _fine(self) -> float:
         return max(LINE_SHARE * self.tolerance, LEAST)
@@ -302,6 +324,12 @@ class Rotary:
         good = off.max(axis=(1, 2)) * self.axis_length <= self._fine / 10
         joined = np.concatenate((bezier[:, :, :-1].reshape(len(points), -1, 7), bezier[:, -1, -1:]), axis=1)
         return joined[:, :, :6] / joined[:, :, 6:], joined[:, :, 6], good
+
+
+def _apart(a: Floats, b: Floats) -> Floats:
+    """Degrees between unit vectors, row by row."""
+    degrees: Floats = np.degrees(2.0 * np.arcsin(np.minimum(np.linalg.norm(a - b, axis=1) / 2.0, 1.0)))
+    return degrees
 
 
 def _bernstein(t: Floats) -> Floats:

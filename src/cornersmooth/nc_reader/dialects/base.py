@@ -70,6 +70,8 @@ class Dialect:
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
     #: what must be in force for words of a kind: ``"vector"``, ``"point"``, ``"angles"``, ``"machine"``
     controls: Mapping[str, tuple[str, ...]] = {}
+    #: whether texts can send the tool up, so that rotary axes turn there
+    retracts: bool = True
     #: what must be in force for curves; empty for nothing
     curves_need: str = ""
     #: the first letter, or letters, of tip and second triple in the lexer, with their decimals

@@ -44,6 +44,8 @@ class IsoWords:
         `Dialect.curves_need`.
     semicolon : bool
         Whether a comment may begin with one.
+    retracts : bool
+        `Dialect.retracts`.
     """
 
     tip_control: Mapping[float, str]
@@ -54,6 +56,7 @@ class IsoWords:
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
     curves_need: str = ""
     semicolon: bool = False
+    retracts: bool = True
 
 
 _FANUC = {43.0: "G43", 43.4: "G43.4", 43.5: "G43.5", 49.0: ""}
@@ -82,7 +85,7 @@ ISO_WORDS: Mapping[str, IsoWords] = {
         unsaid=_NO_THROUGH,
         semicolon=True,
     ),
-    "generic": IsoWords(_FANUC, unsaid=_NO_THROUGH | {"offset"}),
+    "generic": IsoWords(_FANUC, unsaid=_NO_THROUGH | {"offset"}, retracts=False),
 }
 
 
@@ -103,6 +106,7 @@ class Iso(Dialect):
         self.iso = ISO_WORDS[name]
         super().__init__((_LinuxLexer if self.iso.semicolon else _IsoLexer)(rotary, word_list(name).points), rotary)
         self.controls, self.unsaid, self.curves_need = self.iso.controls, self.iso.unsaid, self.iso.curves_need
+        self.retracts = self.iso.retracts
 
     def words(self, line: Line, state: State) -> None:
         """Interpret a line that is no motion block."""

@@ -1,0 +1,136 @@
+"""Rapids in which rotary axes swing a tilted tool: it goes up first, and turns there."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.kinematics import Machine, load_machine
+from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.nc.rewinds import LONGEST_DETOUR, rows_that_swing, swinging
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from cornersmooth.verify import verify
+
+EPS = 0.01
+WORD = re.compile(r"([A-Z])([-+]?[\d.]+)")
+
+
+def ring(z: float, lean: float) -> list[str]:
+    """Most of a turn about Z with a tool that leans outwards."""
+    turn = np.radians(np.arange(0, 351, 25))
+    sine, cosine = np.sin(np.radians(lean)), np.cos(np.radians(lean))
+    return [
+        f"GOTO/{60 * np.cos(a):.4f},{60 * np.sin(a):.4f},{z:g},"
+        f"{sine * np.cos(a):.7f},{sine * np.sin(a):.7f},{cosine:.7f}"
+        for a in turn.tolist()
+    ]
+
+
+def program_text(lean: float) -> bytes:
+    """Two such turns: a table with less than two turns must turn back between them."""
+    lines = ["UNITS/MM", "LOADTL/2", "SPINDL/8000,RPM,CLW", "COOLNT/ON", "RAPID", ring(20, lean)[0], "FEDRAT/500,MMPM"]
+    for z in (0.0, -1.0):
+        lines += [*ring(z, lean), "RAPID", ring(20, lean)[-1], "RAPID", ring(20, lean)[0], "FEDRAT/500,MMPM"]
+    return ("\n".join([*lines, "FINI"]) + "\n").encode()
+
+
+def short(name: str) -> Machine:
+    """Machine whose first axis has less than two turns."""
+    machine = load_machine(name)
+    axes = tuple(replace(axis, limits=(-280.0, 280.0)) if axis.name == "C" else axis for axis in machine.axes)
+    return replace(machine, axes=axes)
+
+
+def text_of(control: str, machine: Machine, *, lean: float = 30.0, form: str | None = None, tcp: bool = True):
+    chosen = choose_form(control, form, machine=machine, tcp=tcp)
+    program = read(program_text(lean), name="ring.cls")
+    stream = io.BytesIO()
+    smoothed = smooth(program, fit_settings(Settings(tolerance=EPS), chosen, "mm"))
+    written = write(smoothed, stream, form=chosen)
+    return program, stream.getvalue().decode().splitlines(), {finding.code for finding in written.findings}
+
+
+def problems(program, lines, control, machine, *, tcp: bool = True):
+    data = ("\n".join(lines) + "\n").encode()
+    return verify(program, data, tolerance=EPS, control=control, machine=machine, tcp=tcp).problems
+
+
+UP = {
+    "fanuc": ["G91 G28 Z0.", "G90", "G49"],
+    "mitsubishi": ["G91 G28 Z0.", "G90", "G49"],
+    "haas": ["G53 G0 Z0.", "G49"],
+    "linuxcnc": ["G53 G0 Z0", "G49"],
+    "siemens": ["TRAFOOF", "SUPA G0 Z0 D0"],
+    "heidenhain": ["FUNCTION RESET TCPM", "L Z-1 R0 FMAX M91"],
+}
+
+
+@pytest.mark.parametrize(
+    ("control", "name", "form", "tcp"),
+    [
+        ("fanuc", "table-ac", None, True),
+        ("fanuc", "head-table-bc", "g6.2", True),
+        ("fanuc", "table-bc", None, False),
+        ("mitsubishi", "head-ac", None, True),
+        ("haas", "table-bc", None, True),
+        ("linuxcnc", "xyzac-trt", None, True),
+        ("siemens", "nutated-bc", None, True),
+        ("heidenhain", "table-ac", None, True),
+    ],
+)
+def test_the_tool_goes_up_before_an_axis_turns_back(control: str, name: str, form: str | None, tcp: bool) -> None:
+    machine = short(name)
+    program, lines, found = text_of(control, machine, form=form, tcp=tcp)
+    assert "CS341" in found
+    bare = [line.partition(" ")[2] for line in lines] if control == "heidenhain" else lines
+    up = UP[control]
+    starts = [k for k in range(len(bare)) if bare[k : k + len(up)] == up][:-1]
+    assert starts
+    for start in starts:
+        behind = bare[start + len(up) :]
+        down = next(k for k, line in enumerate(behind) if re.match(r"(G0|L) X\S+ Y\S+ Z", line))
+        assert not any(re.match(r"G1|L .*[^X]$", line) and "FMAX" not in line for line in behind[:down])
+        # the axes turn before the tool comes down, and it comes down where it turned
+        over, ends = (dict(WORD.findall(behind[k])) for k in (down - 1, down))
+        assert {**over, "Z": ends["Z"]} == ends
+    assert problems(program, lines, control, machine, tcp=tcp) == ()
+    first = starts[0]
+    stop = next(k for k in range(first, len(bare)) if re.match(r"(G0|L) X\S+ Y\S+ Z", bare[k]))
+    wrong = problems(program, [*lines[:first], *lines[stop:]], control, machine, tcp=tcp)
+    assert "CS537" in {problem.code for problem in wrong}
+
+
+def test_an_upright_tool_may_turn_where_it_is() -> None:
+    machine = short("table-ac")
+    program, lines, found = text_of("fanuc", machine, lean=0.0)
+    assert not found & {"CS340", "CS341"}
+    assert problems(program, lines, "fanuc", machine) == ()
+
+
+def test_who_has_no_retract_is_warned() -> None:
+    machine = short("table-ac")
+    program, lines, found = text_of("generic", machine)
+    assert "CS340" in found
+    assert problems(program, lines, "generic", machine) == ()
+
+
+def test_the_detour_of_a_table_is_that_of_its_cone() -> None:
+    machine = load_machine("table-ac")
+    lean = 30.0
+
+    def apart(turn: float) -> float:
+        return float(np.degrees(2 * np.arcsin(np.sin(np.radians(lean)) * np.sin(np.radians(turn / 2)))))
+
+    for turn in (60.0, 120.0, 179.0, 250.0, 300.0, 350.0):
+        detour = 2 * apart(turn / 2) - apart(turn)
+        before, after = np.array([[10.0, lean]]), np.array([[10.0 - turn, lean]])
+        assert swinging(machine, before, after)[0] == (detour > LONGEST_DETOUR)
+    angles = np.array([[0.0, 30.0], [300.0, 30.0], [0.0, 30.0], [0.0, 0.0], [300.0, 0.0]])
+    np.testing.assert_array_equal(rows_that_swing(machine, angles, np.ones(5, np.bool_)), [1, 2])
+    np.testing.assert_array_equal(rows_that_swing(machine, angles, np.zeros(5, np.bool_)), [])
