@@ -228,10 +228,11 @@ def remove_unfinished() -> None:
             os.unlink(path)
 
 
-def remove_leftovers(path: str, process: int) -> None:
-    """Remove what a process that was killed has left beside an output."""
+def remove_leftovers(path: str, process: int | None = None) -> None:
+    """Remove what a process that was killed, or any of them, has left beside an output."""
     folder, name = os.path.split(os.path.realpath(path))
-    for left in glob.glob(os.path.join(glob.escape(folder), glob.escape(f".{name}.{process}-") + "*.part")):
+    whose = "*" if process is None else f"{process}-*"
+    for left in glob.glob(os.path.join(glob.escape(folder), glob.escape(f".{name}.") + whose + ".part")):
         with contextlib.suppress(OSError):
             os.unlink(left)
 
@@ -301,11 +302,20 @@ def _move_to_free_place(temporary: str, target: str, told: str) -> None:
 @contextlib.contextmanager
 def _temporary(folder: str, name: str, mode: int = 0o666) -> Iterator[tuple[BinaryIO, str]]:
     """Yield a new file and its name; what is left of it is removed."""
+    with (
+        temporary_name(folder, name) as path,
+        open(path, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file,
+    ):
+        yield file, path
+
+
+@contextlib.contextmanager
+def temporary_name(folder: str, name: str) -> Iterator[str]:
+    """Yield a name for a file that exists no longer than the block, whatever ends that."""
     path = os.path.join(folder, f".{name}.{os.getpid()}-{secrets.token_hex(4)}.part")
     _unfinished.add(path)  # before it exists: a signal at any moment finds a name to remove
     try:
-        with open(path, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
-            yield file, path
+        yield path
     finally:
         with contextlib.suppress(OSError):
             os.unlink(path)

@@ -23,21 +23,30 @@ class Batch:
     jobs : list of Job
     processes : int
         0 for all cores.
+    scheduler : str
+        Of a cluster that does the work instead: its address or file; empty for none.
     progress : callable, optional
         Called with the files that have ended, and with all.
     """
 
     def __init__(
-        self, jobs: list[Job], processes: int, progress: Callable[[str, int, int], None] | None = None
+        self,
+        jobs: list[Job],
+        processes: int,
+        progress: Callable[[str, int, int], None] | None = None,
+        *,
+        scheduler: str = "",
     ) -> None:
-        self.jobs, self._progress = jobs, progress
+        self.jobs, self._progress, self._scheduler = jobs, progress, scheduler
         self.counts: Counter[str] = Counter()
         self._processes = min(processes or os.cpu_count() or 1, len(jobs))
 
     def run(self, ending: Ending) -> Iterator[Outcome]:
         """Outcomes in the order of the inputs; a file that fails does not stop the others."""
         ending.say = self._interrupted
-        if self._processes == 1:
+        if self._scheduler:
+            yield from self._on_cluster()
+        elif self._processes == 1:
             yield from map(self._counted, map(run_job, self.jobs))
         else:
             yield from self._beside(ending)
@@ -81,3 +90,14 @@ class Batch:
             pool.shutdown(wait=False, cancel_futures=True)
             for worker in workers:
                 worker.end()
+
+    def _on_cluster(self) -> Iterator[Outcome]:
+        from cornersmooth.cli.cluster import run_on_cluster
+
+        early: dict[int, Outcome] = {}
+        turn = 0
+        for place, outcome in run_on_cluster(self.jobs, self._scheduler):
+            early[place] = self._counted(outcome)
+            while turn in early:
+                yield early.pop(turn)
+                turn += 1

@@ -70,6 +70,8 @@ class Job:
         Poses up to which the time that is saved is planned.
     beginning : bool
         Whether standard output gets the first lines only.
+    run : str
+        Name of a run that does a file again where a worker was lost, although that may have written it; empty for none.
     """
 
     source: str
@@ -90,6 +92,7 @@ class Job:
     tool: Tool | None = None
     plan_up_to: int = 0
     beginning: bool = False
+    run: str = ""
 
 
 @dataclass
@@ -185,7 +188,7 @@ def internal_error(failure: Exception, source: str = "") -> str:
 
 
 def _exists(job: Job, outcome: Outcome) -> bool:
-    if os.path.exists(job.target):
+    if os.path.exists(job.target) and not (job.run and (read_mark(job.target) or {}).get("run") == job.run):
         outcome.skipped = "its output exists"
     return bool(outcome.skipped)
 
@@ -206,6 +209,8 @@ def _may_replace(job: Job, made_of: str, outcome: Outcome) -> bool | None:
         return None
     if before.get("made_of") != made_of:
         return False
+    if job.run and before.get("run") == job.run:
+        return True
     if all(map(os.path.exists, job.reports)):
         outcome.skipped, outcome.unverified = "nothing has changed", before.get("not_verified", "")
     return True
@@ -240,7 +245,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
             verify=job.verify,
             require_verified=job.require_verify,
             force=may_replace[job.target],
-            mark={"made_of": made_of} if made_of else None,
+            mark={"made_of": made_of, "run": job.run} if made_of else None,
             processes=None if job.alone else 1,
             progress=progress,
         )

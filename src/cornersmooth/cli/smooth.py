@@ -17,7 +17,7 @@ from cornersmooth.cli.job import Job, Outcome, check, run_job
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import more, print_line, progress_bar, show_findings, show_summary, show_verdict
-from cornersmooth.cli.summary import check_summary, counts_line, line_of, write_summary
+from cornersmooth.cli.summary import check_summary, counts_line, line_of, row_of, write_summary
 from cornersmooth.output import make_folder
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 @outputs.skip_existing
 @outputs.summary
 @outputs.jobs
+@outputs.scheduler
 @outputs.reports
 @outputs.plot_path
 @surface.tool
@@ -94,20 +95,20 @@ def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
         if outcome.contents and not quiet:
             show_summary(outcome.contents, verbose)
         return outcome.exit_code
-    outcomes = []
+    rows, worst, unverified = [], 0, 0
     with progress_bar(quiet, rate=True) as progress:
-        batch = Batch(jobs, given["jobs"], progress)
+        batch = Batch(jobs, given["jobs"], progress, scheduler=given["scheduler"] or "")
         for outcome in batch.run(ending):
             told = outcome.status in ("done", "skipped") and not quiet and (progress is None or verbose > 0)
             if told:
                 print_line(line_of(outcome))
             _tell(outcome, quiet, verbose, told)
-            outcomes.append(outcome)
+            rows.append(row_of(outcome))
+            worst, unverified = max(worst, outcome.exit_code), unverified + bool(outcome.unverified)
     if given["summary"]:
-        write_summary(given["summary"], outcomes)
+        write_summary(given["summary"], rows)
     if not quiet:
-        print_line(counts_line(batch.counts, sum(bool(outcome.unverified) for outcome in outcomes)))
-    worst: int = max(outcome.exit_code for outcome in outcomes)
+        print_line(counts_line(batch.counts, unverified))
     return worst
 
 
@@ -146,6 +147,8 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
         raise click.UsageError("several inputs need -d FOLDER; -o goes with a single input")
     if len(inputs) > 1 and STANDARD in inputs:
         raise click.UsageError("standard input goes with no other input")
+    if given["scheduler"] and (not folder or given["plot"] or given["jobs"] != 1):
+        raise click.UsageError("--scheduler is for batches, which need -d FOLDER and take no --plot and no -j")
     reports = given["reports"]
     if given["plot"]:
         outputs.picture_form(given["plot"])

@@ -73,9 +73,8 @@ def check_summary(path: str) -> None:
         raise SettingsError("CS221", f"cannot tell the form of the summary {path}", "let it end in .json or .csv")
 
 
-def write_summary(path: str, outcomes: list[Outcome]) -> None:
-    """Write a row for each file; as JSON, with the counts."""
-    rows = [row_of(outcome) for outcome in outcomes]
+def write_summary(path: str, rows: list[dict[str, Any]]) -> None:
+    """Write a row for each file, as `row_of` gives them; as JSON, with the counts."""
     text = io.StringIO()
     if path.lower().endswith(".json"):
         counts = {status: sum(row["status"] == status for row in rows) for status in STATUSES}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.extras import install_hint
 from cornersmooth.verify import Distribution
 
 FORMATS = ("png", "svg", "pdf")
@@ -40,9 +41,7 @@ def draw_deviation(found: Distribution, tolerance: float, form: str) -> bytes:
         import matplotlib as mpl
         from matplotlib.figure import Figure
     except ImportError as missing:
-        raise SettingsError(
-            "CS262", "pictures need matplotlib", "install it with: pip install 'cornersmooth[plot]'"
-        ) from missing
+        raise SettingsError("CS262", "pictures need matplotlib", install_hint("plot")) from missing
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     path, classes = figure.subplots(2, 1)
     group = max(-(-len(found) // _POINTS), 1)

@@ -6,6 +6,7 @@ from io import BytesIO
 from typing import Any
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.extras import install_hint
 
 
 def new_figure(width: float, height: float) -> Any:
@@ -19,9 +20,7 @@ def new_figure(width: float, height: float) -> Any:
     try:
         from matplotlib.figure import Figure
     except ImportError as missing:
-        raise SettingsError(
-            "CS262", "pictures need matplotlib", "install it with: pip install 'cornersmooth[plot]'"
-        ) from missing
+        raise SettingsError("CS262", "pictures need matplotlib", install_hint("plot")) from missing
     return Figure(figsize=(width, height), layout="constrained")
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.extras import install_hint
 from cornersmooth.feedrate.timelaw import TimeLaw
 
 FORMATS = ("png", "svg", "pdf")
@@ -38,9 +39,7 @@ def draw(laws: Mapping[str, TimeLaw], form: str) -> bytes:
         import matplotlib as mpl
         from matplotlib.figure import Figure
     except ImportError as missing:
-        raise SettingsError(
-            "CS262", "pictures need matplotlib", "install it with: pip install 'cornersmooth[plot]'"
-        ) from missing
+        raise SettingsError("CS262", "pictures need matplotlib", install_hint("plot")) from missing
     figure = Figure(figsize=(6.0 * len(laws), 6.0), layout="constrained")
     graphs: Any = figure.subplots(2, len(laws), sharex=True, sharey="row", squeeze=False)
     for column, (title, law) in enumerate(laws.items()):

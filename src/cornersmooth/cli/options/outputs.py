@@ -37,6 +37,12 @@ jobs = click.option(
     flag_value=0,
     help="Processes for several inputs; a bare -j takes all cores.",
 )
+scheduler = click.option(
+    "--scheduler",
+    type=str,
+    metavar="ADDRESS|FILE",
+    help="Have a Dask cluster do the files of a batch: tcp://HOST:8786, or the scheduler's file. See docs/batch.md.",
+)
 reports = click.option(
     "--report",
     "reports",
