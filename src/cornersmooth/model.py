@@ -304,6 +304,7 @@ class Status(IntEnum):
     DUPLICATE = 6  #: repeats the pose before it
     TOO_SHORT = 7  #: no room for a transition, or less than the output can show
     FEED_PER_REVOLUTION = 8  #: the output form has no curves at a feed per revolution
+    STRAYS = 10  #: the method's own construction would leave the path by more than it promises
     IN_RUN = 9  #: rounded together with its neighbours, by the curves of `SmoothProgram.runs`
 
 

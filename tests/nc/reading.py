@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nc.rotations import tip_of, tool_direction
-from oracle.motion import Path, angle_between, arc_points, axis_step, unit
+from oracle.motion import Path, angle_between, arc_points, axis_step, fastest_turn, unit
 from oracle.nc_text import Arc
 
 Floats = NDArray[np.float64]
@@ -316,8 +316,8 @@ class Reader:
             return np.ones(len(start), dtype=np.int64)
         if self.turn in ("angles", "machine"):
             turn = np.radians(np.abs(end[:, 3:] - start[:, 3:]).max(axis=1))
-        elif self.turn == "point":
-            turn = angle_between(start[:, 3:] - start[:, :3], end[:, 3:] - end[:, :3])
+        elif self.turn == "point":  # tip and point run straight: the axis turns fastest in the middle
+            turn = fastest_turn(angle_between(start[:, 3:] - start[:, :3], end[:, 3:] - end[:, :3]))
         else:
             turn = angle_between(start[:, 3:], end[:, 3:])
         least = np.where(turn > 0, 16, 1) if self.turn == "machine" else 1

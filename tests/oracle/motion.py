@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +70,11 @@ def angle_between(a: Floats, b: Floats) -> Floats:
 def axis_step(axis_length: float, limit: float) -> float:
     """Largest turn in one sample step, rad, so that the chord of b hides at most `SAGITTA_SHARE` of `limit`."""
     return min(COARSEST_STEP, math.sqrt(8 * SAGITTA_SHARE * limit / axis_length))
+
+
+def fastest_turn(turn: Floats | float) -> Any:
+    """Rad per block, in its middle, of a direction that runs linearly between two at the angle `turn`."""
+    return 2 * np.tan(np.minimum(turn, FLIP) / 2)
 
 
 def curve_point(curve: Curve, parameters: Floats) -> Floats:
@@ -207,6 +213,6 @@ class Original:
         if len(self) < 2:
             return self.tip, self.tip + axis_length * self.axis
         step = axis_step(axis_length, limit * 0.005)
-        count = np.maximum(1, np.ceil(angle_between(self.axis[:-1], self.axis[1:]) / step)).astype(int)
+        count = np.maximum(1, np.ceil(fastest_turn(angle_between(self.axis[:-1], self.axis[1:])) / step)).astype(int)
         parts = [pose + np.arange(n) / n for pose, n in enumerate(count)]
         return self.tip, self.at(np.append(np.concatenate(parts), len(self) - 1.0), axis_length)[1]

@@ -24,6 +24,7 @@ STATUS_NAMES = {
     Status.TOO_SHORT: "too_short",
     Status.FEED_PER_REVOLUTION: "feed_per_revolution",
     Status.IN_RUN: "in_run",
+    Status.STRAYS: "strays",
 }
 LIMIT_NAMES = {
     LimitedBy.NOTHING: "",

@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from typing import Any, Final
 
 import numpy as np
 
-from cornersmooth.model import Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
+from cornersmooth.methods import METHODS
+from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.construction import Construction
 from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
 from cornersmooth.smoothing.legs import Legs, divide, half_angle_cosine
+from cornersmooth.smoothing.sampling import nodes
+from cornersmooth.smoothing.segments import lines_of
+from cornersmooth.smoothing.self_check import distances, passing
 from cornersmooth.smoothing.synchronise import REPORT_PARAMETERS, matching_parameters, synchronisation_report
 from cornersmooth.vectors import angle_between, dot, norm, unit
 
 #: what `Corners.extra` holds: the largest ``||Q−P|−H|`` that the synchronisation leaves (mm), and the jumps of the axis
 #: at both ends of the transition (rad)
 EXTRA = ("sync_residual", "jump_in", "jump_out")
+
+#: parameters at which transitions are measured, u = ½ in the middle, and corners measured at once
+_SAMPLES: Final = np.linspace(0.0, 1.0, 17)
+_MEASURED: Final = 1024
+
+#: how far tip and axis point may be from a common pose, in what is allowed for each: nearly what verification allows
+_TOGETHER: Final = 1.8
+
+#: steps back that the digits of most controls do not show, mm
+_LEAST_BACK: Final = 1e-4
 
 
 def place_zhang2016(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Placed:
@@ -99,6 +114,17 @@ class Zhang2016(Construction):
 
     extra = EXTRA
 
+    def smooth(
+        self, program: Program, settings: Settings, progress: Callable[[int, int], None] | None = None
+    ) -> SmoothProgram:
+        """Smooth a whole program; corners whose transitions stray by more than the method's bound stay sharp."""
+        smoothed = super().smooth(program, settings, progress)
+        rows = np.flatnonzero(smoothed.corners.smoothed)
+        strays = [_strays(smoothed, rows[at : at + _MEASURED]) for at in range(0, len(rows), _MEASURED)]
+        if not any(part.any() for part in strays):
+            return smoothed
+        return replace(smoothed, corners=_left_sharp(smoothed.corners, rows[np.concatenate(strays)]))
+
     def place(self, shaped: ShapedCorners, settings: Settings, room: Floats | None) -> Placed:
         """Trim by the paper's equations; half of each segment is the most."""
         return place_zhang2016(*shaped, settings)
@@ -122,13 +148,14 @@ class Zhang2016(Construction):
         start = program.axis[remainders.start]
         step = program.tip[remainders.end] - program.tip[remainders.start]
         axis_step = step + height * (program.axis[remainders.end] - start)
-        ends = [
-            unit(height * start + remainders.axis[:, [at]] * axis_step - remainders.tip[:, [at]] * step)
-            for at in (0, 1)
-        ]
+        ends = [height * start + remainders.axis[:, [at]] * axis_step - remainders.tip[:, [at]] * step for at in (0, 1)]
         share = np.arange(1, number) / number
         fraction: Floats = remainders.tip[:, :1] + share * (remainders.tip[:, 1:] - remainders.tip[:, :1])
-        return fraction, _great_circle(ends[0], ends[1], share)
+        axis = _great_circle(unit(ends[0]), unit(ends[1]), share)
+        # the motion that all methods are measured against is ruled: where the two differ by more than a line may
+        ruled = unit(ends[0][:, None] + share[:, None] * (ends[1] - ends[0])[:, None])
+        apart = height * norm(axis - ruled).max(axis=1) > settings.interpolation_tolerance
+        return fraction, np.where(apart[:, None, None], ruled, axis)
 
     def axes(self, program: Program, corners: Corners, settings: Settings, rows: Ints, u: Floats) -> Floats:
         """Axes with the axis-point curve at its own parameter v(u): equations (20) to (22).
@@ -172,6 +199,65 @@ class Zhang2016(Construction):
 
 
 CONSTRUCTION = Zhang2016()
+
+
+def _strays(smoothed: SmoothProgram, rows: Ints) -> Bools:
+    """(g,) whether transitions stray, as synchronised lines or, as controls run both curves, at common parameters."""
+    found = np.zeros(len(rows), np.bool_)
+    number = lines_of(smoothed, rows)
+    for count in np.unique(number):
+        same = np.flatnonzero(number == count)
+        tips, levers = CONSTRUCTION.points(smoothed, rows[same], nodes(int(count)))
+        found[same] = _beyond(smoothed, rows[same], _halved(tips), _halved(unit(levers)))
+    tip_curve, axis_curve = nurbs.control_points(
+        smoothed.program, smoothed.corners, rows, smoothed.settings.axis_length
+    )
+    tips, tops = (nurbs.evaluate(one, smoothed.corners.weights[rows], _SAMPLES) for one in (tip_curve, axis_curve))
+    return found | _beyond(smoothed, rows, tips, tops - tips)
+
+
+def _beyond(smoothed: SmoothProgram, rows: Ints, tip: Floats, lever: Floats) -> Bools:
+    """(g,) whether sampled transitions are farther from the original than the method allows."""
+    program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    poses = np.stack((corners.before[rows], corners.pose[rows], corners.after[rows]), axis=1)
+    allowed, height, axis = (
+        (1.0 + METHODS[settings.method].excess) * settings.tolerance,
+        settings.axis_length,
+        unit(lever),
+    )
+    alone_tip, alone_axis, together, backwards = distances(program, height, poses, tip, axis)
+    corner, direction = program.tip[poses[:, 1]], program.axis[poses[:, 1]]
+    worst = np.maximum(alone_tip, alone_axis).max(axis=1)
+    worst = np.maximum(worst, passing(corner, tip))
+    worst = np.maximum(worst, passing(corner + height * direction, tip + height * axis))
+    beyond: Bools = (worst > allowed) | (together.max(axis=1) > _TOGETHER * allowed)
+    return beyond | (backwards > 2.0 * max(settings.tip_resolution, settings.axis_point_resolution, _LEAST_BACK))
+
+
+def _halved(points: Floats) -> Floats:
+    """Points (g, m, 3) with those in the middle between them."""
+    halved = np.repeat(points, 2, axis=1)[:, :-1]
+    halved[:, 1::2] = (points[:, 1:] + points[:, :-1]) / 2.0
+    return halved
+
+
+def _left_sharp(corners: Corners, rows: Ints) -> Corners:
+    """Corners without the transitions of some rows."""
+    status = corners.status.copy()
+    status[rows] = Status.STRAYS
+    changed: dict[str, Any] = {
+        "status": status,
+        "extra": {name: values.copy() for name, values in corners.extra.items()},
+    }
+    for name in ("limited_by", "tip_error", "axis_error", "orientation_error", *_TRIMS):
+        changed[name] = getattr(corners, name).copy()
+        changed[name][rows] = LimitedBy.NOTHING if name == "limited_by" else 0.0
+    for values in changed["extra"].values():
+        values[rows] = np.nan
+    return replace(corners, **changed)
+
+
+_TRIMS: Final = tuple(item.name for item in fields(Corners) if "trim" in item.name)
 
 
 def _great_circle(one: Floats, other: Floats, share: Floats) -> Floats:
