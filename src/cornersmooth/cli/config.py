@@ -12,7 +12,7 @@ from cornersmooth.cli import shop
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
 )
-@click.argument("source", metavar="[IN]", default=".")
+@click.argument("source", type=click.Path(), metavar="[IN]", default=".")
 def command(source: str) -> int:
     """Say which values 'cornersmooth smooth' would use for the file or folder IN, and where each comes from.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from cornersmooth.cli import completing
 from cornersmooth.cli.options import outputs
 
 #: what the modes of a form are called for people
@@ -21,7 +22,7 @@ _MODES = {
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
 )
-@click.argument("name", required=False, metavar="[NAME|FILE]")
+@click.argument("name", required=False, metavar="[NAME|FILE]", shell_complete=completing.controls)
 @outputs.table
 def command(name: str | None, table: bool) -> int:
     """List the controls with their forms, or check and describe one.

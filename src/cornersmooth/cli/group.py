@@ -21,6 +21,8 @@ COMMANDS = {
     "controls": ("cornersmooth.cli.controls", "List the controls that NC text can be written for, and their forms."),
     "machines": ("cornersmooth.cli.machines", "List the machines whose rotary words can be written, or describe one."),
     "config": ("cornersmooth.cli.config", "Say which values hold here, and where each comes from."),
+    "completion": ("cornersmooth.cli.completion", "Print what makes a shell complete commands, names and files."),
+    "man": ("cornersmooth.cli.man", "Print the manual page."),
     "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
 }
 

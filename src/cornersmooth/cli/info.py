@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid.",
 )
-@click.argument("source", metavar="IN")
+@click.argument("source", type=click.Path(), metavar="IN")
 @smoothing.tolerance
 @smoothing.axis_length
 @reading.reading_options

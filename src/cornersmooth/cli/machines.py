@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from cornersmooth.cli import completing
 from cornersmooth.cli.options import outputs
 
 
@@ -12,7 +13,7 @@ from cornersmooth.cli.options import outputs
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
 )
-@click.argument("name", required=False, metavar="[NAME|FILE]")
+@click.argument("name", required=False, metavar="[NAME|FILE]", shell_complete=completing.machines)
 @outputs.table
 def command(name: str | None, table: bool) -> int:
     """List the machines that come with the program, or check and describe one.

@@ -21,6 +21,7 @@ What counts is the option, then the environment (``CORNERSMOOTH_TOLERANCE``), th
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -82,6 +83,10 @@ class ShopCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the shop settings that go with the input, then the options."""
+        if ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
+            with contextlib.suppress(SettingsError, click.UsageError):
+                ctx.meta[__name__] = Shop(find_files(_first_look(self, ctx, list(args))[0]))
+            return super().parse_args(ctx, args)
         first, control = _first_look(self, ctx, list(args))
         _check_environment(self)
         shop = Shop(find_files(first))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     epilog="Exit codes: 0 done; 1 done, but a promise is broken; 2 wrong usage or configuration; "
     "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
 )
-@click.argument("inputs", nargs=-1, required=True, metavar="IN...")
+@click.argument("inputs", type=click.Path(), nargs=-1, required=True, metavar="IN...")
 @smoothing.tolerance
 @outputs.output
 @nc_text.form

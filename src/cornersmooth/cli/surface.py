@@ -27,8 +27,8 @@ _SUFFIXES = (".json", ".csv", ".html", ".png", ".svg", ".pdf")
     epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
     "cannot be read or is not valid; 4 output cannot be written.",
 )
-@click.argument("source", metavar="IN")
-@click.argument("text", metavar="NC")
+@click.argument("source", type=click.Path(), metavar="IN")
+@click.argument("text", type=click.Path(), metavar="NC")
 @smoothing.tolerance
 @smoothing.axis_length
 @surface.tool

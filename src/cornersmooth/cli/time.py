@@ -34,7 +34,7 @@ LAWS = tuple(_TITLES)
     epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid; "
     "4 output cannot be written.",
 )
-@click.argument("source", metavar="IN")
+@click.argument("source", type=click.Path(), metavar="IN")
 @smoothing.tolerance
 @smoothing.axis_length
 @motion.limit_options

@@ -33,8 +33,8 @@ _PROBLEMS_SHOWN = 20
     epilog="Exit codes: 0 the text keeps the tolerance; 1 it does not, or something else is wrong with it; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
 )
-@click.argument("source", metavar="IN")
-@click.argument("text", metavar="NC")
+@click.argument("source", type=click.Path(), metavar="IN")
+@click.argument("text", type=click.Path(), metavar="NC")
 @smoothing.tolerance
 @smoothing.axis_length
 @nc_text.control

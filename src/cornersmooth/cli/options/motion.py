@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from cornersmooth.cli import completing
 from cornersmooth.cli.options.parameters import Duration, all_of
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
 
@@ -86,6 +87,7 @@ limits_machine = click.option(
     "--machine",
     type=str,
     metavar="NAME|FILE",
+    shell_complete=completing.machines,
     help="Keep the limits of this machine's five axes, too: a name that 'cornersmooth machines' lists (its numbers are "
     "examples), or a TOML file with [dynamics.X] and so on.",
 )
@@ -96,7 +98,11 @@ text = click.option(
     help="Plan this NC text, too, as its control would run it: its lines, digits and feeds.",
 )
 text_machine = click.option(
-    "--text-machine", type=str, metavar="NAME|FILE", help="Machine whose rotary words --text has, if it has such."
+    "--text-machine",
+    type=str,
+    metavar="NAME|FILE",
+    shell_complete=completing.machines,
+    help="Machine whose rotary words --text has, if it has such.",
 )
 block_time = click.option(
     "--block-time", type=Duration(), default=0.0, help="Shortest time that the control takes for one block of --text."

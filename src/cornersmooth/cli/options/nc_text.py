@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from cornersmooth.cli import completing
 from cornersmooth.cli.options.parameters import all_of
 from cornersmooth.errors import SettingsError
 
@@ -19,12 +20,14 @@ form = click.option(
     "--form",
     type=str,
     metavar="g1|g6.2|...",
+    shell_complete=completing.forms,
     help="Dense lines, or curves in the control's own form; 'cornersmooth controls' lists them. [default: g1]",
 )
 control = click.option(
     "--control",
     type=str,
     metavar="NAME|FILE",
+    shell_complete=completing.controls,
     default="fanuc",
     show_default=True,
     help="Control the NC text is for: a name that 'cornersmooth controls' lists, or a TOML file.",
@@ -33,6 +36,7 @@ machine = click.option(
     "--machine",
     type=str,
     metavar="NAME|FILE",
+    shell_complete=completing.machines,
     help="The text has rotary words of this machine instead of tool vectors: a name that 'cornersmooth machines' "
     "lists, or a TOML file.",
 )

@@ -1,0 +1,36 @@
+"""``cornersmooth completion``: what makes a shell complete commands, options, controls, machines, forms and files."""
+
+from __future__ import annotations
+
+import click
+
+_LINES = {
+    "bash": 'eval "$(cornersmooth completion bash)"    # in ~/.bashrc',
+    "zsh": 'eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit',
+    "fish": "cornersmooth completion fish | source     # in ~/.config/fish/config.fish",
+}
+
+
+@click.command(
+    "completion",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
+)
+@click.argument("shell", type=click.Choice(list(_LINES)))
+def command(shell: str) -> int:
+    """Print what makes SHELL complete commands, options, names of controls, machines and forms, and files.
+
+    \b
+    Examples:
+      eval "$(cornersmooth completion bash)"    # in ~/.bashrc
+      eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit
+      cornersmooth completion fish | source     # in ~/.config/fish/config.fish
+    """
+    from click.shell_completion import BashComplete, FishComplete, ZshComplete
+
+    from cornersmooth.cli.group import cli
+
+    kinds = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
+    source = kinds[shell](cli, {}, "cornersmooth", "_CORNERSMOOTH_COMPLETE").source()
+    click.echo(source.rstrip())
+    return 0

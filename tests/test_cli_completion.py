@@ -1,0 +1,86 @@
+"""Completion in a real bash, and the manual page."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from cornersmooth.cli.group import COMMANDS
+from oracle.command import DONE, SCRIPT, run
+
+#: asks the function that bash calls, and prints what it answers
+ASK = """
+eval "$(cornersmooth completion bash)"
+COMP_WORDS=({words}) COMP_CWORD={last}
+eval "$(complete -p cornersmooth | sed 's/.*-F \\([^ ]*\\) .*/ask() {{ \\1 cornersmooth; }}/')"
+compopt() {{ echo compopt "$@"; }}
+ask
+printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+
+
+def complete(*words: str, folder: Path) -> list[str]:
+    """What bash offers for the last of the words."""
+    script = ASK.format(words=" ".join(f"'{word}'" for word in ("cornersmooth", *words)), last=len(words))
+    path = f"{SCRIPT.parent}{os.pathsep}{os.environ['PATH']}"
+    asked = subprocess.run(
+        ["bash", "--norc", "-c", script],
+        capture_output=True,
+        cwd=folder,
+        env=os.environ | {"PATH": path},
+        text=True,
+        check=True,
+    )
+    assert asked.stderr == ""
+    return asked.stdout.split("\n")[:-1]
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+def test_bash_completes(tmp_path: Path) -> None:
+    (tmp_path / "cornersmooth.toml").write_text(
+        "[controls.shop]\nlike = 'heidenhain'\n[machines.mill]\nlike = 'table-ac'\n"
+    )
+    part = tmp_path / "part.cls"
+    part.write_text("")
+    answers = {
+        ("smooth", "--work"): ["--work-offset"],
+        ("smooth", "part.cls", "--control", "s"): ["shop", "siemens", "sinumerik", "sinumerik-one"],
+        ("smooth", "part.cls", "--machine", "m"): ["mill"],
+        ("smooth", "part.cls", "--control", "siemens", "-f", ""): ["bspline", "g1", "poly"],
+        ("smooth", "part.cls", "--control", "shop", "-f", "s"): ["spl"],
+    }
+    assert {words: complete(*words, folder=tmp_path) for words in answers} == answers
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+def test_bash_is_left_to_complete_files(tmp_path: Path) -> None:
+    for words in (("smooth", "pa"), ("smooth", "part.cls", "--control", "./my")):
+        assert complete(*words, folder=tmp_path) == ["compopt -o default", ""]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_every_shell_has_a_script(shell: str) -> None:
+    result = run("completion", shell)
+    assert result.returncode == DONE
+    assert f"_CORNERSMOOTH_COMPLETE={shell}_complete" in result.stdout.decode()
+
+
+def test_the_manual_page_has_every_command_and_option() -> None:
+    page = run("man").stdout.decode()
+    for name in COMMANDS:
+        assert f'.SH "{name.upper()}"' in page
+        said = run(name, "--help").stdout.decode()
+        for word in said.split():
+            if word.startswith("--"):
+                assert word.rstrip(",.;:").replace("-", "\\-") in page, word
+
+
+@pytest.mark.skipif(shutil.which("groff") is None, reason="there is no groff")
+def test_the_manual_page_is_rendered_without_a_warning() -> None:
+    done = subprocess.run(["groff", "-man", "-ww", "-Tascii"], input=run("man").stdout, capture_output=True, check=True)
+    assert done.stderr == b""
+    assert b"Round the corners of the CL files IN and write NC text." in done.stdout
