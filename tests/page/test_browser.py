@@ -61,13 +61,13 @@ class Looked:
     def settle(self):
         """Wait until everything is drawn."""
         self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        self.page.wait_for_function("() => !cornersmooth.view.waiting")
+        self.page.wait_for_function("() => cornersmooth.view.pace.still")
 
     def camera(self):
-        return np.array(self.page.evaluate("() => cornersmooth.view.camera.position.toArray()"))
+        return np.array(self.page.evaluate("() => cornersmooth.view.eye.camera.position.toArray()"))
 
     def tool(self):
-        return np.array(self.page.evaluate("() => cornersmooth.view.tool.position.toArray()"))
+        return np.array(self.page.evaluate("() => cornersmooth.view.tool.group.position.toArray()"))
 
     def canvas(self):
         """Pixels (h, w, 3) of the view, without what lies over it."""
@@ -75,7 +75,7 @@ class Looked:
         shown = self.page.evaluate(
             """() => { const canvas = document.createElement("canvas"); const view = document.getElementById("canvas");
             canvas.width = view.width; canvas.height = view.height; const pen = canvas.getContext("2d");
-            pen.drawImage(view, 0, 0); return [canvas.width, canvas.height,
+            cornersmooth.view.draw(0, true); pen.drawImage(view, 0, 0); return [canvas.width, canvas.height,
             btoa(Array.from(pen.getImageData(0, 0, canvas.width, canvas.height).data,
             value => String.fromCharCode(value)).join(""))]; }"""
         )
@@ -131,7 +131,7 @@ def test_a_page_is_drawn_and_can_be_driven(look, text):
     looked.settle()
     after = looked.camera()
     assert np.linalg.norm(after - before) > 1.0
-    target = np.array(page.evaluate("() => cornersmooth.view.controls.target.toArray()"))
+    target = np.array(page.evaluate("() => cornersmooth.view.eye.controls.target.toArray()"))
     corner = np.array(page.evaluate("() => Array.from(cornersmooth.arrays.c_tip.subarray(0, 3))"))
     assert np.linalg.norm(target - corner) < 1e-6
     panel = page.inner_text("#panel")
@@ -225,8 +225,8 @@ def test_keys_charts_and_switches(look, text):
 def test_a_click_on_a_marker_chooses_the_corner(look, text):
     looked = look(text)
     x, y = looked.page.evaluate(
-        """() => { const { view, arrays } = cornersmooth; const p = view.controls.target.clone();
-        p.set(arrays.c_tip[0], arrays.c_tip[1], arrays.c_tip[2]).project(view.camera);
+        """() => { const { view, arrays } = cornersmooth; const p = view.eye.controls.target.clone();
+        p.set(arrays.c_tip[0], arrays.c_tip[1], arrays.c_tip[2]).project(view.eye.camera);
         const box = view.canvas.getBoundingClientRect();
         return [box.x + (0.5 + 0.5 * p.x) * box.width, box.y + (0.5 - 0.5 * p.y) * box.height]; }"""
     )
@@ -284,6 +284,15 @@ def test_surface_on_a_page(look):
     with_surface = looked.canvas().astype(int)
     looked.keep("surface")
     assert "overcut" in looked.page.inner_text("#legend")
+    table = looked.page.inner_text("#metal table")
+    for word in ("overcut", "undercut", "rms", f"{len(surface):,}"):
+        assert word in table
+    counts = surface.histogram()[1]
+    tall = looked.page.evaluate(
+        "() => Array.from(document.querySelectorAll('.bars span'), bar => parseFloat(bar.style.height))"
+    )
+    assert [height > 0.0 for height in tall] == (counts > 0).tolist()
+    assert tall[int(counts.argmax())] == 100.0
     looked.page.locator("#show-surface").click()
     assert np.abs(looked.canvas() - with_surface).sum() > 0
     assert "overcut" not in looked.page.inner_text("#legend")
@@ -303,5 +312,126 @@ def test_mouse_turns_and_zooms(look, text):
     before = looked.camera()
     page.mouse.wheel(0, -300)
     page.wait_for_timeout(300)
+    looked.settle()
+    assert np.linalg.norm(looked.camera() - before) > 0.1
+
+
+def test_less_is_drawn_while_a_slow_view_turns(look, text):
+    looked = look(text)
+    page = looked.page
+    drawn = page.evaluate(
+        """() => new Promise(done => { const { view } = cornersmooth; const drawn = []; const draw = view.pace.draw;
+        view.pace.level = 2;
+        view.pace.draw = (level, still) => { draw(level, still);
+          const shown = view.paths.filter(paths => paths && paths.group.visible);
+          drawn.push([level, still, shown.length, shown[0] === view.paths[level]]); if (still) done(drawn); };
+        view.eye.orbit(0.3, 0, 1); })"""
+    )
+    assert drawn[0] == [2, False, 1, True]
+    assert drawn[-1] == [0, True, 1, True]
+    # what has the colours of the whole has them in the rough, too
+    page.evaluate("() => { cornersmooth.view.draw(2, false); }")
+    page.select_option("#channel", label="corner status")
+    looked.settle()
+    same = page.evaluate(
+        """() => { const of = level => new Set(Array.from(
+          cornersmooth.view.paths[level].ribs.geometry.getAttribute("color").array, value => value.toFixed(4)));
+        const whole = of(0); return [...of(2)].every(value => whole.has(value)); }"""
+    )
+    assert same
+
+
+def test_slow_pictures_make_the_view_coarser(look, text):
+    looked = look(text)
+    levels = looked.page.evaluate(
+        """() => { const { pace } = cornersmooth.view; const levels = []; pace.level = 0; pace.last = 0; pace.gaps = [];
+        let now = 1e6; for (let i = 0; i < 12; i++) { pace.judge(now += 10); levels.push(pace.level); }
+        for (let i = 0; i < 24; i++) { pace.judge(now += 100); levels.push(pace.level); } return levels; }"""
+    )
+    assert levels[:12] == [0] * 12
+    assert levels[-1] == 2
+    assert sorted(levels) == levels
+
+
+def test_lines_near_a_place_of_a_long_path_are_wide(look, text):
+    looked = look(text)
+    page = looked.page
+    page.locator("#rows .row").first.click()
+    looked.settle()
+    page.evaluate("() => cornersmooth.view.lookNear()")
+    near, far = page.evaluate(
+        """() => { const { view, arrays } = cornersmooth; const tip = arrays.w_tip; const at = view.eye.controls.target;
+        const off = i => Math.hypot(tip[3 * i] - at.x, tip[3 * i + 1] - at.y, tip[3 * i + 2] - at.z);
+        const near = new Set(view.near.segments); let far = 0;
+        for (let i = 0; i < tip.length / 3; i++)
+          if (!arrays.w_rapid[i] && off(i) < 2 * view.eye.distance && !near.has(i)) far++;
+        return [near.size, far]; }"""
+    )
+    assert 1 < near < 200
+    assert far == 0
+    assert page.evaluate("() => cornersmooth.view.near.original.geometry.type") == "LineSegmentsGeometry"
+
+
+def test_the_list_of_corners_is_filtered_and_stepped_through(look, text):
+    looked = look(text)
+    page = looked.page
+    every = page.evaluate("() => cornersmooth.corners.shown.length")
+    page.locator("#filters button", has_text="sharp").click()
+    assert page.evaluate("() => cornersmooth.corners.shown.length") == 1
+    assert page.locator("#rows .row").count() == 1
+    page.locator("#filters button", has_text="all").click()
+    assert page.evaluate("() => cornersmooth.corners.shown.length") == every
+    chosen = "() => cornersmooth.corners.shown.indexOf(cornersmooth.corners.selected)"
+    page.locator("#list").focus()
+    for key, place in (
+        ("ArrowDown", 0),
+        ("ArrowDown", 1),
+        ("ArrowDown", 2),
+        ("ArrowUp", 1),
+        ("n", 2),
+        ("p", 1),
+        ("PageDown", every - 1),
+    ):
+        page.keyboard.press(key)
+        assert page.evaluate(chosen) == place, key
+    assert page.locator("#rows .row[aria-selected=true]").count() == 1
+    # settings, versions and notes are behind a fold
+    page.locator("#about summary").click()
+    assert "cornersmooth" in page.inner_text("#facts")
+
+
+def test_pace_of_the_drive(look, text):
+    looked = look(text)
+    page = looked.page
+    gone = []
+    for pace in ("0.1", "5"):
+        page.select_option("#pace", pace)
+        gone.append(
+            page.evaluate(
+                """() => new Promise(done => { const { drive } = cornersmooth; drive.set(0, "test"); drive.play(true);
+                const began = performance.now();
+                const look = () => { const passed = (performance.now() - began) / 1000;
+                if (passed < 0.3) return requestAnimationFrame(look);
+                const ratio = drive.seconds / passed; drive.play(false); done(ratio); };
+                requestAnimationFrame(look); })"""
+            )
+        )
+    assert gone[0] < 0.3 < 1.0 < gone[1]
+
+
+def test_two_fingers_zoom_and_move(look, text):
+    looked = look(text, width=390, height=844)
+    page = looked.page
+    before = looked.camera()
+    page.evaluate(
+        """() => { const canvas = document.getElementById("canvas"); const box = canvas.getBoundingClientRect();
+        canvas.setPointerCapture = canvas.releasePointerCapture = () => {};
+        const tell = (type, id, x, y) => canvas.dispatchEvent(new PointerEvent(type, { pointerId: id, bubbles: true,
+          pointerType: "touch", clientX: box.x + x, clientY: box.y + y, isPrimary: id === 1 }));
+        tell("pointerdown", 1, 100, 100); tell("pointerdown", 2, 160, 100);
+        for (let k = 1; k < 6; k++) {
+          tell("pointermove", 1, 100 - 8 * k, 100); tell("pointermove", 2, 160 + 8 * k, 100); }
+        tell("pointerup", 1, 60, 100); tell("pointerup", 2, 200, 100); }"""
+    )
     looked.settle()
     assert np.linalg.norm(looked.camera() - before) > 0.1

@@ -242,7 +242,7 @@ def test_commands_write_pages(tmp_path):
     times = tmp_path / "times.html"
     assert run("time", source, "-e", "0.02", "--report", times, "-q").returncode == 0
     meta, _ = values_of(times.read_text())
-    assert meta["verdict"].startswith("global takes ")  # the fastest method
+    assert meta["verdict"].startswith("global saves ")  # the fastest method
     assert run("time", source, "--report", tmp_path / "times.json").returncode == 2
 
 

@@ -15,7 +15,22 @@ from cornersmooth.page.scene import Story, Subject, scene
 
 #: scripts in the order they are run
 _LIBRARIES = ("vendor/three.js", "vendor/uplot.js")
-_SCRIPTS = ("data.js", "colours.js", "view.js", "charts.js", "corners.js", "main.js")
+_SCRIPTS = (
+    "data.js",
+    "colours.js",
+    "geometry.js",
+    "paths.js",
+    "camera.js",
+    "pace.js",
+    "tool.js",
+    "metal.js",
+    "view.js",
+    "charts.js",
+    "corners.js",
+    "drive.js",
+    "wiring.js",
+    "main.js",
+)
 _STYLES = ("vendor/uplot.css", "page.css")
 
 #: places of the template that are filled in

@@ -81,7 +81,7 @@ class Charts {
         cursor: { sync: { key: "cornersmooth" }, drag: { x: true, y: false, dist: 6 }, points: { size: 6 } },
         legend: { live: true },
         scales: { x: { time: false }, y: { range: (/** @type {any} */ _, /** @type {number} */ low, /** @type {number} */ high) => [Math.min(1.05 * (low ?? 0), 0), Math.max(1.05 * (high ?? 1), chart.top ?? 0)] } },
-        series: [{ label: unit, value: (/** @type {any} */ _, /** @type {number} */ value) => told(value, unit, 5) }, ...series],
+        series: [{ label: this.scale === "way" ? "path" : "time", value: (/** @type {any} */ _, /** @type {number} */ value) => told(value, unit, 5) }, ...series],
         axes: [{ ...axis, size: 26 }, { ...axis, size: 58 }],
         hooks: {
           draw: [(/** @type {any} */ plot) => drawLimit(plot, chart.limit, bad)],
@@ -130,7 +130,10 @@ class Charts {
 
   /** Puts the cursor of the charts somewhere without calling back. @param {number} value on the scale */
   mark(value) {
-    for (const plot of this.plots) plot.setCursor({ left: plot.valToPos(value, "x"), top: 10 }, true);
+    // charts that were just made know their scales a moment later
+    queueMicrotask(() => {
+      for (const plot of this.plots) plot.setCursor({ left: plot.valToPos(value, "x"), top: 10 }, true);
+    });
   }
 
   resize() {

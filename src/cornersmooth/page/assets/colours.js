@@ -120,8 +120,8 @@ function signedColours(off, span) {
   return colours;
 }
 
-/** Draws the legend of a channel. @param {Channel} channel @param {Meta} meta @param {boolean} surface */
-function showLegend(channel, meta, surface) {
+/** Draws the legend of a channel. @param {Channel} channel @param {Meta} meta @param {number} span at which colours of the surface end, mm; 0 without it */
+function showLegend(channel, meta, span) {
   const box = element("legend");
   box.replaceChildren();
   /** @param {string} colour @param {string} text @param {string} [style] */
@@ -153,9 +153,9 @@ function showLegend(channel, meta, surface) {
     strip(SEQUENTIAL_STOPS, [told(low), told(middle), told(high)]);
     if (channel.bounded) key(OUTSIDE, `over ${told(high)} mm: out of tolerance`);
   }
-  if (surface && meta.surface) {
-    box.append(made("strong", "surface, mm"));
-    strip(DIVERGING, [`overcut ${told(-meta.surface.span)}`, "0", `undercut ${told(meta.surface.span)}`]);
+  if (span > 0) {
+    box.append(made("strong", "machined surface, mm"));
+    strip(DIVERGING, [`overcut ≤ −${told(span, "", 2)}`, "0", `undercut ≥ ${told(span, "", 2)}`]);
   }
   key("var(--original)", "original path");
 }

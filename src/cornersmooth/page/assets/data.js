@@ -3,6 +3,8 @@
 /** @typedef {{type: "f4" | "i4" | "i2" | "u1", at: number, count: number, width: number}} Entry */
 /** @typedef {Float32Array | Int32Array | Int16Array | Uint8Array} Values */
 /** @typedef {{from_second: number, text: string, line: number, outline: number[][]}} ToolShape */
+/** @typedef {{points: number, max_mm: number, mean_mm: number, percentile_95_mm: number, cl_line: number}} Side */
+/** @typedef {{points: number, rms_mm: number | null, overcut: Side, undercut: Side}} Metal */
 /**
  * @typedef {object} Meta
  * @property {string} title
@@ -20,7 +22,7 @@
  * @property {{kinds: string[], reasons: string[], counts: Record<string, number>} | null} corners
  * @property {{speeds: string[], axes?: string[]}} charts
  * @property {ToolShape[]} tools
- * @property {{span: number, edge_mm: number, tolerance_mm: number} | undefined} surface
+ * @property {Metal | undefined} surface
  * @property {Record<string, Entry>} arrays
  */
 

@@ -39,7 +39,7 @@ async function start() {
     const channel = channels[Number(select.value)];
     if (!channel) return;
     view.setColours(coloursOf(channel));
-    showLegend(channel, meta, Boolean(view.surface?.visible));
+    showLegend(channel, meta, view.surface?.visible ? spanOf(arrays.s_off) : 0);
   };
   select.addEventListener("change", recolour);
   recolour();
@@ -59,9 +59,12 @@ async function start() {
     charts.build();
   });
   view.setScheme();
+  showDistribution(meta, arrays);
   drive.set(arrays.w_time[Math.max(arrays.w_rapid.indexOf(0, 1), 0)] ?? 0, "start");
   view.mark(null);
   element("wait").hidden = true;
+  view.resize();
+  view.fit();
   // for tests and for the curious
   Object.assign(globalThis, { cornersmooth: { meta, arrays, view, charts, corners, drive, channels } });
   document.documentElement.dataset.ready = "true";
@@ -88,153 +91,6 @@ function cornerSentence(meta) {
 /** @param {Record<string, Values>} arrays @param {number} i @returns {number[]} */
 function pointAt(arrays, i) {
   return [arrays.w_tip[3 * i], arrays.w_tip[3 * i + 1], arrays.w_tip[3 * i + 2]];
-}
-
-/** The slider and the tool it moves. */
-class Drive {
-  /** @param {Meta} meta @param {Record<string, Values>} arrays @param {View} view */
-  constructor(meta, arrays, view) {
-    this.meta = meta;
-    this.arrays = arrays;
-    this.view = view;
-    this.seconds = 0;
-    this.running = false;
-    /** @type {(seconds: number, way: number) => void} */
-    this.moved = () => {};
-    this.slider = element("slider");
-    this.slider.addEventListener("input", () => this.set((Number(this.slider.value) / 10000) * meta.seconds, "slider"));
-    element("play").addEventListener("click", () => this.play(!this.running));
-  }
-
-  /** @param {number} seconds @param {string} by who asks */
-  set(seconds, by) {
-    this.seconds = Math.min(Math.max(seconds || 0, 0), this.meta.seconds);
-    if (by !== "slider") this.slider.value = String(this.meta.seconds ? (10000 * this.seconds) / this.meta.seconds : 0);
-    if (by !== "clock" && this.running) this.play(false);
-    this.update();
-  }
-
-  update() {
-    const { w_time: time, w_tip: tip, w_axis: axis, w_way: way } = this.arrays;
-    if (!time.length) return;
-    const i = indexAt(time, this.seconds);
-    const next = Math.min(i + 1, time.length - 1);
-    const span = time[next] - time[i];
-    const share = span > 0 ? (this.seconds - time[i]) / span : 0;
-    const place = [0, 1, 2].map((j) => tip[3 * i + j] + share * (tip[3 * next + j] - tip[3 * i + j]));
-    const lean = [0, 1, 2].map((j) => axis[3 * i + j] + share * (axis[3 * next + j] - axis[3 * i + j]));
-    let shape = -1;
-    this.meta.tools.forEach((tool, k) => {
-      if (tool.from_second <= this.seconds) shape = k;
-    });
-    this.view.placeTool(Math.max(shape, 0), place, lean);
-    const kind = this.meta.timed ? "" : " at programmed feed";
-    element("clock").textContent = `${this.seconds.toFixed(2)} of ${this.meta.seconds.toFixed(2)} s${kind}`;
-    this.tellPlace(i);
-    this.moved(this.seconds, way[i] + share * (way[next] - way[i]));
-  }
-
-  /** Says what is known of a written point. @param {number} i */
-  tellPlace(i) {
-    const a = this.arrays;
-    if (i < 0) {
-      element("place").textContent = "";
-      return;
-    }
-    const speed = Number.isFinite(a.w_speed[i]) ? a.w_speed[i] : a.w_feed[i];
-    const off = a.w_rapid[i] ? "rapid" : `off ${offset(a.w_off[i])} mm, axis point ${offset(a.w_axis_off[i])} mm`;
-    element("place").textContent = `CL ${a.w_line[i]} · NC ${a.w_nc[i]}\n${off}` + (Number.isFinite(speed) ? `\n${told(speed, "mm/min", 4)}` : "");
-  }
-
-  /** @param {boolean} on */
-  play(on) {
-    this.running = on;
-    const button = element("play");
-    button.textContent = on ? "❚❚" : "▶";
-    button.setAttribute("aria-label", on ? "Pause" : "Play");
-    if (!on) return;
-    if (this.seconds >= this.meta.seconds) this.set(0, "clock");
-    let before = performance.now();
-    const step = (/** @type {number} */ now) => {
-      if (!this.running) return;
-      this.set(this.seconds + (Math.max(now - before, 0) / 1000) * Number(element("pace").value), "clock");
-      before = now;
-      if (this.seconds >= this.meta.seconds) this.play(false);
-      else requestAnimationFrame(step);
-    };
-    requestAnimationFrame(step);
-  }
-}
-
-/** @param {View} view @param {() => void} recolour */
-function wireSwitches(view, recolour) {
-  element("axes").addEventListener("change", (/** @type {any} */ event) => view.setAxes(event.target.value));
-  element("fit").addEventListener("click", () => view.fit());
-  /** @param {string} id @param {(on: boolean) => void} apply */
-  const wire = (id, apply) => {
-    const box = element(id);
-    box.addEventListener("change", () => {
-      apply(box.checked);
-      view.touch();
-    });
-  };
-  wire("show-original", (on) => (view.wanted.original = on));
-  wire("show-written", (on) => (view.wanted.written = on));
-  wire("show-rapids", (on) => (view.rapids.visible = on));
-  wire("show-tool", (on) => (view.wanted.tool = on));
-  if (view.surface) {
-    const { surface } = view;
-    element("surface-label").hidden = false;
-    element("axes").value = "none";
-    view.setAxes("none");
-    wire("show-surface", (on) => {
-      surface.visible = on;
-      recolour();
-    });
-  }
-}
-
-/** @param {View} view @param {Drive} drive @param {Corners | null} corners */
-function wireKeys(view, drive, corners) {
-  document.addEventListener("keydown", (event) => {
-    const field = /** @type {HTMLElement} */ (event.target).tagName;
-    if (event.ctrlKey || event.metaKey || event.altKey || field === "SELECT" || field === "INPUT") return;
-    const turn = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
-    if (turn && event.target === view.canvas) orbit(view, turn[0] * 0.12, turn[1] * 0.12, 1);
-    else if (event.key === "+" || event.key === "=") orbit(view, 0, 0, 1 / 1.2);
-    else if (event.key === "-") orbit(view, 0, 0, 1.2);
-    else if (event.key === "f" || event.key === "F") view.fit();
-    else if (event.key === "n" || event.key === "N") corners?.step(1);
-    else if (event.key === "p" || event.key === "P") corners?.step(-1);
-    else if (event.key === " " && field !== "BUTTON" && field !== "SUMMARY") drive.play(!drive.running);
-    else return;
-    event.preventDefault();
-  });
-}
-
-/** @param {View} view @param {number} round @param {number} up @param {number} zoom */
-function orbit(view, round, up, zoom) {
-  const arm = view.camera.position.clone().sub(view.controls.target);
-  const reach = arm.length() * zoom;
-  const height = Math.min(Math.max(Math.acos(arm.z / arm.length()) + up, 0.02), Math.PI - 0.02);
-  const heading = Math.atan2(arm.y, arm.x) + round;
-  arm.set(Math.sin(height) * Math.cos(heading), Math.sin(height) * Math.sin(heading), Math.cos(height));
-  view.camera.position.copy(view.controls.target).addScaledVector(arm, reach);
-  view.touch();
-}
-
-/** @param {View} view @param {Drive} drive @param {Corners | null} corners @param {Record<string, Values>} arrays */
-function wirePicking(view, drive, corners, arrays) {
-  /** @type {[number, number] | null} */
-  let pressed = null;
-  view.canvas.addEventListener("pointerdown", (event) => (pressed = [event.offsetX, event.offsetY]));
-  view.canvas.addEventListener("pointerup", (event) => {
-    const moved = !pressed || Math.hypot(event.offsetX - pressed[0], event.offsetY - pressed[1]) > 4;
-    if (moved) return;
-    const found = view.pick(event.offsetX, event.offsetY);
-    if (found && "corner" in found) corners?.select(found.corner);
-    else if (found) drive.set(arrays.w_time[found.point], "view");
-  });
 }
 
 start().catch((/** @type {Error} */ error) => {
