@@ -197,8 +197,9 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "curve_share": (0.01, 1.0),
     "line_share": (0.01, 1.0),
     "blend_share": (0.0, 1.0),
-    "tip_resolution": (0.0, 0.1),
-    "axis_point_resolution": (0.0, 0.1),
+    # what forms in rotary words take off for them grows with the tolerance
+    "tip_resolution": (0.0, 10.0),
+    "axis_point_resolution": (0.0, 10.0),
     "duplicate_distance": (0.0, 0.01),
     "shortest_line": (0.0, 1.0),
 }

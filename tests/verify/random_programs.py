@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.nc import Form
 from cornersmooth.settings import Settings
 from nc.cases import RUNNABLE, Case
 from nc.promise import tame, upright
@@ -42,6 +43,7 @@ class Trial:
     def __str__(self) -> str:
         s = self.settings
         said = [str(self.case), self.units, f"eps {s.tolerance:.4g}", f"H {s.axis_length:.4g}", s.method]
+        said += [f"{s.lines} lines"] if s.lines else []
         if s.method == "proportional":
             said += [s.shape, s.allocation, *(["weights {:g},{:g}".format(*s.weights)] if s.weights != (1, 1) else [])]
         return f"seed {self.seed}: " + " ".join(said) + " [" + " ".join(self.parts) + "]"
@@ -53,6 +55,7 @@ class _Text:
 
     rng: np.random.Generator
     scale: float  #: mm per unit
+    one_tool: bool = False  #: the length of the only one goes into every position
     lines: list[str] = field(default_factory=list)
     feed: float = math.nan
 
@@ -112,7 +115,7 @@ def _flip(rng: np.random.Generator, n: int) -> tuple[Floats, Floats]:
     """The tool axis turns by nearly half a turn within one segment."""
     tip, axis = KINDS[0](rng, n)
     at = int(rng.integers(1, n + 1))
-    angle = math.radians(rng.choice([120.0, 150.0, 170.0, 178.0, 179.9, 179.9999]))
+    angle = math.radians(rng.choice([120.0, 150.0, 160.0, 165.0, 170.0, 174.9]))  # beyond 175 it is refused
     axis = axis.copy()
     axis[at:] = turned(axis[at - 1], angle, rng)
     return tip, axis
@@ -208,7 +211,9 @@ def _holes(text: _Text, fixed: bool, case: Case) -> None:
 
 def _tool(text: _Text) -> None:
     rng = text.rng
-    text.say(f"LOADTL/{int(rng.integers(1, 40))}")
+    number = int(rng.integers(1, 40))
+    if not text.one_tool or not any(line.startswith("LOADTL") for line in text.lines):
+        text.say(f"LOADTL/{number}")
     if rng.random() < 0.7:
         text.say(f"SPINDL/{int(rng.integers(500, 20000))},RPM,CLW")
 
@@ -224,7 +229,8 @@ def trial(seed: int, *, flips: bool = True, only: str = "") -> Trial:
     form = case.choose(endless=True)
     fixed = form.orientation == "fixed"
     units = "inch" if rng.random() < 0.25 else "mm"
-    text = _Text(rng, 25.4 if units == "inch" else 1.0)
+    one_tool = not case.tcp and case.machine.startswith(("head", "nutated"))
+    text = _Text(rng, 25.4 if units == "inch" else 1.0, one_tool)
     text.say("PARTNO TRIAL", "UNITS/INCHES" if units == "inch" else "UNITS/MM")
     _tool(text)
     kinds, oracle = [*CHAINS, "flip"] if flips and not fixed else [*CHAINS], True
@@ -242,10 +248,10 @@ def trial(seed: int, *, flips: bool = True, only: str = "") -> Trial:
         if rng.random() < 0.4:
             _tool(text)
     text.say("SPINDL/OFF", "FINI")
-    return Trial(seed, case, _settings(rng, case), units, "\n".join(text.lines) + "\n", oracle, tuple(parts))
+    return Trial(seed, case, _settings(rng, seed, form), units, "\n".join(text.lines) + "\n", oracle, tuple(parts))
 
 
-def _settings(rng: np.random.Generator, case: Case) -> Settings:
+def _settings(rng: np.random.Generator, seed: int, form: Form) -> Settings:
     options: dict[str, object] = {
         "tolerance": float(np.round(10.0 ** rng.uniform(-3, 0), 6)),
         "axis_length": float(np.round(10.0 ** rng.uniform(0, 2.3), 3)),
@@ -263,7 +269,23 @@ def _settings(rng: np.random.Generator, case: Case) -> Settings:
         options["reversal_angle"] = float(rng.choice([30.0, 90.0, 175.0, 180.0]))
     if rng.random() < 0.2:
         options["axis_step"] = float(rng.choice([0.1, 1.0, 10.0]))
+    if form.curve in ("poly", "spl"):
+        options = {name: value for name, value in options.items() if name not in ("weights", "shape")}
+    _other_methods(np.random.default_rng((seed, 1)), form, options)
     try:
         return Settings(**options)  # type: ignore[arg-type]
     except SettingsError:
         return Settings(tolerance=max(0.002, float(options["tolerance"])), axis_length=10.0)  # type: ignore[arg-type]
+
+
+def _other_methods(rng: np.random.Generator, form: Form, options: dict[str, object]) -> None:
+    """Methods that some forms do not hold, and long lines; by a generator of its own, so that programs stay."""
+    runs = not form.curves or (form.curve in ("bspline", "g6.2") and not form.rotary)
+    if form.curves and form.rotary and options.get("method") == "zhang2016":
+        del options["method"]
+    if rng.random() < 0.25 and runs:
+        for name in ("shape", "allocation", "weights", "orientation_tolerance"):
+            options.pop(name, None)
+        options["method"] = "global"
+    if form.long_lines and rng.random() < 0.4:
+        options["lines"] = str(rng.choice(["long", "dense"]))

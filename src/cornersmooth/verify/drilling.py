@@ -149,20 +149,27 @@ def divide_at_holes(original: Original, nc: Elements, axis_length: float) -> Hol
     search = _Search(original, nc, axis_length)
     all_cycles = drillings(original.program, original.pose[hole].tolist())
     move = element = used = 0
-    for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    runs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    for number, (first, stop) in enumerate(runs):
         cycles = all_cycles[used : used + stop - first]
         used += stop - first
-        start = search.start(first, element, cycles[0]) if first > move else element
-        if first > move:
+        start = element
+        if first > move and not search.stands(move, first, element):
+            start = search.start(first, element, cycles[0])
             found.parts.append((move, first - 1, element, start - 1))
-        groups, element = search.consume(first, stop, start)
+        idle = np.isnan(cycles[-1].depth) and number + 1 < len(runs) and search.same_hole(stop - 1, runs[number + 1][0])
+        groups, element = search.consume(first, stop, start, idle=idle)
         if stop < moves:
             groups[-1], element = search.give_back(stop, groups[-1], cycles[-1], element)
             if element < elements and search.exact(stop, np.array([element]))[0]:
                 found.shared[element] = stop
         if all(nc.kind[k] == Element.RAPID for k in groups[-1]):
             before = [k for group in groups[:-1] for k in group]
-            found.shared[max(before, default=max(start - 1, 0))] = stop - 1
+            last = max(before, default=max(start - 1, 0))
+            found.shared[last] = stop - 1
+            while first and not before and last > 0 and search.exact(first - 1, np.array([last - 1]))[0]:
+                last -= 1  # said twice, as behind a tool change
+                found.shared[last] = stop - 1
         for k, group in enumerate(groups):
             found.element_move.update(dict.fromkeys(group, first + k))
             found.problems += search.check(first + k, group, cycles[k])
@@ -204,6 +211,17 @@ class _Search:
         on = (beside <= self.room) & (turned * self.axis_length <= 2 * self.room)
         return np.where(on, height, np.nan)
 
+    def stands(self, move: int, hole: int, element: int) -> bool:
+        """Whether the moves before a hole lead nowhere: the tool is where they end, and goes on over the hole."""
+        if not 0 < element < len(self.nc) or np.isnan(self.heights(hole, np.array([element]))[0]):
+            return False
+        return all(self.exact(k, np.array([element - 1]))[0] for k in range(move, hole))
+
+    def same_hole(self, one: int, other: int) -> bool:
+        """Whether two moves are to the same hole."""
+        apart = np.linalg.norm(self.tip[one] - self.tip[other]), np.linalg.norm(self.axis[one] - self.axis[other])
+        return bool(apart[0] <= self.room and apart[1] * self.axis_length <= 2 * self.room)
+
     def start(self, hole: int, element: int, cycle: Drilling) -> int:
         """First element of a run of holes: behind the pose before it, where the text goes over to the first hole.
 
@@ -213,19 +231,31 @@ class _Search:
         for begin in range(element, len(self.nc), _WINDOW):
             window = np.arange(begin, min(begin + _WINDOW, len(self.nc)))
             for k in window[self.exact(hole - 1, window)].tolist():
-                reached = k if reached is None else reached
+                reached = k if reached is None or k == reached + 1 else reached  # the same place twice: as new
                 if np.isnan(cycle.depth):
-                    return int(reached) + 1
+                    continue
                 if k + 1 < len(self.nc) and not np.isnan(self.heights(hole, np.array([k + 1]))[0]):
                     return int(k) + 1
+            if reached is not None and np.isnan(cycle.depth):
+                return int(reached) + 1
         return element if reached is None else int(reached) + 1
 
-    def consume(self, first: int, stop: int, element: int) -> tuple[list[list[int]], int]:
-        """Elements of each hole, and the element behind them all."""
+    def consume(self, first: int, stop: int, element: int, *, idle: bool) -> tuple[list[list[int]], int]:
+        """Elements of each hole, and the element behind them all.
+
+        `idle`: nothing is drilled in the last of them, and the next run begins in the same hole: what goes down in it,
+        from where the cycle was entered, belongs to that.
+        """
         groups: list[list[int]] = []
         for move in range(first, stop):
             group: list[int] = []
-            while element < len(self.nc) and not np.isnan(self.heights(move, np.array([element]))[0]):
+            least = -np.inf
+            if idle and move == stop - 1 and first:
+                least = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0) - self.room
+            while element < len(self.nc):
+                height = self.heights(move, np.array([element]))[0]
+                if np.isnan(height) or height < least:
+                    break
                 group.append(element)
                 element += 1
             if not group and groups and groups[-1]:  # the same hole again
