@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate import BlockLimits, Limits, TimeLaw, direct, plan_text
+from cornersmooth.feedrate import BlockLimits, Limits, TimeLaw, direct, plan, plan_text
 from cornersmooth.kinematics import load_machine
-from cornersmooth.model import Program
-from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.model import Program, SmoothProgram
+from cornersmooth.nc import choose_form, fit_settings, load_control, write
 from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
@@ -104,11 +103,107 @@ def test_arcs_and_inches_are_read() -> None:
     assert law.length == pytest.approx(25.4 * (1 + np.pi / 2), rel=1e-6)
 
 
-def test_text_with_curves_is_refused() -> None:
-    nc: NcProgram = read_nc(text_of(read(SAMPLE.read_bytes(), name="impeller.cls"), "g6.2", tolerance=0.01))
-    with pytest.raises(SettingsError) as caught:
-        plan_text(nc, LIMITS)
-    assert caught.value.code == "CS264"
+#: every form with curves, what has so many digits that they do not show, and the machine of rotary words
+CURVES = (
+    ("generic", "g6.2", "9", ""),
+    ("siemens", "bspline", "6", ""),
+    ("siemens", "poly", "6", ""),
+    ("generic", "g6.2", "9", "table-ac"),
+)
+
+
+def blade(count: int = 30) -> Program:
+    """A few corners with a turning tool, transitions from one to the next."""
+    u = np.arange(count) / 3.0
+    tip = np.stack((2.0 * u, np.sin(u), 0.2 * np.cos(2.0 * u)), axis=1)
+    axis = np.stack((0.3 * np.sin(u), 0.2 * np.cos(1.3 * u), np.ones(count)), axis=1)
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    return Program.from_poses(tip, axis, feed=3000.0)
+
+
+def curves_of(
+    program: Program, control: str, form: str, digits: str, name: str = ""
+) -> tuple[SmoothProgram, NcProgram, bytes]:
+    machine = load_machine(name) if name else None
+    chosen = choose_form(control, form, machine=machine, digits=digits)
+    stream = io.BytesIO()
+    smoothed = smooth(program, fit_settings(Settings(tolerance=0.02), chosen, program.units))
+    write(smoothed, stream, form=chosen)
+    return smoothed, read_nc(stream.getvalue(), control=control, machine=machine), stream.getvalue()
+
+
+@pytest.mark.parametrize(("control", "form", "digits", "name"), CURVES)
+def test_curves_of_a_text_with_many_digits_take_as_long_as_those_they_are_of(
+    control: str, form: str, digits: str, name: str
+) -> None:
+    smoothed, nc, _ = curves_of(blade(), control, form, digits, name)
+    assert len(nc.curves) == (56 if form == "poly" else 28)
+    # lines in rotary words turn the axes evenly, from kink to kink: their machine is slower than the ideal one
+    for machine in (None,) if name else (None, load_machine("table-ac")):
+        law = plan_text(nc, LIMITS, machine=machine)
+        expected = plan(smoothed, LIMITS, machine=machine)
+        assert law.total == pytest.approx(expected.total, rel=2e-3)
+        assert law.length == pytest.approx(expected.length, rel=1e-5)
+        times = np.linspace(0.0, 1.0, 101)
+        here, there = law.at(times * law.total), expected.at(times * expected.total)
+        np.testing.assert_allclose(here.tip, there.tip, atol=0.05)  # not at the same moment to the last digit
+        np.testing.assert_allclose(here.axis, there.axis, atol=0.01)
+
+
+def test_what_rotary_words_make_of_a_block_is_one_motion() -> None:
+    """Only where blocks meet may the axes have to slow down."""
+    _, nc, _ = curves_of(blade(), "fanuc", "g6.2", "", "table-ac")
+    law = plan_text(nc, LIMITS, machine=load_machine("table-ac"))
+    same = np.diff(law.path.program.line[law.path.move]) == 0
+    assert same.sum() > 100
+    assert np.isinf(law.path.junction_speed[1:-1][same]).all()
+
+
+def test_polynomials_of_an_upright_tool_are_planned() -> None:
+    program = blade()
+    program = replace(program, axis=np.tile([0.0, 0.0, 1.0], (len(program), 1)))
+    smoothed, nc, _ = curves_of(program, "heidenhain", "spl", "")
+    assert plan_text(nc, LIMITS).total == pytest.approx(plan(smoothed, LIMITS).total, rel=2e-3)
+
+
+def test_rounded_digits_cost_time_on_a_machine_and_a_far_second_point_saves_it() -> None:
+    dense = blade(60)
+    dense = replace(dense, tip=0.1 * dense.tip)
+    machine = load_machine("table-ac")
+    taken = []
+    for digits, lever in (("6", 100), ("4", 100), ("4", 10)):
+        control = load_control("generic").with_digits(digits)
+        control = replace(control, digits=replace(control.digits, lever=lever))
+        form = choose_form(control, "g6.2")
+        stream = io.BytesIO()
+        write(smooth(dense, fit_settings(Settings(tolerance=0.02), form, "mm")), stream, form=form)
+        taken.append(plan_text(read_nc(stream.getvalue(), control="generic"), LIMITS, machine=machine).total)
+    fine, coarse, near = taken
+    assert fine < coarse < near
+
+
+def test_axes_of_a_machine_do_not_jump_where_rounded_curves_meet() -> None:
+    _, nc, _ = curves_of(blade(), "fanuc", "g6.2", "IS-B")
+    machine = load_machine("table-ac")
+    law = plan_text(nc, LIMITS, machine=machine)
+    edges = law.times_at(law.edge[1:-1])
+    before, after = law.axes_at(edges - 1e-9), law.axes_at(edges + 1e-9)
+    assert law.machine_axes is not None
+    _, accel, jerk = law.machine_axes.limits
+    period = LIMITS.period
+    assert (np.abs(after[1] - before[1]) <= 1.01 * accel * period + 1e-4).all()
+    bent = np.abs(after[2] - before[2]) / (jerk * period)
+    # the bound leaves out what the change of the tangent makes of the acceleration along the path
+    assert bent.max() < 1.3
+
+
+def test_blocks_of_a_curve_are_counted() -> None:
+    """Five control points and four knots of a G6.2 are nine blocks, so many times the shortest time."""
+    _, nc, text = curves_of(blade(), "fanuc", "g6.2", "")
+    law = plan_text(nc, LIMITS, blocks=BlockLimits(block_time=0.01))
+    motion = [line for line in text.splitlines() if line[:2] in (b"G1", b"G6", b"K0", b"K1")]
+    assert law.total >= 0.01 * (len(motion) - 1)
+    assert law.total < 0.01 * (len(motion) + 60)
 
 
 def test_command_shows_the_text_beside_the_paths(tmp_path: Path) -> None:

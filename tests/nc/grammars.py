@@ -36,6 +36,10 @@ HOMES = {
     "generic": {},
 }
 
+#: decimals of lengths in mm (in inches one more) and of rotary words
+TIP_DIGITS = {"siemens": 6, "linuxcnc": 6, "generic": 6}
+ANGLE_DIGITS = {"siemens": 6, "linuxcnc": 6, "generic": 6}
+
 #: how tip control or the length of the tool is switched on and off
 LENGTH = {"on": r"G43 H\d+", "off": "G49"}
 VECTORS = {"on": r"G43\.5 H\d+", "off": "G49"}
@@ -47,7 +51,7 @@ TCPM = {"on": "FUNCTION TCPM .*", "off": "FUNCTION RESET TCPM", "tool": r"TOOL C
 
 def reader(control: str, form: str, machine: str = "", tcp: bool = True, units: str = "mm") -> Reader:
     """Reader of the text of a control in one of its forms."""
-    tip = 4 if units == "mm" else 5
+    tip = TIP_DIGITS.get(control, 4) + (units == "inch")
     made = {"siemens": _siemens, "heidenhain": _heidenhain}.get(control, _iso)(control, form, machine, tcp, tip)
     made = replace(made, **HOMES[control])
     return replace(made, scale=1.0 if units == "mm" else 25.4)
@@ -75,8 +79,7 @@ def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
         codes += "|G5 P10000|G5 P0" if (control, form) == ("mitsubishi", "g6.2") else ""
     codes = "|".join(part for part in (codes, switch["on"], switch["off"]) if part)
     if machine:
-        angle = 4 if control == "haas" else 5
-        words, decimals, turn = machine_letters(machine), (angle,) * 2, _rotary(machine, tcp)
+        words, decimals, turn = machine_letters(machine), (ANGLE_DIGITS.get(control, 4),) * 2, _rotary(machine, tcp)
     elif form == "g1":
         words, decimals, turn = ("I", "J", "K"), (7,) * 3, "great circle"
     elif control == "mitsubishi":
@@ -98,7 +101,7 @@ def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
 
 def _siemens(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
     if machine:
-        words, decimals, turn = machine_letters(machine), (5,) * 2, _rotary(machine, tcp)
+        words, decimals, turn = machine_letters(machine), (ANGLE_DIGITS[control],) * 2, _rotary(machine, tcp)
     elif form == "g1":
         words, decimals, turn = ("A3=", "B3=", "C3="), (7,) * 3, "great circle"
     else:
@@ -121,7 +124,7 @@ def _heidenhain(control: str, form: str, machine: str, tcp: bool, tip: int) -> R
     if machine:
         words, decimals, turn = machine_letters(machine), (4,) * 2, "angles"
     elif form == "g1":
-        words, decimals, turn = ("TX", "TY", "TZ"), (7,) * 3, "great circle"
+        words, decimals, turn = ("TX", "TY", "TZ"), (8,) * 3, "great circle"
     else:
         words, decimals, turn = (), (), "fixed"
     line = "LN" if turn == "great circle" else "L"

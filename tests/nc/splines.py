@@ -125,7 +125,7 @@ class HeidenhainSplines:
 
     def __call__(self, reader: Reader, line: str, at: int, position: Floats | None, reading: Reading) -> Floats | None:
         ends = " ".join(rf"{word}([+-]\d+\.\d{{{d}}})" for word, d in zip(reader.words, reader.decimals, strict=True))
-        factor = r"([+-]\d\.\d{7}|[+-][1-9]\.\d{8}E[+-]\d{3})"
+        factor = r"([+-]\d\.\d{8}|[+-][1-9]\.\d{8}E[+-]\d{3})"
         factors = " ".join(f"K{power}{word}{factor}" for word in reader.words for power in (3, 2, 1))
         match = re.fullmatch(f"SPL {ends} {factors}", line)
         if match is None:

@@ -188,4 +188,4 @@ def test_heidenhain_numbers_every_block() -> None:
 def test_inches_have_their_own_word_and_digits() -> None:
     lines = lines_of(choose_form("siemens"), CL.replace("UNITS/MM", "UNITS/INCHES").replace("MMPM", "IPM"))
     assert "G90 G94 G17 G40 G700" in lines
-    assert "G0 X0.00000 Y0.00000 Z50.00000 A3=0.0000000 B3=0.0000000 C3=1.0000000" in lines
+    assert "G0 X0.0000000 Y0.0000000 Z50.0000000 A3=0.0000000 B3=0.0000000 C3=1.0000000" in lines

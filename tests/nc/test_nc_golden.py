@@ -11,7 +11,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.settings import Settings
 from nc.cases import CHOSEN, Case
-from nc.grammars import reader
+from nc.grammars import TIP_DIGITS, reader
 from nc.promise import written
 from nc.reading import TextError
 
@@ -61,7 +61,7 @@ def test_agreed_text_is_text_of_the_control(source: str, case: Case) -> None:
 
 def spoilt(lines: list[str], case: Case, tip: int) -> Iterator[tuple[str, list[str]]]:
     """What is wrong, and the text with it."""
-    first = next(number for number, line in enumerate(lines) if re.search(r"\bX[+-]?\d+\.\d{4,5} Y", line))
+    first = next(number for number, line in enumerate(lines) if re.search(r"\bX[+-]?\d+\.\d{4,7} Y", line))
     changes = {
         "unknown word": lines[first] + " Q1.",
         "a digit less": re.sub(r"(X[+-]?\d+\.\d+)\d ", r"\1 ", lines[first]),
@@ -84,7 +84,8 @@ def spoilt(lines: list[str], case: Case, tip: int) -> Iterator[tuple[str, list[s
 @pytest.mark.parametrize(("source", "case"), TEXTS, ids=lambda value: str(value))
 def test_spoilt_text_is_refused(source: str, case: Case) -> None:
     """The readers can say no."""
-    units, tip = ("inch", 5) if source == "inch" else ("mm", 4)
+    units = "inch" if source == "inch" else "mm"
+    tip = TIP_DIGITS.get(case.control, 4) + (units == "inch")
     lines = golden(source, case).read_text().splitlines()
     for what, text in spoilt(lines, case, tip):
         assert text != lines, what

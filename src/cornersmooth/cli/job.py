@@ -287,13 +287,11 @@ def _limits(job: Job) -> Limits:
 
 
 def _planned(job: Job, result: Result) -> tuple[float, float] | None:
-    """Times of the direct path and of the written one, s; None for texts with curves, and without feeds."""
+    """Times of the direct path and of the written one, s; None for texts without feeds."""
     from cornersmooth.feedrate import direct, plan_text
     from cornersmooth.page.pages import read_written
 
     program, settings, machine = result.program, result.smoothed.settings, result.form.machine
-    if result.form.curve:
-        return None
     machine = machine if machine is not None and machine.dynamics else None
     try:
         limits = _limits(job)

@@ -205,7 +205,12 @@ def _form(given: dict[str, Any]) -> Form:
 
     machine = nc_text.machine_of(given)
     return choose_form(
-        nc_text.control_of(given), given["form"], machine=machine, tcp=not given["no_tcp"], extras=given["extras"]
+        nc_text.control_of(given),
+        given["form"],
+        machine=machine,
+        tcp=not given["no_tcp"],
+        extras=given["extras"],
+        digits=given["digits"],
     )
 
 

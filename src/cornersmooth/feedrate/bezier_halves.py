@@ -8,6 +8,8 @@ the corner, so that short transitions far from the origin keep their digits.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
+from math import comb
 
 import numpy as np
 
@@ -24,9 +26,9 @@ TOGETHER = 512
 
 #: Bernstein coefficients of the five basis functions on the first half: Bézier point j is Σ w_i·P_i·_TO_BEZIER[j, i]
 _TO_BEZIER = np.array([[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0.5, 0.5, 0, 0], [0, 0.25, 0.5, 0.25, 0]])
-_TO_POWERS = np.array([[1, 0, 0, 0], [-3, 3, 0, 0], [3, -6, 3, 0], [-1, 3, -3, 1]], np.float64)
-_FIRST = _TO_POWERS @ _TO_BEZIER
-_SECOND = _TO_POWERS @ _TO_BEZIER[::-1, ::-1]
+_CUBIC = np.array([[1, 0, 0, 0], [-3, 3, 0, 0], [3, -6, 3, 0], [-1, 3, -3, 1]], np.float64)
+_FIRST = _CUBIC @ _TO_BEZIER
+_SECOND = _CUBIC @ _TO_BEZIER[::-1, ::-1]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
@@ -36,6 +38,8 @@ _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 INTERVALS = 12
 _PROGRESS = 1.0 - np.linspace(1.0, 0.0, INTERVALS + 1) ** 1.7
 _NEWTON_STEPS = 3
+#: parameter beside an end at which the tangent is taken where there is none at the end itself
+_BESIDE = 1e-3
 #: a radius of curvature below this is a cusp and is passed with the speed for this radius, mm
 SMALLEST_RADIUS = 1e-6
 #: samples of the curvature per interval, and rounds of closer sampling where it is largest
@@ -64,12 +68,37 @@ def half_curves(points: Floats, weights: Floats, half: Ints) -> Floats:
     return powers
 
 
-def polynomial(points: Floats) -> Floats:
-    """Powers of t (g, 4, 4), as in `half_curves`, of cubics with the Bézier points (g, 4, 3)."""
-    powers = np.zeros((len(points), 4, 4))
-    powers[:, :, :3] = _TO_POWERS @ points
-    powers[:, 0, 3] = 1.0
+def polynomial(points: Floats, weights: Floats | None = None) -> Floats:
+    """Powers of t (g, d + 1, 4), as in `half_curves`, of curves of degree d.
+
+    Parameters
+    ----------
+    points : (g, d + 1, 3) float64
+        Bézier points.
+    weights : (g, d + 1) float64, optional
+        All 1 by default.
+    """
+    convert = _to_powers(points.shape[1] - 1)
+    powers = np.zeros((*points.shape[:2], 4))
+    if weights is None:
+        powers[:, :, :3] = convert @ points
+        powers[:, 0, 3] = 1.0
+        return powers
+    powers[:, :, :3] = convert @ (points * weights[..., None])
+    powers[:, :, 3] = weights @ convert.T
     return powers
+
+
+@cache
+def _to_powers(degree: int) -> Floats:
+    """(d + 1, d + 1) coefficients of t^k in the Bernstein polynomials of a degree."""
+    return np.array(
+        [
+            [(-1) ** (k + i) * comb(degree, k) * comb(k, i) if i <= k else 0 for i in range(degree + 1)]
+            for k in range(degree + 1)
+        ],
+        np.float64,
+    )
 
 
 def corner_halves(
@@ -85,6 +114,17 @@ def corner_halves(
 def evaluate(powers: Floats, t: Floats) -> Floats:
     """(g, m, 3) points at the parameters t (g, m)."""
     return np.moveaxis(_derivatives(powers, t, 0)[0], 0, -1)
+
+
+def end_tangents(powers: Floats) -> Floats:
+    """Unit tangents (2, g, 3) at t = 0 and t = 1; where the curve comes to a stand there, a little inside of it."""
+    found = np.zeros((2, len(powers), 3))
+    for side, places in enumerate(((0.0, _BESIDE), (1.0, 1.0 - _BESIDE))):
+        slopes = [np.moveaxis(_derivatives(powers, np.full((len(powers), 1), t), 1)[1], 0, -1)[:, 0] for t in places]
+        own, inside = (norm(slope)[:, None] for slope in slopes)
+        found[side] = np.where(own > _BESIDE * inside, slopes[0], slopes[1])
+        found[side] /= np.maximum(norm(found[side]), np.finfo(np.float64).tiny)[:, None]
+    return found
 
 
 def _derivatives(powers: Floats, t: Floats, order: int) -> list[Floats]:

@@ -1,4 +1,7 @@
-"""Curved elements of a path as cubics over t ∈ [0, 1]: halves of transitions, pieces of the curves of runs."""
+"""Curved elements of a path as rational polynomials over t ∈ [0, 1].
+
+Halves of transitions and pieces of the curves of runs are cubics; those of an NC text may be of a higher degree.
+"""
 
 from __future__ import annotations
 
@@ -28,10 +31,10 @@ class Cubics(NamedTuple):
 
     Parameters
     ----------
-    tip, axis_point : (g, 4, 4) float64
+    tip, axis_point : (g, d + 1, 4) float64
         Powers of t of w·P and w, as in `bezier_halves.half_curves`, relative to `origin`.
     half : (g,) int64
-        0 and 1 for the halves of a transition, `WHOLE` for a piece of a run.
+        0 and 1 for the halves of a transition, `WHOLE` for a piece of a run or of a curve of a text.
     origin : (g, 3) float64, mm
     """
 
@@ -43,11 +46,11 @@ class Cubics(NamedTuple):
 
 @dataclass(frozen=True)
 class RunPieces:
-    """Curves of whole runs cut at all knots and poses, p pieces in path order.
+    """Curves of whole runs, or of a text, cut at all knots and poses, p pieces in path order.
 
     Parameters
     ----------
-    tip, axis_point : (p, 4, 4) float64
+    tip, axis_point : (p, d + 1, 4) float64
     origin : (p, 3) float64, mm
         As for `Cubics`.
     move : (p,) int64
@@ -81,13 +84,7 @@ class RunPieces:
         tip, axis_point = (
             bezier_halves.polynomial(hull[..., part] - origin[:, None]) for part in (slice(0, 3), slice(3, 6))
         )
-        length, angle = np.zeros(len(hull)), np.zeros(len(hull))
-        for at in range(0, len(hull), _GROUP):
-            rows = np.arange(at, min(at + _GROUP, len(hull)))
-            half = np.full(len(rows), WHOLE)
-            length[rows] = bezier_halves.interval_lengths(tip[rows], bezier_halves.interval_borders(half)).sum(axis=1)
-            still = rows[length[rows] <= bezier_halves.STANDSTILL]
-            angle[still] = bezier_halves.turned_angle(tip[still], axis_point[still], half[: len(still)])
+        length, angle = measured(tip, axis_point)
         s0, s1 = lines.s[pieces.segment], lines.s[pieces.segment + 1]
         fraction = np.stack((pieces.low - s0, pieces.high - s0), axis=1) / (s1 - s0)[:, None]
         inner = np.zeros(len(program), np.bool_)
@@ -97,28 +94,41 @@ class RunPieces:
         return cls(tip, axis_point, origin, runs.pose[pieces.segment + 1], fraction, length, angle, inner)
 
 
+def measured(tip: Floats, axis_point: Floats) -> tuple[Floats, Floats]:
+    """Lengths of the tip (p,) on whole pieces, mm, and angles that the axis turns (p,), rad, where the tip stands."""
+    length, angle = np.zeros(len(tip)), np.zeros(len(tip))
+    for at in range(0, len(tip), _GROUP):
+        rows = np.arange(at, min(at + _GROUP, len(tip)))
+        half = np.full(len(rows), WHOLE)
+        length[rows] = bezier_halves.interval_lengths(tip[rows], bezier_halves.interval_borders(half)).sum(axis=1)
+        still = rows[length[rows] <= bezier_halves.STANDSTILL]
+        angle[still] = bezier_halves.turned_angle(tip[still], axis_point[still], half[: len(still)])
+    return length, angle
+
+
 def cubics(path: Path, element: Ints) -> Cubics:
     """The cubics of some curved elements of a path."""
     from cornersmooth.feedrate.path import Kind
 
     corners, runs = path.corners, path.run_pieces
-    if corners is None:
-        raise ValueError("a direct path has no curves")
     half = (path.span[element, 0] > 0.0).astype(np.int64)
     height, row = path.settings.axis_length, path.corner[element]
+    whole = path.kind[element] == Kind.PIECE
+    half[whole] = WHOLE
+    if runs is not None and whole.all():
+        return Cubics(runs.tip[row], runs.axis_point[row], half, runs.origin[row])
+    if corners is None:
+        raise ValueError("a direct path has no transitions")
     if runs is None:
         tip, axis_point = bezier_halves.corner_halves(path.program, corners, row, half, height)
         return Cubics(tip, axis_point, half, path.program.tip[corners.pose[row]])
-    whole = path.kind[element] == Kind.PIECE
-    half[whole] = WHOLE
     tip, axis_point, origin = np.zeros((len(row), 4, 4)), np.zeros((len(row), 4, 4)), np.zeros((len(row), 3))
     tip[whole], axis_point[whole], origin[whole] = (
         values[row[whole]] for values in (runs.tip, runs.axis_point, runs.origin)
     )
-    if not whole.all():
-        own = row[~whole]
-        tip[~whole], axis_point[~whole] = bezier_halves.corner_halves(path.program, corners, own, half[~whole], height)
-        origin[~whole] = path.program.tip[corners.pose[own]]
+    own = row[~whole]
+    tip[~whole], axis_point[~whole] = bezier_halves.corner_halves(path.program, corners, own, half[~whole], height)
+    origin[~whole] = path.program.tip[corners.pose[own]]
     return Cubics(tip, axis_point, half, origin)
 
 

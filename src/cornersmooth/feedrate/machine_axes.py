@@ -127,17 +127,20 @@ class MachineAxes:
     def jump_speeds(self, accel_time: float) -> Floats:
         """Speeds (m + 1,) at which sharp corners ask no axis for more than its acceleration allows in this time.
 
-        One at the start of every element and one at the end of the last; inf where nothing changes at once.
+        One at the start of every element and one at the end of the last; inf where nothing changes at once. Where
+        curves of a text or of a run join, the jump of the acceleration is bounded as well, by the jerk.
         """
         path = self.path
         found = np.full(len(path) + 1, np.inf)
         sharp = np.flatnonzero(np.isfinite(path.junction_speed) & (path.junction_speed > 0.0))
         if len(sharp):
-            sides = [
-                self.orders(sharp + shift, np.full(len(sharp), share))[1] for shift, share in ((-1, 1.0), (0, 0.0))
-            ]
+            sides = [self.orders(sharp + shift, np.full(len(sharp), share)) for shift, share in ((-1, 1.0), (0, 0.0))]
+            _, accel, jerk = self.limits
             with np.errstate(invalid="ignore", divide="ignore"):
-                allowed = self.limits[1] * accel_time / np.abs(sides[1] - sides[0])
+                allowed = accel * accel_time / np.abs(sides[1][1] - sides[0][1])
+                steady = np.sqrt(jerk * accel_time / np.abs(sides[1][2] - sides[0][2]))
+            joint = (path.kind[sharp] == Kind.PIECE) | (path.kind[sharp - 1] == Kind.PIECE)
+            allowed[joint] = np.fmin(allowed, steady)[joint]
             found[sharp] = np.where(np.isnan(allowed), np.inf, allowed).min(axis=1)
         return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import comb
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,6 @@ from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Floats, Ints
 from cornersmooth.vectors import norm
 
-_BINOMIALS = np.array([[1, 1, 1, 1], [0, 1, 2, 3], [0, 0, 1, 3], [0, 0, 0, 1]], np.float64)
 _NO_SPEED = np.finfo(np.float64).tiny
 
 
@@ -69,13 +69,14 @@ def taylor_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floa
 def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Floats]:
     """Taylor series in t of tip and lever on halves of transitions, and of the speed of the coordinate."""
     found = cubics(path, element)
-    shifts = np.stack([t**k for k in range(taylor.ORDERS)])
+    powers = found.tip.shape[1]
+    shifts = np.stack([t**k for k in range(powers)])
     curves = []
     for curve in (found.tip, found.axis_point):
         around = np.zeros((taylor.ORDERS, len(t), 4))
         for k in range(taylor.ORDERS):
-            for power in range(k, taylor.ORDERS):
-                around[k] += _BINOMIALS[k, power] * shifts[power - k][:, None] * curve[:, power]
+            for power in range(k, powers):
+                around[k] += comb(power, k) * shifts[power - k][:, None] * curve[:, power]
         curves.append(taylor.divide(around[..., :3], around[..., 3:]))
     tip, axis_point = curves
     lever = axis_point - tip

@@ -34,7 +34,7 @@ class Kind(IntEnum):
     LINE = 0
     CURVE = 1
     ARC = 2
-    PIECE = 3  #: of the curve of a whole run
+    PIECE = 3  #: of the curve of a whole run, or of a text
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Path:
     junction_speed : (m + 1,) float64
         Largest speed at the start of element i, and at the end of the last: 0 for a stop, inf for none.
     run_pieces : RunPieces or None
-        The curves of whole runs.
+        The curves of whole runs, or of a text.
     """
 
     program: Program
@@ -98,12 +98,14 @@ def build_path(
     limits: Limits,
     *,
     runs: Runs | None = None,
+    pieces: RunPieces | None = None,
     stop_everywhere: bool = False,
 ) -> Path:
     """Elements of the direct path (`corners` None) or of the smoothed one.
 
     Corners that stay sharp are passed with a change of velocity of at most ``accel · period``, reversals with a stop;
     with `stop_everywhere` every move ends with a stop. The curves of `runs` replace the segments that they belong to.
+    A direct path may have `pieces`, each a whole move.
 
     Raises
     ------
@@ -137,6 +139,15 @@ def build_path(
     tangents[:] = tip_step / np.maximum(chord, STANDSTILL)[:, None]
     if arc.any():
         along[arc], tangents[0, arc], tangents[1, arc] = arcs.shape(program, moves[arc])
+    piece = np.full(n, -1, np.int64)
+    if pieces is not None:
+        piece[pieces.move] = np.arange(len(pieces.move))
+    piece = piece[moves]
+    bent = piece >= 0
+    if pieces is not None and bent.any():
+        own = piece[bent]
+        along[bent], turned[bent] = pieces.length[own], pieces.angle[own]
+        tangents[:, bent] = bezier_halves.end_tangents(pieces.tip[own])
 
     # three slots per move: out of the corner behind, straight on, into the corner ahead
     m = 3 * len(moves)
@@ -155,8 +166,8 @@ def build_path(
 
     kind = np.tile(np.array([Kind.CURVE, Kind.LINE, Kind.CURVE], np.uint8), len(moves))
     kind[1::3][arc] = Kind.ARC
-    corner = np.full((len(moves), 3), -1, np.int64)
-    corner[:, 0], corner[:, 2] = leaving, reaching
+    kind[1::3][bent] = Kind.PIECE
+    corner = np.stack((leaving, piece, reaching), axis=1)
     span = np.zeros((len(moves), 3, 2))
     span[:, 0] = (0.5, 1.0)
     span[:, 2] = (0.0, 0.5)
@@ -197,6 +208,7 @@ def build_path(
         speed=speed[keep],
         rapid=np.repeat(rapid, 3)[keep],
         junction_speed=np.concatenate((slowest, [0.0])),
+        run_pieces=pieces,
     )
     if runs is None or not len(runs):
         return path

@@ -52,7 +52,7 @@ def find_speed_limits(path: Path, limits: Limits) -> SpeedLimits:
         np.zeros((0, bezier_halves.INTERVALS)),
         np.zeros((0, bezier_halves.INTERVALS)),
     )
-    if len(curve) and path.corners is not None:
+    if len(curve):
 
         def tips(some: Ints) -> tuple[Floats, Ints]:
             found = cubics(path, curve[some])

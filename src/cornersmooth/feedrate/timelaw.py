@@ -244,9 +244,8 @@ def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats, Flo
 def shares_at(path: Path, element: Ints, local: Floats) -> Floats:
     """Where (m,) a coordinate `local` from each element's start lies: share of the length, or parameter t on curves."""
     share = local / np.maximum(path.length[element], np.finfo(np.float64).tiny)
-    corners = path.corners
     rows = np.flatnonzero(curved(path)[element] & ~path.turning[element])
-    if corners is not None and len(rows):
+    if len(rows):
         distinct, which = np.unique(element[rows], return_inverse=True)
         found = cubics(path, distinct)
         share[rows] = bezier_halves.parameters_at(found.tip, found.half, which, local[rows])
@@ -255,8 +254,6 @@ def shares_at(path: Path, element: Ints, local: Floats) -> Floats:
 
 def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
     corners = path.corners
-    if corners is None:
-        raise ValueError("a direct path has no curves")
     distinct, which = np.unique(element, return_inverse=True)
     tip_half, axis_half, half, origin = cubics(path, distinct)
     t = np.where(path.turning[element], share, 0.0)
@@ -265,6 +262,8 @@ def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tup
     tip = bezier_halves.evaluate(tip_half[which], t[:, None])[:, 0]
     axis = bezier_halves.axis_vectors(tip_half[which], axis_half[which], t[:, None])[:, 0]
     kappa = bezier_halves.curvature(tip_half[which], t[:, None])[:, 0]
+    if corners is None:
+        return tip + origin[which], axis, kappa
     row, half = path.corner[element], half[which]
     own = construction_of(path.settings.method).axes(path.program, corners, path.settings, row, (half + t) / 2.0)
     axis = axis if own is None else own

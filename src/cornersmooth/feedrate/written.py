@@ -8,18 +8,23 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import scurve
+from cornersmooth.feedrate.cubics import RunPieces
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.planner import Progress, plan_path
 from cornersmooth.feedrate.timelaw import TimeLaw
+from cornersmooth.feedrate.written_curves import WrittenCurves
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import Arcs, FeedMode, Floats, Move, Program, Source, Statement
+from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Move, Program, Source, Statement
 from cornersmooth.nc_reader.elements import Element, Event, NcProgram
 from cornersmooth.settings import Settings
 from cornersmooth.vectors import unit
 
 #: what a motion block does, as a move
 _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Move.ARC, Element.CURVE: Move.LINEAR}
+
+#: parts of blocks add up to whole ones but for this
+_PART_OF_A_BLOCK = 1e-6
 
 #: letters of words at which the motion stops; G only where it dwells
 _STOPPING = ("M", "T")
@@ -48,8 +53,30 @@ class BlockLimits:
             raise SettingsError("CS260", f"look_ahead is {self.look_ahead}", "give 1 or more")
 
 
-def written_program(nc: NcProgram, name: str) -> Program:
-    """The text as a program: a pose at the end of every motion block, statements where the motion stops.
+@dataclass(frozen=True)
+class WrittenMotion:
+    """A text as a program to plan.
+
+    Parameters
+    ----------
+    program : Program
+        A pose at the end of every element, and at every knot inside of a curve; statements where the motion stops.
+    pieces : RunPieces or None
+        The curves.
+    blocks : (n,) float64
+        Blocks of the text that the move into each pose takes: a part of one where a block is several moves.
+    within : (n,) bool
+        The move goes on with what rotary words make of one block: the kinks between such moves are not the machine's.
+    """
+
+    program: Program
+    pieces: RunPieces | None
+    blocks: Floats
+    within: Bools
+
+
+def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> WrittenMotion:
+    """Read the motion of a text.
 
     Parameters
     ----------
@@ -57,66 +84,96 @@ def written_program(nc: NcProgram, name: str) -> Program:
         As `cornersmooth.nc_reader.read_nc` gives it.
     name : str
         File name for messages.
+    axis_length : float, mm
     """
-    if len(nc.curves):
-        raise SettingsError(
-            "CS264", "the text has curves, and only lines and arcs of a text can be planned", "give a text of lines"
-        )
+    curves = WrittenCurves.of(nc, axis_length) if len(nc.curves) else None
+    count = np.ones(len(nc), np.int64)
+    if curves is not None:
+        count += np.bincount(curves.element, minlength=len(nc)) - (nc.kind == Element.CURVE)
+    owner = np.repeat(np.arange(len(nc)), count)
+    last = np.cumsum(count) - 1
+    tip, lever = nc.tip[owner], (nc.second if nc.second_is == "vector" else nc.second - nc.tip)[owner]
+    pieces = None
+    if curves is not None:
+        bent = np.flatnonzero(nc.kind[owner] == Element.CURVE)
+        tip[bent], lever[bent] = curves.end_tip, curves.end_lever
+        pieces = curves.pieces(bent, len(owner))
     move = np.array([_MOVES[Element(kind)] for kind in sorted(Element)], np.uint8)[nc.kind]
     arcs = nc.arcs
     proper = arcs.element > 0
     feed = np.where(nc.kind == Element.RAPID, np.nan, nc.feed)
-    return Program(
-        tip=nc.tip,
-        axis=unit(nc.second if nc.second_is == "vector" else nc.second - nc.tip),
-        kind=move,
-        feed=feed,
-        line=nc.line,
-        feed_mode=np.where(nc.per_revolution, FeedMode.PER_REVOLUTION, FeedMode.PER_MINUTE).astype(np.uint8),
-        keep=np.zeros(len(nc), np.uint8),
-        arcs=Arcs(arcs.element[proper], arcs.centre[proper], arcs.normal[proper], arcs.sweep[proper]),
+    first = np.append(last - count + 1, len(owner))
+    program = Program(
+        tip=tip,
+        axis=unit(lever),
+        kind=move[owner],
+        feed=feed[owner],
+        line=nc.line[owner],
+        feed_mode=np.where(nc.per_revolution, FeedMode.PER_REVOLUTION, FeedMode.PER_MINUTE).astype(np.uint8)[owner],
+        keep=np.zeros(len(owner), np.uint8),
+        arcs=Arcs(last[arcs.element[proper]], arcs.centre[proper], arcs.normal[proper], arcs.sweep[proper]),
         statements=tuple(
-            Statement(event.element, event.line, event.letter, (event.value,), event.text)
+            Statement(int(first[event.element]), event.line, event.letter, (event.value,), event.text)
             for event in nc.events
             if _stops(event)
         ),
         units=nc.units,
         source=Source(name, "nc"),
     )
+    same = np.concatenate(([False], (nc.line[owner[1:]] == nc.line[owner[:-1]]) & nc.rotary))
+    return WrittenMotion(program, pieces, (_blocks(nc) / count)[owner], same & (nc.kind[owner] != Element.RAPID))
+
+
+def _blocks(nc: NcProgram) -> Floats:
+    """(m,) blocks that each element is: a curve is all lines up to the next, lines from one block share it."""
+    begins = np.flatnonzero(np.diff(nc.line, prepend=-1) != 0)
+    sharing = np.diff(np.append(begins, len(nc)))
+    found = np.repeat(1.0 / sharing, sharing)
+    curve = nc.curves.element
+    following = np.append(nc.line, nc.line[-1:] + 1)[curve + 1]
+    known = np.where(curve + 1 < len(nc), following - nc.line[curve], nc.curves.points)
+    found[curve] = np.maximum(known, 1)
+    return found
 
 
 def _stops(event: Event) -> bool:
     return event.letter in _STOPPING or (event.letter == "G" and event.value == _DWELL)
 
 
-def within_blocks(path: Path, limits: Limits, blocks: BlockLimits) -> Path:
-    """The path with the speeds that the control's blocks allow; every move of the path is a block.
+def within_blocks(path: Path, limits: Limits, known: BlockLimits, blocks: Floats) -> Path:
+    """The path with the speeds that the control's blocks allow.
 
-    A block is passed in `block_time` at the soonest. At the end of each the control must be able to stop within those
-    that it knows, with zero acceleration at both ends: over a length d that is the peak speed of the fastest motion
-    from rest to rest over 2·d.
+    A block is passed in `block_time` at the soonest. At the end of each move the control must be able to stop within
+    the blocks that it knows, with zero acceleration at both ends: over a length d that is the peak speed of the fastest
+    motion from rest to rest over 2·d.
+
+    Parameters
+    ----------
+    blocks : (n,) float64
+        As in `WrittenMotion`.
     """
-    if not len(path) or (blocks.block_time == 0.0 and blocks.look_ahead is None):
+    if not len(path) or (known.block_time == 0.0 and known.look_ahead is None):
         return path
     first = np.flatnonzero(np.concatenate(([True], path.move[1:] != path.move[:-1])))
-    block = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(path))))
-    length = np.add.reduceat(path.length, first)
+    move = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(path))))
+    length, number = np.add.reduceat(path.length, first), blocks[path.move[first]]
     speed = path.speed.copy()
-    if blocks.block_time > 0.0:
-        speed = np.minimum(speed, length[block] / blocks.block_time)
-    if blocks.look_ahead is not None:
-        speed = np.minimum(speed, _stoppable(length, blocks.look_ahead, limits)[block])
+    if known.block_time > 0.0:
+        speed = np.minimum(speed, (length / (number * known.block_time))[move])
+    if known.look_ahead is not None:
+        speed = np.minimum(speed, _stoppable(length, number, known.look_ahead, limits)[move])
     return replace(path, speed=speed)
 
 
-def _stoppable(length: Floats, look_ahead: int, limits: Limits) -> Floats:
+def _stoppable(length: Floats, blocks: Floats, look_ahead: int, limits: Limits) -> Floats:
     """(b,) speeds from which the motion can stop within `look_ahead` blocks behind each; inf where no more follow."""
     gone = np.concatenate(([0.0], np.cumsum(length)))
-    behind = np.arange(1, len(length) + 1)
-    known = gone[np.minimum(behind + look_ahead, len(length))] - gone[behind]
+    read = np.concatenate(([0.0], np.cumsum(blocks)))
+    until = read[1:] + look_ahead
+    ahead = np.interp(until, read, gone) - gone[1:]
     limitless, accel, jerk = (np.full(len(length), value) for value in (np.inf, limits.accel, limits.jerk))
-    speed = scurve.peak_speed(2.0 * np.maximum(known, np.finfo(np.float64).tiny), limitless, accel, jerk)
-    return np.where(behind + look_ahead >= len(length), np.inf, speed)
+    speed = scurve.peak_speed(2.0 * np.maximum(ahead, np.finfo(np.float64).tiny), limitless, accel, jerk)
+    return np.where(until >= read[-1] - _PART_OF_A_BLOCK, np.inf, speed)
 
 
 def plan_text(
@@ -132,7 +189,9 @@ def plan_text(
     """Plan an NC text as its control would run it.
 
     Corners of lines are passed with a change of velocity of at most ``accel · period``, with a machine of no axis by
-    more than its own acceleration allows in one period.
+    more than its own acceleration allows in one period. Curves are those of the written numbers, so that rounded digits
+    bend them: where they join with a kink, what holds for corners holds; and no axis of a machine changes its
+    acceleration there by more than its jerk allows in a period.
 
     Parameters
     ----------
@@ -152,13 +211,16 @@ def plan_text(
     Raises
     ------
     SettingsError
-        CS264: the text has curves; a feed move has no feed in mm/min and `Limits.feed` is not given; the machine has no
+        A feed move has no feed in mm/min and `Limits.feed` is not given; the machine has no
         dynamics.
     InputError
         The machine does not reach a tool axis.
     """
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings
-    path = build_path(written_program(nc, name), None, settings, limits)
-    path = within_blocks(path, limits, BlockLimits() if blocks is None else blocks)
+    motion = written_motion(nc, name, settings.axis_length)
+    path = build_path(motion.program, None, settings, limits, pieces=motion.pieces)
+    inside = motion.within[path.move] & ~path.turning & ~np.concatenate(([True], path.turning[:-1]))
+    path = replace(path, junction_speed=np.where(np.append(inside, False), np.inf, path.junction_speed))
+    path = within_blocks(path, limits, BlockLimits() if blocks is None else blocks, motion.blocks)
     return plan_path(path, limits, machine=machine, progress=progress)

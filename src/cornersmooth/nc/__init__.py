@@ -188,7 +188,8 @@ def write(
     statements = StatementWriter(chosen, program, findings, operation, comments=frame.comments)
     circles = plan_circles(program, smoothed.settings, chosen)
     add_warnings(chosen, smoothed, circles, findings)
-    writer = BlockWriter(chosen, program, statements, findings, circles)
+    stretch = chosen.stretch(smoothed.settings.axis_length)
+    writer = BlockWriter(chosen, program, statements, findings, circles, stretch)
     motion = MotionWriter(program, writer, statements, operation, findings)
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)

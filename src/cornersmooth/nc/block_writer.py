@@ -40,6 +40,8 @@ class BlockWriter:
     findings : Findings
     circles : Circles
         How arcs are written.
+    stretch : float
+        `Form.stretch`.
     """
 
     form: Form
@@ -47,6 +49,7 @@ class BlockWriter:
     statements: StatementWriter
     findings: Findings
     circles: Circles
+    stretch: float = 1.0
     blocks: int = 0
     _feed: int = -1  # ticks and feed mode of the last F, as one number
     _mode: int = FeedMode.PER_MINUTE
@@ -147,6 +150,8 @@ class BlockWriter:
             decimals = form.table.digits.angle
             other = to_ticks(other, (decimals,) * 2) / 10.0**decimals
             tip = machine_position(form.machine, tip, other)
+        if form.orientation == "point":
+            other = tip + self.stretch * (other - tip)
         if form.rotary and form.machine is not None and form.machine.names != form.other_words:
             other = other[:, ::-1]
         numbers = np.concatenate((tip, other[:, : len(form.other_words)]), axis=1)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from cornersmooth.errors import SettingsError
 from cornersmooth.model import Units
 
 Blocks = tuple[str, ...]
@@ -107,7 +108,16 @@ class Motion:
 
 @dataclass(frozen=True)
 class Digits:
-    """Digits after the point; `mm` and `inch` for lengths, `feed`, `speed` and `coefficient` at most."""
+    """Digits after the point; `mm` and `inch` for lengths, `feed`, `speed` and `coefficient` at most.
+
+    Parameters
+    ----------
+    most : int
+        Digits of a length in mm that the control takes.
+    lever : int, mm
+        Distance from the tip at which a second point is written at least. Curves are the same whatever it is, as only
+        the direction counts; the farther the point, the less its rounded digits turn the tool.
+    """
 
     mm: int = 4
     inch: int = 5
@@ -117,6 +127,8 @@ class Digits:
     weight: int = 3
     coefficient: int = 7
     speed: int = 0
+    most: int = 6
+    lever: int = 100
 
 
 @dataclass(frozen=True)
@@ -322,6 +334,8 @@ class Control:
     ----------
     like : str
         Control that comes with the program and that it is like; empty for none.
+    systems : mapping of str to Digits
+        Digits to choose from by name, such as increment systems.
     own : bool
         Whether the table is the user's own, whose words may mean what nobody else knows.
     """
@@ -336,9 +350,33 @@ class Control:
     forms: Mapping[str, FormTable]
     extras: Mapping[str, Extra] = field(default_factory=dict)
     lines: LineStyle = LineStyle()
+    systems: Mapping[str, Digits] = field(default_factory=dict)
     own: bool = False
 
     @property
     def dialect(self) -> str:
         """Control that comes with the program and whose words the text has; empty for none."""
         return self.like if self.own else self.name
+
+    def with_digits(self, choice: str) -> Control:
+        """Return the control with other digits.
+
+        Parameters
+        ----------
+        choice : str
+            Name of one of `systems`, or the number of decimals of lengths in mm; those in inches have one more.
+
+        Raises
+        ------
+        SettingsError
+            CS228: neither, or more than the control takes.
+        """
+        known = {name.lower(): digits for name, digits in self.systems.items()}
+        if choice.lower() in known:
+            return replace(self, digits=known[choice.lower()])
+        number = int(choice) if choice.isdecimal() and len(choice) < 3 else 0
+        if not 1 <= number <= self.digits.most:
+            names = "".join(f"{name}, " for name in self.systems)
+            hint = f"use {names}or a number of decimals up to {self.digits.most}"
+            raise SettingsError("CS228", f"{self.name} cannot be written with the digits {choice!r}", hint)
+        return replace(self, digits=replace(self.digits, mm=number, inch=number + 1))

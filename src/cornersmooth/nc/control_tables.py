@@ -66,6 +66,7 @@ _FEED_MODES = {
 #: keys whose values are tables
 _TABLES = (
     "digits",
+    "digits.systems",
     "lines",
     "program",
     "layout",
@@ -150,13 +151,14 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
             name=_text(table, "name", name),
             description=_text(table, "description", ""),
             like=like,
-            digits=_record(Digits, table.get("digits", {}), "digits"),
+            digits=_digits(table),
             program=_program(table.get("program", {})),
             layout=_layout(table.get("layout", {})),
             words=_words(table.get("words", {})),
             forms=_forms(table),
             extras=_extras(table.get("extras", {})),
             lines=_lines(table.get("lines", {})),
+            systems=_systems(table),
             own=True,
         )
     except SettingsError as error:
@@ -191,6 +193,23 @@ def _check_tables(table: Table) -> None:
 def _check_table(value: object, where: str) -> None:
     if not isinstance(value, dict):
         raise _SHELF.wrong(f"{where} is {value!r}", f"write a table [{where}]")
+
+
+def _digits(table: Table) -> Digits:
+    _SHELF.check_keys(table.get("digits", {}), (*(item.name for item in fields(Digits)), "systems"), "digits.")
+    return _record(Digits, {key: value for key, value in table.get("digits", {}).items() if key != "systems"}, "digits")
+
+
+def _systems(table: Table) -> dict[str, Digits]:
+    """Digits to choose from, each with those of the table where it says nothing."""
+    digits = table.get("digits", {})
+    plain = {key: value for key, value in digits.items() if key != "systems"}
+    systems = {}
+    for name, entry in digits.get("systems", {}).items():
+        where = f"digits.systems.{name}"
+        _check_table(entry, where)
+        systems[name] = _record(Digits, {**plain, **entry}, where)
+    return systems
 
 
 def _program(table: Table) -> ProgramTable:
@@ -313,7 +332,7 @@ def _record(kind: type[Record], table: Table, where: str) -> Record:
         elif isinstance(default, bool):
             values[key] = _flag(value, f"{where}.{key}")
         elif isinstance(default, int):
-            most = _MOST_DIGITS if kind is Digits else 1_000_000
+            most = _MOST_DIGITS if kind is Digits and key != "lever" else 1_000_000
             if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
                 raise _SHELF.wrong(f"{where}.{key} is {value!r}", f"give a whole number up to {most}")
             values[key] = value

@@ -94,17 +94,21 @@ class Form:
     def axis_point_resolution(self, units: Units, tolerance: float, axis_length: float) -> float:
         """What the orientation is worth at the axis point, as a step in mm.
 
-        A rounded axis point moves b = tip + H·dir by at most its own rounding and, across the tool, that of the tip;
-        the latter is in `tip_resolution` already. Rotary words have besides what `rotary_tolerance` leaves to them.
+        A second point at the distance H′ moves b = tip + H·dir by at most H/H′ times its own rounding, besides that of
+        the tip, which is in `tip_resolution` already. Rotary words have besides what `rotary_tolerance` leaves to them.
         """
         if self.orientation == "point":
-            return self.rounding(units)
+            return self.rounding(units) / self.stretch(axis_length)
         if self.orientation == "fixed":
             return 2.0 / math.sqrt(3.0) * ROTARY_SHARE * tolerance
         if self.rotary:
             reserve = axis_length * math.radians(self.rotary_tolerance(tolerance, axis_length) + self._angle_rounding)
             return 2.0 / math.sqrt(3.0) * reserve
         return axis_length * float(10.0**-self.table.digits.vector)
+
+    def stretch(self, axis_length: float) -> float:
+        """By how many times farther from the tip than the axis point a second point is written."""
+        return max(self.table.digits.lever / axis_length, 1.0)
 
     def rotary_tolerance(self, tolerance: float, axis_length: float) -> float:
         """Degrees by which rotary axes may leave the axis asked for, rounding of the words not counted."""

@@ -25,6 +25,7 @@ def choose_form(
     machine: Machine | None = None,
     tcp: bool = True,
     extras: Iterable[str] = (),
+    digits: str = "",
 ) -> Form:
     """Return the form of a control by name; the control's default where `form` is None.
 
@@ -38,6 +39,8 @@ def choose_form(
         Whether the control keeps the tool tip itself; without, the words are positions of the machine's axes.
     extras : iterable of str
         Names of functions of the control to be switched on.
+    digits : str
+        As `Control.with_digits` takes it; empty for those of the control's table.
 
     Raises
     ------
@@ -45,6 +48,8 @@ def choose_form(
         Unknown control or form, or a combination that the control cannot run.
     """
     table = control if isinstance(control, Control) else load_control(control)
+    if digits:
+        table = table.with_digits(digits)
     name = next(iter(table.forms)) if form is None else form if form in table.forms else form.lower()
     if name not in table.forms:
         close = closest(name, tuple(table.forms))

@@ -78,6 +78,14 @@ trusted = click.option(
     metavar="FILE",
     help="Lines that belong in the text because you put them there, as --header and --footer of smooth. Repeatable.",
 )
+digits = click.option(
+    "--digits",
+    type=str,
+    metavar="N|NAME",
+    default="",
+    help="Decimals of lengths in mm (in inches one more), or an increment system of the control, as in IS-B. "
+    "[default: what the control takes; fanuc IS-C]",
+)
 block_numbers = click.option("--block-numbers", is_flag=True, help="Number the blocks.")
 no_comments = click.option("--no-comments", is_flag=True, help="Leave out what the CL file says in words.")
 no_verify = click.option(
@@ -92,7 +100,19 @@ def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that writes NC text, besides its form."""
     return all_of(
         function,
-        (control, machine, no_tcp, extras, program_name, work_offset, header, footer, block_numbers, no_comments),
+        (
+            control,
+            machine,
+            no_tcp,
+            extras,
+            digits,
+            program_name,
+            work_offset,
+            header,
+            footer,
+            block_numbers,
+            no_comments,
+        ),
     )
 
 
