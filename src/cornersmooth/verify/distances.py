@@ -220,7 +220,7 @@ def _newton_from_knot(
 ) -> tuple[Floats, np.ndarray]:
     """Nearest points (k, 6) of curves to poses near the knot u, by one step; and whether the step was short enough.
 
-    Distances are taken between control-point curves and a pose whose axis point is as far from its tip as theirs.
+    A second point may stand at any distance from the tip: it is brought to that of the axis point first.
     """
     if 2 * len(curve) < len(group.index):
         value, slope, bend = group.only(curve).jet(u)
@@ -231,8 +231,10 @@ def _newton_from_knot(
     if vectors:  # of length one
         value, slope, bend = (_with_axis_point(part, match.axis_length) for part in (value, slope, bend))
     else:
-        reach = np.linalg.norm(value[:, 3:] - value[:, :3], axis=1) / match.axis_length
-        target[:, 3:] = target[:, :3] + reach[:, None] * (target[:, 3:] - target[:, :3])
+        share = (match.axis_length / np.linalg.norm(value[:, 3:] - value[:, :3], axis=1))[:, None]
+        value, slope, bend = (
+            np.hstack((part[:, :3], part[:, :3] + share * (part[:, 3:] - part[:, :3]))) for part in (value, slope, bend)
+        )
     rest = target - value
     size = np.einsum("ij,ij->i", slope, slope) - np.einsum("ij,ij->i", rest, bend)
     step = np.divide(np.einsum("ij,ij->i", rest, slope), size, out=np.full(len(size), np.inf), where=size > 0)
