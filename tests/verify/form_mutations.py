@@ -134,8 +134,8 @@ def of_numbers(text: Text, rng: np.random.Generator):
             yield Mutant("vector", text.changed(i, match, value + float(rng.choice([-0.2, 0.1]))), text.near(i))
             if abs(value) > 0.05:
                 yield Mutant("sign of a vector", text.changed(i, match, -value), text.near(i))
-        else:
-            yield Mutant("point", text.changed(i, match, value + float(rng.choice([-3, 2]))), text.near(i))
+        else:  # second points stand 100 mm up the axis
+            yield Mutant("point", text.changed(i, match, value + float(rng.choice([-30, 20]))), text.near(i))
     start = text.rapids[0]
     for match in [match for match in PLACE.finditer(text.lines[start]) if match[1] in "XZ"]:
         lost = text.with_line(start, text.lines[start].replace(match[0], ""))
