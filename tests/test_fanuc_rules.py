@@ -66,7 +66,7 @@ def test_first_three_points_lie_on_the_way_in_and_the_last_three_on_the_way_out(
         points = np.array(curve.points)
         np.testing.assert_allclose(points[2, :3], corner, atol=STEP)
         direction = np.array(axis) / np.linalg.norm(axis)
-        np.testing.assert_allclose(points[2, 3:], corner + 10 * direction, atol=STEP)
+        np.testing.assert_allclose(points[2, 3:], corner + 100 * direction, atol=STEP)
         for start, inner, end, share in ((0, 1, 2, 1 / 3), (2, 3, 4, 2 / 3)):
             way = points[end] - points[start]
             np.testing.assert_allclose(points[inner] - points[start], share * way, atol=2 * STEP)
@@ -125,4 +125,4 @@ def test_inch_program_has_five_decimals() -> None:
     assert len(curves(written)) == 2
     assert re.search(r"^G6\.2 P4 K0\. X\d+\.\d{5} ", text, re.MULTILINE)
     np.testing.assert_allclose(curves(written)[0].points[2][:3], (508, 0, 0), atol=25.4e-5)
-    np.testing.assert_allclose(curves(written)[0].points[2][3:], (508, 0, 25.4), atol=25.4e-5)
+    np.testing.assert_allclose(curves(written)[0].points[2][3:], (508, 0, 100), atol=25.4e-5)

@@ -68,7 +68,7 @@ ENDS = {
     ),
     "linuxcnc": (
         ["(CORNERSMOOTH)", SAFE, "G64 P0.01250 Q0", "G53 G0 Z0"],
-        ["G53 G0 Z0", "G49", "M5", "G0 A0.00000 C0.00000", "M2"],
+        ["G53 G0 Z0", "G49", "M5", "G0 A0.000000 C0.000000", "M2"],
     ),
     "mitsubishi": (["%", "O0001", SAFE, *UP], [*UP, "G49", "M5", "M30", "%"]),
     "siemens": (
@@ -109,7 +109,7 @@ def test_a_machine_without_tip_control_ends_in_feed_per_minute() -> None:
         Case("siemens", "g1", "table-ac", tcp=False).choose(), CL.replace("/0,20,0\n", "/0,20,0,0,0.6,0.8\n")
     )
     assert "G93" in lines
-    assert lines[-6:] == ["G94", "M9", "SUPA G0 Z0 D0", "M5", "G0 A0.00000 C0.00000", "M30"]
+    assert lines[-6:] == ["G94", "M9", "SUPA G0 Z0 D0", "M5", "G0 A0.000000 C0.000000", "M30"]
 
 
 # ------------------------------------------------------------------------------------------------ names, numbers

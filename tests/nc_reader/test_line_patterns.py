@@ -14,7 +14,8 @@ from cornersmooth.nc_reader.line_patterns import LinePatterns, lines_of
 from cornersmooth.nc_reader.words import Table
 
 NUMBERS = ["0.", "-0.", "5.", ".5", "-.25", "12.3456", "-123.4567", "0.3956870", "-1.0000000", "1234.5678", "7", "-42"]
-ODD = ["+1.5", "123456.789", "1-2", "", " 3.", "1..2", "1.5+1.5", "--1.5", "1.5E3"]
+NUMBERS += ["123.456789", "-1234.567891", "-9876543.2104567", "99.99999999", "-0.10000001"]
+ODD = ["+1.5", "0.123456789", "1234567890.123456", "1-2", "", " 3.", "1..2", "1.5+1.5", "--1.5", "1.5E3"]
 #: numbers with a sign are of the kind that is read by patterns
 READABLE = [None, "+1.5"]
 

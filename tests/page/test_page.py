@@ -231,6 +231,36 @@ def test_a_page_of_curves_for_whole_runs():
     assert "out of tolerance" not in kinds
 
 
+def test_a_page_of_curves_for_whole_runs():
+    made = smoothed(method="global")
+    meta, arrays = values_of(page_of(made))
+    assert meta["verdict"].startswith("OK: within 0.02 mm everywhere; ")
+    assert dict(meta["facts"])["method"].startswith("global, ")
+    assert set(meta["charts"]["speeds"]) == {"direct", "local", "written"}
+    assert meta["totals"]["local"] < meta["totals"]["direct"]
+    assert 0.01 < np.nanmax(arrays["w_off"]) <= 0.02
+    assert sum(meta["corners"]["counts"].values()) == len(made.smoothed.corners)
+    kinds = [meta["corners"]["kinds"][kind] for kind in arrays["c_kind"]]
+    assert "sharp" in kinds
+    assert any(kind.startswith("rounded") for kind in kinds)
+    assert "out of tolerance" not in kinds
+
+
+def test_a_page_of_curves_for_whole_runs():
+    made = smoothed(method="global")
+    meta, arrays = values_of(page_of(made))
+    assert meta["verdict"].startswith("OK: within 0.02 mm everywhere; ")
+    assert dict(meta["facts"])["method"].startswith("global, ")
+    assert set(meta["charts"]["speeds"]) == {"direct", "local", "written"}
+    assert meta["totals"]["local"] < meta["totals"]["direct"]
+    assert 0.01 < np.nanmax(arrays["w_off"]) <= 0.02
+    assert sum(meta["corners"]["counts"].values()) == len(made.smoothed.corners)
+    kinds = [meta["corners"]["kinds"][kind] for kind in arrays["c_kind"]]
+    assert "sharp" in kinds
+    assert any(kind.startswith("rounded") for kind in kinds)
+    assert "out of tolerance" not in kinds
+
+
 def test_hostile_names_and_comments_are_text():
     made = smoothed(
         name=HOSTILE.replace("{", "{{").replace("}", "}}"),

@@ -21,6 +21,7 @@ EPS, H = 0.02, 10.0
 
 NUMBER = r"[-+]?\d+\.?\d*"
 PLACE = re.compile(rf"(?<![A-Z0-9\[])([XYZ])({NUMBER})")
+SECOND = re.compile(rf"(?<![A-Z0-9\[])([UVW])({NUMBER})")
 TURN = {
     "fanuc": rf"(?<![A-Z0-9])([IJABCUVW])({NUMBER})",
     "siemens": rf"(?<![A-Z0-9])([ABC]3=|[XYZ]H=|[ABC])({NUMBER})",
@@ -87,9 +88,12 @@ class Text:
         return self.with_line(i, f"{line[: match.start(2)]}{sign}{value:.{decimals}f}{line[match.end(2) :]}")
 
     def moved(self, i: int, tip: np.ndarray) -> list[str]:
-        """Text with another position in one line."""
+        """Text with another position in one line, for a second point 100 mm up the axis with the same axis point."""
         new = list(self.lines)
-        for match, value in reversed(list(zip(PLACE.finditer(self.lines[i]), tip, strict=True))):
+        places, seconds = list(PLACE.finditer(self.lines[i])), list(SECOND.finditer(self.lines[i]))
+        way = np.array([float(place[2]) for place in places]) - tip
+        values = [*tip, *(float(second[2]) + 9.0 * off for second, off in zip(seconds, way, strict=False))]
+        for match, value in reversed(list(zip([*places, *seconds], values, strict=True))):
             new = Text(self.case, new).changed(i, match, float(value))
         return new
 
@@ -244,7 +248,7 @@ def of_curves(text: Text, rng: np.random.Generator):
             yield Mutant("weight lost", text.with_line(i, re.sub(r" PW=[\d.]+", "", line)), None)
             yield Mutant("interval lost", text.with_line(i, re.sub(r" PL=[\d.]+", "", line)), (i - 10, i + 14))
         elif "PO[" in line:
-            axis = str(rng.choice(["X", "Y", "Z", "XH", "YH", "ZH"]))
+            axis = str(rng.choice(["X", "Y", "Z", "XH", "YH"]))  # along the axis the second point may be anywhere
             new = re.sub(rf"(PO\[{axis}\]=\(-?[\d.]+),(-?)", r"\1,1\2", line)
             new = re.sub(r",1-", ",-1", new)
             yield Mutant("coefficient", text.with_line(i, new), (i - 2, i + 3))

@@ -2,8 +2,8 @@
 
 What posts write is regular: few patterns make up a text, and a line's pattern is known from where its digits are and
 from what stands between them. Once a pattern is understood, its numbers are read where they must stand, eight digits
-at a time: without the point they fit one machine word, and the value is that integer over a power of ten: exactly
-what `float` gives. Every byte that is no digit is compared with the pattern's; a chunk in which anything is not
+at a time: without the point they fit one machine word, or two, and the value is that integer over a power of ten:
+exactly what `float` gives. Every byte that is no digit is compared with the pattern's; a chunk in which anything is not
 regular is left to the careful reading in `block_tables`.
 """
 
@@ -43,6 +43,8 @@ _FEW_PATTERNS: Final = 256
 _LINE_END: Final = 10
 _TO_ZERO: Final = bytes(ord("0") if code in b"0123456789" else code for code in range(256))
 _CARE: Final = bytes(0 if code in b"0123456789" else 255 for code in range(256))
+#: digits of a number that is read here: integers of so many are exact in float64
+_MOST_DIGITS: Final = 15
 _NUMBER: Final = re.compile(rb"(?P<sign>[-+]?)(?P<whole>\d*)(?P<point>\.?)(?P<part>\d*)(?:E(?P<power>[-+]?\d+))?")
 
 #: numbers of so few bytes are compared before they are read: they may all be the same
@@ -153,7 +155,7 @@ class LinePatterns:
             power = max(decimals, 0) - int(match["power"] or 0)
             if match["power"]:
                 care[match.start("power") : match.end("power")] = b"\xff" * len(match["power"])
-            if not 1 <= digits <= DIGITS or not 0 <= power < len(_TENS):
+            if not 1 <= digits <= _MOST_DIGITS or decimals > DIGITS or not 0 <= power < len(_TENS):
                 return None, bytes(care)
             fields.append((match.end("part"), digits, decimals, power, match["sign"] == b"-"))
         pattern = LinePattern(
@@ -240,7 +242,13 @@ class Lines:
                 word &= _each(column.behind, label)
                 word ^= closed
             word &= _each(column.keep, label)
-            found.append(np.divide(join_digits(word).view(np.int64), _each(column.divisor, label)))
+            value = join_digits(word).view(np.int64)
+            if column.lead:  # digits before those eight
+                np.add(start, _each(column.lead_begin, label), out=at)
+                word = self.words[at].view(np.uint64)
+                word &= _each(column.lead_keep, label)
+                value += 10**DIGITS * join_digits(word).view(np.int64)
+            found.append(np.divide(value, _each(column.divisor, label)))
         return found
 
 
@@ -253,10 +261,16 @@ class _Column:
     begin : int64
         From the start of the line to eight bytes before the end of the number.
     behind, keep : uint64
-        The bytes behind the point, and all digits.
+        The bytes behind the point, and the last eight digits.
+    lead_begin : int64
+        From the start of the line to eight bytes before the end of the digits before those.
+    lead_keep : uint64
+        The digits before those.
     divisor : float64
     point, long : bool
         Whether there is a point, and more bytes than a word has, in any pattern.
+    lead : bool
+        Whether there are digits before the last eight, in any pattern.
     short : int
         Bytes of the number, its sign included, where they are few and as many in all patterns; else 0.
     """
@@ -265,8 +279,11 @@ class _Column:
     behind: Any
     keep: Any
     divisor: Any
+    lead_begin: Any
+    lead_keep: Any
     point: bool
     long: bool
+    lead: bool
     short: int
 
 
@@ -275,13 +292,17 @@ def _columns(table: Ints) -> list[_Column]:
     end, digits, decimals, power, minus = np.ascontiguousarray(table.transpose(2, 0, 1))
     size = digits + (decimals >= 0)
     divisor = np.where(minus > 0, -1.0, 1.0) * _TENS[power]
+    lead = np.maximum(digits - DIGITS, 0)
+    lead_begin = end - 2 * DIGITS - (decimals >= 0)
+    values = (end - DIGITS, _BEHIND[decimals], LAST_DIGITS[digits - lead], divisor, lead_begin, LAST_DIGITS[lead])
     short = (size <= _FEW) & (size == size[0]) & (minus == minus[0]) & (power == np.maximum(decimals, 0))
     return [
         _Column(*column)
         for column in zip(
-            *(_alike(values) for values in (end - DIGITS, _BEHIND[decimals], LAST_DIGITS[digits], divisor)),
+            *map(_alike, values),
             (decimals >= 0).any(axis=0).tolist(),
             (size > DIGITS).any(axis=0).tolist(),
+            (lead > 0).any(axis=0).tolist(),
             np.where(short.all(axis=0), size[0] + minus[0], 0).tolist(),
             strict=True,
         )
