@@ -10,8 +10,8 @@ from scipy.interpolate import BSpline
 from scipy.optimize import NonlinearConstraint, minimize
 
 from cornersmooth.smoothing.runs.banded import Gather, solve_blocks
-from cornersmooth.smoothing.runs.fitting import deviations, fit, over
-from cornersmooth.smoothing.runs.interior import smoothest
+from cornersmooth.smoothing.runs.fitting import fit
+from cornersmooth.smoothing.runs.interior import COLD, Task, smoothest
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.samples import Pieces, Samples
 from cornersmooth.smoothing.runs.solving import RunCurves, solve_runs
@@ -156,41 +156,58 @@ def test_smoothest_is_what_a_general_solver_finds() -> None:
     splines = rough.splines
     samples = Samples.of(splines, lines, Pieces.of(splines, lines))
     windows = Windows.of(splines, splines.span_first[:-1], np.diff(splines.span_first))
-    radius = np.full((len(samples.s), 2), 0.05)
-    control = rough.control.copy()
-    control[windows.control] = smoothest(
-        splines, windows, samples, control, radius, (0.05, 0.05), np.ones(len(splines.width)), 1e-4
-    )
-    assert over(deviations(samples, splines, control), (0.05, 0.05)).max() <= 1.0
-    free = np.flatnonzero(windows.free)
-    basis = np.zeros((len(samples.s), len(control)))
+    rng = np.random.default_rng(4)
+    lever = samples.target[:, 3:] - samples.target[:, :3]
+    axis, stretch = lever / np.linalg.norm(lever, axis=1)[:, None], rng.uniform(-0.9, 1.0, len(lever))
+    free, one = np.flatnonzero(windows.free), np.zeros(len(samples.s), np.int64)
+    basis = np.zeros((len(samples.s), len(rough.control)))
     np.put_along_axis(basis, splines.span_control[samples.span][:, None] + np.arange(4), samples.basis, axis=1)
-    third = np.zeros((len(splines.width), len(control)))
+    third = np.zeros((len(splines.width), len(rough.control)))
     np.put_along_axis(third, splines.span_control[:, None] + np.arange(4), splines.third, axis=1)
-    third *= np.sqrt(splines.width)[:, None]
-    for part in (slice(0, 3), slice(3, 6)):
-        fixed, scale = rough.control[:, part], np.square(third @ rough.control[:, part]).sum()
+    start = rough.control[:, 3:]
+    off = (basis @ start - samples.target[:, 3:]) / 0.05
 
-        def moved(x: np.ndarray, fixed: np.ndarray = fixed) -> np.ndarray:
-            whole = fixed.copy()
-            whole[free] += 0.05 * x.reshape(-1, 3)
-            return whole
+    def size(off: np.ndarray) -> np.ndarray:
+        return np.square(off).sum(axis=1) + stretch * (off * axis).sum(axis=1) ** 2
+
+    for many in (1.0, 0.5):  # begun inside of the bounds, and outside of some of them
+        radius = np.maximum(0.8, many * np.sqrt(size(off)) + 0.1)
+        radius[::7] *= many
+        task = Task(
+            near=Gather(splines.span_control[samples.span], samples.basis, len(start)),
+            smooth=Gather(splines.span_control, splines.third, len(start)),
+            weight=splines.width,
+            axis=axis,
+            stretch=stretch,
+            radius=radius,
+            free=windows.free,
+            sample_window=one,
+            span_window=np.zeros(len(splines.width), np.int64),
+            control_window=windows.window,
+            windows=1,
+        )
+        change = smoothest(task, off, third @ start / 0.05, 1e-5, COLD)
+        assert not change[~windows.free].any()
+        assert (size(off + basis @ change) <= radius**2 * (1 + 1e-6)).all()
+        scaled = np.sqrt(splines.width)[:, None] * third
+        base, scale = scaled @ start / 0.05, np.square(scaled @ start / 0.05).sum()
+
+        def whole(x: np.ndarray) -> np.ndarray:
+            change = np.zeros_like(start)
+            change[free] = x.reshape(-1, 3)
+            return change
 
         reference = minimize(
-            lambda x, moved=moved, scale=scale: np.square(third @ moved(x)).sum() / scale,
+            lambda x, base=base, scale=scale, scaled=scaled: np.square(base + scaled @ whole(x)).sum() / scale,
             np.zeros(3 * len(free)),
-            jac=lambda x, moved=moved, scale=scale: (0.1 / scale * third.T @ (third @ moved(x)))[free].ravel(),
-            constraints=NonlinearConstraint(
-                lambda x, moved=moved, part=part: np.square((basis @ moved(x) - samples.target[:, part]) / 0.05).sum(
-                    axis=1
-                ),
-                -np.inf,
-                1.0,
-            ),
+            jac=lambda x, base=base, scale=scale, scaled=scaled: (
+                (2.0 / scale) * scaled.T @ (base + scaled @ whole(x))
+            )[free].ravel(),
+            constraints=NonlinearConstraint(lambda x, r=radius: size(off + basis @ whole(x)) / r**2, -np.inf, 1.0),
             method="SLSQP",
             options={"maxiter": 500, "ftol": 1e-12},
         )
-        assert np.square(third @ control[:, part]).sum() / scale <= reference.fun * 1.001
+        assert np.square(base + scaled @ change).sum() / scale <= reference.fun * 1.001
 
 
 def test_long_runs_are_smooth_where_windows_meet() -> None:

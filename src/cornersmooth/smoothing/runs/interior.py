@@ -1,53 +1,62 @@
-"""The smoothest spline within the tolerances: a primal-dual interior-point method on all windows at once.
+"""The smoothest spline within the tolerances: a primal-dual interior-point method on many windows at once.
 
-Minimised is ∫w·|C‴|² where |deviation| ≤ radius at every sample: a convex quadratic objective with convex quadratic
-constraints (Boyd and Vandenberghe, Convex Optimization, 11.7). The matrix of a step has 3 by 3 blocks on seven
-diagonals. Tip and axis point share the knots and nothing else, so they are solved one after the other. Every iterate
-keeps the constraints, so the last one does, whenever it ends.
+Minimised is ∫w·|C‴|² where x·M·x ≤ r² for the deviation x at every sample: a convex quadratic objective with convex
+quadratic constraints (Boyd and Vandenberghe, Convex Optimization, 11.7). M = I + k·O·Oᵀ is round about the tool axis O.
+The matrix of a step has 3 by 3 blocks on seven diagonals. What begins within its bounds stays there; what begins
+outside is led inside.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import Gather, solve_blocks
-from cornersmooth.smoothing.runs.ranges import ranges
-from cornersmooth.smoothing.runs.samples import Samples
-from cornersmooth.smoothing.runs.splines import Splines
-from cornersmooth.smoothing.runs.windows import Windows
 
 #: steps at most, and the share of the way to the bounds that each may go
 STEPS, BACK_OFF = 40, 0.95
 
 #: how much the barrier falls in a step
-_CENTRE = 0.1
+_CENTRE = 0.25
 
-#: part of the way to a better curve that is begun from, and the gap over the objective that the multipliers begin with
-NEARLY, COLD, WARM = 0.9, 1.0, 0.3
+#: gap over the objective that is begun with, far from the solution and near it
+COLD, WARM = 1.0, 0.3
+
+#: part of the slope of the objective at the beginning that may be left without multipliers at the end
+SETTLED = 0.1
+
+#: least slack that is begun with: of what is outside its bounds, and of what touches them
+_LEAST_SLACK = 0.02
 
 
 @dataclass(frozen=True)
 class Task:
-    """One half (tip or axis point) of the windows' problem, in units of the tolerance.
+    """Tip or axis point of some windows, in units of the tolerance: c control points, m samples.
 
     Parameters
     ----------
     near, smooth : Gather
         Samples and spans at the control points.
     weight : (spans,) float64
-        Of the squared third derivatives.
+        Of the squared third derivatives, times the widths.
+    axis : (m, 3) float64
+        O at the samples.
+    stretch : (m,) float64
+        k > -1.
     radius : (m,) float64
+        r.
     free : (c,) bool
-    control_window, sample_window, span_window : int64
+    sample_window, span_window, control_window : int64
     windows : int
     """
 
     near: Gather
     smooth: Gather
     weight: Floats
+    axis: Floats
+    stretch: Floats
     radius: Floats
     free: Bools
     sample_window: Ints
@@ -55,131 +64,112 @@ class Task:
     control_window: Ints
     windows: int
 
+    def pull(self, off: Floats) -> Floats:
+        """M·x of deviations (m, 3)."""
+        return off + (self.stretch * dot(self.axis, off))[:, None] * self.axis
 
-def smoothest(
-    splines: Splines,
-    windows: Windows,
-    samples: Samples,
-    control: Floats,
-    radius: Floats,
-    tolerances: tuple[float, float],
-    weight: Floats,
-    gap: float,
-    tried: Floats | None = None,
-) -> Floats:
-    """Return new control points (c, 6) of the windows, rows as in `windows.control`.
+
+def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float) -> Floats:
+    """Change of the control points (c, 3) that makes the windows as smooth as their bounds allow.
 
     Parameters
     ----------
-    control : (controls, 6) float64, mm
-        Of the splines; they keep the radii.
-    weight : (spans,) float64
-        Of the squared third derivative in each span.
-    gap : float
+    off : (m, 3) float64
+        Deviations at the samples to begin with.
+    jerk : (spans, 3) float64
+        Third derivatives to begin with.
+    enough : float
         Bound of what is left to gain, over the objective, that ends the steps.
-    tried : (controls, 6) float64, mm, optional
-        Better control points that need not keep the radii: begun is on the way to them.
-    radius : (m, 2) float64, mm
-        For tip and axis point at the samples.
+    begin : float
+        The same at the beginning, as far as it is known: `COLD` or `WARM`.
     """
-    first = samples.first_of_spans(len(splines.span_run))
-    number = first[windows.span + 1] - first[windows.span]
-    rows = ranges(first[windows.span], number)
-    span_window = np.repeat(np.arange(len(windows.count)), windows.count)
-    near = Gather(np.repeat(windows.local, number), samples.basis[rows], len(windows.control))
-    width = splines.width[windows.span]
-    smooth = Gather(windows.local, splines.third[windows.span], len(windows.control))
-    own_weight = width * weight[windows.span]
-    moved = control[windows.control].copy()
-    for part, tolerance in enumerate(tolerances):
-        own = slice(3 * part, 3 * part + 3)
-        task = Task(
-            near,
-            smooth,
-            own_weight,
-            radius[rows, part] / tolerance,
-            windows.free,
-            np.repeat(span_window, number),
-            span_window,
-            windows.window,
-            len(windows.count),
-        )
-        off = (near.apply(moved[:, own]) - samples.target[rows, own]) / tolerance
-        if tried is not None:
-            way = (tried[windows.control, own] - moved[:, own]) / tolerance
-            step = near.apply(way)
-            slack = (task.radius**2 - _square(off)) / 2.0
-            share = NEARLY * _reach(task, off, step, slack, np.ones_like(slack), np.zeros_like(slack))
-            moved[:, own] += tolerance * share[windows.window][:, None] * way
-            off += share[task.sample_window][:, None] * step
-        jerk = smooth.apply(moved[:, own]) / tolerance
-        cost = np.bincount(span_window, own_weight * _square(jerk), minlength=task.windows)
-        task = replace(task, weight=own_weight / np.where(cost > 0.0, cost, 1.0)[span_window])
-        moved[:, own] += tolerance * _solve(task, off, jerk, gap, COLD if tried is None else WARM)
-    return moved
-
-
-def _solve(task: Task, off: Floats, jerk: Floats, enough: float, begin: float) -> Floats:
-    """Steps from deviations (m, 3) and third derivatives (spans, 3) to the change of the control points (c, 3)."""
     change = np.zeros((len(task.free), 3))
-    stiff = task.smooth.bands(task.weight)
-    many = np.bincount(task.sample_window, minlength=task.windows)
-    slack = (task.radius**2 - _square(off)) / 2.0
-    cost = np.bincount(task.span_window, task.weight * _square(jerk), minlength=task.windows)
-    force = np.maximum(begin * cost / many, 1e-12)[task.sample_window] / slack  # the multipliers
+    first = _cost(task, task.weight, jerk)
+    weight = task.weight / np.where(first > 0.0, first, 1.0)[task.span_window]
+    stiff = task.smooth.bands(weight)
+    many = np.maximum(np.bincount(task.sample_window, minlength=task.windows), 1)
+    pull = task.pull(off)
+    slack = (task.radius**2 - dot(off, pull)) / 2.0
+    inside = slack >= _LEAST_SLACK * task.radius
+    room = np.where(inside, slack, _LEAST_SLACK * task.radius)
+    cost = np.where(first > 0.0, 1.0, 0.0)
+    force = np.maximum(begin * cost / many, 1e-12)[task.sample_window] / room  # the multipliers
+    ahead: Floats = np.ones(task.windows)  # part of the slope at the beginning that no multipliers hold yet
     for _ in range(STEPS):
-        gap = np.bincount(task.sample_window, slack * force, minlength=task.windows)
-        barrier = (_CENTRE * gap / many)[task.sample_window] / slack
-        right = -task.smooth.sums(task.weight[:, None] * jerk) - task.near.sums(barrier[:, None] * off)
-        bands = task.near.bands(_bend(force, slack, off))
+        gap = np.bincount(task.sample_window, room * force, minlength=task.windows)
+        bent = force / room
+        barrier = (_CENTRE * gap / many)[task.sample_window] / room + bent * (room - slack)
+        right = -task.smooth.sums(weight[:, None] * jerk) - task.near.sums(barrier[:, None] * pull)
+        bands = task.near.bands(_bend(task, force, bent, pull))
         bands[..., :3] += stiff
         step = solve_blocks(bands, right, task.free)
         step_off, step_jerk = task.near.apply(step), task.smooth.apply(step)
-        along = _dot(off, step_off)
-        step_force = barrier - force + force / slack * along
-        reach = _reach(task, off, step_off, slack, force, step_force)
-        done = gap <= enough * cost
+        step_pull = task.pull(step_off)
+        along = dot(pull, step_off)
+        step_force = barrier - force + bent * along
+        step_room = slack - room - along
+        square = dot(step_off, step_pull)
+        reach = _reach(task, (inside, slack, room, force), (along, square, step_room, step_force))
+        outside = np.bincount(task.sample_window, slack < -1e-3, minlength=task.windows) > 0
+        done = (gap <= enough * cost) & (ahead <= SETTLED) & ~outside
         reach[done] = 0.0
+        ahead = ahead * (1.0 - reach)
         change += reach[task.control_window][:, None] * step
         by_sample = reach[task.sample_window]
         off = off + by_sample[:, None] * step_off
+        pull = pull + by_sample[:, None] * step_pull
         jerk = jerk + reach[task.span_window][:, None] * step_jerk
         force = force + by_sample * step_force
-        slack = (task.radius**2 - _square(off)) / 2.0
-        cost = np.bincount(task.span_window, task.weight * _square(jerk), minlength=task.windows)
+        slack = slack - by_sample * (along + 0.5 * by_sample * square)
+        room = np.where(inside, slack, np.maximum(room + by_sample * step_room, slack))
+        inside = inside | (slack >= room)
+        cost = _cost(task, weight, jerk)
         if done.all():
             break
     return change
 
 
-def _reach(task: Task, off: Floats, step: Floats, slack: Floats, force: Floats, step_force: Floats) -> Floats:
+def _cost(task: Task, weight: Floats, jerk: Floats) -> Floats:
+    """(windows,) the objective."""
+    return np.bincount(task.span_window, weight * dot(jerk, jerk), minlength=task.windows).astype(np.float64)
+
+
+def _reach(
+    task: Task, now: tuple[Bools, Floats, Floats, Floats], step: tuple[Floats, Floats, Floats, Floats]
+) -> Floats:
     """(windows,) share of the step that keeps the bounds of all samples."""
-    square, along = _square(step), _dot(off, step)
+    inside, slack, room, force = now
+    along, square, step_room, step_force = step
     with np.errstate(divide="ignore", invalid="ignore"):
         # the root of |off + r·step| = radius, in the form without cancellation
-        root = np.sqrt(along**2 + 2.0 * slack * square)
+        root = np.sqrt(np.maximum(along**2 + 2.0 * slack * square, 0.0))
         primal = np.where(along > 0.0, 2.0 * slack / (along + root), (root - along) / square)
+        primal = np.where(square > 0.0, primal, np.inf)
+        linear = np.where(step_room < 0.0, -room / step_room, np.inf)
         dual = np.where(step_force < 0.0, -force / step_force, np.inf)
-    bound = np.minimum(np.where(square > 0.0, primal, np.inf), dual)
+    bound = np.minimum(np.where(inside, primal, linear), dual)
     least = np.full(task.windows, np.inf)
     np.minimum.at(least, task.sample_window, bound)
     return np.minimum(1.0, BACK_OFF * least)
 
 
-def _bend(force: Floats, slack: Floats, off: Floats) -> Floats:
+def _bend(task: Task, force: Floats, bent: Floats, pull: Floats) -> Floats:
     """(m, 6) second derivatives of the bounds: xx, yy, zz, xy, xz, yz."""
-    pull = force / slack
-    x, y, z = off.T
-    return np.stack(
-        (force + pull * x * x, force + pull * y * y, force + pull * z * z, pull * x * y, pull * x * z, pull * y * z),
-        axis=1,
-    )
+    x, y, z = pull.T
+    own = np.ascontiguousarray(task.axis.T)
+    lean = force * task.stretch
+    bx, by, bz, lx, ly = bent * x, bent * y, bent * z, lean * own[0], lean * own[1]
+    out = np.empty((len(force), 6))
+    out[:, 0] = force + bx * x + lx * own[0]
+    out[:, 1] = force + by * y + ly * own[1]
+    out[:, 2] = force + bz * z + lean * own[2] * own[2]
+    out[:, 3] = bx * y + lx * own[1]
+    out[:, 4] = bx * z + lx * own[2]
+    out[:, 5] = by * z + ly * own[2]
+    return out
 
 
-def _square(vectors: Floats) -> Floats:
-    return _dot(vectors, vectors)
-
-
-def _dot(one: Floats, other: Floats) -> Floats:
+def dot(one: Floats, other: Floats) -> Floats:
+    """(m,) products of rows."""
     products: Floats = np.einsum("ij,ij->i", one, other)
     return products

@@ -56,10 +56,10 @@ class Pieces:
 #: samples of a piece whose share of its span is above each of these; a cubic within bounds at quarters is nearly so
 #: between them, and short pieces lie close together
 _SHARES = (0.1, 0.4)
-_NUMBERS = (1, 2, 4)
+_NUMBERS = (1, 2, 3)
 
 #: places of the samples in a piece, for each number: with the end, where Chebyshev polynomials have their extremes
-_PLACES = {1: (0.0,), 2: (0.0, 0.5), 4: (0.0, 0.1464466094, 0.5, 0.8535533906)}
+_PLACES = {1: (0.0,), 2: (0.0, 0.5), 3: (0.0, 0.25, 0.75)}
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Samples:
         number = np.array(_NUMBERS)[np.searchsorted(_SHARES, width / splines.width[pieces.span])]
         piece, place = spread(number)
         span, segment = pieces.span[piece], pieces.segment[piece]
-        shares = np.array([_PLACES[many] + (0.0,) * (4 - many) for many in _NUMBERS])
+        shares = np.array([_PLACES[many] + (0.0,) * (max(_NUMBERS) - many) for many in _NUMBERS])
         s = pieces.low[piece] + width[piece] * shares[np.searchsorted(_NUMBERS, number[piece]), place]
         share = (s - lines.s[segment]) / (lines.s[segment + 1] - lines.s[segment])
         target = lines.point[segment] + share[:, None] * (lines.point[segment + 1] - lines.point[segment])

@@ -1,0 +1,214 @@
+"""Some windows of runs made smooth: samples, what they may deviate, and the rounds of tip and axis point.
+
+Tip and axis point are solved one after the other: the smoothest tip, then the smoothest lever from tip to axis point,
+for it is the lever that the rotary axes follow. At constant H the axis point of a pose is off by what its curve is off
+across the axis O, and by what the tip is off along it; what the axis point's curve does along the axis does not show.
+So the tip leaves along the axis at least what the fit needs across it, and the axis point may use across the axis what
+the tip has left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.smoothing.runs.banded import Gather
+from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, dot, smoothest
+from cornersmooth.smoothing.runs.polylines import Polylines
+from cornersmooth.smoothing.runs.ranges import ranges, starts
+from cornersmooth.smoothing.runs.samples import Pieces, Samples
+from cornersmooth.smoothing.runs.splines import Splines
+from cornersmooth.smoothing.runs.windows import Windows
+
+#: share of the tolerance that the samples may use
+SHARE = 0.97
+
+#: share of the tolerance between the fit and the bounds, so that there is a way to go
+ROOM = 0.02
+
+#: how much less the axis point's curve is bound along the axis than across it (the square of it)
+ALONG = 0.1
+
+#: least and largest share of its tolerance that the tip leaves to the axis point across the axis, wherever it is itself
+LEAST_LEFT, MOST_LEFT = 0.6, 0.9
+
+#: spans on either side that the weight of a span looks at, its power of the mean square of C‴, and the least mean over
+#: the largest of the window
+NEIGHBOURS, POWER, LEAST_MEAN = 1, 0.75, 1e-12
+
+#: what the third derivative of the tip counts beside that of the lever: rotary axes have less jerk to give
+TIP_COUNTS = 0.3
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is the same for all windows of a program.
+
+    Parameters
+    ----------
+    lines : Polylines
+    splines : Splines
+    pieces : Pieces
+        All of them.
+    rough : (controls, 6) float64, mm
+        Control points of the fit, which is well within the tolerances.
+    tolerances : (float, float), mm
+        Of tip and axis point.
+    axis_length : float, mm
+        H.
+    """
+
+    lines: Polylines
+    splines: Splines
+    pieces: Pieces
+    rough: Floats
+    tolerances: tuple[float, float]
+    axis_length: float
+
+    @cached_property
+    def first_piece(self) -> Ints:
+        """(spans + 1,) where the pieces of each span begin."""
+        return starts(np.bincount(self.pieces.span, minlength=len(self.splines.span_run)))
+
+
+def solve_windows(
+    problem: Problem, windows: Windows, control: Floats, tight: Floats, gaps: tuple[float, ...], *, near: bool
+) -> Floats:
+    """Return new control points (c, 6), mm, of the windows, rows as in `windows.control`.
+
+    Parameters
+    ----------
+    control : (controls, 6) float64, mm
+        To begin with; the outer ones of each window stay.
+    tight : (pieces, 2) float64
+        Share of what they may use that tip and axis point of each piece are left.
+    gaps : tuple of float
+        What may be left to gain, over the objective, in each round; weights are those of the curve before the round.
+    near : bool
+        Whether `control` is near the solution.
+    """
+    moved = control[windows.control].copy()
+    there = _Places.of(problem, windows, tight)
+    width = problem.splines.width[windows.span]
+    for gap in gaps:
+        weight = width * even_weights(problem.splines, windows, moved)
+        for part, tolerance in enumerate(problem.tolerances):
+            own = slice(3 * part, 3 * part + 3)
+            off = there.deviation(moved, part)
+            task = there.axis_task(weight, there.deviation(moved, 0)) if part else there.tip_task(weight)
+            curve = moved[:, own] - moved[:, :3] if part else moved[:, own]
+            jerk = task.smooth.apply(curve) / tolerance
+            moved[:, own] += tolerance * smoothest(task, off, jerk, gap, WARM if near else COLD)
+        near = True
+    return moved
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Samples of some windows and how far they may be off, in units of the tolerances."""
+
+    problem: Problem
+    windows: Windows
+    target: Floats
+    near: Gather
+    smooth: Gather
+    axis: Floats
+    short: Floats  # length of the lever over H
+    limit: Floats  # (m, 2)
+    rough: Floats  # (m, 6)
+    sample_window: Ints
+    span_window: Ints
+
+    @classmethod
+    def of(cls, problem: Problem, windows: Windows, tight: Floats) -> _Places:
+        splines, pieces = problem.splines, problem.pieces
+        number = problem.first_piece[windows.span + 1] - problem.first_piece[windows.span]
+        rows = ranges(problem.first_piece[windows.span], number)
+        own = Pieces(pieces.span[rows], pieces.segment[rows], pieces.low[rows], pieces.high[rows])
+        samples = Samples.of(splines, problem.lines, own)
+        span = np.repeat(np.arange(len(windows.span)), number)[samples.piece]
+        begins = np.concatenate(([True], samples.piece[1:] != samples.piece[:-1]))
+        before = np.where(begins, np.maximum(rows - 1, 0)[samples.piece], rows[samples.piece])
+        limit = SHARE * np.minimum(tight[rows][samples.piece], tight[before])  # a piece ends where the next begins
+        near = Gather(windows.local[span], samples.basis, len(windows.control))
+        smooth = Gather(windows.local, splines.third[windows.span], len(windows.control))
+        lever = samples.target[:, 3:] - samples.target[:, :3]
+        length = np.sqrt(dot(lever, lever))
+        span_window = np.repeat(np.arange(len(windows.count)), windows.count)
+        rough = (near.apply(problem.rough[windows.control]) - samples.target) / np.repeat(problem.tolerances, 3)
+        axis, short = lever / length[:, None], length / problem.axis_length
+        return cls(
+            problem, windows, samples.target, near, smooth, axis, short, limit, rough, span_window[span], span_window
+        )
+
+    def deviation(self, moved: Floats, part: int) -> Floats:
+        """(m, 3) of tip or axis point from control points (c, 6)."""
+        own = slice(3 * part, 3 * part + 3)
+        off: Floats = (self.near.apply(moved[:, own]) - self.target[:, own]) / self.problem.tolerances[part]
+        return off
+
+    def tip_task(self, weight: Floats) -> Task:
+        """The tip; |across|² + (1 + k)·along² ≤ r² leaves the axis point its part."""
+        off, (tip, axis) = self.rough[:, 3:], self.limit.T
+        across = np.sqrt(np.maximum(dot(off, off) - dot(self.axis, off) ** 2, 0.0)) / self.short + ROOM
+        left = np.clip(across / axis, LEAST_LEFT, MOST_LEFT)
+        unit = self.problem.tolerances[0] / self.problem.tolerances[1]
+        stretch = np.maximum((tip * unit / axis) ** 2 / (1.0 - left**2) - 1.0, 0.0)
+        return self._task(weight, stretch, np.maximum(tip, _size(self.axis, stretch, self.rough[:, :3]) + ROOM))
+
+    def axis_task(self, weight: Floats, tip_off: Floats) -> Task:
+        """The axis point, from the deviation (m, 3) of the tip."""
+        along = dot(self.axis, tip_off) * self.problem.tolerances[0] / self.problem.tolerances[1]
+        radius = self.short * np.sqrt(np.maximum(self.limit[:, 1] ** 2 - along**2, 0.0))
+        stretch = np.full(len(radius), ALONG - 1.0)
+        return self._task(weight, stretch, np.maximum(radius, _size(self.axis, stretch, self.rough[:, 3:]) + ROOM))
+
+    def _task(self, weight: Floats, stretch: Floats, radius: Floats) -> Task:
+        return Task(
+            near=self.near,
+            smooth=self.smooth,
+            weight=weight,
+            axis=self.axis,
+            stretch=stretch,
+            radius=radius,
+            free=self.windows.free,
+            sample_window=self.sample_window,
+            span_window=self.span_window,
+            control_window=self.windows.window,
+            windows=len(self.windows.count),
+        )
+
+
+def even_weights(splines: Splines, windows: Windows, control: Floats) -> Floats:
+    """(spans,) weights of |C‴|² that give calm and sharp places of the windows their say.
+
+    Where the jerk limits it, a machine passes with v ~ |C‴|^(-1/3), so its time is ∫|C‴|^(1/3): the weights are those
+    of its quadratic model at the curve known so far, |C‴|^(-5/3), with the mean over neighbouring spans.
+    """
+    curve = np.hstack((TIP_COUNTS * control[:, :3], control[:, 3:] - control[:, :3]))
+    third = np.zeros((len(windows.span), 6))
+    for k in range(4):
+        third += splines.third[windows.span, k, None] * curve[windows.local + k]
+    window, width = np.repeat(np.arange(len(windows.count)), windows.count), splines.width[windows.span]
+    own = width * np.square(third).sum(axis=1)
+    total, length = own.copy(), width.copy()
+    for shift in range(1, NEIGHBOURS + 1):
+        same = np.where(window[shift:] == window[:-shift], 1.0 - shift / (NEIGHBOURS + 1.0), 0.0)
+        for sums, values in ((total, own), (length, width)):
+            sums[shift:] += same * values[:-shift]
+            sums[:-shift] += same * values[shift:]
+    mean = total / length
+    largest = np.zeros(len(windows.count))
+    np.maximum.at(largest, window, mean)
+    relative = mean / np.where(largest > 0.0, largest, 1.0)[window]
+    weights: Floats = np.maximum(relative, LEAST_MEAN) ** (-POWER)
+    return weights
+
+
+def _size(axis: Floats, stretch: Floats, off: Floats) -> Floats:
+    """(m,) lengths of deviations in the metric I + k·O·Oᵀ."""
+    lengths: Floats = np.sqrt(np.maximum(dot(off, off) + stretch * dot(axis, off) ** 2, 0.0))
+    return lengths
