@@ -246,18 +246,26 @@ def test_commands_write_pages(tmp_path):
     assert run("time", source, "--report", tmp_path / "times.json").returncode == 2
 
 
-def test_the_time_of_long_paths_is_planned_on_demand(tmp_path):
+def test_the_time_of_long_paths_is_estimated(tmp_path):
     source, nc = tmp_path / "long.cls", tmp_path / "long.nc"
-    rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(201))
+    rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(401))
     source.write_text(f"TOOL PATH/LONG,TOOL,T\nFEDRAT/MMPM,1500.0\n{rows}END-OF-PATH\n")
     verdicts = []
-    for more in ((), ("-v",), ("-q",)):
+    for more in ((), ("-v",), ("-q",), ("--report", tmp_path / "long.html")):
         done = run("smooth", source, "-e", "0.02", "-o", nc, "--force", *more)
         assert done.returncode == 0, done.stderr
         verdicts.append(done.stderr.decode().split("\n")[0])
-    assert verdicts[0] == "OK: within 0.02 mm everywhere; no corner stays sharp"
-    assert re.fullmatch(re.escape(verdicts[0]) + r"; saves \d+\.\d s of \d+\.\d s", verdicts[1])
+    opening = "OK: within 0.02 mm everywhere; no corner stays sharp; "
+    about = re.fullmatch(opening + r"saves about (\d+) s of (\d+) s \(estimated from 49.9 % of the path\)", verdicts[0])
+    planned = re.fullmatch(opening + r"saves (\d+\.\d) s of (\d+\.\d) s", verdicts[1])
+    for found, right in zip(about.groups(), planned.groups(), strict=True):
+        assert float(found) == pytest.approx(float(right), rel=0.02, abs=0.6)
     assert verdicts[2] == ""
+    # the page has planned all of it; its words are those of the terminal
+    assert verdicts[3] == values_of((tmp_path / "long.html").read_text())[0]["verdict"]
+    shown = re.fullmatch(opening + r"saves (\d+\.\d) s of (\d+\.\d) s", verdicts[3])
+    for found, right in zip(shown.groups(), planned.groups(), strict=True):
+        assert float(found) == pytest.approx(float(right), rel=0.01, abs=0.3)
 
 
 def test_a_text_off_the_path_is_broken_in_words(tmp_path):

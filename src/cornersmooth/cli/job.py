@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
     from cornersmooth.nc import Form, Frame
     from cornersmooth.pipeline import Progress, Result
+    from cornersmooth.report.verdict import Saving
     from cornersmooth.settings import Settings
     from cornersmooth.surface.tool import Tool
 
@@ -66,8 +67,9 @@ class Job:
         Picture of the path; empty for none.
     tool : Tool or None
         For pages, instead of that of the file.
-    plan_up_to : int
-        Poses up to which the time that is saved is planned.
+    plan : (int, int)
+        Poses up to which the time that is saved is planned as a whole, and the stretches of longer programs from which
+        it is estimated; none for not at all.
     beginning : bool
         Whether standard output gets the first lines only.
     run : str
@@ -90,7 +92,7 @@ class Job:
     skip_existing: bool = False
     plot: str = ""
     tool: Tool | None = None
-    plan_up_to: int = 0
+    plan: tuple[int, int] = (0, 0)
     beginning: bool = False
     run: str = ""
 
@@ -107,8 +109,8 @@ class Outcome:
     skipped: str = ""
     #: what of the text is not verified; empty for nothing
     unverified: str = ""
-    #: planned times of the direct path and of the written one, s
-    planned: tuple[float, float] | None = None
+    #: planned times
+    saving: Saving | None = None
     #: lines that standard output did not get
     held_back: int = 0
 
@@ -257,10 +259,11 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         outcome.held_back = beginning.held_back
     outcome.unverified = result.unverified
     contents = result.report()
-    if len(result.program) <= job.plan_up_to and result.verification is not None and result.verification.passed:
-        outcome.planned = _planned(job, result)
     for path in job.reports:
-        _write_report(path, job, bool(may_replace[path]), source, result, contents)
+        saving = _write_report(path, job, bool(may_replace[path]), source, result, contents)
+        outcome.saving = saving or outcome.saving
+    if job.plan[1] and not outcome.saving and result.verification is not None and result.verification.passed:
+        outcome.saving = _planned(job, result)
     if job.plot:
         picture = _picture(job, result, contents)
         with open_output(target_of(job.plot), replace=bool(may_replace[job.plot])) as output:
@@ -286,39 +289,34 @@ def _limits(job: Job) -> Limits:
     return Limits() if job.feed is None else Limits(feed=job.feed)
 
 
-def _planned(job: Job, result: Result) -> tuple[float, float] | None:
-    """Times of the direct path and of the written one, s; None for texts without feeds."""
-    from cornersmooth.feedrate import direct, plan_text
-    from cornersmooth.page.pages import read_written
+def _planned(job: Job, result: Result) -> Saving | None:
+    from cornersmooth.saving import estimate_saving
 
-    program, settings, machine = result.program, result.smoothed.settings, result.form.machine
-    machine = machine if machine is not None and machine.dynamics else None
-    try:
-        limits = _limits(job)
-        before = direct(program, limits, "velocity_jump", settings=settings, machine=machine)
-        text = read_written(result, result.frame)
-        return before.total, plan_text(text, limits, settings=settings, machine=machine).total
-    except CornersmoothError:
-        return None
+    poses, stretches = job.plan
+    settings = result.smoothed.settings
+    return estimate_saving(result.program, settings, result.form, _limits(job), poses=poses, stretches=stretches)
 
 
 def _write_report(
     path: str, job: Job, may_replace: bool, source: bytes, result: Result, contents: dict[str, Any]
-) -> None:
+) -> Saving | None:
+    """Write a report; return the times that were planned for it."""
     from cornersmooth.report import corners_csv, report_json
 
-    suffix = os.path.splitext(path)[1].lower()
+    suffix, saving = os.path.splitext(path)[1].lower(), None
     if suffix == ".json":
         texts = iter([report_json(contents)])
     elif suffix == ".csv":
         texts = corners_csv(result.smoothed, dense=not result.form.curve)
     else:
-        from cornersmooth.page import result_page
+        from cornersmooth.page.pages import page_and_saving
 
-        texts = iter([result_page(result, source=source, frame=result.frame, limits=_limits(job), tool=job.tool)])
+        page, saving = page_and_saving(result, source=source, frame=result.frame, limits=_limits(job), tool=job.tool)
+        texts = iter([page])
     with open_output(target_of(path), replace=may_replace) as output:
         for text in texts:
             output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8
+    return saving
 
 
 def _say_rejected(name: str, result: Result, broken: PromiseError) -> str:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from cornersmooth.pipeline import Progress
+    from cornersmooth.report.verdict import Saving
 
 #: code of the finding that a text is not verified
 NOT_VERIFIED = "CS509"
@@ -79,11 +80,11 @@ def show_findings(source: str, contents: dict[str, Any], verbose: int) -> None:
         print_line(f"{source}: {more(len(ranked) - len(shown), 'finding')}; -v shows them")
 
 
-def show_verdict(contents: dict[str, Any], planned: tuple[float, float] | None = None) -> None:
+def show_verdict(contents: dict[str, Any], saving: Saving | None = None) -> None:
     """Print how it went, in one sentence."""
     from cornersmooth.report.verdict import verdict
 
-    console().print(verdict(contents, planned), style="bold")
+    console().print(verdict(contents, saving), style="bold")
 
 
 def show_summary(contents: dict[str, Any], verbose: int) -> None:

@@ -90,7 +90,7 @@ def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
         if outcome.held_back and not quiet:
             print_line(f"... {more(outcome.held_back, 'line')}; -o FILE writes them, -o - shows them all")
         if outcome.contents and not quiet:
-            show_verdict(outcome.contents, outcome.planned)
+            show_verdict(outcome.contents, outcome.saving)
         _tell(outcome, quiet, verbose)
         if outcome.contents and not quiet:
             show_summary(outcome.contents, verbose)
@@ -125,7 +125,7 @@ def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> No
 def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
     from cornersmooth.nc import fit_settings
-    from cornersmooth.settings import MOST_TIMED_POSES, MOST_TIMED_POSES_VERBOSE
+    from cornersmooth.settings import TIMED_POSES, TIMED_POSES_VERBOSE, TIMED_STRETCHES, TIMED_STRETCHES_VERBOSE
 
     folder, output = given["directory"], given["output"]
     quiet, verbose = given["quiet"], given["verbose"]
@@ -182,7 +182,11 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 plot=given["plot"] or "",
                 tool=given["tool"],
                 beginning=not folder and not output and _to_terminal(),
-                plan_up_to=0 if quiet or folder else MOST_TIMED_POSES_VERBOSE if verbose else MOST_TIMED_POSES,
+                plan=(0, 0)
+                if quiet or folder
+                else (TIMED_POSES_VERBOSE, TIMED_STRETCHES_VERBOSE)
+                if verbose
+                else (TIMED_POSES, TIMED_STRETCHES),
             )
         )
     by_target: dict[str, str] = {}

@@ -17,8 +17,9 @@ from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.page.document import document
 from cornersmooth.page.scene import Story, Subject, scene
-from cornersmooth.report.verdict import kept_text, saving_text, times_text, verdict
-from cornersmooth.settings import Settings
+from cornersmooth.report.verdict import Saving, kept_text, saving_text, times_text, verdict
+from cornersmooth.saving import estimate_saving
+from cornersmooth.settings import TIMED_POSES_VERBOSE, TIMED_STRETCHES_VERBOSE, Settings
 from cornersmooth.surface.tool import Tool
 from cornersmooth.verify import Verification, verify
 
@@ -52,6 +53,18 @@ def result_page(
     tool : Tool, optional
         Instead of that of the file.
     """
+    return page_and_saving(result, source=source, frame=frame, limits=limits, tool=tool)[0]
+
+
+def page_and_saving(
+    result: Result,
+    *,
+    source: bytes = b"",
+    frame: Frame | None = None,
+    limits: Limits | None = None,
+    tool: Tool | None = None,
+) -> tuple[str, Saving | None]:
+    """Page of a file that was smoothed, as `result_page` makes it, and the times that its verdict tells."""
     smoothed, form, settings = result.smoothed, result.form, result.smoothed.settings
     nc = read_written(result, frame)
     limits = Limits() if limits is None else limits
@@ -73,14 +86,17 @@ def result_page(
         *_settings_facts(settings),
         *_limit_facts(limits, form.machine),
     ]
+    kept = None if result.verification is None else result.verification.passed
     notes = [f"{finding.severity}, line {finding.line}: {finding.text}" for finding in result.findings[:_MOST_NOTES]]
 
-    def sentence(seconds: Mapping[str, float]) -> str:
-        both = (seconds["direct"], seconds["written"]) if {"direct", "written"} <= set(seconds) else None
-        return verdict(contents, both)
-
-    kept = None if result.verification is None else result.verification.passed
-    return _page(subject, Story(result.program.source.name, "", kept, facts, notes), sentence)
+    meta, pack = scene(subject, Story(result.program.source.name, "", kept, facts, notes))
+    saving = _saving(meta["totals"])
+    if saving is None and kept:
+        saving = estimate_saving(
+            result.program, settings, form, limits, poses=TIMED_POSES_VERBOSE, stretches=TIMED_STRETCHES_VERBOSE
+        )
+    meta["verdict"] = verdict(contents, saving)
+    return document(meta, pack), saving
 
 
 def read_written(result: Result, frame: Frame | None = None) -> NcProgram:
@@ -141,8 +157,8 @@ def verified_page(
     notes = [f"CL line {item.cl_line}, NC line {item.nc_line}: {item.text}" for item in found.problems[:_MOST_NOTES]]
 
     def sentence(seconds: Mapping[str, float]) -> str:
-        timed = {"direct", "written"} <= set(seconds) and surface is None
-        return text + (f"; {saving_text(seconds['direct'], seconds['written'])}" if timed else "")
+        saving = _saving(seconds) if surface is None else None
+        return text if saving is None else f"{text}; {saving_text(saving)}"
 
     return _page(subject, Story(program.source.name, "", found.passed, facts, notes), sentence)
 
@@ -194,6 +210,10 @@ def surface_text(surface: SurfaceMap) -> str:
     within = told["within_tolerance_percent"]
     share = "" if within is None else f"; {within:.4g} % of {told['points']:,} points within {surface.tolerance:g} mm"
     return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}"
+
+
+def _saving(seconds: Mapping[str, float]) -> Saving | None:
+    return Saving(seconds["direct"], seconds["written"]) if {"direct", "written"} <= set(seconds) else None
 
 
 def _page(subject: Subject, story: Story, sentence: Any) -> str:

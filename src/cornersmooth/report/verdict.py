@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from cornersmooth.report.corners import corner_table
 
 #: sharp corners that a report lists
 _LISTED = 100
+
+#: part of the time below which an estimated saving is none
+_ALIKE = 0.005
 
 #: degrees below which the tip goes straight on
 _STRAIGHT_ON = 1.0
@@ -50,15 +54,30 @@ def sharp_text(corner: Mapping[str, Any]) -> str:
     return f":{corner['line']} {corner['status'].replace('_', ' ')} {corner['turn_deg']:.0f}°"
 
 
-def verdict(contents: Mapping[str, Any], seconds: tuple[float, float] | None = None) -> str:
+@dataclass(frozen=True)
+class Saving:
+    """Planned times of a program as it was and as it is written.
+
+    Parameters
+    ----------
+    direct, written : float, s
+    part : float
+        Part of the poses that was planned; below 1 both times are estimated from it.
+    """
+
+    direct: float
+    written: float
+    part: float = 1.0
+
+
+def verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> str:
     """Say how it went.
 
     Parameters
     ----------
     contents : mapping
         The report.
-    seconds : (float, float), optional
-        Planned times of the direct path and of the written one.
+    saving : Saving, optional
     """
     found, unverified = contents.get("verification"), contents.get("not_verified", "")
     parts = ["NOT VERIFIED" + (f": {unverified}" if unverified else "")] if found is None else [kept_text(found)]
@@ -70,8 +89,8 @@ def verdict(contents: Mapping[str, Any], seconds: tuple[float, float] | None = N
         parts.append(f"{count:,} {stay} sharp, first {sharp_text(contents['sharp'][0])}")
     else:
         parts.append("no corner stays sharp")
-    if seconds is not None:
-        parts.append(saving_text(*seconds))
+    if saving is not None:
+        parts.append(saving_text(saving))
     return "; ".join(parts)
 
 
@@ -88,9 +107,17 @@ def kept_text(found: Mapping[str, Any]) -> str:
     return text
 
 
-def saving_text(direct: float, written: float) -> str:
-    """Say what smoothing saves of the time of the direct path, s."""
-    saved = direct - written
+def saving_text(saving: Saving) -> str:
+    """Say what smoothing saves of the time of the direct path."""
+    direct, written, saved = saving.direct, saving.written, saving.direct - saving.written
+    if saving.part < 1.0:
+        share = max(100.0 * saving.part, 0.01)
+        source = f"estimated from {share:.{1 if share >= 1.0 else 2}f} % of the path"
+        if abs(saved) < _ALIKE * direct:
+            return f"takes about {direct:.0f} s as the direct path does ({source})"
+        if saved > 0.0:
+            return f"saves about {saved:.0f} s of {direct:.0f} s ({source})"
+        return f"takes about {-saved:.0f} s more than {direct:.0f} s ({source})"
     if abs(saved) < 0.05:
         return f"takes {written:.1f} s as the direct path does"
     return f"saves {saved:.1f} s of {direct:.1f} s" if saved > 0.0 else f"takes {-saved:.1f} s more than {direct:.1f} s"
