@@ -47,12 +47,13 @@ def smoothed(
     comment: str = "none",
     source: str = "part.cls",
     method: str = "proportional",
+    form: object = None,
 ) -> Result:
     """Run of a path in memory."""
     import io
 
     text = path.format(name=name, comment=comment).encode()
-    return postprocess(text, io.BytesIO(), Settings(tolerance=0.02, method=method), reading={"name": source})
+    return postprocess(text, io.BytesIO(), Settings(tolerance=0.02, method=method), form=form, reading={"name": source})
 
 
 def page_of(result: Result, **more: object) -> str:

@@ -110,6 +110,24 @@ def test_planned_times_and_speeds_agree_with_the_laws(page, result):
     assert np.nanmin(arrays["way_speed_written"][at - 4 : at + 4]) < 100.0
 
 
+@pytest.mark.parametrize(("control", "form"), [("fanuc", "g1"), ("fanuc", "g6.2"), ("siemens", "bspline")])
+def test_the_written_law_is_that_of_the_text(control, form):
+    from cornersmooth.feedrate import plan_text
+    from cornersmooth.nc import choose_form
+
+    made = smoothed(form=choose_form(control, form))
+    meta, arrays = values_of(page_of(made))
+    settings = made.smoothed.settings
+    law = plan_text(read_written(made), Limits(), settings=settings)
+    assert meta["totals"]["written"] == pytest.approx(law.total, rel=1e-9)
+    time = arrays["w_time"]
+    assert np.all(np.diff(time) >= 0.0)
+    assert time[-1] == pytest.approx(law.total, rel=1e-6)
+    # points are passed when the law is there
+    off = np.linalg.norm(law.at(time.astype(float)).tip - np.asarray(meta["centre"]) - arrays["w_tip"], axis=1)
+    assert off[arrays["w_rapid"] == 0].max() < 0.02
+
+
 def test_axes_of_a_machine_have_charts(result):
     from dataclasses import replace
 

@@ -15,7 +15,7 @@ from cornersmooth.feedrate.planner import Progress, plan_path
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.feedrate.written_curves import WrittenCurves
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Move, Program, Source, Statement
+from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Program, Source, Statement
 from cornersmooth.nc_reader.elements import Element, Event, NcProgram
 from cornersmooth.settings import Settings
 from cornersmooth.vectors import unit
@@ -65,6 +65,8 @@ class WrittenMotion:
         The curves.
     blocks : (n,) float64
         Blocks of the text that the move into each pose takes: a part of one where a block is several moves.
+    element : (n,) int64
+        Element of the text that the move into each pose is, or is a part of.
     within : (n,) bool
         The move goes on with what rotary words make of one block: the kinks between such moves are not the machine's.
     """
@@ -72,6 +74,7 @@ class WrittenMotion:
     program: Program
     pieces: RunPieces | None
     blocks: Floats
+    element: Ints
     within: Bools
 
 
@@ -121,7 +124,7 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
         source=Source(name, "nc"),
     )
     same = np.concatenate(([False], (nc.line[owner[1:]] == nc.line[owner[:-1]]) & nc.rotary))
-    return WrittenMotion(program, pieces, (_blocks(nc) / count)[owner], same & (nc.kind[owner] != Element.RAPID))
+    return WrittenMotion(program, pieces, (_blocks(nc) / count)[owner], owner, same & (nc.kind[owner] != Element.RAPID))
 
 
 def _blocks(nc: NcProgram) -> Floats:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate import Limits, TimeLaw, direct, plan
+from cornersmooth.feedrate import Limits, TimeLaw, direct, plan, plan_text
+from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Statement
+from cornersmooth.model import Floats, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.motions import OriginalPath, WrittenPath
 from cornersmooth.settings import Settings
@@ -62,14 +63,13 @@ def plan_all(
     left_out: list[str] = []
     seconds = None
     machine = machine if machine is not None and machine.dynamics else None
-    text = None if written is None or nc is None else _program_of(nc, written, program)
     try:
         for name, moves in (
             ("direct", len(program)),
             ("local", len(program)),
-            ("written", 0 if text is None else len(text)),
+            ("written", 0 if nc is None else len(nc)),
         ):
-            if name in laws or (name == "local" and smoothed is None) or (name == "written" and text is None):
+            if name in laws or (name == "local" and smoothed is None) or (name == "written" and nc is None):
                 continue
             if moves > MOST_MOVES:
                 left_out.append(f"The {name} path has {moves:,} moves; its speed is planned up to {MOST_MOVES:,}.")
@@ -77,15 +77,15 @@ def plan_all(
                 laws[name] = direct(program, limits, "velocity_jump", settings=settings, machine=machine)
             elif name == "local" and smoothed is not None:
                 laws[name] = plan(smoothed, limits, machine=machine)
-            elif text is not None:
-                laws[name] = direct(text, limits, "velocity_jump", settings=settings, machine=machine)
+            elif nc is not None:
+                laws[name] = plan_text(nc, limits, settings=settings, machine=machine)
     except SettingsError as refused:
         left_out.append(f"No speed is planned: {refused.what}" + (f" (line {refused.line})." if refused.line else "."))
     for name, law in laws.items():
-        if name == "written" and written is not None:
-            vertex = np.flatnonzero(written.end)
-            ways[name] = _places(law, written.way[vertex])
-            seconds = _seconds(law, written, vertex)
+        if name == "written" and written is not None and nc is not None:
+            at = _coordinates(law, nc, written, settings.axis_length)
+            ways[name] = at, written.way
+            seconds = law.times_at(at)
         else:
             ways[name] = _places(law, original.way)
     return Planned(laws, ways, seconds, tuple(left_out))
@@ -155,38 +155,20 @@ def _places(law: TimeLaw, way: Floats) -> tuple[Floats, Floats]:
     return coordinate, np.maximum.accumulate(np.concatenate(([way[path.start[0]]], way[path.move[last]])))
 
 
-def _seconds(law: TimeLaw, written: WrittenPath, vertex: Ints) -> Floats:
-    """Time at every point: by the coordinate, which runs evenly between vertices."""
-    path = law.path
-    if not len(path):
-        return np.zeros(len(written))
-    reached = np.full(len(vertex), -1.0)
-    reached[path.move] = law.edge[1:]  # the last element of a move wins
-    reached = np.maximum.accumulate(np.maximum(reached, 0.0))
-    number = np.searchsorted(vertex, np.arange(len(written)))
-    number = np.minimum(number, len(vertex) - 1)
-    before = np.maximum(number - 1, 0)
-    share = np.where(written.end, 1.0, written.share)
-    at = reached[before] + share * (reached[number] - reached[before])
-    times: Floats = np.maximum.accumulate(law.times_at(at))
-    return times
-
-
-def _program_of(nc: NcProgram, written: WrittenPath, program: Program) -> Program:
-    """The text as a program of moves: what stands between its elements interrupts as it does in the CL file."""
-    vertex = np.flatnonzero(written.end)
-    kind = np.where(written.rapid[vertex], Move.RAPID, Move.LINEAR).astype(np.uint8)
-    first = np.searchsorted(written.element[vertex], np.arange(len(nc) + 1))
-    events = {event.element: event.line for event in nc.events if event.letter != "("}
-    return Program.from_poses(
-        written.tip[vertex],
-        written.axis[vertex],
-        kind=kind,
-        feed=written.feed[vertex],
-        line=written.nc_line[vertex],
-        statements=tuple(
-            Statement(int(first[min(element, len(nc))]), line, "AUXFUN") for element, line in sorted(events.items())
-        ),
-        source=program.source,
-        units=program.units,
-    )
+def _coordinates(law: TimeLaw, nc: NcProgram, written: WrittenPath, axis_length: float) -> Floats:
+    """Path coordinates (m,) of the points of the written path, ascending."""
+    last = np.searchsorted(written_motion(nc, "", axis_length).element, np.arange(len(nc)), side="right") - 1
+    reached = np.maximum.accumulate(law.edge[np.searchsorted(law.path.move, last, side="right")])
+    element = written.element
+    step = np.zeros(len(element))
+    step[1:] = np.linalg.norm(np.diff(written.tip, axis=0), axis=1)
+    # within an element in proportion to the way; to the share where the tip stands still
+    gone = np.cumsum(step)
+    ends = np.flatnonzero(np.append(element[1:] != element[:-1], True))
+    end = gone[ends][np.searchsorted(element[ends], element)]
+    begin = np.concatenate(([0.0], gone[ends]))[np.searchsorted(element[ends], element)]
+    length = end - begin
+    share = np.divide(gone - begin, length, out=written.share.copy(), where=length > 0.0)
+    before = np.concatenate(([0.0], reached))[element]
+    found: Floats = np.maximum.accumulate(before + share * (reached[element] - before))
+    return found
