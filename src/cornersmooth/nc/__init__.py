@@ -26,7 +26,7 @@ from cornersmooth.nc.form_choice import check_program, choose_form
 from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.motion_writer import MotionWriter
 from cornersmooth.nc.operation import Operation
-from cornersmooth.nc.program_frame import Frame
+from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.statement_writer import StatementWriter
@@ -190,7 +190,8 @@ def write(
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
     writer = BlockWriter(chosen, program, statements, findings, circles, stretch)
-    motion = MotionWriter(program, writer, statements, operation, findings)
+    approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
+    motion = MotionWriter(program, writer, statements, operation, findings, approach, frame.retract)
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
         text.write_blocks(operation.start())

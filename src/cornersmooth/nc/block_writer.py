@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.kinematics import machine_position
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
+from cornersmooth.nc.along_tool import lifted
 from cornersmooth.nc.circles import FIRST_PLANE, Circles
 from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.curve_blocks import Curves, RowWriter
@@ -105,6 +106,14 @@ class BlockWriter:
         if self.form.orientation == "point":
             return []
         return [self._rapid(ticks, np.arange(len(ticks)) != 2)]
+
+    def lifted(self, ticks: Ints, distance: float) -> Ints:
+        """Row of ticks so many mm back along the tool axis."""
+        return lifted(self.form, self.program.units, self.program.mm_per_unit, ticks, distance)
+
+    def rapid(self, ticks: Ints) -> str:
+        """Rapid block of a row of ticks."""
+        return self._rapid(ticks, slice(None))
 
     def _rapid(self, ticks: Ints, chosen: slice | Bools) -> str:
         """Rapid block of some words of a row."""

@@ -49,6 +49,8 @@ class MotionWriter:
     statements: StatementWriter
     operation: Operation
     findings: Findings
+    approach: float = 0.0  #: mm along the tool, behind a retract
+    retract: float = 0.0  #: mm along the tool, before a retract
     blocks: int = 0  #: those that are not `writer`'s
     _repeated: int = 0
     _position: NDArray[np.int64] | None = None
@@ -64,6 +66,7 @@ class MotionWriter:
 
     def __post_init__(self) -> None:
         self._said = _with_starts(self.program)
+        self.operation.withdraw = self._withdraw
         self._approach = approaches(self.program) if (self.program.kind == Move.HOLE).any() else None
 
     def write(self, rows: Rows, ticks: Ints) -> Iterator[bytes]:
@@ -291,13 +294,27 @@ class MotionWriter:
         if self.operation.retracted:
             self.operation.retracted = False
             self._warn_of_tilt(int(run.move[0]))
-            yield from self._blocks(self.writer.approach(first))
+            yield from self._blocks(self._approaches(first, bool(run.rapid[0])))
             if not run.rapid[0]:
                 text = "the first motion of a tool is a feed move: it feeds down from the height of the retract"
                 self.findings.add("CS333", "warning", int(self.program.line[run.move[0]]), text)
         self._warn_of_standing_still(run)
         self._position = self._last = run.ticks[-1]
         yield self.writer.text(run, dwell)
+
+    def _approaches(self, first: Ints, rapid: bool) -> list[str]:
+        """Blocks that bring the tool over its first position, and to where it comes down along its axis."""
+        if not (self.approach and rapid and self.operation.can_rewind()):
+            return self.writer.approach(first)
+        start = self.writer.lifted(first, self.approach)
+        return [*self.writer.approach(start), self.writer.rapid(start)]
+
+    def _withdraw(self) -> list[str]:
+        """Blocks that bring the tool back along its axis, before a retract."""
+        if not self.retract or self._position is None or not self.operation.can_rewind():
+            return []
+        self._position = self.writer.lifted(self._position, self.retract)
+        return [self.writer.rapid(self._position)]
 
     def _warn_of_tilt(self, pose: int) -> None:
         """Say that the control turns the tool on its own behind a retract: the text cannot turn it before."""

@@ -45,6 +45,7 @@ class Operation:
     spindle: Blocks = ()  #: blocks that turn the spindle; none while it stands
     coolant: Blocks = ()  #: the same for the coolant
     begun: bool = False  #: the blocks of `begin` hold
+    withdraw: Callable[[], list[str]] = list  #: blocks along the tool before a retract, of who knows where it is
     halted: bool = False  #: the CL file has stopped the program since the last motion
     _tip_control: bool = False
     _functions: bool = False
@@ -88,12 +89,19 @@ class Operation:
         elif another and not self.halted:
             steps = (*steps, *self.form.table.program.between_tools)
         self._moved = False
-        return self._expand(steps)
+        return [*self._back(), *self._expand(steps)]
 
     def go_home(self) -> list[str]:
         """Blocks that bring the tool to the height of the retract with spindle and coolant on."""
         self._moved = self.begun = False
-        return self._expand([step for step in self.form.table.program.tool_end if step in _STEPS.keys() - _RUNNING_ON])
+        return [
+            *self._back(),
+            *self._expand([step for step in self.form.table.program.tool_end if step in _STEPS.keys() - _RUNNING_ON]),
+        ]
+
+    def _back(self) -> list[str]:
+        """Blocks along the tool, where it is not high up anyway."""
+        return self.withdraw() if self._tip_control and not self.retracted else []
 
     def can_rewind(self) -> bool:
         """Whether there is a retract, above which rotary axes may turn as they like."""

@@ -21,6 +21,9 @@ from cornersmooth.text import format_number
 #: decimals of that
 _BLEND_DECIMALS = 5
 
+#: mm along the tool in forms with a point on the axis, which go to their first position on all axes at once
+POINT_APPROACH = 20.0
+
 #: characters of a name from that of a file: SINUMERIK takes 24
 _LONGEST_NAME = 24
 
@@ -53,6 +56,9 @@ class Frame:
         Such as ``G54``, or the number of a preset; None for that of the control's table, empty for none.
     provenance : tuple of str
         What the text is made of, for comments before the header.
+    approach, retract : float, mm
+        How far the tool comes down along its axis to the first position behind a retract, and goes back along it before
+        a retract; 0 for neither. A form with a point on the axis comes down by `POINT_APPROACH` at least.
     stem : str
         Name of the CL file without its ending, for the program where `program` is None; empty for none.
     """
@@ -65,6 +71,8 @@ class Frame:
     work_offset: str | None = None
     provenance: tuple[str, ...] = ()
     stem: str = ""
+    approach: float = 0.0
+    retract: float = 0.0
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
         """What stands for braces in the blocks around the motion and in those of extras.

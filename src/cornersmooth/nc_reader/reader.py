@@ -149,6 +149,10 @@ class Reader:
         self.placed = False
         self.blocks = 0
         self.way_back = WayBack(name)
+        #: the last element that was given out, if any
+        self.given: list[Elements] = []
+        #: elements up to a rapid along the tool before a retract that nobody asked for
+        self.withdrawn = -1
 
     def chunks(self, items: Iterable[Table | Line]) -> Iterator[Elements]:
         """Take runs of motion blocks and other lines, and give out the path elements as they come."""
@@ -183,7 +187,7 @@ class Reader:
         elif line.words:
             self.flush()
             self.dialect.words(line, self)
-            self.events += [Event(self.elements, *self._event(*late)) for late in self.late]
+            self.events += [Event(self._place, *self._event(*late)) for late in self.late]
             self.late = []
 
     def flush(self) -> None:
@@ -281,6 +285,7 @@ class Reader:
                 rotary=self.rotary is not None,
             )
         )
+        self.way_back.look_along(self.ready[-1])
         self.elements += len(run.kind)
         self.curves += len(curves)
         if not self.placed and (run.kind != Element.RAPID).any():
@@ -306,6 +311,7 @@ class Reader:
         """Give out what is ready."""
         found = Elements.joined(self.ready)
         self.ready, self.given_out = [], self.elements
+        self.given = [found.part(max(len(found) - 1, 0), len(found))]
         room = np.zeros(len(found))
         if self.rotary is not None:
             room = self.rotary.pole_room(found.second)
@@ -318,12 +324,17 @@ class Reader:
         """Units in force."""
         return "inch" if self.modal.inch else "mm"
 
+    @property
+    def _place(self) -> int:
+        """Element that words stand before."""
+        return self.elements - (self.elements == self.withdrawn)
+
     def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
         """Say a word that stands beside the motion; a late one acts after the motion of its block."""
         if late:
             self.late.append((line, letter, value, text))
         else:
-            self.events.append(Event(self.elements, *self._event(line, letter, value, text)))
+            self.events.append(Event(self._place, *self._event(line, letter, value, text)))
 
     @staticmethod
     def _event(line: Line, letter: str, value: float, text: str) -> tuple[int, str, float, str]:
@@ -347,6 +358,12 @@ class Reader:
 
     def leave(self, axes: str) -> None:
         """Say that axes go to positions of the machine."""
+        if self.way_back.look_back(self.given, self.ready):  # words behind it belong where it comes from
+            self.withdrawn = self.elements
+            place = len(self.events)
+            while place and self.events[place - 1].element == self.elements:
+                place -= 1
+            self.events[place:] = [replace(event, element=event.element - 1) for event in self.events[place:]]
         self.modal = self.way_back.leave(self.modal, axes)
 
     def _check_swings(self, elements: Ints, run: Executed) -> None:

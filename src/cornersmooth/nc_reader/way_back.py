@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Floats
-from cornersmooth.nc_reader.elements import Element, Problem
+from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.execution import Executed, Modal
+
+#: how far, mm and rad, a way along the tool may be off it: printed digits
+_ASIDE, _TURN = 1e-3, 1e-3
 
 
 class WayBack:
@@ -26,6 +30,9 @@ class WayBack:
         self._name = name
         #: whether an axis stands at a position of the machine
         self.open = False
+        #: says of a rapid along the tool, with the last printed digit, whether nobody asked for it; all are by default
+        self.added: Callable[[Floats, Floats, float], bool] = lambda start, end, step: False
+        self._arrival = 0
         #: where the last rapid has gone, NaN where that is not known, and its line
         self._above: tuple[Floats, int] | None = None
 
@@ -34,6 +41,41 @@ class WayBack:
         self.open = True
         tip = tuple(math.nan if axis in axes else value for axis, value in zip("XYZ", modal.tip, strict=True))
         return modal.but(tip=tip)
+
+    def look_along(self, elements: Elements) -> None:
+        """Let a rapid that nobody asked for, straight above the first position behind a retract, end there."""
+        line, self._arrival = self._arrival, 0
+        if not line or len(elements) < 2 or int(elements.line[0]) != line:
+            return
+        ends = elements.part(0, 2)
+        along = (ends.kind == Element.RAPID).all() and _is_above(ends, 0, 1)
+        if along and self.added(ends.tip[0], ends.tip[1], ends.tip_step):
+            elements.tip[0], elements.second[0] = ends.tip[1], ends.second[1]
+
+    def look_back(self, given: list[Elements], ready: list[Elements]) -> bool:
+        """Let a last rapid that nobody asked for, straight back along the tool before a retract, not move the tool.
+
+        Parameters
+        ----------
+        given : list of Elements
+            What has been given out last.
+        ready : list of Elements
+            What is to be given out, and may be changed.
+
+        Returns
+        -------
+        bool
+            Whether there is one.
+        """
+        parts = [*given, *ready[-2:]]
+        if not ready or sum(map(len, parts)) < 2 or ready[-1].kind[-1] != Element.RAPID:
+            return False
+        whole = Elements.joined(parts)
+        ends = whole.part(len(whole) - 2, len(whole))
+        if not (_is_above(ends, 1, 0) and self.added(ends.tip[0], ends.tip[1], ends.tip_step)):
+            return False
+        ready[-1].tip[-1], ready[-1].second[-1] = ends.tip[0], ends.second[0]
+        return True
 
     def arrive(self, run: Executed, problems: list[Problem]) -> Executed:
         """Leave out the rapids of the way back.
@@ -61,6 +103,8 @@ class WayBack:
         if gone.any():
             row = int(np.flatnonzero(gone)[-1])
             self._above = np.concatenate((run.tip[row], run.second[row])), int(run.line[row])
+        if not self.open:
+            self._arrival = int(run.line[int(np.argmin(unknown))])
         if not self.open and self._above is not None:
             above, line = self._above
             self._above = None
@@ -73,6 +117,17 @@ class WayBack:
             for key in ("kind", "tip", "second", "line", "feed", "per_revolution", "feed_room")
         }
         return replace(run, **rows, arc_element=(np.cumsum(kept) - 1)[run.arc_element])
+
+
+def _is_above(ends: Elements, above: int, below: int) -> bool:
+    """Whether a tip is straight back along the tool from another, with the same axis."""
+    axis = ends.second if ends.second_is == "vector" else ends.second - ends.tip
+    axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    way = ends.tip[above] - ends.tip[below]
+    height = float(way @ axis[below])
+    aside = float(np.linalg.norm(way - height * axis[below]))
+    turned = float(np.linalg.norm(axis[above] - axis[below]))
+    return height > 0.0 and aside <= _ASIDE + _TURN * height and turned <= _TURN
 
 
 def _check_approach(above: Floats, run: Executed, arrival: int, line: int, problems: list[Problem]) -> None:

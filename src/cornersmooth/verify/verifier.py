@@ -24,6 +24,7 @@ from cornersmooth.settings import BOUNDS
 from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.checks import Examined, examine
 from cornersmooth.verify.findings import Findings, Largest, Poses
+from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.statements import Token, asked, compare, said
 from cornersmooth.verify.task import Task
@@ -187,6 +188,7 @@ class Verifier:
         lines = read_lines(source, self._name, options.dialect.lexer)
         room = options.tolerance / self._program.mm_per_unit
         check = WordCheck(options.control, options.dialect.lexer, room, self._trusted, self._weights)
+        reader.way_back.added = OwnRapids(task).added
         text = _Text(reader.chunks(check.watch(lines) if self._words else lines), reader.events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
         problems = [*reader.problems, *check.problems]

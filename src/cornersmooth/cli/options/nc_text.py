@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli import completing
-from cornersmooth.cli.options.parameters import all_of
+from cornersmooth.cli.options.parameters import LENGTH, all_of
 from cornersmooth.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -63,6 +63,16 @@ work_offset = click.option(
     metavar="WORD",
     help="Work offset, such as G55, or the number of a preset; 'none' leaves it out. Default: G54, or preset 1.",
 )
+approach = click.option(
+    "--approach",
+    type=LENGTH,
+    help="How far the tool comes down along its axis to the first position behind a retract. [default: straight down]",
+)
+retract = click.option(
+    "--retract",
+    type=LENGTH,
+    help="How far the tool goes back along its axis before it goes up. [default: straight up]",
+)
 header = click.option(
     "--header",
     type=click.Path(),
@@ -108,6 +118,8 @@ def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
             digits,
             program_name,
             work_offset,
+            approach,
+            retract,
             header,
             footer,
             block_numbers,
