@@ -30,8 +30,8 @@ class WayBack:
         self._name = name
         #: whether an axis stands at a position of the machine
         self.open = False
-        #: says of a rapid along the tool, with the last printed digit, whether nobody asked for it; all are by default
-        self.added: Callable[[Floats, Floats, float], bool] = lambda start, end, step: False
+        #: says whether nobody asked for a rapid along the tool: start, end, last printed digit, the end near the part
+        self.added: Callable[[Floats, Floats, float, Floats], bool] = lambda start, end, step, near: False
         self._arrival = 0
         #: where the last rapid has gone, NaN where that is not known, and its line
         self._above: tuple[Floats, int] | None = None
@@ -49,7 +49,7 @@ class WayBack:
             return
         ends = elements.part(0, 2)
         along = (ends.kind == Element.RAPID).all() and _is_above(ends, 0, 1)
-        if along and self.added(ends.tip[0], ends.tip[1], ends.tip_step):
+        if along and self.added(ends.tip[0], ends.tip[1], ends.tip_step, ends.tip[1]):
             elements.tip[0], elements.second[0] = ends.tip[1], ends.second[1]
 
     def look_back(self, given: list[Elements], ready: list[Elements]) -> bool:
@@ -72,7 +72,7 @@ class WayBack:
             return False
         whole = Elements.joined(parts)
         ends = whole.part(len(whole) - 2, len(whole))
-        if not (_is_above(ends, 1, 0) and self.added(ends.tip[0], ends.tip[1], ends.tip_step)):
+        if not (_is_above(ends, 1, 0) and self.added(ends.tip[0], ends.tip[1], ends.tip_step, ends.tip[0])):
             return False
         ready[-1].tip[-1], ready[-1].second[-1] = ends.tip[0], ends.second[0]
         return True
