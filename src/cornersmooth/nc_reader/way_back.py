@@ -33,6 +33,7 @@ class WayBack:
         #: says whether nobody asked for a rapid along the tool: start, end, last printed digit, the end near the part
         self.added: Callable[[Floats, Floats, float, Floats], bool] = lambda start, end, step, near: False
         self._arrival = 0
+        self._came = 0  # line of the last end of a way back
         #: where the last rapid has gone, NaN where that is not known, and its line
         self._above: tuple[Floats, int] | None = None
 
@@ -70,6 +71,8 @@ class WayBack:
         parts = [*given, *ready[-2:]]
         if not ready or sum(map(len, parts)) < 2 or ready[-1].kind[-1] != Element.RAPID:
             return False
+        if ready[-1].line[-1] == self._came:  # the element before it is on the other side of a retract
+            return False
         whole = Elements.joined(parts)
         ends = whole.part(len(whole) - 2, len(whole))
         if not (_is_above(ends, 1, 0) and self.added(ends.tip[0], ends.tip[1], ends.tip_step, ends.tip[0])):
@@ -104,7 +107,7 @@ class WayBack:
             row = int(np.flatnonzero(gone)[-1])
             self._above = np.concatenate((run.tip[row], run.second[row])), int(run.line[row])
         if not self.open:
-            self._arrival = int(run.line[int(np.argmin(unknown))])
+            self._arrival = self._came = int(run.line[int(np.argmin(unknown))])
         if not self.open and self._above is not None:
             above, line = self._above
             self._above = None
