@@ -3,13 +3,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: run test check bench controller format clean
+.PHONY: run test thorough check bench controller format clean
 
 run: $(STAMP)  ## install into .venv, smooth the samples, show what came out
 	$(BIN)/python samples/show.py
 
 test: $(STAMP)  ## the whole test suite, on all processors
 	$(BIN)/python -m pytest -n auto --dist worksteal
+
+thorough: $(STAMP)  ## the same with every case of the long lists
+	CORNERSMOOTH_THOROUGH=1 $(BIN)/python -m pytest -n auto --dist worksteal
 
 check: $(STAMP)  ## lint, format and types
 	$(BIN)/ruff check .

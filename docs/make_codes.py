@@ -9,6 +9,7 @@ import ast
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -148,6 +149,7 @@ class Module:
                     yield from (text for value in given for text in self._texts(value))
 
 
+@cache
 def names_of_codes() -> dict[str, frozenset[str]]:
     """Names of the source that stand for codes: constants, and arguments by name."""
     found: dict[str, set[str]] = {}
@@ -164,6 +166,7 @@ def names_of_codes() -> dict[str, frozenset[str]]:
     return {name: frozenset(codes) for name, codes in found.items()}
 
 
+@cache
 def entries() -> list[Entry]:
     """Every code of the source with its texts, sorted."""
     names = names_of_codes()

@@ -10,6 +10,7 @@ import signal
 import stat
 import subprocess
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,7 @@ from oracle.command import (
     wait_for,
 )
 from oracle.nc_text import parse
+from oracle.share import share
 
 # ---------------------------------------------------------------- 4: output
 
@@ -240,8 +242,10 @@ def _ends(out: Path) -> bool:
         return False
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("moment", [_reads, _has_read, _begins_to_write, _writes, _verifies])
+@pytest.mark.parametrize(
+    ("moment", "number"),
+    share(product([_reads, _has_read, _begins_to_write, _writes, _verifies], [signal.SIGINT, signal.SIGTERM]), 3),
+)
 def test_interruption_leaves_the_old_file(
     large: Path,
     tmp_path: Path,

@@ -12,7 +12,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     return Bench(tmp_path_factory.mktemp("bench"), single=31_000, several=2_000)
 
 
-@pytest.mark.parametrize("one", tries(16, seed=7), ids=lambda one: f"{'batch' if one.batch else 'single'}-{one.how}")
+@pytest.mark.parametrize("one", tries(8, seed=7), ids=lambda one: f"{'batch' if one.batch else 'single'}-{one.how}")
 def test_nothing_is_left_of_an_interrupted_run(bench: Bench, one: Try) -> None:
     found = bench.interrupt(one)
     assert found.wrong == [], found.said

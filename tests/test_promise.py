@@ -25,12 +25,13 @@ from oracle.library import exact_poses, original_motion, write
 from oracle.motion import Path as Motion
 from oracle.motion import written_path
 from oracle.nc_text import Code, Curve, Form, Line, Written, parse
+from oracle.share import how_many, share
 
 TOLERANCES = (0.001, 0.01, 0.04, 0.15)
 AXIS_LENGTHS = (10.0, 50.0)
 FORMS: tuple[Form, ...] = ("g1", "g6.2")
 #: for each tolerance and axis length; half of them in either form
-CHAINS = 1000
+CHAINS = how_many(480, 1000)
 #: statuses of the report under which a pose need not be passed
 ROUNDED = "smoothed"
 REPEATED = "duplicate"
@@ -226,7 +227,7 @@ def _every(names: tuple[str, ...], cases: list[tuple[Form, float, float]]) -> li
 
 @pytest.mark.parametrize(
     ("name", "form", "tolerance", "axis_length"),
-    [*_every(OWN_FIVE_AXIS, CASES), *of_corpus(_every(FIVE_AXIS, CASES))],
+    [*share(_every(OWN_FIVE_AXIS, CASES), 2), *of_corpus(share(_every(FIVE_AXIS, CASES), 2))],
 )
 def test_five_axis_files(name: str, form: Form, tolerance: float, axis_length: float) -> None:
     whole_file(cl_file(name), form, tolerance, axis_length)

@@ -21,6 +21,7 @@ from oracle.judge import feeds_out_of_place, judge, not_passed, runs_of
 from oracle.library import exact_poses, original_motion
 from oracle.motion import written_path
 from oracle.nc_text import Curve, Form, Written, parse
+from oracle.share import how_many, share
 
 ROOT = Path(__file__).resolve().parent.parent
 FORMS: tuple[Form, ...] = ("g1", "g6.2")
@@ -57,7 +58,9 @@ def write(program: Program, form: Form, options: dict[str, Any]) -> tuple[Writte
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("tolerance", "axis_length"), [(0.01, 50.0), (0.15, 10.0)])
 def test_random_chains(form: Form, tolerance: float, axis_length: float, options: dict[str, Any]) -> None:
-    chains = random_chains(100, 150)
+    # every case sees other chains
+    case = FORMS.index(form) + 2 * list(OPTIONS.values()).index(options) + 10 * int(tolerance > 0.1)
+    chains = random_chains(100 + case, how_many(60, 150))
     program = cornersmooth.read(cl_text(chains)[0])
     written, smoothed = write(program, form, {"tolerance": tolerance, "axis_length": axis_length, **options})
     assert smoothed.corners.smoothed.mean() > 0.6
@@ -83,7 +86,7 @@ def test_own_files(name: str, options: dict[str, Any], form: Form) -> None:
     keeps_the_promise(cl_file(name), form, options)
 
 
-@pytest.mark.parametrize(("name", "options", "form"), of_corpus(product(FILES, OPTIONS, FORMS)))
+@pytest.mark.parametrize(("name", "options", "form"), of_corpus(share(product(FILES, OPTIONS, FORMS), 3)))
 def test_real_files(name: str, options: str, form: Form) -> None:
     keeps_the_promise(cl_file(name), form, OPTIONS[options])
 

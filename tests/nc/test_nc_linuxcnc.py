@@ -30,6 +30,7 @@ from oracle.files import OWN, of_corpus
 from oracle.judge import judge
 from oracle.motion import Path as Motion
 from oracle.motion import unit
+from oracle.share import how_many
 
 Floats = NDArray[np.float64]
 
@@ -114,7 +115,7 @@ WAYS = [
 
 @pytest.mark.parametrize(("machine", "tcp", "units"), WAYS)
 def test_positions_are_those_in_the_text(machine: str, tcp: bool, units: str, tmp_path: Path) -> None:
-    cl = flat(1, 24)[0]
+    cl = flat(1, how_many(12, 24))[0]
     text = written(cl if units == "mm" else in_inches(cl), machine, tcp=tcp)
     accepted(text, tmp_path)
     letters = "XYZAC" if "ac" in machine else "XYZBC"
@@ -137,7 +138,7 @@ def test_tip_and_axis_by_its_own_formulas_keep_the_tolerance(
     machine: str, tcp: bool, units: str, tmp_path: Path
 ) -> None:
     """The published kinematics of trtfuncs.c over the positions that the interpreter produces."""
-    cl, chains = flat(2, 60 if tcp else 12)
+    cl, chains = flat(2, how_many(30, 60) if tcp else how_many(8, 12))
     if units == "inch":
         cl, chains = in_inches(cl), [replace(chain, tip=25.4 * chain.tip) for chain in chains]
     axis_length, tolerance = 10.0, 0.01

@@ -19,6 +19,7 @@ from nc.promise import random_verdict, runs_of, verdict, without_holes
 from oracle.chains import Chain, cl_text
 from oracle.files import cl_file, of_corpus
 from oracle.motion import Original, unit
+from oracle.share import how_many, share
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 
@@ -33,7 +34,7 @@ LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
 )
 def test_random_chains_keep_the_tolerance(case: Case, tolerance: float, axis_length: float, units: str) -> None:
     settings = Settings(tolerance=tolerance, axis_length=axis_length)
-    count = 24 if case.tcp else 6  # without tool tip control every line becomes many
+    count = how_many(14, 24) if case.tcp else 6  # without tool tip control every line becomes many
     found = random_verdict(case, settings, len(str(case)), count, units)
     assert found.deviation.worst <= tolerance, found
 
@@ -79,11 +80,12 @@ OWN = ["nx_blade.cls", "nx_pocket.cls", "creo_plate.ncl", "solidworks_bracket.ap
     [*((name, part) for part, name in enumerate(OWN)), *of_corpus((name, part) for part, name in enumerate(FILES))],
 )
 def test_files_keep_the_tolerance(name: str, part: int) -> None:
-    """Each file in half of the controls and forms, each of those with half of the files: `nc.sweep` does all."""
+    """Each file in a third of the controls and forms, each of those with a third of the files: `nc.sweep` does all."""
     path = cl_file(name)
     # without tool tip control every line becomes many: `nc.sweep` tries those
     small = path.stat().st_size < 12_000 and name not in OWN
-    cases = [case for index, case in enumerate(CHOSEN) if (case.tcp or small) and (index + part) % 2]
+    cases = [case for case in CHOSEN if case.tcp or small]
+    cases = share(cases, 3, part)
     assert sum(keeps_the_tolerance(path, case) for case in cases) > len(cases) - 5
 
 

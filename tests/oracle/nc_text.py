@@ -346,7 +346,7 @@ class _Grammar:
     def numbers(self, words: tuple[str, ...], number: int) -> Six:
         """Values in mm (tip, axis point) or plain (vector)."""
         for word in words:
-            if word[0] == "-" and not word.strip("-0."):
+            if word.startswith("-0") and not word.strip("-0."):
                 raise BadTextError(f"{number}: negative zero {word}")
         second = self.scale if self.form == "g6.2" else 1.0
         x, y, z, i, j, k = (float(word) for word in words)

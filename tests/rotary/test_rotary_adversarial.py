@@ -19,9 +19,10 @@ from cornersmooth.kinematics import (
 )
 from cornersmooth.kinematics.poses import angle_between
 from cornersmooth.rotary import FilledPath, fill, insertions, rotary_angles
+from oracle.share import how_many
 
 TOLERANCE = 0.02  # degrees
-CASES = 200
+CASES = how_many(100, 200)
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
