@@ -57,6 +57,8 @@ def stretches(text: str, control: str) -> list[list[Stretch]]:
         knots, points, intervals = [], [], []
 
     for line in text.splitlines():
+        if "G28" in line or "SUPA" in line:  # a place of the machine
+            continue
         numbers = {word: re.search(rf"(?:^|\s){re.escape(word)}(-?[\d.]+)", line) for word in words}
         curve = (
             re.search(r"\bPL=([\d.]+)", line) if control == "siemens" else re.match(r"(?:G6\.2 P4 )?K([\d.]+)", line)

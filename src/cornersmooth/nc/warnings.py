@@ -22,7 +22,7 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
         _feeds(smoothed.program, findings)
     for extra in form.extras:
         if extra.warning:
-            findings.add("CS339", "warning", 0, f"{extra.name}: {extra.warning}")
+            findings.add("CS339", "warning", 0, f"{extra.name} was asked for: {extra.warning}")
 
 
 def _arcs(circles: Circles, program: Program, findings: Findings) -> None:
