@@ -159,7 +159,7 @@ def _chain(text: _Text, case: Case, fixed: bool, kind: str) -> None:
 def _arcs(text: _Text) -> None:
     """Arcs and lines in a plane, the tool upright; the normal points up: a plain CL file turns left about it."""
     rng, up = text.rng, np.array([0.0, 0, 1])
-    here = np.round(rng.uniform(-30, 30, 3), 3)
+    here = np.round(np.round(rng.uniform(-30, 30, 3), 3) / text.scale, 4) * text.scale
     text.rapid(here + [0, 0, 20], up)
     text.at_feed(float(rng.integers(100, 2000)) / text.scale)
     text.goto(here, up)

@@ -14,12 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
-from cornersmooth.settings import Settings
+from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
 from cornersmooth.vectors import norm, square
 
 #: bend (mm) that one line per half may bridge, over the chord tolerance
 _BEND_PER_CHORD = 1.0 / PAPER_ERROR
+
+#: largest product of a line's turn and the tangent of half the segment's, rad, where the axis turns by more than 90°
+_STEEP = 0.25
 
 #: poses or corners measured at once: their intermediate arrays fit the processor's cache
 _BATCH = 16384
@@ -114,9 +117,11 @@ def turn_limit(settings: Settings, half_turn: Floats, tolerance: float) -> Float
     """
     share = tolerance / 2.0 / settings.axis_length
     limit = np.full_like(half_turn, math.cbrt(54.0 * share))
-    tangent = np.tan(np.minimum(half_turn, math.radians(60)))
+    tangent = np.tan(np.minimum(half_turn, math.radians(FLIP_ANGLE / 2.0)))
     steep = tangent > 0.0
     limit[steep] = np.minimum(limit[steep], np.sqrt(4.0 * share / tangent[steep]))
+    # beyond a right angle the rate changes so fast that the second order tells it within small steps only
+    limit[tangent > 1.0] = np.minimum(limit[tangent > 1.0], _STEEP / tangent[tangent > 1.0])
     if settings.axis_step is not None:
         limit = np.minimum(limit, math.radians(settings.axis_step))
     return limit
@@ -129,8 +134,6 @@ def _divide(settings: Settings, segments: Segments, poses: Ints, chord: Floats) 
     if settings.axis_step is not None:
         turning |= 2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)) > math.radians(settings.axis_step)
     pose, half = poses[turning], np.arcsin(np.minimum(chord[turning] / 2.0, 1.0))
-    ruled = half <= math.radians(settings.max_axis_step) / 2.0 + 1e-12
-    pose, half = pose[ruled], half[ruled]
     if not len(pose):
         return
     # angle of the ruled axis from the middle of its segment: tan φ is linear in the fraction

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.distances import Distances, Reached
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
@@ -72,10 +72,10 @@ def original_backwards(match: Match, theirs: Reached) -> Found | None:
     way = _way(length, here, before)
     straight = way <= _STRAIGHT * _distance(_on(six, before), _on(six, here)) + match.slack
     falls, before, here = falls[straight], before[straight], here[straight]
-    later = _cost(match, theirs.vertex[falls], here, before, forward=True)
-    earlier = _cost(match, theirs.vertex[falls - 1], before, here, forward=False)
+    later, comes_back = _cost(match, theirs.vertex[falls], here, before, forward=True)
+    earlier, came = _cost(match, theirs.vertex[falls - 1], before, here, forward=False)
     gain = np.minimum(later, earlier)
-    wrong = np.flatnonzero(gain > match.slack)
+    wrong = np.flatnonzero((gain > match.slack) & ~comes_back & ~came)
     if not len(wrong):
         return None
     original, vertex = match.original, theirs.vertex[falls[wrong]]
@@ -84,8 +84,16 @@ def original_backwards(match: Match, theirs: Reached) -> Found | None:
     return vertex.astype(np.float64), cl_line, nc_line, gain[wrong]
 
 
-def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: bool) -> Floats:
-    """How much farther the text is from original vertices when it may not pass them before, or behind, `bound`."""
+def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: bool) -> tuple[Floats, Bools]:
+    """Look at original vertices as if the text may not pass them before, or behind, `bound`.
+
+    Returns
+    -------
+    gain : (k,) float64, mm
+        How much farther it is from them then.
+    comes : (k,) bool
+        Whether it comes back to them there, within the tolerance: a reversal that is run, if not to its very end.
+    """
     own, six = match.path.six[vertex], match.six
     middle = np.minimum(bound.astype(np.int64), len(six) - 2)
     ends = np.flatnonzero(np.append(np.diff(match.stretch) != 0, True))
@@ -95,14 +103,22 @@ def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: b
     # the segment that the bound lies on counts in part, those beyond it whole
     segment, at = nearest_segments(own, six, middle, 0, middle, middle)
     limited = np.maximum(at, bound - middle) if forward else np.minimum(at, bound - middle)
-    best = _distance(own, _on(six, middle + limited))
+    reached = _on(six, middle + limited)
+    best = _distance(own, reached)
     beyond = middle + (1 if forward else -1)
     there = (beyond <= last) & (beyond >= first)
     low, high = (beyond, np.maximum(last, beyond)) if forward else (np.minimum(first, beyond), beyond)
     rows = np.flatnonzero(there)
     segment, at = nearest_segments(own[rows], six, beyond[rows], _REACH, low[rows], high[rows])
-    best[rows] = np.minimum(best[rows], _distance(own[rows], _on(six, segment + at)))
-    return best - _distance(own, _on(six, free))
+    other = _on(six, segment + at)
+    away = _distance(own[rows], other)
+    nearer = away < best[rows]
+    reached[rows[nearer]] = other[nearer]
+    best[rows] = np.minimum(best[rows], away)
+    off = own - reached
+    own_way = np.maximum(_distance(off[:, :3], 0.0), _distance(off[:, 3:], 0.0))
+    comes = (own_way <= match.tolerance) & (_distance(own, _on(six, bound)) - best > match.slack)
+    return best - _distance(own, _on(six, free)), comes
 
 
 def _on(six: Floats, place: Floats) -> Floats:
@@ -120,7 +136,7 @@ def _way(length: Floats, start: Floats, end: Floats) -> Floats:
     return way
 
 
-def _distance(a: Floats, b: Floats) -> Floats:
+def _distance(a: Floats, b: Floats | float) -> Floats:
     away = a - b
     distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
     return distance
