@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from nc.writing import codes, text_of_cl
+from cornersmooth.errors import InputError
+from cornersmooth.nc import Frame, choose_form
+from nc.writing import codes, lines_of, text_of_cl
 
 NX = "TOOL PATH/A,TOOL,B\nTLDATA/DRILL,MILL,8.0,0.0,80.0,118.0,35.0\nMSYS/0,0,0,1,0,0,0,1,0\n"
 PLAIN = "UNITS/MM\n"
@@ -174,3 +176,12 @@ def test_the_corner_after_a_hole_is_passed_exactly() -> None:
     )
     assert "G1 X9.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000 F800." in lines
     assert not [line for line in lines if " X9.0000 Y9.0000" in line]
+
+
+def test_a_tap_is_an_error_unless_it_may_be_left_out() -> None:
+    cl = f"{PLAIN}RAPID\nGOTO/10,5,30\nCYCLE/TAP,FEDTO,10,MMPM,250,RAPTO,3\nGOTO/10,5,0\nCYCLE/OFF\nFINI\n"
+    form = choose_form("fanuc", "g1")
+    assert any("NOT DRILLED" in line for line in lines_of(form, cl, frame=Frame(skip_taps=True)))
+    with pytest.raises(InputError, match="a tap, which is not written") as refused:
+        lines_of(form, cl, frame=Frame(skip_taps=False))
+    assert refused.value.line == 1 + cl[: cl.index("CYCLE/TAP")].count("\n")

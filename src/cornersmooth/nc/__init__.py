@@ -185,7 +185,9 @@ def write(
     frame = frame or Frame()
     values = frame.values(chosen, program, smoothed.settings)
     operation = Operation(chosen, values, frame.texts(chosen, values), findings)
-    statements = StatementWriter(chosen, program, findings, operation, comments=frame.comments)
+    statements = StatementWriter(
+        chosen, program, findings, operation, comments=frame.comments, skip_taps=frame.skip_taps
+    )
     circles = plan_circles(program, smoothed.settings, chosen)
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)

@@ -59,6 +59,8 @@ class Frame:
     approach, retract : float, mm
         How far the tool comes down along its axis to the first position behind a retract, and goes back along it before
         a retract; 0 for neither. A form with a point on the axis comes down by `POINT_APPROACH` at least.
+    skip_taps : bool
+        Whether holes that are to be tapped are only gone over, with a warning; an error otherwise.
     stem : str
         Name of the CL file without its ending, for the program where `program` is None; empty for none.
     """
@@ -71,6 +73,7 @@ class Frame:
     work_offset: str | None = None
     provenance: tuple[str, ...] = ()
     stem: str = ""
+    skip_taps: bool = True
     approach: float = 0.0
     retract: float = 0.0
 

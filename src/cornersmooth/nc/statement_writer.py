@@ -61,6 +61,7 @@ class StatementWriter:
     findings: Findings
     operation: Operation
     comments: bool = True
+    skip_taps: bool = True  #: whether taps are left out with a warning
     plane: int = 17  #: the plane selected, kept by who writes the motion
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
     cycle: Cycle | None = None  #: the hole cycle in force, None where it is not understood
@@ -297,11 +298,23 @@ class StatementWriter:
         if words == ["ON"]:
             self.cycle = self._last_cycle
         elif words != ["INIT"]:  # SolidWorks announces a cycle by it
+            self._refuse_tap(statement, words)
             self.cycle = self._last_cycle = read_cycle(statement.args, self.program, self.speed)
         if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
             text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
             self.findings.add("CS321", "warning", statement.line, text)
         return self.comment(statement.text)
+
+    def _refuse_tap(self, statement: Statement, words: list[str]) -> None:
+        """A tap cannot be written as moves, and a hole without its thread is nothing to be silent about."""
+        if "TAP" in words and not self.skip_taps:
+            raise InputError(
+                "CS342",
+                "a tap, which is not written: plain moves cannot turn the spindle with the feed",
+                "give --skip-taps, and put the control's own cycle where the text says NOT DRILLED",
+                file=self.program.source.name,
+                line=statement.line,
+            )
 
     def end(self, statement: Statement) -> list[str]:
         """END: the end of the text; in the middle of the path a stop."""

@@ -73,6 +73,9 @@ retract = click.option(
     type=LENGTH,
     help="How far the tool goes back along its axis before it goes up. [default: straight up]",
 )
+skip_taps = click.option(
+    "--skip-taps", is_flag=True, help="Only go over holes that are to be tapped, with a warning, instead of an error."
+)
 header = click.option(
     "--header",
     type=click.Path(),
@@ -120,6 +123,7 @@ def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
             work_offset,
             approach,
             retract,
+            skip_taps,
             header,
             footer,
             block_numbers,
