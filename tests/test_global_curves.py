@@ -192,3 +192,25 @@ def test_sections_are_the_curve_of_the_run() -> None:
         if gone >= own[-1]:
             at, run_of, gone = at + len(own) + 2, run_of + 1, 0.0
     assert run_of == len(runs)
+
+
+def test_a_long_span_beside_short_ones_is_verified(tmp_path: Path) -> None:
+    chain = random_chains(4, 6, corners=8)[0]  # beside a sharp corner; the axis turns by 8 degrees in one span
+    for control, (form, _) in FORMS.items():
+        options = ["--control", control, "-f", form, "--method", "global", "-e", "0.003"]
+        result = run("smooth", "-", "-o", tmp_path / f"{control}.nc", "-q", *options, data=cl_text([chain])[0])
+        assert result.returncode == 0, result.stderr.decode()
+
+
+def test_runs_with_steep_turns_are_named_where_curves_are_written() -> None:
+    tilt = np.radians([0.0, 5.0, 45.0, 50.0, 55.0])
+    tip = np.stack((np.arange(5) * 5.0, [0.0, 1, 0, 1, 0], np.zeros(5)), axis=1)
+    axis = np.stack((np.sin(tilt), 0 * tilt, np.cos(tilt)), axis=1)
+    program = cornersmooth.Program.from_poses(tip, axis)
+    for lines in (True, False):
+        settings = cornersmooth.Settings(method="global", round_feed_changes=lines)
+        smoothed = cornersmooth.smooth(program, settings)
+        told = [finding for finding in smoothed.findings if finding.code == "CS229"]
+        assert (smoothed.runs is not None) == lines
+        assert [finding.count for finding in told] == ([] if lines else [3])
+        assert smoothed.corners.rounded.all()

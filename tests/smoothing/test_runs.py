@@ -12,6 +12,7 @@ from scipy.optimize import NonlinearConstraint, minimize
 from cornersmooth.smoothing.runs.banded import Gather, solve_blocks
 from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.interior import COLD, Task, smoothest
+from cornersmooth.smoothing.runs.lines import largest_curvature
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.samples import Pieces, Samples
 from cornersmooth.smoothing.runs.solving import RunCurves, solve_runs
@@ -259,3 +260,29 @@ def test_same_input_gives_the_same_curve() -> None:
     one, other = (solve_runs(lines, (0.01, 0.01), H) for _ in range(2))
     np.testing.assert_array_equal(one.control, other.control)
     np.testing.assert_array_equal(one.splines.knot, other.splines.knot)
+
+
+def test_curvature_beside_a_pose_is_the_largest_of_its_half_segments() -> None:
+    lines = random_runs(5, 6, 8, H)
+    curves = solve_runs(lines, (0.02, 0.02), H)
+    largest = largest_curvature(curves.lines, curves.splines, curves.control)
+    for run in range(len(lines.count)):
+        own = np.arange(lines.first[run], lines.first[run + 1])
+        spline = spline_of(curves, run)
+        s = np.linspace(0.0, lines.s[own[-1]], 4001)[1:-1]
+        first, second = (spline.derivative(order)(s)[:, :3] for order in (1, 2))
+        bent = np.linalg.norm(np.cross(first, second), axis=1) / np.linalg.norm(first, axis=1) ** 3
+        moving = np.linalg.norm(first, axis=1) > 0.05 * lines.step
+        pose = np.abs(s[:, None] - lines.s[own]).argmin(axis=1)
+        for place in range(len(own)):
+            here = moving & (pose == place)
+            assert bent[here].max(initial=0.0) <= 1.3 * largest[own[place]] + 1e-6
+    assert (largest < 1e9).all()
+
+
+def test_curvature_of_a_circle() -> None:
+    t = np.linspace(0, 3.0, 300)
+    tip = np.stack((30 * np.cos(t), 30 * np.sin(t), 0 * t), axis=1)
+    curves = solve_runs(through(np.hstack((tip, tip + [0, 0, H]))), (0.01, 0.01), H)
+    largest = largest_curvature(curves.lines, curves.splines, curves.control)
+    np.testing.assert_allclose(largest[20:-20], 1 / 30, rtol=0.02)

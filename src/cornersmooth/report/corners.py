@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.construction import construction_of
+from cornersmooth.smoothing.global_runs import RUN_CURVATURE
 from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.vectors import angle_between, norm
 
@@ -96,7 +97,7 @@ def _names(names: dict[Status, str] | dict[LimitedBy, str], codes: NDArray[np.ui
 
 
 def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:
-    """Largest curvature of the tip curve, 1/mm; 0 where it has no length or there is no transition."""
+    """Largest curvature of the tip curve, 1/mm; 0 where it has no length and where nothing is rounded."""
     curvature = np.zeros(len(rows))
     for block in np.array_split(np.arange(len(rows)), max(1, len(rows) // 8192)):
         chosen = rows[block]
@@ -106,7 +107,10 @@ def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:
         swing = norm(np.cross(first, second))
         bent = np.divide(swing, speed**3, out=np.zeros_like(speed), where=speed > 1e-12)
         curvature[block] = bent.max(axis=1)
-    return curvature
+    in_runs = smoothed.corners.extra.get(RUN_CURVATURE)
+    if in_runs is None:
+        return curvature
+    return np.where(np.isnan(in_runs[rows]), curvature, in_runs[rows])
 
 
 @dataclass(frozen=True)

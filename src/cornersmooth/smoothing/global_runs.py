@@ -12,7 +12,7 @@ from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program,
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
-from cornersmooth.smoothing.runs.lines import TURNING, points_at
+from cornersmooth.smoothing.runs.lines import TURNING, largest_curvature, points_at
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.ranges import ranges, spread, starts
 from cornersmooth.smoothing.runs.solving import STEP, RunCurves, solve_runs
@@ -33,6 +33,10 @@ ENDS_RUN = (
 STEEPEST = 30.0
 
 
+#: what `Corners.extra` has: largest curvature of the curve of a run beside each of its corners, 1/mm
+RUN_CURVATURE = "run_curvature"
+
+
 class GlobalRuns(Proportional):
     """Corners of a run are rounded together; those of runs that cannot be are rounded one by one."""
 
@@ -41,25 +45,26 @@ class GlobalRuns(Proportional):
     ) -> SmoothProgram:
         """Round every corner by itself, then replace whole runs by one pair of curves."""
         corners = place_corners(program, settings, self)
-        pose, count = find_runs(program, settings, corners)
+        pose, count, steep = find_runs(program, settings, corners)
+        findings = program.findings if not len(steep) else (*program.findings, _steep(program, steep))
         if not len(count):
-            return SmoothProgram(program, corners, settings, program.findings)
+            return SmoothProgram(program, corners, settings, findings)
         point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
         tolerances = settings.tip_tolerance, settings.axis_point_tolerance - TURNING * settings.tolerance
         lines = Polylines.through(point, count, STEP * min(tolerances))
         curves = solve_runs(lines, tolerances, settings.axis_length, progress)
         runs = _kept(curves, pose)
-        findings = program.findings
         if not curves.kept.all():
             first = int(pose[lines.first[:-1][~curves.kept][0]])
             findings = (*findings, _one_by_one(program, first, curves, count))
         return SmoothProgram(program, _with_runs(corners, runs, curves, len(program)), settings, findings, runs)
 
 
-def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[Ints, Ints]:
+def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[Ints, Ints, Ints]:
     """Poses of the runs that have a corner to round, repeated poses left out, and their number in each run.
 
-    Runs in which the axis turns steeply are left to rounding corner by corner where the output is curves.
+    Runs in which the axis turns steeply are left to rounding corner by corner where the output is curves; third come
+    the poses of their corners.
     """
     around = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
     chains = program.chains
@@ -76,7 +81,7 @@ def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[I
     # a run is a row of segments whose inner poses all join; segment i leads from pose i to pose i + 1
     segment = np.flatnonzero(chain[1:] == chain[:-1])
     if not len(segment):
-        return pose[:0], pose[:0]
+        return pose[:0], pose[:0], pose[:0]
     begins = ~joins[segment]
     run = np.cumsum(begins) - 1
     first = segment[begins]
@@ -84,8 +89,12 @@ def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[I
     wanted = np.bincount(run, bent[segment]) > 0
     if not settings.round_feed_changes:
         turn = angle_between(program.axis[pose[segment]], program.axis[pose[segment + 1]])
-        wanted &= np.bincount(run, turn > np.radians(STEEPEST)) == 0
-    return pose[ranges(first[wanted], number[wanted] + 1)], number[wanted] + 1
+        steep = wanted & (np.bincount(run, turn > np.radians(STEEPEST)) > 0)
+        wanted &= ~steep
+    else:
+        steep = np.zeros(len(wanted), np.bool_)
+    left = pose[ranges(first[steep] + 1, number[steep] - 1)]
+    return pose[ranges(first[wanted], number[wanted] + 1)], number[wanted] + 1, left
 
 
 def _kept(curves: RunCurves, pose: Ints) -> Runs:
@@ -119,6 +128,8 @@ def _with_runs(corners: Corners, runs: Runs, curves: RunCurves, poses: int) -> C
     known = np.repeat(curves.kept, curves.lines.count)
     for name, found in (("tip_error", tip), ("axis_error", axis), ("orientation_error", turn)):
         values[name][rows] = found[known][inner]
+    curvature = np.full(len(corners), np.nan)
+    curvature[rows] = largest_curvature(curves.lines, curves.splines, curves.control)[known][inner]
     trim_in, trim_out = corners.trim_in.copy(), corners.trim_out.copy()
     trim_in[rows] = trim_out[rows] = 0.0
     return replace(
@@ -129,6 +140,7 @@ def _with_runs(corners: Corners, runs: Runs, curves: RunCurves, poses: int) -> C
         trim_out=trim_out,
         axis_trim_in=trim_in,
         axis_trim_out=trim_out,
+        extra={**corners.extra, RUN_CURVATURE: curvature},
         **values,
     )
 
@@ -147,6 +159,11 @@ def _at_poses(curves: RunCurves) -> tuple[Floats, Floats, Floats]:
     off = tip - lines.point[:, :3]
     top = off + size * axis - lever
     return norm(off), norm(top), angle_between(axis, lever / size)
+
+
+def _steep(program: Program, pose: Ints) -> Finding:
+    text = f"the tool axis turns by more than {STEEPEST:g} deg in one move; curves round such runs corner by corner"
+    return Finding("CS229", "note", int(program.line[pose[0]]), text, len(pose))
 
 
 def _one_by_one(program: Program, pose: int, curves: RunCurves, count: Ints) -> Finding:

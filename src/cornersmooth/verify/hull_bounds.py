@@ -17,6 +17,9 @@ from cornersmooth.verify.polyline import directions, unit, written_at
 #: samples between two knots where the hull alone does not settle it
 _SAMPLES = 32
 
+#: segments of the original that are looked at beyond both ends of a curve
+_BESIDE = 3
+
 #: curves searched in one batch at most
 _MOST_CURVES = 20000
 
@@ -39,20 +42,34 @@ def hull_gaps(match: Match, limit: float) -> tuple[Floats, Ints, Floats, Floats]
     element = np.concatenate([np.zeros(0, np.int64), *suspects])[:_MOST_CURVES]
     if not len(element):
         return None
+    trail, first = match.written.trail, match.written.first
+    end = trail.last[element - first]
+    begin = np.where(element > first, trail.last[np.maximum(element - first - 1, 0)], 0)
+    begin = np.where(match.on[begin], begin, end)  # a stretch begins in the middle of nothing
+    # a curve may lead past many segments: it is looked at from its middle to both of its ends
+    low, high = np.minimum(match.segment[begin], match.segment[end]), match.segment[end]
+    reach = np.exp2(np.ceil(np.log2(_BESIDE + (high - low + 1) // 2))).astype(np.int64)
+    tip, axis = np.zeros(len(element)), np.zeros(len(element))
+    for size in np.unique(reach).tolist():
+        rows = np.flatnonzero(reach == size)
+        tip[rows], axis[rows] = _searched(match, element[rows], (low[rows] + high[rows]) // 2, size)
+    return match.place[end - 1], element, tip, axis
+
+
+def _searched(match: Match, element: Ints, middle: Ints, reach: int) -> tuple[Floats, Floats]:
+    """(k,) largest deviations of tip and axis point at samples of curves, from segments around `middle` (k,)."""
     grid = np.linspace(0.0, 1.0, 2 * _SAMPLES + 1)
     owner = np.repeat(element, len(grid))
     tip, axis = written_at(match.nc, owner, np.tile(grid, len(element)))
     six = np.hstack((tip, tip + match.axis_length * axis))
-    trail = match.written.trail
-    middle = np.repeat(match.segment[trail.last[element - match.written.first] - 1], len(grid))
-    vertex = np.repeat(trail.last[element - match.written.first], len(grid))
+    vertex = match.written.trail.last[owner - match.written.first]
     result = []
     for metric in ("tip", "axis point"):
         segment, at = nearest_segments(
             six,
             match.path.six,
-            middle,
-            3,
+            np.repeat(middle, len(grid)),
+            reach,
             match.low[vertex],
             match.high[vertex],
             metric,
@@ -62,8 +79,7 @@ def hull_gaps(match: Match, limit: float) -> tuple[Floats, Ints, Floats, Floats]
         their_axis = unit(theirs.axis[segment] + at[:, None] * (theirs.axis[segment + 1] - theirs.axis[segment]))
         gap = gap_between(tip, axis, their_tip, their_axis, match.axis_length)
         result.append((gap.tip if metric == "tip" else gap.axis_point).reshape(len(element), len(grid)))
-    place = match.place[trail.last[element - match.written.first] - 1]
-    return place, element, result[0].max(axis=1), result[1].max(axis=1)
+    return result[0].max(axis=1), result[1].max(axis=1)
 
 
 def _suspects(match: Match, group: CurveGroup, limit: float) -> Ints:

@@ -21,6 +21,9 @@ from cornersmooth.vectors import angle_between, norm, unit
 #: share of ε that turning the axis inside a line may take; `global_runs` leaves it free
 TURNING = 0.02
 
+#: pieces measured together
+_TOGETHER = 8192
+
 #: most lines for one segment
 _MOST_LINES = 20_000
 
@@ -35,6 +38,29 @@ def points_at(control: Floats, splines: Splines, span: Ints, s: Floats) -> tuple
     basis = splines.basis(span, s)
     points = np.einsum("mk,mkd->md", basis, control[splines.span_control[span][:, None] + np.arange(4)])
     return points[:, :3], unit(points[:, 3:] - points[:, :3])
+
+
+def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Floats:
+    """(n,) 1/mm: largest curvature of the tip curves in the halves of the segments beside each pose of the runs."""
+    largest = np.zeros(len(lines.s))
+    pieces = Pieces.of(splines, lines)
+    at = np.linspace(0.0, 1.0, 9)
+    slope = np.stack(((1.0 - at) ** 2, 2.0 * at * (1.0 - at), at**2), axis=1)
+    bend = np.stack((1.0 - at, at), axis=1)
+    for begin in range(0, len(pieces.span), _TOGETHER):
+        rows = slice(begin, begin + _TOGETHER)
+        span, segment, low, high = pieces.span[rows], pieces.segment[rows], pieces.low[rows], pieces.high[rows]
+        points = control[splines.span_control[span][:, None] + np.arange(4), :3]
+        hull = splines.bernstein(span, low, high) @ points
+        first, second = 3.0 * slope @ np.diff(hull, axis=1), 6.0 * bend @ np.diff(hull, 2, axis=1)
+        speed = norm(first)
+        # where the tip all but stands there is no curvature to speak of
+        least = 1e-6 * (high - low)[:, None] * lines.step
+        curvature = np.divide(norm(np.cross(first, second)), speed**3, out=np.zeros_like(speed), where=speed > least)
+        middle = (lines.s[segment] + lines.s[segment + 1])[:, None] / 2.0
+        nearer = segment[:, None] + (low[:, None] + at * (high - low)[:, None] > middle)
+        np.maximum.at(largest, nearer, curvature)
+    return largest
 
 
 def run_lines(runs: Runs, lines: Polylines, settings: Settings) -> tuple[Ints, Floats, Floats]:
