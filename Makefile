@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: run test thorough check bench controller format clean
+.PHONY: run test thorough check docs bench controller format clean
 
 run: $(STAMP)  ## install into .venv, smooth the samples, show what came out
 	$(BIN)/python samples/show.py
@@ -18,6 +18,9 @@ check: $(STAMP)  ## lint, format and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+docs: $(STAMP)  ## the reference of the library, as pages in build/docs
+	$(BIN)/python docs/make_reference.py
 
 bench: $(STAMP)  ## time the whole command beside a plain C program
 	$(BIN)/python benchmarks/bench.py

@@ -14,7 +14,7 @@ Step by step, with the numbers in between; the form says which digits the contro
         cornersmooth.write(smoothed, stream, form=form)
     found = cornersmooth.verify(program, "part.nc", tolerance=0.04)
 
-- `sample` gives points on the smoothed path, `report` the whole story as a dictionary
+- `sample` gives points on the smoothed path, `corner_table` its corners, `report` the whole story as a dictionary
 - `plan` and `direct` say how long a machine takes for the smoothed and the original path, `compare` both
 - `choose_form`, `load_control` and `load_machine` take names or TOML files; `Frame` holds what stands around the motion
 - `CornersmoothError` is what everything here raises; its text says where, what, and what to do
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from cornersmooth.path_points import PathPoints, sample
     from cornersmooth.pipeline import Result, postprocess, smooth
     from cornersmooth.report import report
+    from cornersmooth.report.corners import corner_table
     from cornersmooth.settings import Settings
     from cornersmooth.verify import Verification, verify
 
@@ -64,6 +65,7 @@ _HOME = {
     "Verification": "verify",
     "choose_form": "nc",
     "compare": "feedrate",
+    "corner_table": "report.corners",
     "direct": "feedrate",
     "fit_settings": "nc",
     "from_poses": "model",
@@ -96,6 +98,7 @@ __all__ = [
     "Verification",
     "choose_form",
     "compare",
+    "corner_table",
     "direct",
     "fit_settings",
     "from_poses",

@@ -44,13 +44,14 @@ _CURVATURE_AT = np.array([0.2, 0.3, 0.38, 0.44, 0.48, 0.5, 0.52, 0.56, 0.62, 0.7
 _TOGETHER = 4096
 
 
-def corner_table(smoothed: SmoothProgram, rows: Ints, *, dense: bool = True) -> dict[str, Column]:
-    """Columns of the table for some corners.
+def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bool = True) -> dict[str, Column]:
+    """Corners as a table: place, angles, lengths, errors, curvature, what limits them.
 
     Parameters
     ----------
-    rows : (g,) int64
-        Rows of `smoothed.corners`.
+    smoothed : SmoothProgram
+    rows : (g,) int64, optional
+        Rows of `smoothed.corners`; all of them by default.
     dense : bool
         Whether transitions are written as lines, not as curves.
 
@@ -61,6 +62,7 @@ def corner_table(smoothed: SmoothProgram, rows: Ints, *, dense: bool = True) -> 
         that only the method has.
     """
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
+    rows = np.arange(len(corners)) if rows is None else rows
     pose, before, after = corners.pose[rows], corners.before[rows], np.maximum(corners.after[rows], 0)
     tip_in, tip_out = program.tip[pose] - program.tip[before], program.tip[after] - program.tip[pose]
     tip_out[corners.after[rows] < 0] = 0.0

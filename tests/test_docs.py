@@ -1,0 +1,157 @@
+"""What README, docs and helps show is run: examples, commands, tables."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from cornersmooth.cli.group import COMMANDS
+from cornersmooth.kinematics import parse_machine
+from cornersmooth.nc import parse_control
+from oracle.command import DONE, SCRIPT, SMALL, run
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+#: pages whose examples belong together
+STORIES = ("library.md", "gallery.md")
+
+
+def load(name: str) -> ModuleType:
+    """A script of the folder docs."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", STORIES)
+def test_examples_run_and_print_what_the_page_says(name: str, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib").use("agg")
+    text = (ROOT / "docs" / name).read_text()
+    quick = text.replace("--stations 400", "--stations 20")
+    assert re.sub(r"\d+", "#", load("run_examples").run_page(quick, tmp_path)) == re.sub(r"\d+", "#", quick)
+    for picture in re.findall(r"!\[[^]]+\]\((gallery/[^)]+)\)", text):
+        assert (tmp_path / picture).stat().st_size > 1000
+        assert (ROOT / "docs" / picture).exists()
+
+
+def commands(text: str) -> Iterator[str]:
+    """Commands of cornersmooth in indented or fenced lines, without their remarks."""
+    for line in text.splitlines():
+        words = line.strip().removeprefix("$ ")
+        if line.startswith("    ") and re.match(r"(cat \S+ \| |eval \"\$\()?cornersmooth ", words):
+            yield re.sub(r"^eval \"\$\((.*)\)\"", r"\1", re.sub(r"\s+#.*$", "", words))
+
+
+def help_text(name: str) -> str:
+    return "\n".join(f"  {line}" for line in run(name, "--help").stdout.decode().splitlines())
+
+
+#: what is about another machine, or changes the home of who runs it
+ELSEWHERE = ("$file", "{}", "cl/d07", "--scheduler", "~/", "| source")
+SHOWN = {page.name: list(commands(page.read_text())) for page in PAGES if page.name not in STORIES}
+HELPS = {name: list(commands(help_text(name))) for name in COMMANDS}
+
+
+@pytest.fixture
+def shop(tmp_path: Path) -> Path:
+    """A folder with all the files that the commands name."""
+    folder = tmp_path
+    for name in ("part.cls", "part.ncl", "jobs/part.cls", "cl/one.cls", "cl/deep/two.cls"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(SMALL.replace(b"UNITS/MM\n", b"UNITS/MM\nCUTTER/6,3\n"))
+    (folder / "mine.toml").write_text('like = "siemens"\n')
+    for name, options in {"nc": [], "mpf": ["--control", "siemens"]}.items():
+        assert run("smooth", "part.cls", "-e", "0.005", "-o", f"part.{name}", *options, cwd=folder).returncode == DONE
+    (folder / "part.ngc").write_bytes(
+        run("smooth", "part.cls", "--control", "linuxcnc", "--machine", "xyzac-trt", cwd=folder).stdout
+    )
+    return folder
+
+
+def execute(line: str, folder: Path) -> None:
+    """Run a command in the folder; whatever stands at the place of an output may go."""
+    if any(word in line for word in ELSEWHERE):
+        return
+    if set("|>;*$") & set(line):
+        path = f"{SCRIPT.parent}{os.pathsep}{os.environ['PATH']}"
+        subprocess.run(
+            ["bash", "-c", line], cwd=folder, env=os.environ | {"PATH": path}, check=True, capture_output=True
+        )
+        return
+    _, command, *words = shlex.split(line)
+    with_force = command in ("smooth", "verify", "time", "surface") and "--help" not in words and "-h" not in words
+    mill = 'like = "table-ac"\n'
+    (folder / "mill.toml").write_text(mill)
+    (folder / "mine.toml").write_text(mill if command == "machines" else 'like = "siemens"\n')
+    result = run(command, *words, *(["--force"] if with_force and "--force" not in words else []), cwd=folder)
+    assert result.returncode == DONE, f"{line}: {result.stderr.decode()}"
+
+
+@pytest.mark.parametrize("name", [name for name, lines in SHOWN.items() if lines])
+def test_commands_of_pages_work(name: str, shop: Path) -> None:
+    for line in SHOWN[name]:
+        execute(line, shop)
+
+
+@pytest.mark.parametrize("name", list(COMMANDS))
+def test_examples_of_helps_work(name: str, shop: Path) -> None:
+    assert HELPS[name]
+    for line in HELPS[name]:
+        execute(line, shop)
+
+
+def test_tables_of_pages_are_valid(tmp_path: Path) -> None:
+    tables = [
+        (page.name, text) for page in PAGES for text in re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL)
+    ]
+    assert len(tables) >= 3
+    for name, text in tables:
+        table = tomllib.loads(text)
+        if name == "settings.md":
+            (tmp_path / "cornersmooth.toml").write_text(text)
+            assert run("config", tmp_path).returncode == DONE
+        elif "dynamics" in table:
+            parse_machine(f'like = "table-ac"\n{text}')
+        else:
+            parse_control(text)
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+def test_the_job_of_an_array_does_its_share(shop: Path) -> None:
+    (script,) = re.findall(r"    #!/bin/bash\n(?:    .*\n)+", (ROOT / "docs" / "batch.md").read_text())
+    there = script.replace("/shared/job", str(shop))
+    path = f"{SCRIPT.parent}{os.pathsep}{os.environ['PATH']}"
+    environment = os.environ | {"PATH": path, "SLURM_ARRAY_TASK_ID": "1"}
+    subprocess.run(["bash", "-e", "-c", there], env=environment, check=True, capture_output=True)
+    assert [str(path.relative_to(shop)) for path in (shop / "nc").rglob("*.nc")] == ["nc/deep/two.nc"]
+
+
+def test_the_reference_is_made_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("pdoc")
+    done = subprocess.run(
+        [sys.executable, ROOT / "docs" / "make_reference.py", tmp_path], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    page = (tmp_path / "cornersmooth.html").read_text()
+    for name in ("postprocess", "Settings", "corner_table", "SmoothProgram"):
+        assert f'id="{name}"' in page
+
+
+def test_links_lead_somewhere() -> None:
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text()):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
