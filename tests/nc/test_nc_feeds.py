@@ -1,13 +1,19 @@
-"""Feeds where a curve begins: the block that would have said them may have no length in the written digits."""
+"""Feeds where a curve begins, which the block before may not say; and what F takes of inverse time."""
 
 from __future__ import annotations
 
+import io
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.kinematics import load_machine
+from cornersmooth.model import Program
+from cornersmooth.nc import choose_form
+from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
 from nc.cases import CHOSEN, Case
@@ -48,3 +54,44 @@ def test_a_curve_says_the_feed_where_no_line_is_left_before_it(case: Case) -> No
     assert sum(" F8" in block for block in behind) == 1
     found = verify(program, text.encode(), tolerance=0.003, control=case.control, machine=form.machine, tcp=case.tcp)
     assert found.problems == ()
+
+
+def dense(count: int = 60) -> Program:
+    """Poses 0.05 mm apart at 3 m/min, a millisecond each."""
+    u = np.arange(count) / 20.0
+    tip = np.stack((u, np.sin(u), 0.2 * np.cos(2.0 * u)), axis=1)
+    axis = np.stack((0.3 * np.sin(u), 0.2 * np.cos(1.3 * u), np.ones(count)), axis=1)
+    return Program.from_poses(tip, axis / np.linalg.norm(axis, axis=1, keepdims=True), feed=3000.0)
+
+
+@pytest.mark.parametrize(("control", "largest"), [("fanuc", 9999.999), ("haas", 9999.999), ("siemens", 999999.999)])
+def test_inverse_time_keeps_to_what_f_takes(control: str, largest: float) -> None:
+    form = choose_form(control, machine=load_machine("table-ac"), tcp=False)
+    stream = io.BytesIO()
+    result = postprocess(dense(), stream, Settings(tolerance=0.002), form=form, processes=1)
+    assert result.verification is not None
+    assert result.verification.passed
+    words = re.findall(r" F(\d+\.\d*)$", stream.getvalue().decode(), re.MULTILINE)
+    values = np.array(words, np.float64)
+    assert max(len(word.partition(".")[2]) for word in words) <= 3
+    assert values.min() >= 0.001
+    assert values.max() == largest
+    slowed = [finding.count for finding in result.findings if finding.code == "CS371"]
+    assert slowed == [int((values == largest).sum())]
+    assert any(finding.code == "CS372" for finding in result.findings)
+
+
+def test_a_block_at_the_limit_may_be_slower_but_not_faster() -> None:
+    machine = load_machine("table-ac")
+    form = choose_form("fanuc", machine=machine, tcp=False)
+    text, _ = written(dense(), form, Settings(tolerance=0.002))
+    how = {"tolerance": 0.002, "machine": machine, "tcp": False}
+    assert verify(dense(), text.encode(), **how).passed
+    slow = dense()
+    slow = replace(slow, feed=slow.feed / 1000.0)
+    text, _ = written(slow, form, Settings(tolerance=0.002))
+    assert "F9999.999" not in text
+    first = re.search(r" F\d+\.\d*$", text[text.index("G93") :], re.MULTILINE)
+    assert first is not None
+    spoilt = text.replace(first[0], " F9999.999", 1)
+    assert {problem.code for problem in verify(slow, spoilt.encode(), **how).problems} == {"CS541"}

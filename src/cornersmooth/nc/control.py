@@ -88,6 +88,8 @@ class Motion:
         Whether words stand apart; ``0.5`` rather than ``.5``; ``2.5000`` rather than ``2.5``.
     inch_feed : int
         What one inch per minute is written as: 10 where F counts tenths.
+    fastest : float, 1/min
+        Largest F of inverse time (G93) that the control takes; 0 for none. Such an F has three decimals.
     """
 
     rapid: str = "G0"
@@ -104,6 +106,7 @@ class Motion:
     leading_zeros: bool = True
     trailing_zeros: bool = True
     inch_feed: int = 1
+    fastest: float = 9999.999
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cornersmooth.kinematics import tool_axis
+from cornersmooth.kinematics import tip_position, tool_axis
 from cornersmooth.model import Ints, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
@@ -48,6 +48,9 @@ def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> Li
         unit if machine is None else lambda words: tool_axis(machine, words),
         settings.blend_share * settings.tolerance,
         lag * settings.tolerance if lag else math.inf,
+        (lambda position, words: tip_position(machine, position, words))
+        if machine is not None and form.orientation == "machine"
+        else None,
     )
 
 

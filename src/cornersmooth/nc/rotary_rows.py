@@ -8,18 +8,19 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.kinematics import inverse_time
+from cornersmooth.kinematics import Machine, inverse_time, machine_position
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import line_limits
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves, rotary_angles
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.long_lines import fewest_lines, segments_of_rows, vertices
+from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.vectors import norm
 
@@ -32,6 +33,12 @@ _FASTEST_TURN = 36_000.0
 #: degrees that a rotary axis turns in one block of a cut at most: far from the half turn where some controls go the
 #: other way round
 LARGEST_TURN = 60.0
+
+#: shortest times of a block that short ones are merged to
+_SHORTEST_TIMES = 1.5
+
+#: decimals of F of inverse time: FANUC takes 0.001 to 9999.999
+INVERSE_TIME_DECIMALS = 3
 
 #: turns below this many degrees are none
 _NO_TURN = 1e-9
@@ -74,6 +81,7 @@ def rotary_rows(
     limits = line_limits(settings, form, largest_turn)
     timed = _timed_cuts(path.angles, move, program) if form.orientation == "machine" else None
     inserted, first_inserted, unsolved = 0, 0, []
+    merged, slowed, first_slowed = 0, 0, 0
     for begin in range(0, max(len(move) - 1, 1), _CHUNK):
         here = slice(begin, begin + _CHUNK + 1)  # the last row of a chunk is the start of the next
         more = insertions(
@@ -99,8 +107,25 @@ def rotary_rows(
             of_move, of_start = move[here][row], start[here][row]
             found = vertices(smoothed, filled.tip, filled.axis, filled.angles, of_move, of_start, exact)
             filled = filled.only(fewest_lines(found, limits))
-        rate = _rates(filled, move[here], None if timed is None else timed[here], program, settings, form)
         own = slice(1 if begin else 0, None)
+        of_timed, fastest = None if timed is None else timed[here], form.mode.motion.fastest
+        rate = _rates(filled, move[here], of_timed, program, settings, form)
+        if rate is not None and fastest:
+            if form.orientation == "machine" and (rate > fastest).any():
+                before = len(filled.pose)
+                filled = _merged(
+                    smoothed, machine, filled, (move[here], start[here], at_pose[here]), rate, limits, fastest
+                )
+                merged += before - len(filled.pose)
+                rate = _rates(filled, move[here], of_timed, program, settings, form)
+            assert rate is not None
+            beyond = np.flatnonzero(rate[own] > fastest)
+            if len(beyond) and not slowed:
+                first_slowed = int(line[here][filled.pose[own][beyond[0]]])
+            slowed += len(beyond)
+            rate = np.minimum(rate, fastest)
+        if rate is not None:
+            rate = np.round(rate, INVERSE_TIME_DECIMALS)
         count = len(filled.pose[own])
         yield Rows(
             tip=filled.tip[own],
@@ -113,9 +138,44 @@ def rotary_rows(
     if unsolved:
         text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
         findings.add("CS369", "warning", unsolved[0], text, len(unsolved))
+    if slowed:
+        text = f"block slowed down: it is shorter than F{form.mode.motion.fastest:.10g} of inverse time (G93) can say"
+        findings.add("CS371", "warning", first_slowed, text, slowed)
+    if merged:
+        text = "block merged with its neighbour: shorter than inverse time (G93) can say"
+        findings.add("CS372", "note", 0, text, merged)
     if inserted:
         text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
         findings.add("CS367", "note", first_inserted, text, inserted)
+
+
+def _merged(
+    smoothed: SmoothProgram,
+    machine: Machine,
+    filled: FilledPath,
+    rows: tuple[Ints, Ints, Bools],
+    rate: Floats,
+    limits: LineLimits,
+    fastest: float,
+) -> FilledPath:
+    """The path without rows between blocks that are too short to be timed, as far as ε allows.
+
+    Parameters
+    ----------
+    rows : (n,) int64, (n,) int64, (n,) bool
+        Move of each row of the unfilled path, the pose that its segment starts from, and whether it is at a pose.
+    rate : (m,) float64, 1/min
+    """
+    move, start, at_pose = (column[filled.pose] for column in rows)
+    found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move, start, at_pose & ~filled.inserted)
+    quick = rate > fastest
+    minutes = np.where(np.isfinite(rate), 1.0 / np.where(rate > 0.0, rate, 1.0), 0.0)
+    # a row stays where it ends a part of the time that is long enough
+    part = np.floor(np.cumsum(minutes) * fastest / _SHORTEST_TIMES)
+    ends = np.append(part[1:] != part[:-1], True)
+    between = quick | np.append(quick[1:], False)
+    position = machine_position(machine, filled.tip, filled.angles)
+    return filled.only(fewest_lines(replace(found, fixed=found.fixed | ends | ~between, position=position), limits))
 
 
 def _whole(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:

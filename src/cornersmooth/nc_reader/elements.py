@@ -198,7 +198,8 @@ class Elements:
     feed_room : (m,) float64
         mm/min or mm/rev by which the feed is not known: digits of F, and of times and ways where it is timed.
         Negative where the feed is that of the axis point, if the tip stands still, but where the tip may as well creep
-        by what the digits do not show: its feed is then anything up to a few times that room.
+        by what the digits do not show: its feed is then anything up to a few times that room. NaN where the feed of the
+        move may be higher than this, as F is the largest that the control takes.
     second_room : (m,) float64
         By how much, as `second`, directions that must be exact may be off beside the printed digits.
     curves : Curves

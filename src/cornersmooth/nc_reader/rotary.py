@@ -32,7 +32,10 @@ _MOST_LINES = 4096
 _ORDER, _HALVINGS = 8, 6
 
 #: last digit of F where it is moves per minute
-_F_STEP = 1e-4
+_F_STEP = 1e-3
+
+#: largest F of G93 on controls: a block with it may be slower than it should be
+_FASTEST = (9999.999, 999_999.999)
 
 #: ways of the tip shorter than so many steps of what is printed say little
 SHORT_STEPS = 3.0
@@ -247,7 +250,11 @@ class Rotary:
         if not self.tip_control:
             room[still] *= -1.0
         room[(rate * turn > FAST_TURN) | (~still & short)] = np.inf
-        return rate * way, room
+        feed = rate * way
+        slowed = np.isin(rate, _FASTEST) & np.isfinite(room)
+        feed[slowed] -= np.abs(room[slowed])
+        room[slowed] = np.nan
+        return feed, room
 
     def _curves(self, curves: CurveTable) -> CurveTable:
         """Curves in tip and tool vector."""

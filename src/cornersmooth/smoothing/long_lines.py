@@ -52,6 +52,8 @@ class Vertices:
         Never decreasing.
     fixed : (r,) bool
         A line ends here in any case.
+    position : (r, 3) float64 or None, mm
+        Of the linear axes, where the control knows nothing of the tip; else the tip runs straight.
     """
 
     tip: Floats
@@ -60,6 +62,7 @@ class Vertices:
     original_axis_point: Floats
     parameter: Floats
     fixed: Bools
+    position: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,8 @@ class LineLimits:
     axis_length : float, mm
     axis_of : callable
         Unit tool axes (m, 3) of words (m, d).
+    tip_of : callable or None
+        Tips (m, 3) of positions of the linear axes (m, 3) and words (m, d), where rows have such positions.
     blend, lag : float, mm
         How far the tip may be off a corner of lines that the control rounds by itself, and how far the axis point may
         lag behind the tip there by the estimate of `lags`.
@@ -87,6 +92,7 @@ class LineLimits:
     axis_of: Callable[[Floats], Floats]
     blend: float = 0.0
     lag: float = np.inf
+    tip_of: Callable[[Floats, Floats], Floats] | None = None
 
 
 def segments_of_rows(move: Ints) -> tuple[Ints, Bools]:
@@ -265,8 +271,11 @@ def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
     share = (s[row] - low[line]) / np.where(length > 0.0, length, 1.0)[line]
     share = share[:, None]
     begin, finish = start[line], end[line]
-    tip = rows.tip[begin] + share * (rows.tip[finish] - rows.tip[begin])
     words = rows.words[begin] + share * (rows.words[finish] - rows.words[begin])
+    way = rows.tip if rows.position is None else rows.position
+    tip = way[begin] + share * (way[finish] - way[begin])
+    if limits.tip_of is not None:
+        tip = limits.tip_of(tip, words)
     axis_point = tip + limits.axis_length * limits.axis_of(words)
     off = np.maximum(
         norm(tip - rows.original_tip[row]) / limits.tip,

@@ -90,6 +90,7 @@ def _same(said: Floats, per_revolution: Bools, room: Floats, feed: Floats, mode:
     asked = feed[move]
     slack = ARITHMETIC * np.maximum(np.abs(asked), 1.0)
     near = (np.abs(said - asked) <= np.abs(room) + slack) | (asked <= -_CREEPING * room)
+    near |= np.isnan(room) & (said <= asked + slack)
     same: Bools = np.isnan(asked) | (near & (per_revolution == mode[move]))
     return same
 
