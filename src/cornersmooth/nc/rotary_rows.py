@@ -166,8 +166,9 @@ def _merged(
         Move of each row of the unfilled path, the pose that its segment starts from, and whether it is at a pose.
     rate : (m,) float64, 1/min
     """
-    move, start, at_pose = (column[filled.pose] for column in rows)
-    found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move, start, at_pose & ~filled.inserted)
+    own, inserted = filled.pose, filled.inserted
+    move, start, at_pose = rows[0][own], rows[1][own], rows[2][own] & ~inserted
+    found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move, start, at_pose)
     quick = rate > fastest
     minutes = np.where(np.isfinite(rate), 1.0 / np.where(rate > 0.0, rate, 1.0), 0.0)
     # a row stays where it ends a part of the time that is long enough
