@@ -2,6 +2,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# one more than processors: some tests wait
+WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 
 .PHONY: run test thorough check docs bench controller format clean
 
@@ -9,10 +11,10 @@ run: $(STAMP)  ## install into .venv, smooth the samples, show what came out
 	$(BIN)/python samples/show.py
 
 test: $(STAMP)  ## the whole test suite, on all processors
-	$(BIN)/python -m pytest -n auto --dist worksteal
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 thorough: $(STAMP)  ## the same with every case of the long lists
-	CORNERSMOOTH_THOROUGH=1 $(BIN)/python -m pytest -n auto --dist worksteal
+	CORNERSMOOTH_THOROUGH=1 $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 check: $(STAMP)  ## lint, format and types
 	$(BIN)/ruff check .

@@ -153,7 +153,7 @@ def test_a_batch_that_was_interrupted_goes_on_where_it_was(tmp_path: Path) -> No
     bench = Bench(tmp_path, single=10, several=500)
     out = tmp_path / "out"
     words = [word for word in bench.words(True, out) if word != "--force"]
-    for moment in (0.5, 0.6, 0.7):
+    for moment in (0.5, 0.7):
         process = subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True)
         try:
             process.wait(moment * bench.seconds[True])

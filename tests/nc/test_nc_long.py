@@ -14,6 +14,7 @@ from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.settings import Settings
 from nc.cases import CHOSEN, Case
 from nc.promise import random_verdict, runs_of, verdict, without_holes, written
+from oracle.share import how_many
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 
@@ -26,7 +27,7 @@ LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
 def test_random_chains_keep_the_tolerance(case: Case, seed: int) -> None:
     tolerance, axis_length = LIMITS[(len(str(case)) + seed) % 3]
     settings = Settings(tolerance=tolerance, axis_length=axis_length, lines="long")
-    found = random_verdict(case, settings, 7 * seed + len(str(case)), 16)
+    found = random_verdict(case, settings, 7 * seed + len(str(case)), how_many(8, 16))
     assert found.deviation.worst <= tolerance, found
 
 

@@ -19,6 +19,7 @@ from cornersmooth.nc_reader import reader
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import Verifier, Where, batches, verifier, verify
+from oracle.share import share
 
 from .writing import unit, wavy
 
@@ -168,7 +169,7 @@ def _spoilt(lines):
 def test_what_is_wrong_is_reported_as_for_the_whole(used, processes):
     program = part()
     lines = text_of(program).decode().splitlines()
-    for name, spoilt, code in _spoilt(lines):
+    for name, spoilt, code in share(_spoilt(lines), 2, processes != 1):
         # behind a change of units no rapid fits any more: which is missed for which is decided batch by batch
         text = ("\n".join(spoilt) + "\n").encode()
         found = check(program, text, used, processes, batches_used=False, everywhere=name != "units")
