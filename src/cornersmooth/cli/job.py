@@ -12,6 +12,7 @@ from cornersmooth.cli.files import STANDARD, Beginning, check_path, read_input, 
 from cornersmooth.cli.fingerprint import fingerprint
 from cornersmooth.cli.show import more
 from cornersmooth.errors import CornersmoothError, PromiseError, SettingsError
+from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import ClosedPipe, make_folder, open_output, read_mark
 
 if TYPE_CHECKING:
@@ -161,6 +162,7 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
 
     `ClosedPipe` and KeyboardInterrupt pass through.
     """
+    return_large_arrays()
     outcome = Outcome(job)
     try:
         if not (job.skip_existing and _exists(job, outcome)):

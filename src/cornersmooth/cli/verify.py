@@ -16,6 +16,7 @@ from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surfa
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import more
 from cornersmooth.errors import SettingsError
+from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ def command(source: str, text: str, **given: Any) -> int:
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
+    return_large_arrays()
     form = _check_outputs(source, text, given)
     data, name = read_input(source)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text

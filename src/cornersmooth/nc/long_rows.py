@@ -66,11 +66,11 @@ def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form) -> Iter
         none = [np.full(len(chunk.tip), -1, np.int64) if chunk.arc is None else chunk.arc for chunk in chunks]
         arc = np.concatenate(none)
     chunks.clear()
-    start, at_pose = segments_of_rows(move)
     limits = line_limits(smoothed.settings, form)
     for begin in range(0, max(len(move) - 1, 1), _CHUNK):
         here = slice(begin, begin + _CHUNK + 1)  # the last row of a chunk is the start of the next
-        part = vertices(smoothed, tip[here], axis[here], axis[here], move[here], start[here], at_pose[here])
+        start, at_pose = segments_of_rows(move, here.start, here.stop)
+        part = vertices(smoothed, tip[here], axis[here], axis[here], move[here], start, at_pose)
         kept = begin + fewest_lines(part, limits)[1 if begin else 0 :]
         nothing = np.zeros(len(kept), np.int8)
         yield Rows(

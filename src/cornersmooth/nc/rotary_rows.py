@@ -76,36 +76,38 @@ def rotary_rows(
     path = rotary_angles(machine, tip, axis, tolerance=tolerance, rapid=rapid, line=line, file=file)
     for finding in path.findings:
         findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
+    angles = path.angles
+    del path, line  # all that is still held as long as rows are written counts
     largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
-    start, at_pose = segments_of_rows(move)
     limits = line_limits(settings, form, largest_turn)
-    timed = _timed_cuts(path.angles, move, program) if form.orientation == "machine" else None
+    timed = _timed_cuts(angles, move, program) if form.orientation == "machine" else None
     inserted, first_inserted, unsolved = 0, 0, []
     merged, slowed, first_slowed = 0, 0, 0
     for begin in range(0, max(len(move) - 1, 1), _CHUNK):
         here = slice(begin, begin + _CHUNK + 1)  # the last row of a chunk is the start of the next
+        line = program.line[move[here]]
         more = insertions(
             machine,
             tip[here],
             axis[here],
-            path.angles[here],
+            angles[here],
             tolerance=tolerance,
             rapid=rapid[here],
             tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
             max_step=largest_turn,
-            line=line[here],
+            line=line,
             file=file,
         )
         if len(more) and not inserted:
-            first_inserted = int(line[here][more.segment[0] + 1])
+            first_inserted = int(line[more.segment[0] + 1])
         inserted += len(more)
-        unsolved += line[here][more.unsolved + 1].tolist()
-        filled = fill(tip[here], axis[here], path.angles[here], more)
+        unsolved += line[more.unsolved + 1].tolist()
+        filled = fill(tip[here], axis[here], angles[here], more)
         if long:
             row = filled.pose
-            exact = at_pose[here][row] & ~filled.inserted
-            of_move, of_start = move[here][row], start[here][row]
-            found = vertices(smoothed, filled.tip, filled.axis, filled.angles, of_move, of_start, exact)
+            start, at_pose = segments_of_rows(move, here.start, here.stop)
+            exact = at_pose[row] & ~filled.inserted
+            found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move[here][row], start[row], exact)
             filled = filled.only(fewest_lines(found, limits))
         own = slice(1 if begin else 0, None)
         of_timed, fastest = None if timed is None else timed[here], form.mode.motion.fastest

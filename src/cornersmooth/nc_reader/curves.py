@@ -125,14 +125,13 @@ class CurveGroup:
             result[r] += values[r, p] * own[p]
         return result.transpose(2, 0, 1)
 
-    def at_own(self, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
-        """(r, 6) points and (r, 6) derivatives of the curves `rows`, each at its own parameter."""
-        value, slope = basis(self.knot, self.order, u), basis_derivative(self.knot, self.order, u)
-        weighted, weight = self.weighted[rows], self.weight[rows]
-        below = np.einsum("ri,ri->r", value, weight)[:, None]
-        fall = np.einsum("ri,ri->r", slope, weight)[:, None]
-        point = np.einsum("ri,rid->rd", value, weighted) / below
-        return point, (np.einsum("ri,rid->rd", slope, weighted) - fall * point) / below
+    def at_own(self, rows: Ints, u: Floats) -> Floats:
+        """(r, 6) points of the curves `rows`, each at its own parameter."""
+        value = basis(self.knot, self.order, u)
+        point: Floats = np.einsum("ri,rid->rd", value, self.weighted[rows])
+        if not self.plain:
+            point /= np.einsum("ri,ri->r", value, self.weight[rows])[:, None]
+        return point
 
     def jet(self, u: float, columns: slice = slice(None)) -> tuple[Floats, Floats, Floats]:
         """Points, first and second derivatives (k, 6) of all curves at one parameter, or some of their columns."""

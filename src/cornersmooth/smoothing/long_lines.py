@@ -95,15 +95,25 @@ class LineLimits:
     tip_of: Callable[[Floats, Floats], Floats] | None = None
 
 
-def segments_of_rows(move: Ints) -> tuple[Ints, Bools]:
-    """Pose that the segment of each row starts from (r,), -1 before the first, and last rows of their moves (r,).
+def segments_of_rows(move: Ints, begin: int, end: int) -> tuple[Ints, Bools]:
+    """Pose that the segment of each row starts from, -1 before the first, and whether it is the last row of its move.
 
-    The last row of a move is at its pose, or in the middle of the transition that rounds it; `move` as in `Rows`.
+    The last row of a move is at its pose, or in the middle of the transition that rounds it.
+
+    Parameters
+    ----------
+    move : (n,) int64
+        Of all rows, as in `Rows`.
+    begin, end : int
+        The rows that are asked for.
     """
-    last = np.append(move[1:] != move[:-1], True)[: len(move)]
-    first = np.concatenate(([True], last))[: len(move)]
-    starts = np.concatenate(([-1], move[last][:-1]))
-    return starts[np.cumsum(first) - 1], last
+    end = min(end, len(move))
+    before = max(int(np.searchsorted(move, move[begin])) - 1, 0)  # last row of the move before
+    own = move[before : end + 1]
+    last = np.append(own[1:] != own[:-1], True)[: end - before]
+    first = np.concatenate(([True], last))[: end - before]
+    starts = np.concatenate(([-1], own[: end - before][last]))
+    return starts[np.cumsum(first) - 1][begin - before :], last[begin - before :]
 
 
 def vertices(

@@ -22,7 +22,7 @@ from cornersmooth.verify.rapids import Rapids, fraction_along, moving_rapids
 from cornersmooth.verify.task import Task
 
 #: elements in a batch
-BATCH: Final = 1 << 15
+BATCH: Final = 1 << 14
 
 #: batches that are held back while stops of the text fit nothing
 _HELD: Final = 4

@@ -14,7 +14,7 @@ from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 from cornersmooth.verify.wide_search import passed_nearby
 
 #: rows of a batch for which tip and axis point are looked at each on its own: at a time, and at most
-_OWN_ROWS, _MOST_OWN_ROWS = 64, 2048
+_OWN_ROWS, _MOST_OWN_ROWS = 16, 2048
 
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 TOGETHER: Final = 2.0

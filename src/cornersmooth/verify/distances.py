@@ -133,8 +133,7 @@ def from_original(match: Match) -> Reached:
     bent = np.flatnonzero(~match.written.straight[owner - match.written.first])
     if len(bent):
         tip[bent], axis[bent], at[bent] = _on_bent(match, point.take(bent, axis=0), segment[bent], at[bent])
-    own = trail.tip.take(vertex, axis=0), trail.axis.take(vertex, axis=0)
-    gap = gap_between(tip, axis, *own, match.axis_length)
+    gap = gap_between(tip, axis, point[:, :3], trail.axis.take(vertex, axis=0), match.axis_length)
     return Reached(vertex, gap, segment + at)
 
 

@@ -112,14 +112,19 @@ class Original:
         Pose of every move; the first is where the motion starts.
     trail : Trail
         Owners are indices into `pose`.
-    arc : (m,) int64
-        Row of the program's arcs, -1 for straight moves.
     """
 
     program: Program
     pose: Ints
     trail: Trail
-    arc: Ints
+
+    def arcs_of(self, owner: Ints) -> Ints:
+        """(k,) rows of the program's arcs that moves are, -1 for straight ones and for where the motion starts."""
+        pose, arcs = self.pose[owner], self.program.arcs.pose
+        if not len(arcs):
+            return np.full(len(pose), -1)
+        row = np.minimum(np.searchsorted(arcs, pose), len(arcs) - 1)
+        return np.where((arcs[row] == pose) & (owner > 0), row, -1)
 
     def at(self, owner: Ints, fraction: Floats) -> tuple[Floats, Floats]:
         """Tip and unit axis (k, 3) at a fraction of moves: the ruled motion, or the true arc."""
@@ -127,7 +132,7 @@ class Original:
         end = self.pose[owner]
         start = self.pose[np.maximum(owner - 1, 0)]
         tip = between(program.tip, start, end, fraction)
-        row = self.arc[owner]
+        row = self.arcs_of(owner)
         curved = np.flatnonzero(row >= 0)
         if len(curved):
             arcs, r = program.arcs, row[curved]
@@ -166,32 +171,27 @@ def original_motion(program: Program, tolerance: float, axis_length: float) -> O
     # an arc wants a start: where that is only stated the tool is sent there
     stated[:-1] &= program.kind[1:] != Move.ARC
     pose = np.flatnonzero(~stated)
-    arc = np.full(len(pose), -1, np.int64)
-    place = np.searchsorted(pose, program.arcs.pose)
-    arc[place] = np.arange(len(place))
-    arc[:1] = -1
     # nearly always all poses but the first: no copy then
     chosen = slice(pose[0], pose[-1] + 1) if len(pose) and pose[-1] - pose[0] == len(pose) - 1 else pose
     tip, axis = program.tip[chosen], program.axis[chosen]
     cuts = turn_cuts(axis, tolerance, axis_length)
-    curved = np.flatnonzero(arc >= 0)
+    curved = np.searchsorted(pose, program.arcs.pose)
+    row = np.flatnonzero(curved > 0)
+    curved = curved[row]
     if len(curved):
-        row = arc[curved]
         start = tip[curved - 1] - program.arcs.centre[row]
         normal = program.arcs.normal[row]
         radius = np.linalg.norm(start - np.einsum("ij,ij->i", start, normal)[:, None] * normal, axis=1)
         sweep = program.arcs.sweep[row]
         cuts[curved] = np.maximum(cuts[curved], arc_cuts(radius, sweep, tolerance))
-    bare = Original(
-        program, pose, Trail(tip, axis, np.arange(len(pose)), np.ones(len(pose)), np.arange(len(pose))), arc
-    )
+    bare = Original(program, pose, Trail(tip, axis, np.arange(len(pose)), np.ones(len(pose)), np.arange(len(pose))))
     if not len(pose) or cuts.max() == 1:
         return bare
     owner, fraction, last = divided(cuts)
     tip, axis = tip.take(owner, axis=0), axis.take(owner, axis=0)
     inner = np.flatnonzero(fraction < 1)
     tip[inner], axis[inner] = bare.at(owner[inner], fraction[inner])
-    return Original(program, pose, Trail(tip, axis, owner, fraction, last), arc)
+    return Original(program, pose, Trail(tip, axis, owner, fraction, last))
 
 
 def turn_cuts(axis: Floats, tolerance: float, axis_length: float) -> Ints:
@@ -322,6 +322,6 @@ def written_at(nc: Elements, element: Ints, fraction: Floats) -> tuple[Floats, F
             spans = group.spans
             parameter = spans[0] + fraction[on[mine]] * (spans[-1] - spans[0])
             local = np.searchsorted(group.index, row[mine])
-            point, _ = group.at_own(local, parameter)
+            point = group.at_own(local, parameter)
             tip[on[mine]], second[on[mine]] = point[:, :3], point[:, 3:]
     return tip, directions(nc, tip, second)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,8 @@ class Task:
         """Make it."""
         original = original_motion(program, tolerance, axis_length)
         path = Polyline.of(original.trail.six(axis_length))
+        # tips are held once only
+        original = replace(original, trail=replace(original.trail, tip=path.six[:, :3]))
         return cls(original, path, _exact_poses(original), tolerance, axis_length)
 
     def margin(self, nc: Elements) -> float:

@@ -8,8 +8,9 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from inspect import signature
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Any, Final, ParamSpec, Self, TypeVar, cast
 
 import numpy as np
 
@@ -35,6 +36,9 @@ from cornersmooth.verify.workers import Helper, can_fork, map_in_processes
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
 
+_Given = ParamSpec("_Given")
+_Found = TypeVar("_Found")
+
 #: poses from which on it is worth while to let other processes work
 _LONG: Final = 30_000
 
@@ -42,26 +46,20 @@ _LONG: Final = 30_000
 _BEFORE: Final = -1.0
 
 
-def verify(
-    program: Program,
-    nc: NcProgram | bytes | str | os.PathLike[str],
-    *,
-    tolerance: float,
-    axis_length: float = 10.0,
-    control: str = "fanuc",
-    machine: Machine | None = None,
-    tcp: bool = True,
-    words: bool = True,
-    trusted: Sequence[str] = (),
-    weights: Sequence[float] | None = None,
-    processes: int = 1,
-) -> Verification:
-    """Measure an NC text against the CL program it was made from.
+class Verifier:
+    """Measures an NC text against the CL program it was made from, and may begin while the text is still being written.
+
+    A context manager: processes of its own read the text as it grows, until `result` is asked for or the block ends::
+
+        with Verifier(program, path, tolerance=0.04) as verifier:
+            ...  # write to path
+            found = verifier.result()
 
     Parameters
     ----------
     program : Program
     nc : NcProgram, bytes or path
+        A file must be there, but need not be whole.
     tolerance : float, mm
         ε: what is allowed at tip and axis point.
     axis_length : float, mm
@@ -78,10 +76,6 @@ def verify(
     processes : int
         Processes to work on long texts with, where the system can fork; the result does not depend on it.
 
-    Returns
-    -------
-    Verification
-
     Raises
     ------
     InputError
@@ -89,46 +83,11 @@ def verify(
     SettingsError
         CS202 for a tolerance or axis length out of bounds; as in `read_nc`.
     """
-    if isinstance(nc, NcProgram):
-        _check_bounds(tolerance, axis_length)
-        elements = Elements(**{column.name: getattr(nc, column.name) for column in fields(Elements)})
-        text = _Text(iter([elements]), list(nc.events))
-        measured = _measure(Task.of(program, tolerance, axis_length), text, words=words, processes=processes)
-        return measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
-    with Verifier(
-        program,
-        nc,
-        tolerance=tolerance,
-        axis_length=axis_length,
-        control=control,
-        machine=machine,
-        tcp=tcp,
-        words=words,
-        trusted=trusted,
-        weights=weights,
-        processes=processes,
-    ) as verifier:
-        return verifier.result()
-
-
-class Verifier:
-    """A verification that begins while the text is still being written.
-
-    A context manager: processes of its own read the text as it grows, until `result` is asked for or the block ends::
-
-        with Verifier(program, path, tolerance=0.04) as verifier:
-            ...  # write to path
-            found = verifier.result()
-
-    Parameters
-    ----------
-    As `verify`, but for `nc`: bytes or path; the file must be there.
-    """
 
     def __init__(
         self,
         program: Program,
-        nc: bytes | str | os.PathLike[str],
+        nc: NcProgram | bytes | str | os.PathLike[str],
         *,
         tolerance: float,
         axis_length: float = 10.0,
@@ -141,15 +100,16 @@ class Verifier:
         processes: int = 1,
     ) -> None:
         _check_bounds(tolerance, axis_length)
-        self._program, self._words, self._processes = program, words, processes
+        self._program, self._words = program, words
+        self._processes = processes if can_fork() and len(program) >= _LONG else 1
         self._trusted, self._weights = tuple(trusted), weights
-        self._name = None if isinstance(nc, bytes) else str(nc)
         self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
-        self._source = Source(readable_twice(nc))
+        self._text = nc if isinstance(nc, NcProgram) else Source(readable_twice(nc))
+        self._name = None if isinstance(nc, NcProgram | bytes) else str(nc)
         self._helper: Helper | None = None
 
     def __enter__(self) -> Self:
-        if self._processes > 1 and can_fork() and len(self._program) >= _LONG:
+        if self._processes > 1 and isinstance(self._text, Source):
             with contextlib.suppress(OSError):  # without it it takes longer
                 self._helper = Helper(self._work)
         return self
@@ -159,7 +119,8 @@ class Verifier:
     ) -> None:
         if self._helper is not None:
             self._helper.end()
-        self._source.close()
+        if isinstance(self._text, Source):
+            self._text.close()
 
     def result(self) -> Verification:
         """Say what was found; the text must be complete.
@@ -169,7 +130,8 @@ class Verifier:
         InputError
             Where the text cannot be read.
         """
-        self._source.finish()
+        if isinstance(self._text, Source):
+            self._text.finish()
         if self._helper is None:
             return self._work()
         found: Verification = self._helper.result()
@@ -177,8 +139,17 @@ class Verifier:
 
     def _work(self) -> Verification:
         """Read and measure the text as far as it goes."""
-        options, source = self._options, self._source
-        task = Task.of(self._program, options.tolerance, options.axis_length)
+        task = Task.of(self._program, self._options.tolerance, self._options.axis_length)
+        return self._of_text(task, self._text) if isinstance(self._text, Source) else self._of_read(task, self._text)
+
+    def _of_read(self, task: Task, nc: NcProgram) -> Verification:
+        elements = Elements(**{column.name: getattr(nc, column.name) for column in fields(Elements)})
+        text = _Text(iter([elements]), list(nc.events))
+        measured = _measure(task, text, words=self._words, processes=self._processes)
+        return measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
+
+    def _of_text(self, task: Task, source: Source) -> Verification:
+        options = self._options
         steps = options.steps(source.head(DIGITS_SAMPLE))
         rotary = options.rotary(steps)
         lever = None
@@ -196,6 +167,34 @@ class Verifier:
             problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
         return replace(found, trusted=tuple(check.trusted))
+
+
+def _taking_what(kind: Callable[_Given, object]) -> Callable[[Callable[..., _Found]], Callable[_Given, _Found]]:
+    """Say of a function that it takes what another takes: type checkers and `help` show those parameters."""
+
+    def decorate(function: Callable[..., _Found]) -> Callable[_Given, _Found]:
+        own = signature(function).return_annotation
+        cast(Any, function).__signature__ = signature(kind).replace(return_annotation=own)
+        return function
+
+    return decorate
+
+
+@_taking_what(Verifier)
+def verify(*args: Any, **how: Any) -> Verification:
+    """Measure an NC text, that is whole, against the CL program it was made from.
+
+    Parameters
+    ----------
+    As `Verifier`.
+
+    Raises
+    ------
+    InputError, SettingsError
+        As `Verifier`.
+    """
+    with Verifier(*args, **how) as verifier:
+        return verifier.result()
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,12 @@ data of its parent without copying it.
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import sys
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -68,7 +66,6 @@ class Helper:
         MemoryError
             The process has been ended from outside, which is what a system short of memory does.
         """
-        release_memory()
         return _received(self._connection)
 
     def end(self) -> None:
@@ -80,18 +77,15 @@ class Helper:
 def map_in_processes(work: Callable[[Item], Result], items: Iterable[Item], processes: int) -> Iterator[Result]:
     """Give out what `work` makes of each item, in order, as `processes` processes find it.
 
-    Items are taken as they are needed, a fixed number ahead. Few items do not leave this process; nor does any where
-    there is only one process or the system cannot fork safely.
+    Items are taken as they are needed, a fixed number ahead; none before the processes have been forked, which would
+    keep copies of them. Nothing leaves this process where there is to be only one or the system cannot fork safely.
 
     Raises
     ------
     MemoryError
         A process has been ended from outside, which is what a system short of memory does.
     """
-    source = iter(items)
-    first = list(islice(source, _AHEAD))
-    alone = processes < 2 or not can_fork() or len(first) < _AHEAD
-    crew = None if alone else _Crew(work, processes)
+    crew = _Crew(work, processes) if processes > 1 and can_fork() else None
     waiting: deque[Callable[[], Result]] = deque()
 
     def start(item: Item) -> Callable[[], Result]:
@@ -101,10 +95,9 @@ def map_in_processes(work: Callable[[Item], Result], items: Iterable[Item], proc
         return lambda: found
 
     try:
-        while first:
-            waiting.append(start(first.pop(0)))
-        for item in source:
-            yield waiting.popleft()()
+        for item in items:
+            if len(waiting) == _AHEAD:
+                yield waiting.popleft()()
             waiting.append(start(item))
             del item
         while waiting:
@@ -212,18 +205,8 @@ def _received(connection: Connection) -> Any:
     return found
 
 
-def release_memory() -> None:
-    """Give back what the allocator holds but nobody uses.
-
-    After a fork it would be copied by whichever process writes there first, and kept by the others.
-    """
-    if (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)) is not None:  # glibc has it
-        trim(0)
-
-
 def _forked(target: Callable[..., None], *args: Any, daemon: bool) -> BaseProcess:
     """Start a process that calls `target`; it has all that this one has."""
-    release_memory()
     with warnings.catch_warnings():  # newer Pythons warn of threads, of which only numpy's idle ones are left
         warnings.simplefilter("ignore", DeprecationWarning)
         process: BaseProcess = _CONTEXT.Process(target=_obeying, args=(target, args), daemon=daemon)
