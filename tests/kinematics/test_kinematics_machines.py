@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.kinematics import load_machine, machine_names, parse_machine
+from cornersmooth.kinematics import load_machine, machine_names, machine_table, parse_machine
 
 PLAIN = """
 name = "mine"
@@ -134,8 +134,8 @@ def test_number_of_axes_is_checked():
 
 
 def test_unknown_names_and_files(tmp_path: Path):
-    with pytest.raises(SettingsError, match=r"unknown machine 'xyzac_trt'; did you mean xyzac-trt\? use a TOML file"):
-        load_machine("xyzac_trt")
+    with pytest.raises(SettingsError, match=r"unknown machine 'xyzac-tt'; did you mean xyzac-trt\? use a TOML file"):
+        load_machine("xyzac-tt")
     with pytest.raises(SettingsError, match=r"missing\.toml: error: machine file cannot be read: No such file"):
         load_machine(tmp_path / "missing.toml")
     binary = tmp_path / "binary.toml"
@@ -176,3 +176,62 @@ def test_what_is_wrong_in_dynamics_is_said(old: str, new: str, message: str):
     with pytest.raises(SettingsError) as caught:
         parse_machine(DYNAMIC.replace(old, new), file="m.toml")
     assert message in str(caught.value)
+
+
+SAMPLES = sorted((Path(__file__).parents[2] / "samples" / "machines").glob("*.toml"))
+
+
+def test_four_samples_are_there():
+    kinds = {path.stem: load_machine(path).kind for path in SAMPLES}
+    assert kinds == {
+        "fork-head": "head-head",
+        "nutated-head-table": "table-head",
+        "trunnion-ac": "table-table",
+        "trunnion-bc": "table-table",
+    }
+
+
+@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
+def test_samples_are_whole(path: Path):
+    machine = load_machine(path)
+    assert machine.name == path.stem
+    assert [item.name for item in machine.travel] == ["X", "Y", "Z"]
+    assert {item.name for item in machine.dynamics} == {*"XYZ", *machine.names}
+    assert machine.tool_length > 0
+    told = machine.describe()
+    for item in machine.travel:
+        assert f"\n  {item.name} from {item.low:g} to {item.high:g} mm" in told
+    assert "zero of the part at (" in told
+
+
+@pytest.mark.parametrize("name", machine_names())
+def test_every_key_of_a_table_has_a_comment(name: str):
+    keys = set()
+    for line in machine_table(name).splitlines():
+        if "=" in line and not line.startswith("#"):
+            assert " # " in line, line
+            keys.add(line.split("=")[0].strip())
+    text = machine_table(name)
+    for key in ("name", "direction", "carrier", "velocity", "acceleration", "jerk", "preferred"):
+        assert key in keys, key
+    for key in ("tool_direction", "tool_length", "part_zero", "travel"):
+        assert f"{key} = " in text, key
+    assert parse_machine(text) == load_machine(name)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("travel = 3", r"travel is not a table; write \[travel\]"),
+        ("[travel]\nX = 3", r"travel of X is 3; write X = \[lowest, highest\] in mm"),
+        ("[travel]\nX = [1, 1]", "travel of X is 1 and 1; give the lower one first, in mm"),
+        ("[travel]\nC = [1, 2]", "unknown key travel.C; known keys are X, Y, Z"),
+        ('[travel]\nY = ["low", 2]', "travel of Y is 'low'; give a number"),
+        ("[travel]\nY = [-inf, 2]", "travel of Y is -inf and 2"),
+    ],
+)
+def test_wrong_travel_is_said(text: str, message: str):
+    begin, axes = PLAIN.split("[[axis]]", 1)
+    whole = f"{begin}\n{text}\n[[axis]]{axes}" if "=" in text.split("\n")[0] else f"{PLAIN}\n{text}"
+    with pytest.raises(SettingsError, match=message):
+        parse_machine(whole)

@@ -15,7 +15,13 @@ from cornersmooth.cli.options import outputs
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]", shell_complete=completing.machines)
 @outputs.table
-def command(name: str | None, table: bool) -> int:
+@click.option(
+    "--pose",
+    metavar="A..,C..",
+    help="Say which way the tool points at these rotary angles, and where the linear axes stand: A30,C45, with the tip "
+    "on the part A30,C45,X10,Y0,Z5, or bare angles in alphabetical order.",
+)
+def command(name: str | None, table: bool, pose: str | None) -> int:
     """List the machines that come with the program, or check and describe one.
 
     A machine is two rotary axes, each in a table or a head, by direction, point and limits; a TOML file describes your
@@ -27,17 +33,24 @@ def command(name: str | None, table: bool) -> int:
       cornersmooth machines xyzac-trt
       cornersmooth machines table-ac --table > mine.toml
       cornersmooth machines mine.toml
+      cornersmooth machines mine.toml --pose A30,C45
     """
     from cornersmooth.kinematics import load_machine, machine_names, machine_table
 
+    if (table or pose) and name is None:
+        raise click.UsageError(f"{'--table' if table else '--pose'} needs the name of a machine")
+    if table and pose:
+        raise click.UsageError("--table and --pose exclude each other")
     if table:
-        if name is None:
-            raise click.UsageError("--table needs the name of a machine")
-        click.echo(machine_table(name), nl=False)
-        return 0
-    if name:
+        click.echo(machine_table(str(name)), nl=False)
+    elif name and pose is not None:
+        from cornersmooth.kinematics.posed import describe_pose, parse_pose
+
+        machine = load_machine(name)
+        click.echo(describe_pose(machine, parse_pose(machine, pose)))
+    elif name:
         click.echo(load_machine(name).describe())
-        return 0
-    for machine in map(load_machine, machine_names()):
-        click.echo(f"{machine.name}: {machine.description}")
+    else:
+        for machine in map(load_machine, machine_names()):
+            click.echo(f"{machine.name}: {machine.description}")
     return 0

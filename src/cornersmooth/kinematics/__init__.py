@@ -1,21 +1,25 @@
 """Machines: their axes and limits, the tool axis that rotary angles give and the angles that give it, positions."""
 
-from cornersmooth.kinematics.dynamics import Dynamics
+from cornersmooth.kinematics.dynamics import Dynamics, Travel
 from cornersmooth.kinematics.machine import Machine, RotaryAxis
 from cornersmooth.kinematics.machine_tables import load_machine, machine_names, machine_table, parse_machine
 from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis
 from cornersmooth.kinematics.position import inverse_time, machine_position, tip_position
+from cornersmooth.kinematics.travel import check_travel, nose_position
 
 __all__ = [
     "Dynamics",
     "Machine",
     "RotaryAxis",
     "Solutions",
+    "Travel",
+    "check_travel",
     "inverse_time",
     "load_machine",
     "machine_names",
     "machine_position",
     "machine_table",
+    "nose_position",
     "parse_machine",
     "solutions",
     "tip_position",

@@ -1,4 +1,4 @@
-"""How fast the axes of a machine may go."""
+"""How fast the axes of a machine may go, and how far the linear ones."""
 
 from __future__ import annotations
 
@@ -9,6 +9,27 @@ from cornersmooth.errors import SettingsError
 
 #: addresses of the linear axes
 LINEAR = ("X", "Y", "Z")
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Lowest and highest position of a linear axis.
+
+    Parameters
+    ----------
+    name : {"X", "Y", "Z"}
+    low, high : float, mm
+        Of the spindle nose with the heads at zero, in the coordinates in which the points of the tables are given.
+    """
+
+    name: str
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            what = f"travel of {self.name} is {self.low:g} and {self.high:g}"
+            raise SettingsError("CS253", what, "give the lower one first, in mm")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.kinematics.dynamics import LINEAR, Dynamics
+from cornersmooth.kinematics.dynamics import LINEAR, Dynamics, Travel
 from cornersmooth.model import Floats
 from cornersmooth.vectors import unit as unit_vector
 
@@ -112,6 +112,8 @@ class Machine:
         Where the zero of the part sits in the coordinates in which the points of the tables are given.
     dynamics : tuple of Dynamics
         Limits of any of the five axes; only the planning of the time asks for them.
+    travel : tuple of Travel
+        How far any of X, Y and Z goes; what is written is checked against it (`cornersmooth.kinematics.travel`).
     """
 
     name: str
@@ -122,6 +124,7 @@ class Machine:
     tool_length: float = 0.0
     part_zero: Vector = (0.0, 0.0, 0.0)
     dynamics: tuple[Dynamics, ...] = ()
+    travel: tuple[Travel, ...] = ()
 
     def __post_init__(self) -> None:
         where = f"machine {self.name}"
@@ -204,6 +207,9 @@ class Machine:
             lines.append(f"  starts with {self.preferred[0]} {'positive' if self.preferred[1] > 0 else 'negative'}")
         if self.swings_the_tool:
             lines.append(f"  tool length {self.tool_length:g} mm")
+        if any(self.part_zero):
+            lines.append(f"  zero of the part at ({', '.join(f'{number:g}' for number in self.part_zero)}) mm")
+        lines += [f"  {item.name} from {item.low:g} to {item.high:g} mm" for item in self.travel]
         lines += [f"  {item.describe()}" for item in self.dynamics]
         return "\n".join(lines)
 

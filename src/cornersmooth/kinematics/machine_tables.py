@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.kinematics.dynamics import LINEAR, Dynamics
+from cornersmooth.kinematics.dynamics import LINEAR, Dynamics, Travel
 from cornersmooth.kinematics.machine import Machine, RotaryAxis
 from cornersmooth.tables import Shelf, Table
 
@@ -14,7 +14,17 @@ _SHELF = Shelf(
     "machine",
     __package__,
     "machines",
-    keys=("name", "description", "preferred", "tool_direction", "tool_length", "part_zero", "axis", "dynamics"),
+    keys=(
+        "name",
+        "description",
+        "preferred",
+        "tool_direction",
+        "tool_length",
+        "part_zero",
+        "travel",
+        "axis",
+        "dynamics",
+    ),
     unknown="CS250",
     unreadable="CS251",
     unknown_key="CS252",
@@ -44,7 +54,7 @@ def load_machine(name_or_path: str | Path) -> Machine:
 
 
 def machine_table(name: str) -> str:
-    """Text of the table of a machine that comes with the program.
+    """Text of the table of a machine that comes with the program, every key with a comment.
 
     Raises
     ------
@@ -62,7 +72,8 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
     text : str or dict
         Keys: ``like`` (a machine that comes with the program; then only what is different), ``name``, ``description``,
         ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``part_zero`` and two tables ``[[axis]]`` with
-        ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``; and for the planning of the time
+        ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``; ``[travel]`` with ``X``, ``Y`` and
+        ``Z``, each ``[lowest, highest]``, any of which may be left out; and for the planning of the time
         tables ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min
         or deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which may be left out.
     file : str
@@ -92,6 +103,7 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
             tool_length=_number(table.get("tool_length", 0.0), "tool_length"),
             part_zero=_vector(table, "part_zero", (0.0, 0.0, 0.0)),
             dynamics=_dynamics(table, (*LINEAR, first.name, second.name)),
+            travel=_travel(table),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
@@ -116,6 +128,20 @@ def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
         positive=entry.get("positive", "tool"),
         limits=limits,
     )
+
+
+def _travel(table: dict[str, Any]) -> tuple[Travel, ...]:
+    given = table.get("travel", {})
+    if not isinstance(given, dict):
+        raise _SHELF.wrong("travel is not a table", "write [travel] and X = [lowest, highest] below")
+    _SHELF.check_keys(given, LINEAR, "travel.")
+    found = []
+    for name in (name for name in LINEAR if name in given):
+        ends = given[name]
+        if not isinstance(ends, list) or len(ends) != 2:
+            raise _SHELF.wrong(f"travel of {name} is {ends!r}", f"write {name} = [lowest, highest] in mm")
+        found.append(Travel(name, *(_number(end, f"travel of {name}") for end in ends)))
+    return tuple(found)
 
 
 def _dynamics(table: dict[str, Any], names: tuple[str, ...]) -> tuple[Dynamics, ...]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.kinematics.travel import check_travel
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
@@ -58,7 +59,9 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
     if any(len(group) for group in found.groups):
         text = "G6.2 with rotary axes under tool tip control is the machine builder's to allow; ask before running it"
         findings.add("CS370", "warning", 0, text)
-    yield from _Table(smoothed, found).chunks()
+    for chunk in _Table(smoothed, found).chunks():
+        check_travel(machine, chunk.tip, chunk.other, program.line[chunk.move], program.source.name)
+        yield chunk
 
 
 class _Table:

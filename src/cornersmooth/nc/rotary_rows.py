@@ -14,6 +14,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine, inverse_time, machine_position
+from cornersmooth.kinematics.travel import check_travel
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
@@ -128,6 +129,7 @@ def rotary_rows(
             rate = np.minimum(rate, fastest)
         if rate is not None:
             rate = np.round(rate, INVERSE_TIME_DECIMALS)
+        check_travel(machine, filled.tip[own], filled.angles[own], line[here][filled.pose[own]], file)
         count = len(filled.pose[own])
         yield Rows(
             tip=filled.tip[own],

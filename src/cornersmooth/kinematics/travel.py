@@ -1,0 +1,73 @@
+"""How far the linear axes of a machine go, and which positions lie beyond."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.errors import InputError
+from cornersmooth.kinematics.dynamics import LINEAR
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.position import machine_position
+from cornersmooth.model import Floats, Ints
+
+#: mm beyond the travel that are rounding
+_ROUNDING = 1e-6
+
+
+def nose_position(machine: Machine, tip: Floats, angles: Floats) -> Floats:
+    """Where the linear axes stand: positions of the spindle nose with the heads at zero.
+
+    Parameters
+    ----------
+    tip : (n, 3) float64, mm
+        In part coordinates.
+    angles : (n, 2) float64, degrees
+
+    Returns
+    -------
+    (n, 3) float64, mm
+        In the coordinates in which the points of the tables are given. A control under tool tip control moves its axes
+        there although the words are the tip.
+    """
+    position: Floats = machine_position(machine, tip, angles) + machine.part_zero + machine.tool_length * machine.tool
+    return position
+
+
+def check_travel(machine: Machine, tip: Floats, angles: Floats, line: Ints, file: str | None = None) -> None:
+    """Refuse positions that the linear axes cannot reach.
+
+    Parameters
+    ----------
+    tip : (n, 3) float64, mm
+        In part coordinates.
+    angles : (n, 2) float64, degrees
+    line : (n,) int64
+        Source lines, 0 for none.
+
+    Raises
+    ------
+    InputError
+        CS374: the first position beyond the travel of an axis.
+    """
+    if not machine.travel or not len(tip):
+        return
+    position = nose_position(machine, tip, angles)
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    for item in machine.travel:
+        low[LINEAR.index(item.name)], high[LINEAR.index(item.name)] = item.low, item.high
+    beyond = np.maximum(low - position, position - high)
+    rows = np.flatnonzero((beyond > _ROUNDING).any(axis=1))
+    if not len(rows):
+        return
+    row = int(rows[0])
+    axis = int(np.argmax(beyond[row]))
+    end = low[axis] if position[row, axis] < low[axis] else high[axis]
+    farthest = beyond[rows].max()
+    raise InputError(
+        "CS374",
+        f"{LINEAR[axis]} of {machine.name} would have to go to {position[row, axis]:.3f} mm, its travel ends at "
+        f"{end:g} mm; {len(rows):,} positions lie up to {farthest:.3f} mm beyond",
+        "move the part (part_zero in the machine file), or see that tool_length and travel are right",
+        file=file,
+        line=int(line[row]) or None,
+    )
