@@ -104,9 +104,9 @@ def rotary_rows(
         inserted += len(more)
         unsolved += line[more.unsolved + 1].tolist()
         filled = fill(tip[here], axis[here], angles[here], more)
+        start, at_pose = segments_of_rows(move, here.start, here.stop)
         if long:
             row = filled.pose
-            start, at_pose = segments_of_rows(move, here.start, here.stop)
             exact = at_pose[row] & ~filled.inserted
             found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move[here][row], start[row], exact)
             filled = filled.only(fewest_lines(found, limits))
@@ -116,15 +116,13 @@ def rotary_rows(
         if rate is not None and fastest:
             if form.orientation == "machine" and (rate > fastest).any():
                 before = len(filled.pose)
-                filled = _merged(
-                    smoothed, machine, filled, (move[here], start[here], at_pose[here]), rate, limits, fastest
-                )
+                filled = _merged(smoothed, machine, filled, (move[here], start, at_pose), rate, limits, fastest)
                 merged += before - len(filled.pose)
                 rate = _rates(filled, move[here], of_timed, program, settings, form)
             assert rate is not None
             beyond = np.flatnonzero(rate[own] > fastest)
             if len(beyond) and not slowed:
-                first_slowed = int(line[here][filled.pose[own][beyond[0]]])
+                first_slowed = int(line[filled.pose[own][beyond[0]]])
             slowed += len(beyond)
             rate = np.minimum(rate, fastest)
         if rate is not None:
