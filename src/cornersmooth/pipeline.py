@@ -7,12 +7,13 @@ will be written, how the text is to be read back) is put together here.
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,12 +23,15 @@ from cornersmooth.errors import Finding, InputError, PromiseError
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
-from cornersmooth.nc_reader import CONTROLS
+from cornersmooth.nc_reader import CONTROLS, read_nc
 from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
 from cornersmooth.provenance import Provenance
 from cornersmooth.report import report
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, Verifier, useful_processes
+
+if TYPE_CHECKING:
+    from cornersmooth.feedrate import Limits
 
 #: blocks taken on trust that are told one by one
 _TRUSTED_TOLD = 3
@@ -135,6 +139,7 @@ def postprocess(
     frame: Frame | None = None,
     reading: Mapping[str, Any] | None = None,
     feed: float | None = None,
+    plan_feeds: Limits | None = None,
     verify: bool = True,
     require_verified: bool = False,
     force: bool | None = False,
@@ -160,6 +165,9 @@ def postprocess(
         Keyword arguments of `read`.
     feed : float, mm/min, optional
         For moves that have none.
+    plan_feeds : Limits, optional
+        Plan the text within these limits, and those of the axes of the form's machine, and give every block the feed
+        that it reaches there. The whole text is held in memory then.
     verify : bool
         Whether the text is read back and measured before it takes its place.
     require_verified : bool
@@ -195,6 +203,7 @@ def postprocess(
     with _timed(seconds, "smooth"):
         smoothed = smooth(program, settings, form=form, progress=_stage(progress, "smoothing"))
     provenance = _provenance(source, program, smoothed.settings, form)
+    provenance = replace(provenance, planned_feeds=plan_feeds is not None)
     frame = replace(frame or Frame(), provenance=provenance.lines())
     with (
         open_output(target, hold=not unverified or require_verified, replace=may_replace) as output,
@@ -209,13 +218,19 @@ def postprocess(
                 axis_length=smoothed.settings.axis_length,
                 trusted=_users_blocks(frame, form, program, smoothed.settings),
                 weights=provenance.weights,
+                slower=provenance.planned_feeds,
                 processes=useful_processes() if processes is None else processes,
                 **back,
             )
             stack.enter_context(verifier)
         with _timed(seconds, "write"):
             told = _stage(progress, "writing")
-            written = nc.write(smoothed, output.stream, form=form, frame=frame, progress=told)
+            if plan_feeds is None:
+                written = nc.write(smoothed, output.stream, form=form, frame=frame, progress=told)
+            else:
+                whole = io.BytesIO()
+                written = nc.write(smoothed, whole, form=form, frame=frame, progress=told)
+                output.stream.write(_with_planned_feeds(whole.getvalue(), program, smoothed.settings, form, plan_feeds))
             output.stream.flush()
         verification = None
         if verifier is not None:
@@ -240,6 +255,24 @@ def postprocess(
     if output.rejected:
         raise _rejection(result, "breaks its promise" if broken else "is not verified")
     return result
+
+
+def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form: Form, limits: Limits) -> bytes:
+    """The text with the feeds of its own plan."""
+    from cornersmooth.feedrate import block_feeds, plan_text
+    from cornersmooth.nc.planned_feeds import PlannedFeeds
+
+    how = {**reading_back(form), "tolerance": settings.verified_tolerance, "axis_length": settings.axis_length}
+    how.pop("words")
+    read_back = read_nc(text, name=program.source.name, **how)
+    machine = form.machine if form.machine is not None and form.machine.dynamics else None
+    law = plan_text(read_back, limits, name=program.source.name, settings=settings, machine=machine)
+    line, feed, minutes = block_feeds(law)
+    # of several elements of a block, which have one feed, the first
+    element = np.searchsorted(read_back.line, line)
+    return PlannedFeeds(line, feed, minutes, read_back.feed[element]).write(
+        text, form, program.units, program.mm_per_unit
+    )
 
 
 def _provenance(

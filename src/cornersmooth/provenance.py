@@ -33,6 +33,8 @@ class Provenance:
         Of the CL file, in hexadecimal digits; empty where it is not known.
     weights : tuple of float or None
         Those that control points of curves have; None where they may have any.
+    planned_feeds : bool
+        Whether feeds are those of a plan, at most the programmed ones.
     """
 
     version: str
@@ -46,6 +48,7 @@ class Provenance:
     source: str = ""
     sha256: str = ""
     weights: tuple[float, ...] | None = (1.0,)
+    planned_feeds: bool = False
 
     def lines(self) -> tuple[str, ...]:
         """Texts of the comments."""
@@ -58,6 +61,7 @@ class Provenance:
             **({"MACHINE": self.machine} if self.machine else {}),
             **({} if self.tcp else {"TCP": "no"}),
             **({"WEIGHTS": self._weights_word} if self._weights_word else {}),
+            **({"FEEDS": "plan"} if self.planned_feeds else {}),
         }
         first = f"CORNERSMOOTH {self.version}: " + " ".join(f"{key}={_word(value)}" for key, value in words.items())
         second = " ".join(([f"SHA256={self.sha256}"] if self.sha256 else []) + [f"CL={self.source}"])
@@ -98,6 +102,7 @@ def read_provenance(text: bytes) -> Provenance | None:
             tcp=words.get("TCP") != "no",
             sha256=digest[1].lower() if digest else "",
             weights=_weights(words.get("WEIGHTS", "1")),
+            planned_feeds=words.get("FEEDS") == "plan",
         )
     except (KeyError, ValueError):
         return None

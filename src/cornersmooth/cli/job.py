@@ -71,6 +71,8 @@ class Job:
     plan : (int, int)
         Poses up to which the time that is saved is planned as a whole, and the stretches of longer programs from which
         it is estimated; none for not at all.
+    plan_feeds : Limits or None
+        Within which the feeds of the blocks are planned; None for the programmed ones.
     beginning : bool
         Whether standard output gets the first lines only.
     run : str
@@ -94,6 +96,7 @@ class Job:
     plot: str = ""
     tool: Tool | None = None
     plan: tuple[int, int] = (0, 0)
+    plan_feeds: Limits | None = None
     beginning: bool = False
     run: str = ""
 
@@ -200,7 +203,7 @@ def _exists(job: Job, outcome: Outcome) -> bool:
 def _made_of(job: Job, source: bytes) -> str:
     """Name for everything that the text of a job depends on."""
     text = hashlib.sha256(source).hexdigest()
-    wanted = (job.verify, job.require_verify, job.feed)
+    wanted = (job.verify, job.require_verify, job.feed, job.plan_feeds)
     return fingerprint(text, job.reading, job.settings, job.form, job.frame, *wanted)
 
 
@@ -246,6 +249,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
             frame=job.frame,
             reading={"name": name, **job.reading},
             feed=job.feed,
+            plan_feeds=job.plan_feeds,
             verify=job.verify,
             require_verified=job.require_verify,
             force=may_replace[job.target],

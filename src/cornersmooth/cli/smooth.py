@@ -14,7 +14,7 @@ from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.files import STANDARD, check_path, read_input
 from cornersmooth.cli.inputs import Input, find_inputs
 from cornersmooth.cli.job import Job, Outcome, check, run_job
-from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
+from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import more, print_line, progress_bar, show_findings, show_summary, show_verdict
 from cornersmooth.cli.summary import check_summary, counts_line, line_of, row_of, write_summary
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
 @smoothing.chord_tolerance
 @smoothing.axis_step
 @reading.feed
+@motion.planned_feed_options
 @reading.reading_options
 @nc_text.no_verify
 @nc_text.require_verify
@@ -173,6 +174,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 form=form,
                 frame=replace(frame, stem="" if found.path == STANDARD else os.path.basename(found.stem)),
                 feed=given["feed"],
+                plan_feeds=motion.planned_limits_of(given),
                 force=given["force"],
                 verify=not given["no_verify"],
                 require_verify=given["require_verify"],

@@ -89,7 +89,16 @@ def command(source: str, text: str, **given: Any) -> int:
     ]
     if remark:  # first: what follows may be hard to understand without it
         click.echo(f"{text}: warning: {remark}", err=True)
-    found = verify(program, nc, **how, words=not own, trusted=trusted, weights=weights, processes=useful_processes())
+    found = verify(
+        program,
+        nc,
+        **how,
+        words=not own,
+        trusted=trusted,
+        weights=weights,
+        slower=given.get("slower", False),
+        processes=useful_processes(),
+    )
     _write_reports(program, found, [path for path in given["reports"] if path not in pages])
     if pages:
         from cornersmooth.nc_reader import read_nc
@@ -143,6 +152,7 @@ def _take_over(
     said |= {"control": made.control} if made.control in control_names() else {}
     said |= {"machine": made.machine or None} if made.machine in ("", *machine_names()) else {}
     typed = click.core.ParameterSource.COMMANDLINE
+    given["slower"] = made.planned_feeds
     given |= {name: value for name, value in said.items() if context.get_parameter_source(name) != typed}
     if made.machine and not given["machine"]:
         raise SettingsError("CS225", f"the text is for the machine {made.machine}", "name its file with --machine")

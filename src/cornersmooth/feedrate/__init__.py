@@ -9,7 +9,7 @@ from cornersmooth.feedrate.limiting import limiting
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
 from cornersmooth.feedrate.timelaw import States, TimeLaw
-from cornersmooth.feedrate.written import BlockLimits, plan_text
+from cornersmooth.feedrate.written import BlockLimits, block_feeds, plan_text
 
 __all__ = [
     "AxisLimits",
@@ -20,6 +20,7 @@ __all__ = [
     "States",
     "TimeLaw",
     "axis_peaks",
+    "block_feeds",
     "compare",
     "direct",
     "limiting",

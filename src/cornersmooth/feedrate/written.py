@@ -179,6 +179,35 @@ def _stoppable(length: Floats, blocks: Floats, look_ahead: int, limits: Limits) 
     return np.where(until >= read[-1] - _PART_OF_A_BLOCK, np.inf, speed)
 
 
+def block_feeds(law: TimeLaw) -> tuple[Ints, Floats, Floats]:
+    """What a plan of a text makes of its blocks.
+
+    Parameters
+    ----------
+    law : TimeLaw
+        As `plan_text` gives it.
+
+    Returns
+    -------
+    line : (b,) int64
+        NC lines of the blocks that feed, ascending; of curves, their first.
+    feed : (b,) float64, mm/min
+        Mean speed of the tip; NaN where it stands still for a part of the block.
+    minutes : (b,) float64
+        What each block takes.
+    """
+    path = law.path
+    feeding = np.flatnonzero(~path.rapid)
+    if not len(feeding):
+        return np.zeros(0, np.int64), np.zeros(0), np.zeros(0)
+    minutes = np.diff(law.times_at(law.edge))[feeding] / 60.0
+    line = path.program.line[path.move[feeding]]
+    first = np.flatnonzero(np.concatenate(([True], line[1:] != line[:-1])))
+    length = np.add.reduceat(np.where(path.turning[feeding], np.nan, path.length[feeding]), first)
+    taken = np.add.reduceat(minutes, first)
+    return line[first], length / np.maximum(taken, np.finfo(np.float64).tiny), taken
+
+
 def plan_text(
     nc: NcProgram,
     limits: Limits | None = None,

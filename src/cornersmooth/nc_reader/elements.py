@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -234,6 +234,12 @@ class Elements:
         rows = slice(first, stop)
         own: dict[str, Any] = {name: getattr(self, name)[rows] for name in _COLUMNS}
         return replace(self, **own, curves=self.curves.part(first, stop), arcs=self.arcs.part(first, stop))
+
+    def at_most(self) -> Self:
+        """Return the same elements with feeds below which those of the moves may not be (`feed_room` NaN)."""
+        least = np.maximum(self.feed - np.abs(self.feed_room), np.finfo(np.float64).tiny)
+        feed = np.where(self.feed > 0.0, least, self.feed)
+        return replace(self, feed=feed, feed_room=np.full(len(self), np.nan))
 
     @classmethod
     def joined(cls, parts: Sequence[Elements]) -> Elements:

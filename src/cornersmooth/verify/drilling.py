@@ -16,7 +16,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.verify.polyline import Original, directions
-from cornersmooth.verify.rapids import digit_errors
+from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 
 #: elements looked through at a time for the beginning of a run
 _WINDOW = 512
@@ -318,6 +318,7 @@ class _Search:
                     problems.append(Problem("CS563", cl_line, line, "a feed move enters a hole from the side"))
                 wrong = not np.isnan(cycle.feed) and (
                     abs(nc.feed[k] - cycle.feed) > 2 * abs(nc.feed_room[k])
+                    or (np.isnan(nc.feed_room[k]) and nc.feed[k] > cycle.feed + ARITHMETIC)
                     or nc.per_revolution[k] != cycle.per_revolution
                 )
                 if wrong:

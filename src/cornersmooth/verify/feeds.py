@@ -90,7 +90,7 @@ def _same(said: Floats, per_revolution: Bools, room: Floats, feed: Floats, mode:
     asked = feed[move]
     slack = ARITHMETIC * np.maximum(np.abs(asked), 1.0)
     near = (np.abs(said - asked) <= np.abs(room) + slack) | (asked <= -_CREEPING * room)
-    near |= np.isnan(room) & (said <= asked + slack)
+    near |= np.isnan(room) & (said > 0.0) & (said <= asked + slack)
     same: Bools = np.isnan(asked) | (near & (per_revolution == mode[move]))
     return same
 
@@ -127,7 +127,7 @@ def _inside_rounding(
     """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
     length, trail = match.path.length, match.original.trail
     said, room = pair[0], abs(pair[1]) + ARITHMETIC * max(abs(pair[0]), 1.0)
-    creeping = -_CREEPING * pair[1]
+    creeping, slower = -_CREEPING * pair[1], bool(np.isnan(pair[1]))
     visible = match.margin / 2
     low, high = int(match.low[start]), int(match.high[start])
 
@@ -153,7 +153,10 @@ def _inside_rounding(
     ):
         if not low < pose_vertex <= high:
             continue
-        if not any(abs(feed[other] - said) <= room or feed[other] <= creeping for other in beyond(step)):
+        if not any(
+            abs(feed[other] - said) <= room or feed[other] <= creeping or (slower and 0.0 < said <= feed[other])
+            for other in beyond(step)
+        ):
             continue
         pose = length[pose_vertex]
         begin, other = length[trail.last[move - 1]], length[trail.last[move]]

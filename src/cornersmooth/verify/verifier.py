@@ -73,6 +73,8 @@ class Verifier:
         Blocks that belong where they stand because the user put them there: what they do is taken on trust.
     weights : sequence of float, optional
         Those that curves have, where that is known: any other is a problem, even if the curve stays within ε.
+    slower : bool
+        Whether feeds may be below those of the CL file, as where the text has those of a plan.
     processes : int
         Processes to work on long texts with, where the system can fork; the result does not depend on it.
 
@@ -97,12 +99,13 @@ class Verifier:
         words: bool = True,
         trusted: Sequence[str] = (),
         weights: Sequence[float] | None = None,
+        slower: bool = False,
         processes: int = 1,
     ) -> None:
         _check_bounds(tolerance, axis_length)
         self._program, self._words = program, words
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
-        self._trusted, self._weights = tuple(trusted), weights
+        self._trusted, self._weights, self._slower = tuple(trusted), weights, slower
         self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._text = nc if isinstance(nc, NcProgram) else Source(readable_twice(nc))
         self._name = None if isinstance(nc, NcProgram | bytes) else str(nc)
@@ -144,7 +147,7 @@ class Verifier:
 
     def _of_read(self, task: Task, nc: NcProgram) -> Verification:
         elements = Elements(**{column.name: getattr(nc, column.name) for column in fields(Elements)})
-        text = _Text(iter([elements]), list(nc.events))
+        text = _Text(iter([elements.at_most() if self._slower else elements]), list(nc.events))
         measured = _measure(task, text, words=self._words, processes=self._processes)
         return measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
 
@@ -160,7 +163,8 @@ class Verifier:
         room = options.tolerance / self._program.mm_per_unit
         check = WordCheck(options.control, options.dialect.lexer, room, self._trusted, self._weights)
         reader.way_back.added = OwnRapids(task).added
-        text = _Text(reader.chunks(check.watch(lines) if self._words else lines), reader.events)
+        chunks = reader.chunks(check.watch(lines) if self._words else lines)
+        text = _Text((part.at_most() for part in chunks) if self._slower else chunks, reader.events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
         problems = [*reader.problems, *check.problems]
         found = measured.verification(

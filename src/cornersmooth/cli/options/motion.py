@@ -83,6 +83,40 @@ def limits_of(given: dict[str, Any]) -> Limits:
     return Limits(**{name: given[name] for name in _LIMITS})
 
 
+feed_from_plan = click.option(
+    "--feed-from-plan",
+    is_flag=True,
+    help="Give every block the feed that a plan of the text reaches there, within --accel, --jerk and the limits of "
+    "--machine: for controls that do not look ahead.",
+)
+#: of a plan whose feeds are written
+_PLANNED = ("accel", "jerk", "centripetal", "period")
+
+
+def planned_feed_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of feeds from a plan."""
+    return all_of(function, (feed_from_plan, *(_LIMITS[name] for name in _PLANNED)))
+
+
+def planned_limits_of(given: dict[str, Any]) -> Limits | None:
+    """Limits of the plan whose feeds are written; None where they are the programmed ones.
+
+    Raises
+    ------
+    UsageError
+        Limits without `--feed-from-plan`.
+    """
+    from cornersmooth.feedrate import Limits
+
+    if given["feed_from_plan"]:
+        return Limits(**{name: given[name] for name in _PLANNED})
+    context = click.get_current_context()
+    for name in _PLANNED:
+        if context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name} is for --feed-from-plan")
+    return None
+
+
 limits_machine = click.option(
     "--machine",
     type=str,

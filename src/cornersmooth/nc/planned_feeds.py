@@ -1,0 +1,95 @@
+"""The feeds that a plan reaches, put into the blocks of a text: for controls that do not look ahead themselves."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints, Units
+from cornersmooth.nc.control import INVERSE_TIME
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.rotary_rows import INVERSE_TIME_DECIMALS
+from cornersmooth.text import format_number
+
+#: figures of a planned feed, and the part of the programmed one from which on it is that
+_FIGURES: Final = 4
+_ALL_BUT: Final = 0.999
+
+#: feed word at the end of a line, with its number
+_FEED: Final = re.compile(rb" ?F(\d+\.?\d*|\.\d+)$")
+
+
+@dataclass(frozen=True)
+class PlannedFeeds:
+    """Feeds of a plan for the blocks of a text, b of them.
+
+    Parameters
+    ----------
+    line : (b,) int64
+        NC lines, ascending.
+    feed : (b,) float64, mm/min
+        NaN where the plan says none, as where the tip stands still.
+    minutes : (b,) float64
+        What a block takes, for inverse time.
+    programmed : (b,) float64, mm/min
+        What the feed may not exceed; the feed where the plan says none.
+    """
+
+    line: Ints
+    feed: Floats
+    minutes: Floats
+    programmed: Floats
+
+    def write(self, text: bytes, form: Form, units: Units, mm_per_unit: float) -> bytes:
+        """Return the text with a feed word wherever the feed changes, none above the programmed one.
+
+        Blocks under inverse time (G93) get one over the minutes that they take.
+        """
+        motion, digits = form.mode.motion, form.table.digits
+        scale = 10.0**digits.feed
+        unit = (motion.inch_feed if units == "inch" else 1) / mm_per_unit
+        asked = np.rint(self.programmed * unit * scale)
+        planned = np.fmin(self.feed, self.programmed) * unit * scale
+        # not more figures than say anything, rounded down
+        step = np.maximum(10.0 ** np.floor(np.log10(np.maximum(planned, 1.0)) - _FIGURES + 1), 1.0)
+        planned = np.where(planned >= _ALL_BUT * asked, asked, np.maximum(np.floor(planned / step) * step, 1.0))
+        ticks = np.where(np.isnan(self.feed), asked, planned)
+        rate = np.floor(10.0**INVERSE_TIME_DECIMALS / np.maximum(self.minutes, np.finfo(np.float64).tiny))
+        lines = text.split(b"\n")
+        word = (" " if motion.spaces else "") + motion.feed
+
+        def said(value: float, decimals: int) -> bytes:
+            number = format_number(value / 10.0**decimals, decimals, trim=True)
+            return (word + (number if motion.feed_point else number.rstrip("."))).encode()
+
+        inverse = form.table.words.feed_mode.get(INVERSE_TIME, "").encode() or None
+        others = [block.encode() for key, block in form.table.words.feed_mode.items() if key != INVERSE_TIME]
+        modes = np.array([k for k, block in enumerate(lines) if block in others or block == inverse], np.int64)
+        timed = np.array([lines[k] == inverse for k in modes.tolist()] or [False])
+        mode = np.searchsorted(modes, self.line - 1) - 1
+        under_time = (mode >= 0) & timed[np.maximum(mode, 0)]
+        own = {int(line) - 1 for line in self.line}
+        with_feed = [k for k, block in enumerate(lines) if b"F" in block and k not in own and _FEED.search(block)]
+        unknown = iter(sorted({*with_feed, *modes.tolist()}))
+        upset = next(unknown, len(lines))
+        current: bytes | None = None
+        for k, row in enumerate((self.line - 1).tolist()):
+            while upset < row:  # another feed, or another kind of feed, since the last block
+                current, upset = None, next(unknown, len(lines))
+            last = row
+            while form.table.layout.continuation and lines[last].endswith(form.table.layout.continuation.encode()):
+                last += 1
+            old = _FEED.search(lines[last])
+            bare = lines[last][: old.start()] if old else lines[last]
+            if under_time[k]:
+                known = float(old[1]) * 10.0**INVERSE_TIME_DECIMALS if old else np.inf
+                lines[last] = bare + said(max(min(float(rate[k]), known), 1.0), INVERSE_TIME_DECIMALS)
+                current = None
+                continue
+            new = said(float(ticks[k]), digits.feed)
+            lines[last] = bare if new == current else bare + new
+            current = new
+        return b"\n".join(lines)

@@ -1,0 +1,104 @@
+"""Feeds of a plan in the text: never above the programmed ones, as fast as the plan, and verified as such."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cornersmooth.feedrate import Limits, block_feeds, plan_text
+from cornersmooth.kinematics import load_machine
+from cornersmooth.model import Program
+from cornersmooth.nc import Form, choose_form
+from cornersmooth.nc_reader import read_nc
+from cornersmooth.pipeline import postprocess, reading_back
+from cornersmooth.provenance import read_provenance
+from cornersmooth.settings import Settings
+from cornersmooth.verify import verify
+
+CASES = (
+    ("fanuc", "g1", "", True),
+    ("fanuc", "g6.2", "", True),
+    ("fanuc", "g1", "table-ac", False),
+    ("siemens", "bspline", "", True),
+    ("siemens", "poly", "", True),
+    ("heidenhain", "g1", "", True),
+    ("heidenhain", "spl", "table-ac", True),
+    ("linuxcnc", "g1", "xyzac-trt", True),
+    ("haas", "g1", "table-ac", True),
+)
+LIMITS = Limits(accel=500.0, jerk=5000.0)
+
+
+def program(units: str = "mm") -> Program:
+    """Corners of all angles, and a change of the feed."""
+    u = np.arange(14) / 2.0
+    tip = np.stack((4.0 * u, 3.0 * np.sin(2.0 * u), 0.2 * np.cos(2.0 * u)), axis=1)
+    axis = np.stack((0.1 * np.sin(u), 0.3 + 0.05 * np.cos(1.3 * u), np.ones(14)), axis=1)
+    whole = Program.from_poses(tip, axis / np.linalg.norm(axis, axis=1, keepdims=True), feed=6000.0, units=units)
+    return replace(whole, feed=np.where(np.arange(14) > 8, 3000.0, whole.feed))
+
+
+def form_of(control: str, form: str, machine: str, tcp: bool) -> Form:
+    return choose_form(control, form, machine=load_machine(machine) if machine else None, tcp=tcp)
+
+
+def made(form: Form, units: str = "mm", *, planned: bool = True) -> bytes:
+    stream = io.BytesIO()
+    limits = LIMITS if planned else None
+    result = postprocess(program(units), stream, Settings(tolerance=0.02), form=form, plan_feeds=limits, processes=1)
+    assert result.verification is not None
+    assert result.verification.passed
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("units", ["mm", "inch"])
+@pytest.mark.parametrize(("control", "form", "machine", "tcp"), CASES)
+def test_blocks_have_the_mean_speed_of_the_plan(control: str, form: str, machine: str, tcp: bool, units: str) -> None:
+    chosen = form_of(control, form, machine, tcp)
+    how = {key: value for key, value in reading_back(chosen).items() if key != "words"} | {"tolerance": 0.02}
+    plain, text = (read_nc(made(chosen, units, planned=planned), **how) for planned in (False, True))
+    np.testing.assert_array_equal(plain.tip, text.tip)
+    axes = None if chosen.machine is None or not chosen.machine.dynamics else chosen.machine
+    line, feed, _ = block_feeds(plan_text(plain, LIMITS, machine=axes))
+    element = np.searchsorted(plain.line, line)
+    said = text.feed[element]
+    assert (said <= plain.feed[element] * (1 + 1e-9) + np.nan_to_num(np.abs(plain.feed_room[element]), nan=10.0)).all()
+    known = ~np.isnan(feed)
+    assert known.sum() > 10
+    # four figures, or three decimals of inverse time
+    np.testing.assert_allclose(said[known], np.minimum(feed, plain.feed[element])[known], rtol=2e-3, atol=0.05)
+    assert said.min() < 0.9 * said.max()
+
+
+def test_the_head_says_it_and_verification_goes_by_that() -> None:
+    form = choose_form("fanuc")
+    text = made(form)
+    found = read_provenance(text)
+    assert found is not None
+    assert found.planned_feeds
+    how = {"tolerance": 0.02}
+    assert verify(program(), text, slower=True, **how).passed
+    assert {problem.code for problem in verify(program(), text, **how).problems} == {"CS541"}
+    plain = made(form, planned=False)
+    before = read_provenance(plain)
+    assert before is not None
+    assert not before.planned_feeds
+    faster = re.sub(rb"F6000\.", b"F6001.", plain)
+    assert {problem.code for problem in verify(program(), faster, slower=True, **how).problems} == {"CS541"}
+    no_feed = re.sub(rb" F[\d.]+", b"", plain)
+    assert {problem.code for problem in verify(program(), no_feed, slower=True, **how).problems} == {"CS542"}
+    stands = re.sub(rb"F6000\.", b"F0.", plain)
+    assert "CS541" in {problem.code for problem in verify(program(), stands, slower=True, **how).problems}
+
+
+def test_feeds_that_the_plan_reaches_stay_as_they_are() -> None:
+    """A long line at a feed that it reaches at once needs no other word."""
+    tip = np.array([[0.0, 0.0, 0.0], [400.0, 0.0, 0.0], [800.0, 0.0, 0.0]])
+    line = Program.from_poses(tip, np.tile([0.0, 0.0, 1.0], (3, 1)), feed=300.0)
+    stream = io.BytesIO()
+    postprocess(line, stream, Settings(tolerance=0.02), form=choose_form("fanuc"), plan_feeds=Limits(), processes=1)
+    assert set(re.findall(rb"F[\d.]+", stream.getvalue())) == {b"F300."}
