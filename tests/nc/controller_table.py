@@ -4,7 +4,8 @@
 
 Prints one table: each path unsmoothed, and as the program writes it for LinuxCNC, at two tolerances. The axes of the
 machine have the limits of `linuxcnc_controller.STATED`, the feed is 1800 mm/min; time is counted in servo cycles, so
-that the load of this computer does not matter. FOLDER holds the real CL files of the tests; without it the sample alone is run.
+that the load of this computer does not matter. FOLDER holds the real CL files of the tests; without it the sample alone
+is run.
 Exit code 0 where long lines keep the tolerance in what is executed, and are nowhere slower than the fastest unsmoothed
 text that does.
 """
