@@ -202,8 +202,15 @@ def test_a_long_span_beside_short_ones_is_verified(tmp_path: Path) -> None:
         assert result.returncode == 0, result.stderr.decode()
 
 
+def test_turns_between_knots_far_apart_are_verified(tmp_path: Path) -> None:
+    chain = random_chains(5010, 20, corners=8)[1]  # the axis turns by 27 degrees in one segment, with few knots in it
+    options = ["-f", "g6.2", "--method", "global", "-e", "0.001", "-H", "50"]
+    result = run("smooth", "-", "-o", tmp_path / "o.nc", "-q", *options, data=cl_text([chain])[0])
+    assert result.returncode == 0, result.stderr.decode()
+
+
 def test_runs_with_steep_turns_are_named_where_curves_are_written() -> None:
-    tilt = np.radians([0.0, 5.0, 45.0, 50.0, 55.0])
+    tilt = np.radians([0.0, 5.0, 70.0, 75.0, 80.0])
     tip = np.stack((np.arange(5) * 5.0, [0.0, 1, 0, 1, 0], np.zeros(5)), axis=1)
     axis = np.stack((np.sin(tilt), 0 * tilt, np.cos(tilt)), axis=1)
     program = cornersmooth.Program.from_poses(tip, axis)

@@ -7,7 +7,13 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.distances import Distances, Reached, own_gaps_of_original, own_gaps_of_written
+from cornersmooth.verify.distances import (
+    Distances,
+    Reached,
+    common_gaps_of_original,
+    own_gaps_of_original,
+    own_gaps_of_written,
+)
 from cornersmooth.verify.findings import Findings, Poses
 from cornersmooth.verify.hull_bounds import hull_gaps
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
@@ -85,7 +91,11 @@ def _take(
     over = over[known[over]]
     apart = over[(gap.larger[over] > together) & (np.maximum(tip, axis)[over] <= limit)]
     if len(apart):
-        found.violations.add(525, place[apart], cl_line[apart], nc_line[apart], gap.larger[apart])
+        amount = gap.larger[apart] if mine else common_gaps_of_original(match, reached, apart)
+        still = amount > together  # a step from a knot is not exact where the axis turns much before the next
+        apart, amount = apart[still], amount[still]
+        if len(apart):
+            found.violations.add(525, place[apart], cl_line[apart], nc_line[apart], amount)
     for code, values in ((521, tip), (522, axis)):
         broken = over[values[over] > limit]
         if len(broken):

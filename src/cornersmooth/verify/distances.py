@@ -340,16 +340,33 @@ def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Flo
 _REACH = 4
 
 
+def common_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> Floats:
+    """Distance of chosen original vertices from the nearest written pose: the larger one of tip and axis point."""
+    segment = np.minimum(reached.place[rows].astype(np.int64), len(match.six) - 2)
+    vertex = reached.vertex[rows]
+    tip, axis, _ = search_elements(match, _elements_around(match, segment), match.path.six[vertex])
+    trail = match.original.trail
+    gap = gap_between(tip, axis, trail.tip[vertex], trail.axis[vertex], match.axis_length)
+    return np.minimum(gap.larger, reached.gap.larger[rows])
+
+
+def _elements_around(match: Match, segment: Ints) -> Ints:
+    """(k, e) element of each segment of the written trail, and those beside it."""
+    nc, written = match.nc, match.written
+    first, last = written.first + 1, written.first + len(written.trail.last) - 1
+    owner = written.trail.owner[segment + 1]
+    elements = np.clip(owner[:, None] + np.arange(-_REACH, _REACH + 1), first, last)
+    return np.where(nc.kind[elements] == Element.RAPID, owner[:, None], elements)
+
+
 def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
     """Distance of chosen original vertices from the written tip path and axis-point path, each on its own."""
-    nc, written = match.nc, match.written
     segment = np.minimum(reached.place[rows].astype(np.int64), len(match.six) - 2)
     ends = np.flatnonzero(np.append(np.diff(match.stretch) != 0, True))
     stretch = np.searchsorted(ends, segment)
     low = np.concatenate(([0], ends[:-1] + 1))[stretch]
     high = np.maximum(ends[stretch] - 1, segment)
     point = match.path.six[reached.vertex[rows]]
-    first, last = written.first + 1, written.first + len(written.trail.last) - 1
     result = []
     ways: tuple[tuple[Metric, slice, Floats], ...] = (
         ("tip", slice(0, 3), reached.gap.tip[rows]),
@@ -358,8 +375,6 @@ def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Fl
     for metric, column, known in ways:
         near, at = nearest_segments(point, match.six, segment, _REACH * match.parts, low, high, metric)
         climb(point, match.six, segment, low, high, near, at, metric)
-        owner = written.trail.owner[near + 1]
-        elements = np.clip(owner[:, None] + np.arange(-_REACH, _REACH + 1), first, last)
-        elements = np.where(nc.kind[elements] == Element.RAPID, owner[:, None], elements)
+        elements = _elements_around(match, near)
         result.append(np.minimum(search_elements(match, elements, point, column=column)[2], known))
     return result[0], result[1]
