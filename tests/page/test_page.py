@@ -230,6 +230,14 @@ def test_thinning_of_a_long_path_hides_no_corner_out_of_tolerance(monkeypatch):
     assert meta["corners"]["counts"]["out of tolerance"] >= 23
     listed = set(arrays["c_line"][arrays["c_kind"] == 0].tolist())
     assert {int(pose) + 1 for pose in off} <= listed
+    # about each of them both paths are drawn as they are
+    of_original = set(arrays["o_line"].tolist())
+    for pose in off.tolist():
+        near = range(pose, min(pose + 3, 1201))  # lines count from 1
+        assert set(near) <= of_original
+        at = arrays["w_tip"][:, 0] + meta["centre"][0]
+        for x_near in x[pose - 1 : pose + 2]:
+            assert np.abs(at - x_near).min() < 1e-4
     drawn = set(arrays["w_line"][arrays["w_off"] > 0.02].tolist())
     assert {int(pose) + 1 for pose in off} <= drawn
     assert any("are drawn" in note for note in meta["notes"])

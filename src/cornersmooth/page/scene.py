@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.feedrate import Limits, TimeLaw
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import Floats, Ints, Program, SmoothProgram
+from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.corners import KINDS, CornerList, measured_corners, smoothed_corners
 from cornersmooth.page.motions import OriginalPath, WrittenPath, original_path, written_path
@@ -28,6 +28,9 @@ SCHEMA = "cornersmooth-page/1"
 
 #: about so many points of each path are drawn
 MOST_POINTS = 250_000
+
+#: poses on either side of a listed corner that are drawn
+_BESIDE = 1
 
 #: steps of the charts: this many, or so many for each pose where that is more, but no more than the last
 _STEPS, _STEPS_PER_POSE, _MOST_STEPS = 2000, 6, 12_000
@@ -182,9 +185,7 @@ def _add_original(
     if len(must) > MOST_POINTS and must.sum() > MOST_POINTS:
         must = original.breaks.copy()
     if corners is not None:
-        special = np.zeros(len(program), np.bool_)
-        special[corners.pose] = True
-        must |= special[original.pose]
+        must |= _seen(corners, np.arange(len(program)), len(program))[original.pose]
     rows = thinned(original.tip, np.zeros(len(must)), must, MOST_POINTS)
     pack.add("o_tip", original.tip[rows] - centre, "f4")
     pack.add("o_axis", original.axis[rows], "i2")
@@ -211,7 +212,7 @@ def _add_written(
     must |= larger > settings.verified_tolerance
     kind = np.full(len(written), 255, np.uint8)
     if corners is not None:
-        must[places[corners.pose]] = True
+        must |= _seen(corners, places, len(written))
         kind[:] = _kinds(written, corners, places)
     rows = thinned(written.tip, larger, must, MOST_POINTS)
     speed = np.full(len(written), np.nan)
@@ -234,6 +235,25 @@ def _add_written(
         pack.add(name, values[rows], "f4")
     pack.add("w_line", written.cl_line[rows], "i4")
     pack.add("w_nc", written.nc_line[rows], "i4")
+
+
+def _seen(corners: CornerList, places: Ints, count: int) -> Bools:
+    """(count,) rows of a path that belong to listed corners.
+
+    All of it about those out of tolerance, and about as many of the others as fit.
+
+    Parameters
+    ----------
+    places : (n,) int64
+        Row of each pose, ascending.
+    """
+    first = places[np.maximum(corners.pose - _BESIDE, 0)]
+    last = places[np.minimum(corners.pose + _BESIDE, len(places) - 1)]
+    fits = (corners.kind == 0) | (np.cumsum(last + 1 - first) <= MOST_POINTS // 8)
+    ends = [np.bincount(rows[fits], minlength=count + 1)[: count + 1] for rows in (first, last + 1)]
+    seen: Bools = np.cumsum(ends[0] - ends[1])[:count] > 0
+    seen[places[corners.pose]] = True
+    return seen
 
 
 def _kinds(written: WrittenPath, corners: CornerList, places: Ints) -> Ints:
