@@ -5,7 +5,7 @@ STAMP := $(VENV)/.installed
 # one more than processors: some tests wait
 WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 
-.PHONY: run test thorough check docs bench controller format clean
+.PHONY: run test thorough check docs packages bench controller format clean
 
 run: $(STAMP)  ## install into .venv, smooth the samples, show what came out
 	$(BIN)/python samples/show.py
@@ -23,6 +23,9 @@ check: $(STAMP)  ## lint, format and types
 
 docs: $(STAMP)  ## the reference of the library, as pages in build/docs
 	$(BIN)/python docs/make_reference.py
+
+packages: $(STAMP)  ## wheel and sdist, installed in every Python that is here
+	.ci/packages
 
 bench: $(STAMP)  ## time the whole command beside a plain C program
 	$(BIN)/python benchmarks/bench.py
