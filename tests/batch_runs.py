@@ -93,6 +93,7 @@ def run_killed(way: Way, folder: Path, out: Path, whole: dict[str, bytes], secon
         done = subprocess.run(way.words(out), cwd=folder, capture_output=True, check=False)
         if done.returncode == 0:
             break
+        print(way.name, done.returncode, [line for line in done.stderr.decode().splitlines() if "error" in line])
     wrong += [f"lost: {name}" for name in whole.keys() - texts(out).keys()]
     wrong += [f"left: {path.name}" for path in out.rglob("*") if path.is_file() and path.suffix != ".nc"]
     wrong += [f"half written: {name}" for name, text in texts(out).items() if text != whole[name]]

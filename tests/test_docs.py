@@ -151,6 +151,23 @@ def test_the_reference_is_made_without_a_warning(tmp_path: Path) -> None:
         assert f'id="{name}"' in page
 
 
+def test_the_numbers_of_the_readme_are_those_that_come_out() -> None:
+    """One row of the table, and a twentieth for what changes: `python docs/make_numbers.py` makes all of it."""
+    numbers = load("make_numbers")
+    rows = {
+        row.split("|")[1].strip(): row
+        for row in numbers.PLACE.search((ROOT / "README.md").read_text())[0].split("\n")[2:-1]
+    }
+    assert list(rows) == ["as it was", *(f"{tolerance:g}" for tolerance in numbers.TOLERANCES)]
+    told = [float(word.replace(",", "")) for word in re.findall(r"[\d.,]*\d", rows["0.01"])]
+    result, nc = numbers.smoothed(0.01)
+    found = result.verification
+    made = [0.01, result.written.blocks, found.max_tip_deviation_mm, found.max_axis_point_deviation_mm]
+    made.append(numbers.seconds_after(0.01, nc, None))
+    assert told[:5] == pytest.approx(made, rel=0.05)
+    assert f"| {numbers.seconds_before(None):.0f}." in re.sub(r"\.\d s", ". s", rows["as it was"])
+
+
 def test_links_lead_somewhere() -> None:
     for page in PAGES:
         for target in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text()):
