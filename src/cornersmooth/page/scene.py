@@ -204,7 +204,7 @@ def _add_written(
     settings: Settings,
     centre: Floats,
 ) -> None:
-    larger = np.fmax(written.tip_off, written.axis_off)
+    larger, most = np.fmax(written.tip_off, written.axis_off), MOST_POINTS
     must = written.rapid.copy()
     must[:-1] |= written.rapid[1:]
     if must.sum() > MOST_POINTS:
@@ -212,9 +212,11 @@ def _add_written(
     must |= larger > settings.verified_tolerance
     kind = np.full(len(written), 255, np.uint8)
     if corners is not None:
-        must |= _seen(corners, places, len(written))
+        seen = _seen(corners, places, len(written))
+        must |= seen
+        most -= min(int(seen.sum()), most // 2) if len(written) > most else 0
         kind[:] = _kinds(written, corners, places)
-    rows = thinned(written.tip, larger, must, MOST_POINTS)
+    rows = thinned(written.tip, larger, must, most)
     speed = np.full(len(written), np.nan)
     if planned.seconds is not None:
         speed = speeds_over(planned.laws["written"], planned.seconds)
