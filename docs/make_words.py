@@ -47,6 +47,8 @@ def roles(entry: dict[str, Any], kind: str) -> str:
         said.append(f"at most {entry['share']:g} ε")
     if entry.get("before"):
         said.append("before an arc")
+    if entry.get("zero"):
+        said.append("only where the rotary axes are at zero")
     if entry.get("high"):
         said.append("only behind a retract")
     if entry.get("retract"):

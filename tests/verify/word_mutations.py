@@ -165,6 +165,7 @@ def named_in(case: Case, lines: list[str], end: str = "\n") -> list[tuple[int, s
             control=case.control,
             machine=case.choose().machine,
             tcp=case.tcp,
+            weights=weights_of(case),
         )
     except InputError as error:
         return [(error.line, f"{error.code} {error.what}")]
@@ -176,13 +177,18 @@ def named_by_words(case: Case, lines: list[str], end: str = "\n") -> list[tuple[
     data = (end.join(lines) + end).encode("latin-1")
     options = options_of(case)
     reader = Reader(None, options, options.steps(data))
-    check = WordCheck(options.control, options.dialect.lexer, EPS)
+    check = WordCheck(options.control, options.dialect.lexer, EPS, weights=weights_of(case))
     try:
         for _ in reader.chunks(check.watch(read_lines(data, None, options.dialect.lexer))):
             pass
     except InputError as error:
         return [(error.line, error.what)]
     return [(problem.nc_line, problem.text) for problem in (*check.problems, *reader.problems)]
+
+
+def weights_of(case: Case) -> tuple[float, ...] | None:
+    """Weights that the head of a text names: on the knots of rotary angles curves have others."""
+    return None if case.choose().rotary else (1.0,)
 
 
 @cache
@@ -234,7 +240,20 @@ class Text:
 def mutants(case: Case, rng: np.random.Generator, each: int) -> Iterator[Mutant]:
     """Mutants of the text of a case, `each` of a kind."""
     text = Text(case, text_of(case))
-    for kind in (_dwells, _skips, _points, _siemens_curves, _heads, _frames, _insertions, _behind, _hidden, _harmless):
+    for kind in (
+        _dwells,
+        _skips,
+        _points,
+        _siemens_curves,
+        _heads,
+        _frames,
+        _offsets,
+        _tables,
+        _insertions,
+        _behind,
+        _hidden,
+        _harmless,
+    ):
         yield from kind(text, rng, each)
 
 
@@ -302,6 +321,36 @@ def _heads(text: Text, rng: np.random.Generator, each: int) -> Iterator[Mutant]:
     off = [k for k in text.statements if re.search(r"^G49$|TRAFOOF|RESET TCPM", text.lines[k]) and k > text.motion[-1]]
     for k in off:
         yield Mutant("tip control on at the end", text.replaced(k), (k - 1, len(text.lines)), text.lines[k])
+
+
+def _offsets(text: Text, rng: np.random.Generator, each: int) -> Iterator[Mutant]:
+    lines = text.lines
+    for k in [k for k in text.statements if re.search(r"\bG(43(\.[45])?|234) H\d+", lines[k])]:
+        other = re.sub(r" H(\d+)", lambda found: f" H{int(found[1]) + 1}", lines[k])
+        yield Mutant("length offset of another tool", text.replaced(k, other), (k + 1, k + 3))
+        yield Mutant(
+            "length offset lost", text.replaced(k, re.sub(r" H\d+", "", lines[k])), (k - 1, text.motion[0] + 3)
+        )
+        yield Mutant("length switched on lost", text.replaced(k), (k - 1, text.motion[0] + 3))
+    if text.family == "heidenhain":
+        for k in [k for k in text.statements if re.search(r"TOOL CALL \d+ Z", lines[k])]:
+            other = re.sub(r"CALL (\d+)", lambda found: f"CALL {int(found[1]) + 1}", lines[k])
+            yield Mutant("another tool", text.replaced(k, other), (k + 1, k + 3))
+            yield Mutant("tool change lost", text.replaced(k), (0, text.motion[0] + 3))
+
+
+def _tables(text: Text, rng: np.random.Generator, each: int) -> Iterator[Mutant]:
+    """The table stands turned where tool tip control is switched on, or nobody says how it stands."""
+    if not text.case.machine or not text.case.tcp or text.case.control not in ("fanuc", "mitsubishi"):
+        return
+    on = next(k for k, line in enumerate(text.lines) if line.startswith("G43.4"))
+    names = re.findall(r"([ABC])[-0-9]", text.lines[on - 1])
+    if len(names) == 2 and text.lines[on - 1].startswith("G0 "):
+        turned = f"G0 {names[0]}0.0000 {names[1]}30.0000"
+        yield Mutant("tip control on at a turned table", text.replaced(on - 1, turned), (on, on + 2))
+        yield Mutant("table not sent to zero", text.replaced(on - 1), (on - 1, on + 2))
+        later = [*text.lines[: on - 1], text.lines[on], text.lines[on - 1], *text.lines[on + 1 :]]
+        yield Mutant("tip control on before the table is at zero", later, (on - 1, on + 2))
 
 
 def _name(word: str) -> str:

@@ -20,8 +20,9 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     ``needs``: a word that must stand in the same block, of whose state it may say more. ``must``: the same, for a word
     that is nothing without. ``alone``: no other words may stand beside it. ``before``: ``"arc"``. ``after``: a word
     that must have been said since the last time. ``then``, ``behind``: the next block, the block before. ``share``:
-    what the number in brackets may be of the tolerance. ``never``: the control has no such word. ``high``: only behind
-    a retract; a control with such a word wants the tool high at the end, too.
+    what the number in brackets may be of the tolerance. ``zero``: the rotary axes must have been sent to zero before:
+    where a parameter says so, the part program turns with the angles of that moment. ``never``: the control has no such
+    word. ``high``: only behind a retract; a control with such a word wants the tool high at the end, too.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.
@@ -62,6 +63,7 @@ class WordRule:
     never: bool = False
     high: bool = False
     retract: bool = False
+    zero: bool = False
 
 
 @dataclass(frozen=True)

@@ -172,7 +172,9 @@ def divide_at_holes(original: Original, nc: Elements, axis_length: float) -> Hol
                 found.shared[last] = stop - 1
         for k, group in enumerate(groups):
             found.element_move.update(dict.fromkeys(group, first + k))
-            found.problems += search.check(first + k, group, cycles[k])
+            found.problems += search.check(
+                first + k, group, cycles[k], alone=not search.repeats(first, stop, first + k)
+            )
             if group and cycles[k].dwell:
                 found.dwells.append((first + k, cycles[k].dwell))
         # the move out of the last hole starts wherever the tool has been left
@@ -243,18 +245,18 @@ class _Search:
     def consume(self, first: int, stop: int, element: int, *, idle: bool) -> tuple[list[list[int]], int]:
         """Elements of each hole, and the element behind them all.
 
-        `idle`: nothing is drilled in the last of them, and the next run begins in the same hole: what goes down in it,
-        from where the cycle was entered, belongs to that.
+        `idle`: nothing is drilled in the last of them, and the next run begins in the same hole: only what stays where
+        the cycle was entered belongs to this one.
         """
         groups: list[list[int]] = []
         for move in range(first, stop):
             group: list[int] = []
-            least = -np.inf
+            entered = np.nan
             if idle and move == stop - 1 and first:
-                least = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0) - self.room
+                entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
             while element < len(self.nc):
                 height = self.heights(move, np.array([element]))[0]
-                if np.isnan(height) or height < least:
+                if np.isnan(height) or abs(height - entered) > self.room:
                     break
                 group.append(element)
                 element += 1
@@ -285,8 +287,12 @@ class _Search:
         keep = first if nc.kind[first] != Element.RAPID else first + 1
         return [k for k in group if k < keep], first
 
-    def check(self, move: int, group: list[int], cycle: Drilling) -> list[Problem]:
-        """Depth, feeds and rapids of one hole."""
+    def repeats(self, first: int, stop: int, move: int) -> bool:
+        """Whether a neighbour in a run of holes is the same hole."""
+        return any(first <= other < stop and self.same_hole(move, other) for other in (move - 1, move + 1))
+
+    def check(self, move: int, group: list[int], cycle: Drilling, *, alone: bool) -> list[Problem]:
+        """Depth, feeds and rapids of one hole; `alone`: it is drilled once."""
         nc, cl_line = self.nc, int(self.line[move])
         feeds = [k for k in group if nc.kind[k] != Element.RAPID]
         known = not np.isnan(cycle.depth)
@@ -324,6 +330,9 @@ class _Search:
                 if wrong:
                     text = f"the feed is {nc.feed[k]:g}, the cycle says {cycle.feed:g}"
                     problems.append(Problem("CS541", cl_line, line, text))
+                down = height.get(k - 1, np.inf) > height[k]
+                if alone and down and drilled > self.room and self.room < -height[k] <= drilled + self.room:
+                    problems.append(Problem("CS562", cl_line, line, "a hole is drilled again"))
                 drilled = max(drilled, -height[k])
         if height[group[-1]] < -self.room:
             text = "the tool leaves a hole sideways"

@@ -21,6 +21,9 @@ _BEYOND_VISIBLE = 3.0
 #: a tip that creeps goes at most so many times the room of the feed: `SHORT_STEPS` and two of which the room is two
 _CREEPING = (SHORT_STEPS + 2) / 2
 
+#: an element shorter than this may have the feed of any move so near, mm: ten steps of what CL files are written in
+_TINY = 1e-3
+
 #: elements that are looked at one by one in a run of wrong ones; none of those behind them is better
 _MOST_SINGLE = 50
 
@@ -103,6 +106,8 @@ def _alike(match: Match, element: int, start: int, end: int) -> Ints:
     nc, six = match.nc, match.path.six
     pole = match.axis_length * float(nc.second_room[element - 1 : element + 1].max()) if nc.rotary else 0.0
     room = 2 * match.margin + pole  # a pose is a rounding off, and its place as far from it as the margin
+    if np.linalg.norm(match.six[end] - match.six[start]) < _TINY:
+        room = max(room, _TINY)
     found = []
     for vertex, step in ((start, -1), (end, 1)):
         segment, fraction = int(match.segment[vertex]), match.fraction[vertex]

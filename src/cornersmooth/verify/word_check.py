@@ -22,6 +22,9 @@ NOT_ESTABLISHED: Final = "CS572"
 #: words of positions along the linear axes: with them a block is a motion that the states count for
 _LINEAR: Final = frozenset("XYZ")
 
+#: words of rotary axes
+_ROTARY: Final = frozenset("ABC")
+
 #: words of which a block may have one
 _MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "BSPLINE", "POLY"))
 
@@ -81,6 +84,8 @@ class WordCheck:
         self._high = False
         #: states that an approach establishes again
         self._approach = {rule.state for rule in self.list.words if rule.off} | {"work offset"}
+        #: where the rotary axes have been sent, as far as that is said
+        self._angles: dict[str, float] = {}
         self._arc: tuple[str, int] | None = None
         self._code = -1.0
         self._weights = None if weights is None else np.array(tuple(weights))
@@ -122,6 +127,10 @@ class WordCheck:
             self._moved(int(table.line[row]), float(codes[given[-1]]) if len(given) else self._code)
         if len(known):
             self._code = float(codes[known[-1]])
+        for name in _ROTARY & table.columns.keys():
+            given = table.columns[name][~np.isnan(table.columns[name])]
+            if len(given):
+                self._angles[name] = float(given[-1])
 
     def _check_weights(self, table: Table, codes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
         """Complain of the first curve with a weight that none has; R of an arc is its radius."""
@@ -190,6 +199,7 @@ class WordCheck:
 
     def _note(self, line: Line, words: list[str]) -> None:
         """Keep the motion of a block on its own."""
+        self._angles |= {word.name: word.value for word in line.words if word.name in _ROTARY}
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
         still = any(rule.retract and rule.pattern.fullmatch(_text(words)) for rule in self.list.blocks)
@@ -320,6 +330,8 @@ class WordCheck:
                     self._wrong(NOT_LISTED, number, f"{word} is more than {rule.share:g} of the tolerance")
             if rule.then is not None:
                 self._then = (rule, number)
+            if rule.zero and (not self._angles or any(self._angles.values())):
+                self._wrong(NOT_LISTED, number, f"{word} without the rotary axes at zero before it")
             if rule.high and not self._high:
                 self._wrong(NOT_LISTED, number, f"{word} without a retract before it")
             if rule.retract:
