@@ -253,6 +253,8 @@ class Rotary:
         feed = rate * way
         slowed = np.isin(rate, _FASTEST) & np.isfinite(room)
         feed[slowed] -= np.abs(room[slowed])
+        creeping = slowed & still & (not self.tip_control)  # the tip may have timed it, by what the digits do not show
+        feed[creeping] = np.minimum(feed, rate * np.maximum(length - 2 * step, 0.0))[creeping]
         room[slowed] = np.nan
         return feed, room
 

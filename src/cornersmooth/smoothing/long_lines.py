@@ -273,13 +273,25 @@ def _reaches(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bool
 
 def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
     inner = end - start - 1
-    line = np.repeat(np.arange(len(start)), inner)
-    first = np.cumsum(inner) - inner
-    row = np.arange(len(line)) - first[line] + start[line] + 1
+    kept = _off(rows, limits, start, end, inner, halves=False) <= _USED
+    if limits.tip_of is not None:  # between positions of the axes the tip runs on a bow, largest between the rows
+        kept &= _off(rows, limits, start, end, inner + 1, halves=True) <= _USED
+    return kept
+
+
+def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints, *, halves: bool) -> Floats:
+    """(q,) largest share of the limits that lines use, at the `count` rows between their ends or halfway between rows."""
+    line = np.repeat(np.arange(len(start)), count)
+    first = np.cumsum(count) - count
+    row = np.arange(len(line)) - first[line] + start[line] + (not halves)
     s, low = rows.parameter, rows.parameter[start]
     length = s[end] - low
-    share = (s[row] - low[line]) / np.where(length > 0.0, length, 1.0)[line]
-    share = share[:, None]
+
+    def at(values: Floats) -> Floats:
+        middle: Floats = (values[row] + values[row + 1]) / 2.0 if halves else values[row]
+        return middle
+
+    share = ((at(s) - low[line]) / np.where(length > 0.0, length, 1.0)[line])[:, None]
     begin, finish = start[line], end[line]
     words = rows.words[begin] + share * (rows.words[finish] - rows.words[begin])
     way = rows.tip if rows.position is None else rows.position
@@ -288,8 +300,8 @@ def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
         tip = limits.tip_of(tip, words)
     axis_point = tip + limits.axis_length * limits.axis_of(words)
     off = np.maximum(
-        norm(tip - rows.original_tip[row]) / limits.tip,
-        norm(axis_point - rows.original_axis_point[row]) / limits.axis_point,
+        norm(tip - at(rows.original_tip)) / limits.tip,
+        norm(axis_point - at(rows.original_axis_point)) / limits.axis_point,
     )
-    kept: Bools = np.maximum.reduceat(off, first) <= _USED
-    return kept
+    largest: Floats = np.maximum.reduceat(off, first)
+    return largest

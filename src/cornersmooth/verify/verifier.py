@@ -290,8 +290,13 @@ class _Measured:
         known |= {element: length_at(move) for element, move in self.batches.holes.items()}
         first = self.batches.stops.first
 
+        order = sorted(known)
+
         def place(element: int) -> float:
-            return known.get(element, _BEFORE if element < first else 0.0)
+            """Where an element ends: one that leads nowhere, as a second rapid to the same place, as those before."""
+            if element < first or not order:
+                return known.get(element, _BEFORE if element < first else 0.0)
+            return known[order[max(bisect_right(order, element) - 1, 0)]]
 
         # the way back from the last hole may be the CL file's next move; at holes that are not drilled nothing moves
         for element, behind in self.batches.shared.items():
