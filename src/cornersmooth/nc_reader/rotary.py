@@ -34,6 +34,9 @@ _ORDER, _HALVINGS = 8, 6
 #: last digit of F where it is moves per minute
 _F_STEP = 1e-3
 
+#: a feed that is lower than any, mm/min, and yet is one
+_LEAST_FEED = 1e-9
+
 #: largest F of G93 on controls: a block with it may be slower than it should be
 _FASTEST = (9999.999, 999_999.999)
 
@@ -255,6 +258,7 @@ class Rotary:
         feed[slowed] -= np.abs(room[slowed])
         creeping = slowed & still & (not self.tip_control)  # the tip may have timed it, by what the digits do not show
         feed[creeping] = np.minimum(feed, rate * np.maximum(length - 2 * step, 0.0))[creeping]
+        feed[slowed] = np.maximum(feed[slowed], _LEAST_FEED)
         room[slowed] = np.nan
         return feed, room
 

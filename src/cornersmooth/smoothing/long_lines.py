@@ -280,7 +280,7 @@ def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
 
 
 def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints, *, halves: bool) -> Floats:
-    """(q,) largest share of the limits that lines use, at the `count` rows between their ends or halfway between rows."""
+    """(q,) largest share of the limits in use, at the `count` rows inside lines or halfway between rows."""
     line = np.repeat(np.arange(len(start)), count)
     first = np.cumsum(count) - count
     row = np.arange(len(line)) - first[line] + start[line] + (not halves)
