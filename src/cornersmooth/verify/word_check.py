@@ -128,9 +128,9 @@ class WordCheck:
         if len(known):
             self._code = float(codes[known[-1]])
         for name in _ROTARY & table.columns.keys():
-            given = table.columns[name][~np.isnan(table.columns[name])]
-            if len(given):
-                self._angles[name] = float(given[-1])
+            values = table.columns[name][~np.isnan(table.columns[name])]
+            if len(values):
+                self._angles[name] = float(values[-1])
 
     def _check_weights(self, table: Table, codes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
         """Complain of the first curve with a weight that none has; R of an arc is its radius."""
