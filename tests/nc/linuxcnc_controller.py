@@ -58,8 +58,12 @@ STATED = {
 BLEND = 0.1
 #: distance of the points that the original motion is sampled at, mm
 STEP = 0.01
-#: motion.motion-type of feed moves
-FEEDING = 2
+#: motion.motion-type of rapids and feed moves
+TRAVERSING, FEEDING = 1, 2
+#: mm from the zero of the part up to where retracts go
+HEIGHT = 300.0
+#: degrees from which on a tool counts as tilted, and mm that a rapid may be beside one of the CL file
+LEAST_TILT, ASIDE = 1.0, 0.05
 
 INI = """[EMC]
 VERSION = 1.1
@@ -120,6 +124,7 @@ net j2 joint.2.motor-pos-cmd => joint.2.motor-pos-fb sampler.0.pin.2
 net j3 joint.3.motor-pos-cmd => joint.3.motor-pos-fb sampler.0.pin.3
 net j4 joint.4.motor-pos-cmd => joint.4.motor-pos-fb sampler.0.pin.4
 net kind motion.motion-type => sampler.0.pin.5
+net speed spindle.0.speed-out-rps => spindle.0.speed-in
 setp {kinematics}.y-offset 0
 setp {kinematics}.z-offset 0
 net stop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
@@ -172,6 +177,8 @@ command.teleop_enable(1)
 command.wait_complete()
 command.mode(linuxcnc.MODE_AUTO)
 command.wait_complete()
+command.set_optional_stop(False)
+command.wait_complete()
 command.program_open(folder + "/program.ngc")
 command.wait_complete()
 command.auto(linuxcnc.AUTO_RUN, 0)
@@ -185,8 +192,18 @@ finish("done")
 Dynamics = Mapping[str, tuple[float, float]]
 
 
-def write_configuration(folder: Path, text: bytes, seconds: float, dynamics: Dynamics | None = None) -> None:
-    """Everything that the controller reads; `dynamics` says how fast each axis may go and speed up."""
+def write_configuration(
+    folder: Path, text: bytes, seconds: float, dynamics: Dynamics | None = None, height: float = 0.0
+) -> None:
+    """Everything that the controller reads.
+
+    Parameters
+    ----------
+    dynamics : mapping
+        How fast each axis may go and speed up.
+    height : float, mm
+        Of the machine's zero of Z, where retracts go to, above the zero of the part.
+    """
     dynamics = dynamics or {**dict.fromkeys("XYZ", LINEAR), **dict.fromkeys("AC", ROTARY)}
     ini = INI.format(
         folder=folder,
@@ -211,7 +228,8 @@ def write_configuration(folder: Path, text: bytes, seconds: float, dynamics: Dyn
     (folder / "headless.ini").write_text(ini)
     (folder / "headless.hal").write_text(HAL.format(kinematics=KINEMATICS))
     (folder / "tool.tbl").write_text("".join(f"T{number} P{number} Z0 D1\n" for number in range(1, 60)))
-    (folder / "linuxcnc.var").write_text("".join(f"{number} 0\n" for number in (5161, 5210, 5220, 5221, 5390)))
+    offsets = {**dict.fromkeys((5161, 5210, 5220, 5221, 5390), 0.0), 5223: -height}
+    (folder / "linuxcnc.var").write_text("".join(f"{number} {value:g}\n" for number, value in sorted(offsets.items())))
     (folder / "program.ngc").write_bytes(text)
     drive = folder / "drive.py"
     drive.write_text(DRIVE.format(python=DEBIAN_PYTHON, folder=str(folder), seconds=seconds))
@@ -220,9 +238,18 @@ def write_configuration(folder: Path, text: bytes, seconds: float, dynamics: Dyn
 
 def run_controller(text: bytes, seconds: float, dynamics: Dynamics | None = None) -> tuple[str, Floats, float]:
     """What became of a program, the commands to the motors while it fed (m, 5), and the seconds of motion."""
+    word, samples = run_samples(text, seconds, dynamics)
+    moving = samples[samples[:, 5] != 0]
+    return word, samples[samples[:, 5] == FEEDING, :5], len(moving) * SERVO_SECONDS
+
+
+def run_samples(
+    text: bytes, seconds: float, dynamics: Dynamics | None = None, height: float = 0.0
+) -> tuple[str, Floats]:
+    """What became of a program, and every servo cycle: commands to the motors and the kind of motion (m, 6)."""
     with tempfile.TemporaryDirectory(prefix="linuxcnc-") as name:
         folder = Path(name)
-        write_configuration(folder, text, seconds, dynamics)
+        write_configuration(folder, text, seconds, dynamics, height)
         user: list[str] = []
         if os.geteuid() == 0:
             for path in (folder, *folder.iterdir()):
@@ -239,13 +266,12 @@ def run_controller(text: bytes, seconds: float, dynamics: Dynamics | None = None
         result = folder / "result.txt"
         if not result.exists():
             tail = (folder / "log.txt").read_text(errors="replace").splitlines()[-15:]
-            return "\n".join(["the controller did not start:", *tail]), np.zeros((0, 5)), 0.0
+            return "\n".join(["the controller did not start:", *tail]), np.zeros((0, 6))
         lines = [line.split() for line in (folder / "samples.txt").read_text().splitlines() if "overrun" not in line]
         samples = np.array([[float(number) for number in line] for line in lines if len(line) == 7])
         overrun = (folder / "samples.txt").read_text().count("overrun")
         word = result.read_text() if not overrun else f"{overrun} samples lost"
-        moving = samples[samples[:, 6] != 0]
-        return word, samples[samples[:, 6] == FEEDING, 1:6], len(moving) * SERVO_SECONDS
+        return word, samples[:, 1:].reshape(-1, 6)
 
 
 def tool(joints: Floats) -> tuple[Floats, Floats]:
@@ -293,6 +319,31 @@ def deviations(poses: Floats, cuts: list[Floats]) -> tuple[float, float]:
     return float(worst[0].max()), float(worst[1].max())
 
 
+def check_rapids(name: str, program: Program, text: bytes, seconds: float) -> int:
+    """Run a program and look where rapids move a tilted tool: along those of the CL file, or above their ends."""
+    word, samples = run_samples(text, seconds, height=HEIGHT)
+    moving = samples[samples[:, 5] == TRAVERSING]
+    tip, axis = tool(moving[:, :5])
+    tip = tip + (0.0, 0.0, HEIGHT)
+    tilted = tip[axis[:, 2] < np.cos(np.radians(LEAST_TILT))]
+    ends = np.flatnonzero(rapid_moves(program.kind) & (np.arange(len(program)) > 0))
+    start, way = program.tip[ends - 1], program.tip[ends] - program.tip[ends - 1]
+    off = np.full(len(tilted), np.inf)
+    for begin, step in zip(start, way, strict=True):
+        share = np.clip(((tilted - begin) @ step) / max(float(step @ step), 1e-30), 0, 1)
+        off = np.minimum(off, np.linalg.norm(tilted - begin - share[:, None] * step, axis=1))
+    leaning = ends[program.axis[ends, 2] < np.cos(np.radians(LEAST_TILT))]
+    clearance = float(program.tip[leaning, 2].min(initial=np.inf))
+    elsewhere = tilted[off > ASIDE]
+    lowest = float(elsewhere[:, 2].min()) if len(elsewhere) else np.inf
+    print(f"{name}: {word}; {len(moving)} servo cycles in rapid, {len(tilted)} of them with a tilted tool")
+    print(
+        f"{len(elsewhere)} of these more than {ASIDE:g} mm beside the rapids of the CL file, "
+        f"the lowest at Z{lowest:.3f}; the lowest of these with a tilted tool ends at Z{clearance:.3f}"
+    )
+    return 0 if word == "done" and len(moving) and lowest >= clearance - ASIDE else 1
+
+
 def main() -> int:
     """Run one CL file and print what came of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -301,6 +352,7 @@ def main() -> int:
     parser.add_argument("-H", "--axis-length", type=float, default=10.0, help="mm")
     parser.add_argument("--feed", type=float, default=500.0, help="mm/min where the CL file gives none")
     parser.add_argument("--seconds", type=float, default=600.0, help="give up after so long")
+    parser.add_argument("--rapids", action="store_true", help="look at the rapids instead of the cuts")
     given = parser.parse_args()
     program = read(given.cl.read_bytes(), name=given.cl.name)
     program = replace(program, feed=np.where(np.isnan(program.feed), given.feed, program.feed))
@@ -309,6 +361,8 @@ def main() -> int:
     smoothed = smooth(program, fit_settings(settings, form, program.units))
     text = io.BytesIO()
     blocks = write(smoothed, text, form=form).blocks
+    if given.rapids:
+        return check_rapids(given.cl.name, program, text.getvalue(), given.seconds)
     begin = time.monotonic()
     word, joints, moving = run_controller(text.getvalue(), given.seconds)
     print(

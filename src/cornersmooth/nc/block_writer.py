@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.errors import InputError
 from cornersmooth.kinematics import machine_position
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.along_tool import lifted
@@ -208,6 +209,7 @@ class BlockWriter:
             self._mode = int(modes[place])
             if self._mode == FeedMode.PER_REVOLUTION and not self.statements.speed:
                 text = "feed per revolution while no spindle speed is given; controls stop there or stand still"
+                self._refuse(int(run.move[feeding[place]]), text, "give the spindle its speed in the CL file")
                 self.findings.add("CS324", "warning", int(self.program.line[run.move[feeding[place]]]), text)
             before[int(feeding[place])] = self._block(self.statements.words.feed_mode, self._mode)
         if run.arc is not None:
@@ -290,8 +292,17 @@ class BlockWriter:
         text = format_number(ticks / 10.0**decimals, decimals, trim=True)
         return text if self.form.mode.motion.feed_point else text.rstrip(".")
 
+    def _refuse(self, move: int, what: str, hint: str) -> None:
+        """Refuse what the control would refuse before it runs a line."""
+        if self.form.mode.motion.feed_needed:
+            raise InputError("CS343", what, hint, file=self.program.source.name, line=int(self.program.line[move]))
+
     def _count_missing(self, moves: Ints) -> None:
         text = "feed move without a feed in the CL file; most controls stop with an alarm, give one with --feed"
+        if self._feed < 0:
+            self._refuse(
+                int(moves[0]), "a feed move before any feed, which the control refuses", "give one with --feed"
+            )
         self.findings.add("CS311", "warning", int(self.program.line[moves[0]]), text, len(moves))
 
 

@@ -41,6 +41,8 @@ class Words:
         With ``{milliseconds}`` or ``{seconds}``.
     compensation_left, compensation_right : tuple of str
         Cutter compensation, with ``{register}``.
+    compensation_entry : bool
+        Whether the first move under it must go some way in the plane, more than what the register holds.
     plane : mapping
         Block for the planes 17 (XY), 18 (ZX) and 19 (YZ).
     feed_mode : mapping
@@ -62,6 +64,7 @@ class Words:
     compensation_left: Blocks = ()
     compensation_right: Blocks = ()
     compensation_off: Blocks = ()
+    compensation_entry: bool = False
     plane: Mapping[int, str] = field(default_factory=dict)
     feed_mode: Mapping[int, str] = field(default_factory=dict)
 
@@ -86,6 +89,9 @@ class Motion:
         Whether numbers that are not negative have a plus.
     spaces, leading_zeros, trailing_zeros : bool
         Whether words stand apart; ``0.5`` rather than ``.5``; ``2.5000`` rather than ``2.5``.
+    feed_needed : bool
+        Whether a program without a feed before its first feed move, or with one per revolution and no spindle speed, is
+        refused by the control before it runs.
     inch_feed : int
         What one inch per minute is written as: 10 where F counts tenths.
     fastest : float, 1/min
@@ -105,6 +111,7 @@ class Motion:
     spaces: bool = True
     leading_zeros: bool = True
     trailing_zeros: bool = True
+    feed_needed: bool = False
     inch_feed: int = 1
     fastest: float = 9999.999
 

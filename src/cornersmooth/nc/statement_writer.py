@@ -7,6 +7,7 @@ is not understood becomes a comment and a counted warning, never an NC word by g
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -274,6 +275,7 @@ class StatementWriter:
         register = whole_number(numbers or [float(self.operation.offset)])
         if not side or len(words) > 2 or not set(words[1:]) <= planes.keys() or register is None:
             return None
+        self._check_entry(statement)
         self.findings.add(
             "CS319",
             "warning",
@@ -288,6 +290,27 @@ class StatementWriter:
             self.plane = plane
             blocks += [self.words.plane[plane]] if plane in self.words.plane else []
         return [*blocks, *(block.format(register=register) for block in side)]
+
+    def _check_entry(self, statement: Statement) -> None:
+        """Refuse a first move that is too short for cutter compensation to begin on, where the control does."""
+        pose, tip = statement.pose, self.program.tip
+        if not self.words.compensation_entry or not 0 < pose < len(tip):
+            return
+        length = math.hypot(*(tip[pose] - tip[pose - 1])[:2])
+        if not length > 0.0:
+            raise InputError(
+                "CS344",
+                "cutter compensation begins on a move without any way in the plane, which the control refuses",
+                "let the CAM system lead in on a line, or put the cutter's radius into the path",
+                file=self.program.source.name,
+                line=statement.line,
+            )
+        if length <= self._diameter / 2.0:
+            text = (
+                f"cutter compensation begins on a move of {length:g} mm in the plane: the control refuses it where the "
+                "register holds the whole radius of the tool"
+            )
+            self.findings.add("CS345", "warning", statement.line, text)
 
     def hole_cycle(self, statement: Statement) -> list[str]:
         """CYCLE: kept for the holes that follow."""
