@@ -250,7 +250,8 @@ def _seen(corners: CornerList, places: Ints, count: int) -> Bools:
         Row of each pose, ascending.
     """
     first = places[np.maximum(corners.pose - _BESIDE, 0)]
-    last = places[np.minimum(corners.pose + _BESIDE, len(places) - 1)]
+    # the vertex at a pose may count as the first point of the next move
+    last = np.minimum(places[np.minimum(corners.pose + _BESIDE, len(places) - 1)] + 1, count - 1)
     fits = (corners.kind == 0) | (np.cumsum(last + 1 - first) <= MOST_POINTS // 8)
     ends = [np.bincount(rows[fits], minlength=count + 1)[: count + 1] for rows in (first, last + 1)]
     seen: Bools = np.cumsum(ends[0] - ends[1])[:count] > 0
