@@ -6,10 +6,12 @@ import io
 import os
 import pty
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from cornersmooth import extras
 from cornersmooth.cli.files import Beginning
 from cornersmooth.nc import control_aliases, control_names, load_control
 from oracle.command import DONE, SMALL, USAGE, command, environment, run
@@ -141,6 +143,18 @@ def test_time_takes_a_feed_where_the_file_has_none(tmp_path: Path) -> None:
     assert b"warning: feed move without a feed in the CL file; planned with --feed 900 mm/min" in result.stderr
     (tmp_path / "whole.cls").write_bytes(SMALL)
     assert run("time", tmp_path / "whole.cls", "--feed", "900").stderr == b""
+
+
+def test_what_is_missing_is_installed_as_the_package_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    part = tmp_path / "part.cls"
+    part.write_bytes(SMALL)
+    words = ("smooth", part, "-o", tmp_path / "part.nc", "--plot", tmp_path / "part.png", "--force")
+    root = SAMPLES.parent
+    assert f"install it with: pip install -e '{root}[plot]'" in run(*words, cwd=tmp_path).stderr.decode()
+    assert "install it with: pip install -e '.[plot]'" in run(*words, cwd=root).stderr.decode()
+    monkeypatch.setattr(extras, "__file__", str(tmp_path / "site-packages" / "cornersmooth" / "extras.py"))
+    assert "install it with: pip install 'cornersmooth[plot]'" in run(*words, cwd=tmp_path).stderr.decode()
 
 
 @pytest.mark.parametrize("size", [1, 7, 1000])
