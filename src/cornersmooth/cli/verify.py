@@ -116,6 +116,8 @@ def command(source: str, text: str, **given: Any) -> int:
         picture = draw_deviation(deviation_along(program, nc, **how), given["tolerance"], form)
         with open_output(target_of(given["plot"])) as output:
             output.stream.write(picture)
+    if found.unverified:
+        click.echo(f"{text}: warning: NOT VERIFIED: {found.unverified}", err=True)
     for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
         click.echo(line, err=True)
     if not given["quiet"]:

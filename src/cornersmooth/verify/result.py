@@ -69,6 +69,8 @@ class Verification:
         NC line that passes nearest.
     trusted : tuple of (int, str)
         NC lines, and blocks, whose meaning is taken on trust because the user put them there.
+    unverified : str
+        What of the text was not looked at; empty where all of it was.
     """
 
     passed: bool
@@ -93,6 +95,7 @@ class Verification:
     pose_angle: Floats = field(repr=False)
     pose_nc_line: Ints = field(repr=False)
     trusted: tuple[tuple[int, str], ...] = ()
+    unverified: str = ""
 
     @property
     def max_tip_deviation_mm(self) -> float:
@@ -131,6 +134,7 @@ class Verification:
             "elements": self.elements,
             "curves": self.curves,
             "problem_count": self.problem_count,
+            "not_verified": self.unverified,
             "trusted": [{"nc_line": line, "text": text} for line, text in self.trusted],
             **{key: _finite(where.value) for key, where in places.items()},
             "where": {key: {"cl_line": where.cl_line, "nc_line": where.nc_line} for key, where in places.items()},

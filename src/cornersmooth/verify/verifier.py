@@ -25,6 +25,7 @@ from cornersmooth.settings import BOUNDS
 from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.checks import Examined, examine
 from cornersmooth.verify.findings import Findings, Largest, Poses
+from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.statements import Token, asked, compare, said
@@ -149,7 +150,8 @@ class Verifier:
         elements = Elements(**{column.name: getattr(nc, column.name) for column in fields(Elements)})
         text = _Text(iter([elements.at_most() if self._slower else elements]), list(nc.events))
         measured = _measure(task, text, words=self._words, processes=self._processes)
-        return measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
+        found = measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
+        return replace(found, unverified="the words of the text: they are looked at where it is read, not afterwards")
 
     def _of_text(self, task: Task, source: Source) -> Verification:
         options = self._options
@@ -170,7 +172,8 @@ class Verifier:
         found = measured.verification(
             problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
-        return replace(found, trusted=tuple(check.trusted))
+        unverified = "" if self._words else "words beside the motion, which a table of your own may define"
+        return replace(found, trusted=tuple(check.trusted), unverified=unverified)
 
 
 def _taking_what(kind: Callable[_Given, object]) -> Callable[[Callable[..., _Found]], Callable[_Given, _Found]]:
@@ -255,6 +258,7 @@ class _Measured:
             text = f"the text is in {units}, the CL file in {program.units}"
             problems.append(Problem("CS505", 0, 1, text))
         problems += self.batches.problems + self.findings.feeds.problems + self.findings.violations.problems()
+        problems += half_turns(program)
         if self.words and self.batches.elements:  # without any motion nothing has a place
             problems += self._statement_problems(unsaid)
         return Verification.of(

@@ -1,0 +1,32 @@
+"""Feed moves of the CL file in which the tool axis turns so far that nobody knows which way round it goes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Move, Program
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.settings import FLIP_ANGLE
+
+
+def half_turns(program: Program) -> list[Problem]:
+    """Moves that no text can be measured against, with their CL lines: CS526.
+
+    Between opposite axes there is no great circle, and near them it hangs on the last digits of both.
+    """
+    axis, kind = program.axis, program.kind
+    fed = np.isin(kind[1:], (Move.LINEAR, Move.ARC)) & (kind[:-1] != Move.FROM)
+    turn = np.degrees(
+        2.0 * np.arctan2(np.linalg.norm(axis[1:] - axis[:-1], axis=1), np.linalg.norm(axis[1:] + axis[:-1], axis=1))
+    )
+    poses = 1 + np.flatnonzero(fed & (turn > FLIP_ANGLE + 1e-9))
+    return [
+        Problem(
+            "CS526",
+            int(program.line[pose]),
+            0,
+            f"the tool axis turns by {turn[pose - 1]:.4g} deg in one move; which way a control turns is not defined",
+            float("nan"),
+        )
+        for pose in poses.tolist()
+    ]
