@@ -435,3 +435,21 @@ def test_two_fingers_zoom_and_move(look, text):
     )
     looked.settle()
     assert np.linalg.norm(looked.camera() - before) > 0.1
+
+
+def test_numbers_are_written_for_people(look, text):
+    looked = look(text)
+    page = looked.page
+    told = page.evaluate(
+        """() => { const { drive, meta, arrays } = cornersmooth; const whole = meta.seconds; const said = [];
+        for (const seconds of [59.994, 599.99, 600, 20495.23]) { meta.seconds = seconds; drive.set(seconds, "test");
+          said.push(document.getElementById("clock").textContent); } meta.seconds = whole; drive.set(0, "test");
+        return said; }"""
+    )
+    assert told == [
+        "59.99 s of 59.99 s",
+        "599.99 s of 599.99 s",
+        "0:10:00 h of 0:10:00 h",
+        "5:41:35 h of 5:41:35 h",
+    ]
+    assert "e-" not in page.inner_text("#plots")

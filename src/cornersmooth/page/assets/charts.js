@@ -71,7 +71,7 @@ class Charts {
       const unit = this.scale === "way" ? "mm" : "s";
       const series = chart.series.map(({ name, colour }) => ({
         label: name, stroke: colour, width: 1.4, points: { show: false }, spanGaps: false,
-        value: (/** @type {any} */ _, /** @type {number | null} */ value) => (value === null ? "–" : told(value)),
+        value: (/** @type {any} */ _, /** @type {number | null} */ value) => (value === null ? "–" : chart.unit === "mm" ? offset(value) : told(value)),
       }));
       /** @type {any} */
       const options = {
@@ -81,7 +81,7 @@ class Charts {
         cursor: { sync: { key: "cornersmooth" }, drag: { x: true, y: false, dist: 6 }, points: { size: 6 } },
         legend: { live: true },
         scales: { x: { time: false }, y: { range: (/** @type {any} */ _, /** @type {number} */ low, /** @type {number} */ high) => [Math.min(1.05 * (low ?? 0), 0), Math.max(1.05 * (high ?? 1), chart.top ?? 0)] } },
-        series: [{ label: this.scale === "way" ? "path" : "time", value: (/** @type {any} */ _, /** @type {number} */ value) => told(value, unit, 5) }, ...series],
+        series: [{ label: this.scale === "way" ? "path" : "time", value: (/** @type {any} */ _, /** @type {number | null} */ value) => (value === null ? "–" : `${grouped(value)} ${unit}`) }, ...series],
         axes: [{ ...axis, size: 26 }, { ...axis, size: 58 }],
         hooks: {
           draw: [(/** @type {any} */ plot) => drawLimit(plot, chart.limit, bad)],

@@ -93,6 +93,19 @@ function told(value, unit = "", digits = 3) {
   return unit ? `${text} ${unit}` : text;
 }
 
+/** A length or a time of a whole path: six digits, thousands apart. @param {number} value */
+function grouped(value) {
+  return value.toLocaleString("en", { maximumSignificantDigits: 6 });
+}
+
+/** Seconds, from ten minutes on as hours, minutes and seconds. @param {number} value */
+function clock(value) {
+  if (value < 600) return `${value.toFixed(2)} s`;
+  const whole = Math.floor(value);
+  const parts = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  return `${parts[0]}:${parts.slice(1).map((part) => String(part).padStart(2, "0")).join(":")} h`;
+}
+
 /** Millimetres as deviations are told: to a tenth of a micrometre. @param {number} value */
 function offset(value) {
   return Number.isFinite(value) ? value.toFixed(4) : "–";

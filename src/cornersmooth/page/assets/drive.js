@@ -38,7 +38,7 @@ class Drive {
     });
     this.view.placeTool(Math.max(shape, 0), place, lean);
     const kind = this.meta.timed ? "" : " at programmed feed";
-    element("clock").textContent = `${this.seconds.toFixed(2)} of ${this.meta.seconds.toFixed(2)} s${kind}`;
+    element("clock").textContent = `${clock(this.seconds)} of ${clock(this.meta.seconds)}${kind}`;
     this.tellPlace(i);
     this.moved(this.seconds, way[i] + share * (way[next] - way[i]));
   }
