@@ -49,9 +49,9 @@ TRAORI = {"on": "TRAORI", "off": "TRAFOOF", "tool": "M6"}
 TCPM = {"on": "FUNCTION TCPM .*", "off": "FUNCTION RESET TCPM", "tool": r"TOOL CALL \d+ Z"}
 
 
-def reader(control: str, form: str, machine: str = "", tcp: bool = True, units: str = "mm") -> Reader:
-    """Reader of the text of a control in one of its forms."""
-    tip = TIP_DIGITS.get(control, 4) + (units == "inch")
+def reader(control: str, form: str, machine: str = "", tcp: bool = True, units: str = "mm", digits: str = "") -> Reader:
+    """Reader of the text of a control in one of its forms; `digits` of lengths in mm, where they are not the usual."""
+    tip = int(digits or TIP_DIGITS.get(control, 4)) + (units == "inch")
     made = {"siemens": _siemens, "heidenhain": _heidenhain}.get(control, _iso)(control, form, machine, tcp, tip)
     made = replace(made, **HOMES[control])
     return replace(made, scale=1.0 if units == "mm" else 25.4)

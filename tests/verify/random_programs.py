@@ -30,7 +30,10 @@ ACTING = ("COOLNT/ON", "COOLNT/OFF", "COOLNT/MIST", "OPSTOP", "STOP", "SPINDL/90
 
 @dataclass(frozen=True)
 class Trial:
-    """A program and what is done with it; `oracle` where the independent reader can judge its motion."""
+    """A program and what is done with it; `oracle` where the independent reader can judge its motion.
+
+    `digits` as `Control.with_digits` takes them, empty for the control's own; `planned` where feeds are those of a plan.
+    """
 
     seed: int
     case: Case
@@ -39,11 +42,15 @@ class Trial:
     cl: str
     oracle: bool
     parts: tuple[str, ...] = ()
+    digits: str = ""
+    planned: bool = False
 
     def __str__(self) -> str:
         s = self.settings
         said = [str(self.case), self.units, f"eps {s.tolerance:.4g}", f"H {s.axis_length:.4g}", s.method]
         said += [f"{s.lines} lines"] if s.lines else []
+        said += [f"digits {self.digits}"] if self.digits else []
+        said += ["planned feeds"] if self.planned else []
         if s.method == "proportional":
             said += [s.shape, s.allocation, *(["weights {:g},{:g}".format(*s.weights)] if s.weights != (1, 1) else [])]
         return f"seed {self.seed}: " + " ".join(said) + " [" + " ".join(self.parts) + "]"
@@ -248,7 +255,13 @@ def trial(seed: int, *, flips: bool = True, only: str = "") -> Trial:
         if rng.random() < 0.4:
             _tool(text)
     text.say("SPINDL/OFF", "FINI")
-    return Trial(seed, case, _settings(rng, seed, form), units, "\n".join(text.lines) + "\n", oracle, tuple(parts))
+    cl, settings = "\n".join(text.lines) + "\n", _settings(rng, seed, form)
+    own = np.random.default_rng((seed, 2))  # so that programs stay
+    digits = str(own.choice(["", "", "3", "4", "5", "6"]))
+    if int(digits or 0) > form.table.digits.most:
+        digits = ""
+    planned = bool(own.random() < 0.25)
+    return Trial(seed, case, settings, units, cl, oracle, tuple(parts), digits, planned)
 
 
 def _settings(rng: np.random.Generator, seed: int, form: Form) -> Settings:

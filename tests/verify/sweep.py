@@ -14,14 +14,18 @@ import time
 import traceback
 import warnings
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cornersmooth.cl import read
 from cornersmooth.errors import CornersmoothError
+from cornersmooth.feedrate import Limits
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import Form, fit_settings, write
+from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
@@ -38,18 +42,21 @@ HAIR = 2e-3
 LENGTHS = (10.0, 50.0)
 
 
-def texts(program: Program, form: Form, settings: Settings) -> tuple[bytes, Settings]:
+def texts(program: Program, form: Form, settings: Settings, *, planned: bool = False) -> tuple[bytes, Settings]:
     """NC text of a program, and the settings with the digits of the control in them."""
     fitted = fit_settings(settings, form, program.units)
     stream = io.BytesIO()
-    write(smooth(program, fitted), stream, form=form)
+    if planned:
+        postprocess(program, stream, settings, form=form, plan_feeds=Limits(), verify=False)
+    else:
+        write(smooth(program, fitted), stream, form=form)
     return stream.getvalue(), fitted
 
 
-def keeps(case: Case, program: Program, text: bytes, settings: Settings, allowed: float) -> bool:
+def keeps(case: Case, program: Program, text: bytes, settings: Settings, allowed: float, digits: str = "") -> bool:
     """Whether the oracle finds the text within `allowed` ε of the CL path."""
     limit = allowed * settings.tolerance
-    found = reader(case.control, case.form, case.machine, case.tcp, program.units).read(
+    found = reader(case.control, case.form, case.machine, case.tcp, program.units, digits).read(
         text.decode("ascii"), settings.axis_length, settings.tolerance
     )
     paths, originals = found.runs(settings.axis_length), runs_of(program, settings.tolerance)
@@ -59,11 +66,15 @@ def keeps(case: Case, program: Program, text: bytes, settings: Settings, allowed
     )
 
 
-def judged(case: Case, program: Program, settings: Settings, *, oracle: bool) -> tuple[str, str]:
+def judged(
+    case: Case, program: Program, settings: Settings, *, oracle: bool, digits: str = "", planned: bool = False
+) -> tuple[str, str]:
     """Outcome of one text: a word, and what is to be said of it."""
     form = case.choose(endless=True)
+    if digits:
+        form = replace(form, table=form.table.with_digits(digits))
     try:
-        text, fitted = texts(program, form, settings)
+        text, fitted = texts(program, form, settings, planned=planned)
     except CornersmoothError as refusal:
         return f"refused {refusal.code}", str(refusal)
     try:
@@ -75,6 +86,7 @@ def judged(case: Case, program: Program, settings: Settings, *, oracle: bool) ->
             control=case.control,
             machine=form.machine,
             tcp=case.tcp,
+            slower=planned,
         )
         problems = [f"{problem.nc_line}: {problem.code} {problem.text}" for problem in found.problems]
     except CornersmoothError as refusal:
@@ -82,11 +94,11 @@ def judged(case: Case, program: Program, settings: Settings, *, oracle: bool) ->
     allowed = fitted.verified_tolerance / fitted.tolerance
     oracle = oracle and not (settings.method == "global" and form.curves)  # it reads curves of one corner only
     if problems:
-        wrong = oracle and not keeps(case, program, text, settings, allowed - HAIR)
+        wrong = oracle and not keeps(case, program, text, settings, allowed - HAIR, digits)
         if wrong and settings.method == "zhang2016":  # it promises ε of its own construction
             return "rightly found", ""
         return ("BROKEN PROMISE" if wrong else "FALSE ALARM"), " | ".join(problems[:3])
-    if oracle and not keeps(case, program, text, settings, allowed + HAIR):
+    if oracle and not keeps(case, program, text, settings, allowed + HAIR, digits):
         return "MISSED", "beyond the tolerance"
     return "passed", ""
 
@@ -108,10 +120,10 @@ def main() -> int:
     count: Counter[str] = Counter()
     begin = time.process_time()
 
-    def take(name: str, case: Case, data: bytes, settings: Settings, *, oracle: bool = True) -> None:
+    def take(name: str, case: Case, data: bytes, settings: Settings, *, oracle: bool = True, **how: Any) -> None:
         try:
             program = read(data, name="trial.cls")
-            outcome, said = judged(case, program, settings, oracle=oracle and not has_holes(program))
+            outcome, said = judged(case, program, settings, oracle=oracle and not has_holes(program), **how)
         except Exception as failure:
             where = traceback.extract_tb(failure.__traceback__)[-1]
             outcome, said = "FAILED", f"{type(failure).__name__}: {failure} ({where.filename}:{where.lineno})"
@@ -124,7 +136,9 @@ def main() -> int:
 
     for seed in range(*given.seeds):
         one: Trial = trial(seed, only=given.only)
-        take(str(one), one.case, one.cl.encode(), one.settings, oracle=one.oracle)
+        take(
+            str(one), one.case, one.cl.encode(), one.settings, oracle=one.oracle, digits=one.digits, planned=one.planned
+        )
     cases = [case for case in CHOSEN if given.only in str(case)]
     for number, path in enumerate(given.files):
         data = path.read_bytes()
