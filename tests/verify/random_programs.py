@@ -32,7 +32,7 @@ ACTING = ("COOLNT/ON", "COOLNT/OFF", "COOLNT/MIST", "OPSTOP", "STOP", "SPINDL/90
 class Trial:
     """A program and what is done with it; `oracle` where the independent reader can judge its motion.
 
-    `digits` as `Control.with_digits` takes them, empty for the control's own; `planned` where feeds are those of a plan.
+    `digits` as `Control.with_digits` takes them, empty for the control's own; `planned`: feeds are those of a plan.
     """
 
     seed: int
