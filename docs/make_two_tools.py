@@ -1,0 +1,178 @@
+"""Writes docs/two_tools.md: the text of samples/two_tools.cls for every control, each line with its reason.
+
+python docs/make_two_tools.py
+
+Reasons stand below, and where there is nothing more to be said in the lists of words, `nc_reader/word_lists`.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from cornersmooth.cl import read
+from cornersmooth.errors import InputError
+from cornersmooth.kinematics import load_machine
+from cornersmooth.nc import Form, choose_form, fit_settings, write
+from cornersmooth.nc_reader.reading_options import ReadingOptions
+from cornersmooth.nc_reader.word_list import WordRule, word_list
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from cornersmooth.verify.word_check import said
+
+HERE = Path(__file__).resolve().parent
+PAGE = HERE / "two_tools.md"
+SAMPLE = HERE.parent / "samples" / "two_tools.cls"
+
+#: control, machine, tool tip control
+RUNS = (
+    ("fanuc", "", True),
+    ("fanuc", "table-ac", True),
+    ("fanuc", "table-ac", False),
+    ("mitsubishi", "table-ac", True),
+    ("haas", "table-bc", True),
+    ("siemens", "", True),
+    ("siemens", "table-ac", True),
+    ("heidenhain", "", True),
+    ("heidenhain", "table-ac", True),
+    ("linuxcnc", "xyzac-trt", True),
+    ("generic", "", True),
+)
+
+#: why a line stands where it stands; the first that fits
+_REASONS = (
+    (r"%", "begin and end of the tape"),
+    (r"O\d+|BEGIN PGM .*|END PGM .*|[;(] ?TWO_TOOLS\)?|; CORNERSMOOTH|\(CORNERSMOOTH\)", "the program and its units"),
+    (
+        r"G21 G90 .*|G90 G94 .*",
+        "safe start: nothing of the program before holds (units, absolute, feed per minute, "
+        "plane, compensation, tool length and cycles off)",
+    ),
+    (r"G64 P.*", "the control's own blending, within its share of the tolerance"),
+    (r"PLANE RESET STAY", "no tilted plane from the program before"),
+    (
+        r"G91 G28 Z0\.|G53 G0 Z0\.?|SUPA G0 Z0 D0|L Z-1 R0 FMAX M91",
+        "retract: up to where no rotary axis and no tool change meets the part",
+    ),
+    (r"G90", "absolute again behind the retract"),
+    (r"\(.*|;.*", "what the CL file says, or how the text was made"),
+    (r"T\d+ M6|T\d+|M6|TOOL CALL \d+ Z", "tool change, high up"),
+    (r"S\d+ M[34]|TOOL CALL Z S.*|M[34]", "spindle on, before the tool comes down"),
+    (r"M[78]", "coolant as the CL file asks for it"),
+    (r"M9", "coolant off, before the tool goes up"),
+    (r"M5", "spindle off, behind the retract, or where the CL file says so"),
+    (r"M1", "optional stop: the operator may look at the part and at the next tool"),
+    (r"G54|CYCL DEF 247 .*", "work offset; behind TRAORI, which deselects it"),
+    (r"D1", "length of the tool"),
+    (r"M126", "rotary axes go the shorter way"),
+    (
+        r"(G0|L) [AB]\S+ C\S+( FMAX)?",
+        "rotary axes, high up: to zero before tool tip control that counts from where the "
+        "table stands, else to the first angles; to zero at the end",
+    ),
+    (r"G43\.[45] H\d+|G234 H\d+|TRAORI|FUNCTION TCPM .*", "tool tip control on"),
+    (r"G43 H\d+", "length of the tool"),
+    (r"ORI.*", "what the words of the tool axis mean, and how it turns between blocks"),
+    (
+        r"G49|TRAFOOF|FUNCTION RESET TCPM",
+        "tool tip control off; G49, which may move by the length of the tool, behind the retract",
+    ),
+    (r"G9[345]|M13[67]", "feed mode of the blocks that follow"),
+    (r"G4 .*|CYCL DEF 9\..*", "dwell"),
+    (r"M30|M2", "end"),
+)
+
+_HEAD = """# Two tools on every control, line by line
+
+Made by `python docs/make_two_tools.py` from `samples/two_tools.cls` (two tools, rapids with a tilted tool, five-axis
+corners, feed per revolution, an arc, a dwell) at `-e 0.01 -H 10`; a test says when it is out of date. The reason of a
+line is why it stands where it stands; feed moves one behind another are one row.
+No text of this page but that of linuxcnc has run on a control.
+"""
+
+
+def text_of(control: str, machine: str, *, tcp: bool) -> tuple[Form, list[str]]:
+    """Lines of the text of the sample."""
+    form = choose_form(control, machine=load_machine(machine) if machine else None, tcp=tcp)
+    program = read(SAMPLE.read_bytes(), name=SAMPLE.name)
+    stream = io.BytesIO()
+    write(smooth(program, fit_settings(Settings(), form, "mm")), stream, form=form)
+    return form, stream.getvalue().decode("ascii").splitlines()
+
+
+def reason(line: str, form: Form) -> str:
+    """Why a line is there; what the list of words says of it where nothing more is to be said."""
+    bare = re.sub(r"^\d+ ", "", line) if form.control == "heidenhain" else line
+    for pattern, why in _REASONS:
+        if re.fullmatch(pattern, bare):
+            return why
+    options = ReadingOptions.of(
+        form.control, form.machine, tcp=form.orientation != "machine", tolerance=0.01, axis_length=10.0
+    )
+    try:
+        found = options.dialect.lexer.line(line.encode(), 1, None)
+    except InputError:
+        return ""
+    words = [said(word) for word in found.words] or (["%"] if found.tape else [])
+    if not words:
+        return "comment"
+    rules = word_list(form.control)
+    text = " ".join(words)
+    for block in rules.blocks:
+        if block.pattern.fullmatch(text):
+            return block.says
+    if any(pattern.fullmatch(text) for pattern in (*rules.begin, *rules.end)):
+        return "begins or ends the program"
+    told = [_says(rules.words, word, words) for word in words]
+    return "; ".join(dict.fromkeys(filter(None, told)))
+
+
+def _says(rules: tuple[WordRule, ...], word: str, beside: list[str]) -> str:
+    fitting = [rule for rule in rules if rule.pattern.fullmatch(word) and not rule.never]
+    with_others = [rule for rule in fitting if rule.needs and any(rule.needs.fullmatch(other) for other in beside)]
+    plain = [rule for rule in fitting if rule.needs is None]
+    return next((rule.says for rule in (*with_others, *plain)), "")
+
+
+def rows(form: Form, lines: list[str]) -> Iterator[str]:
+    """Rows of the table of a text; feed moves one behind another are one row."""
+    feeding = high = False
+    for line in lines:
+        why = reason(line, form)
+        motion = why.startswith(("motion", "radius"))
+        if motion and not re.search(r"\bG0\b|FMAX", line):
+            if not feeding:
+                word = re.match(r"\d* ?(\S+)", line)
+                yield f"| `{word[1] if word else line} ...` | feed moves, measured against the CL file |"
+            feeding = True
+            continue
+        feeding = False
+        if motion:
+            over = re.search(r"\bZ[-+\d]", line) is None
+            why = (
+                "over the first position, high up"
+                if over
+                else "straight down to it"
+                if high
+                else "rapid of the CL file"
+            )
+            high = over
+        yield f"| `{line}` | {why} |"
+
+
+def page() -> str:
+    """The whole page."""
+    parts = [_HEAD]
+    for control, machine, tcp in RUNS:
+        form, lines = text_of(control, machine, tcp=tcp)
+        options = f"--control {control}" + (f" --machine {machine}" if machine else "") + ("" if tcp else " --no-tcp")
+        parts.append(f"## {control}{', ' + machine if machine else ''}{'' if tcp else ', without tip control'}\n")
+        parts.append(f"Options: `{options}`.\n")
+        parts.append("\n".join(["| line | reason |", "|---|---|", *rows(form, lines)]) + "\n")
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
