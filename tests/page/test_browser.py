@@ -170,6 +170,17 @@ def test_keys_charts_and_switches(look, text):
         page.keyboard.press(key)
         looked.settle()
         assert np.linalg.norm(looked.camera() - before) > 1e-3, key
+    target = "() => cornersmooth.view.eye.controls.target.toArray()"
+    for key, back in (("Shift+ArrowRight", "Shift+ArrowLeft"), ("Shift+ArrowUp", "Shift+ArrowDown")):
+        before, arm = np.array(page.evaluate(target)), looked.camera() - page.evaluate(target)
+        page.keyboard.press(key)
+        looked.settle()
+        moved = np.array(page.evaluate(target))
+        assert np.linalg.norm(moved - before) > 1e-2, key
+        np.testing.assert_allclose(looked.camera() - moved, arm, atol=1e-6)
+        page.keyboard.press(back)
+        looked.settle()
+        np.testing.assert_allclose(page.evaluate(target), before, atol=1e-6)
     page.keyboard.press("n")
     looked.settle()
     assert "sharp: reversal" in page.inner_text("#panel")

@@ -113,6 +113,17 @@ class Eye {
     this.changed();
   }
 
+  /** Moves across the view, in parts of its height. @param {number} right @param {number} up */
+  pan(right, up) {
+    this.flight++;
+    const size = 2 * this.distance * Math.tan((Math.PI / 360) * this.camera.fov);
+    const [across, above] = [0, 1].map((column) => new THREE.Vector3().setFromMatrixColumn(this.camera.matrix, column));
+    const way = across.multiplyScalar(right * size).addScaledVector(above, up * size);
+    this.camera.position.add(way);
+    this.controls.target.add(way);
+    this.changed();
+  }
+
   /** Place on the canvas, pixels; null behind the eye. @param {Vector} point is changed */
   onCanvas(point) {
     point.project(this.camera);

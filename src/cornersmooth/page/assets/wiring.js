@@ -34,7 +34,8 @@ function wireKeys(view, drive, corners) {
     const field = /** @type {HTMLElement} */ (event.target).tagName;
     if (event.ctrlKey || event.metaKey || event.altKey || field === "SELECT" || field === "INPUT") return;
     const turn = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
-    if (turn && event.target === view.canvas) view.eye.orbit(turn[0] * 0.12, turn[1] * 0.12, 1);
+    if (turn && event.shiftKey && event.target === view.canvas) view.eye.pan(0.1 * turn[0], -0.1 * turn[1]);
+    else if (turn && event.target === view.canvas) view.eye.orbit(turn[0] * 0.12, turn[1] * 0.12, 1);
     else if (event.key === "+" || event.key === "=") view.eye.orbit(0, 0, 1 / 1.2);
     else if (event.key === "-") view.eye.orbit(0, 0, 1.2);
     else if (event.key === "f" || event.key === "F") view.fit();
