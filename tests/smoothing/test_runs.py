@@ -286,3 +286,14 @@ def test_curvature_of_a_circle() -> None:
     curves = solve_runs(through(np.hstack((tip, tip + [0, 0, H]))), (0.01, 0.01), H)
     largest = largest_curvature(curves.lines, curves.splines, curves.control)
     np.testing.assert_allclose(largest[20:-20], 1 / 30, rtol=0.02)
+
+
+def test_axis_that_does_not_turn_does_not_tremble() -> None:
+    points = winding(300, seed=8)
+    turning = winding(40, seed=9)
+    points[:, 3:] = points[:, :3] + H * np.array([0.36, 0.48, 0.8])
+    curves = solve_runs(through(points, turning), (0.01, 0.01), H)
+    assert curves.kept.all()
+    own = curves.control[: curves.splines.control_first[1]]
+    np.testing.assert_allclose(own[:, 3:] - own[:, :3], [H * np.array([0.36, 0.48, 0.8])] * len(own), atol=1e-11)
+    assert curves.axis_bound[0] <= 0.01

@@ -14,11 +14,11 @@ from functools import cached_property
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import Gather
 from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, dot, smoothest
 from cornersmooth.smoothing.runs.polylines import Polylines
-from cornersmooth.smoothing.runs.ranges import ranges, starts
+from cornersmooth.smoothing.runs.ranges import ranges, spread, starts
 from cornersmooth.smoothing.runs.samples import Pieces, Samples
 from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.smoothing.runs.windows import Windows
@@ -33,11 +33,14 @@ ROOM = 0.02
 ALONG = 0.1
 
 #: least and largest share of its tolerance that the tip leaves to the axis point across the axis, wherever it is itself
-LEAST_LEFT, MOST_LEFT = 0.6, 0.9
+LEAST_LEFT, MOST_LEFT = 0.7, 0.9
 
 #: spans on either side that the weight of a span looks at, its power of the mean square of C‴, and the least mean over
 #: the largest of the window
 NEIGHBOURS, POWER, LEAST_MEAN = 1, 0.75, 1e-12
+
+#: levers that differ by less than this part of the coordinates are the same
+STILL = 1e-14
 
 #: what the third derivative of the tip counts beside that of the lever: rotary axes have less jerk to give
 TIP_COUNTS = 0.3
@@ -73,6 +76,22 @@ class Problem:
         """(spans + 1,) where the pieces of each span begin."""
         return starts(np.bincount(self.pieces.span, minlength=len(self.splines.span_run)))
 
+    @cached_property
+    def first_lever(self) -> Floats:
+        """(runs, 3) mm: from tip to axis point at the start of each run."""
+        first = self.lines.point[self.lines.first[:-1]]
+        return first[:, 3:] - first[:, :3]
+
+    @cached_property
+    def still(self) -> Bools:
+        """(runs,) bool: the axis does not turn at all; it must not tremble then, least of all at a machine's pole."""
+        lever = self.lines.point[:, 3:] - self.lines.point[:, :3]
+        run = spread(self.lines.count)[0]
+        size = np.abs(self.lines.point).max(axis=1)
+        off = np.abs(lever - self.first_lever[run]).max(axis=1) > STILL * np.maximum(size, self.axis_length)
+        still: Bools = np.bincount(run, off, minlength=len(self.lines.count)) == 0
+        return still
+
 
 def solve_windows(
     problem: Problem, windows: Windows, control: Floats, tight: Floats, gaps: tuple[float, ...], *, near: bool
@@ -102,6 +121,8 @@ def solve_windows(
             curve = moved[:, own] - moved[:, :3] if part else moved[:, own]
             jerk = task.smooth.apply(curve) / tolerance
             moved[:, own] += tolerance * smoothest(task, off, jerk, gap, WARM if near else COLD)
+        still = problem.still[problem.splines.control_run[windows.control]]
+        moved[still, 3:] = moved[still, :3] + problem.first_lever[problem.splines.control_run[windows.control[still]]]
         near = True
     return moved
 
