@@ -134,3 +134,12 @@ def test_the_detour_of_a_table_is_that_of_its_cone() -> None:
     angles = np.array([[0.0, 30.0], [300.0, 30.0], [0.0, 30.0], [0.0, 0.0], [300.0, 0.0]])
     np.testing.assert_array_equal(rows_that_swing(machine, angles, np.ones(5, np.bool_)), [1, 2])
     np.testing.assert_array_equal(rows_that_swing(machine, angles, np.zeros(5, np.bool_)), [])
+
+
+@pytest.mark.parametrize(("control", "limits", "said"), [("siemens", None, True), ("siemens", (0, 720), False)])
+def test_words_that_a_modulo_axis_may_refuse_are_said(control: str, limits: tuple[float, float] | None, said: bool):
+    machine = load_machine("table-ac")
+    axes = tuple(replace(axis, limits=limits) if axis.name == "C" else axis for axis in machine.axes)
+    _, _, found = text_of(control, replace(machine, axes=axes))
+    assert ("CS346" in found) == said
+    assert "CS346" not in text_of("fanuc", replace(machine, axes=axes))[2]

@@ -92,6 +92,8 @@ class Motion:
     feed_needed : bool
         Whether a program without a feed before its first feed move, or with one per revolution and no spindle speed, is
         refused by the control before it runs.
+    endless_words : bool
+        Whether words of endless rotary axes beyond 0 to 360 degrees are taken on every machine.
     inch_feed : int
         What one inch per minute is written as: 10 where F counts tenths.
     fastest : float, 1/min
@@ -112,6 +114,7 @@ class Motion:
     leading_zeros: bool = True
     trailing_zeros: bool = True
     feed_needed: bool = False
+    endless_words: bool = True
     inch_feed: int = 1
     fastest: float = 9999.999
 

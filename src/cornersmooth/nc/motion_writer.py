@@ -59,6 +59,7 @@ class MotionWriter:
     _next_statement: int = 0
     _said_tool: bool = False
     _said_spindle: bool = False
+    _said_turns: bool = False
     _arc_begun: int = -1  #: arc behind a FROM whose start has been gone to
     _ticks: Ints = field(init=False)  #: of the block that is written
     _said: tuple[Statement, ...] = field(init=False)
@@ -299,6 +300,7 @@ class MotionWriter:
                 text = "the first motion of a tool is a feed move: it feeds down from the height of the retract"
                 self.findings.add("CS333", "warning", int(self.program.line[run.move[0]]), text)
         self._warn_of_standing_still(run)
+        self._warn_of_turns(run)
         self._position = self._last = run.ticks[-1]
         yield self.writer.text(run, dwell)
 
@@ -321,6 +323,23 @@ class MotionWriter:
         if not self.writer.form.rotary and self.program.axis[pose][2] < _UPRIGHT:
             text = "the first motion of a tool turns it to a tilted axis; see that it is free to, or name the machine"
             self.findings.add("CS337", "warning", int(self.program.line[pose]), text)
+
+    def _warn_of_turns(self, run: Run) -> None:
+        """Say once that an endless axis gets words that some machines of the control refuse."""
+        form = self.writer.form
+        if self._said_turns or form.mode.motion.endless_words or form.machine is None or not form.rotary:
+            return
+        endless = np.isinf(form.machine.limits).all(axis=1)
+        angles = self.writer.angles(run.ticks)[:, endless]
+        rows = np.flatnonzero(((angles < 0.0) | (angles >= 360.0)).any(axis=1))
+        if len(rows):
+            self._said_turns = True
+            names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
+            text = (
+                f"words of {names} beyond 0 to 360 deg: a modulo axis takes them only where the builder allows it "
+                "(MD30455 bit 0, else alarm 16830); give the axis its limits in a machine file where it does not"
+            )
+            self.findings.add("CS346", "warning", int(self.program.line[run.move[rows[0]]]), text)
 
     def _warn_of_standing_still(self, run: Run) -> None:
         """Say once that a tool moves that was not loaded, and for each tool that it cuts while the spindle stands."""
