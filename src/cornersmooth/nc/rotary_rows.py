@@ -38,6 +38,9 @@ LARGEST_TURN = 60.0
 #: shortest times of a block that short ones are merged to
 _SHORTEST_TIMES = 1.5
 
+#: part of the tolerance, and turn of an axis in degrees, that such a block may have
+_MERGED_SHARE, _MERGED_TURN = 0.8, 5.0
+
 #: decimals of F of inverse time: FANUC takes 0.001 to 9999.999
 INVERSE_TIME_DECIMALS = 3
 
@@ -178,6 +181,13 @@ def _merged(
     ends = np.append(part[1:] != part[:-1], True)
     between = quick | np.append(quick[1:], False)
     position = machine_position(machine, filled.tip, filled.angles)
+    # the way between two rows bends, too: what turns little bends little
+    limits = replace(
+        limits,
+        tip=_MERGED_SHARE * limits.tip,
+        axis_point=_MERGED_SHARE * limits.axis_point,
+        turn=min(limits.turn, _MERGED_TURN),
+    )
     return filled.only(fewest_lines(replace(found, fixed=found.fixed | ends | ~between, position=position), limits))
 
 

@@ -276,6 +276,30 @@ def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
     kept = _off(rows, limits, start, end, inner, halves=False) <= _USED
     if limits.tip_of is not None:  # between positions of the axes the tip runs on a bow, largest between the rows
         kept &= _off(rows, limits, start, end, inner + 1, halves=True) <= _USED
+    if rows.position is not None:
+        kept &= _in_order(rows, limits, start, end)
+    return kept
+
+
+def _in_order(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
+    """(q,) bool: whether the tool never goes back along the original, where axes that run evenly bend its way."""
+    assert rows.position is not None
+    assert limits.tip_of is not None
+    count = end - start + 1
+    line = np.repeat(np.arange(len(start)), count)
+    first = np.cumsum(count) - count
+    row = np.arange(len(line)) - first[line] + start[line]
+    s, begin, finish = rows.parameter, start[line], end[line]
+    length = s[end] - s[start]
+    share = ((s[row] - s[begin]) / np.where(length > 0.0, length, 1.0)[line])[:, None]
+    words, position = (
+        values[begin] + share * (values[finish] - values[begin]) for values in (rows.words, rows.position)
+    )
+    tip = limits.tip_of(position, words)
+    way = np.diff(np.hstack((tip, tip + limits.axis_length * limits.axis_of(words))), axis=0)
+    original = np.diff(np.hstack((rows.original_tip[row], rows.original_axis_point[row])), axis=0)
+    back = (line[1:] == line[:-1]) & ((way * original).sum(axis=1) < 0.0)
+    kept: Bools = np.bincount(line[1:][back], minlength=len(start)) == 0
     return kept
 
 
