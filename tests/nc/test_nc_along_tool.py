@@ -103,3 +103,15 @@ def test_rapids_of_the_cl_file_along_the_tool_must_stay() -> None:
     program, lines, tolerance = text_of(case, "MM", Frame())
     last = max(k for k, line in enumerate(lines) if line.startswith("G0 X"))
     assert problems(case, program, [*lines[:last], *lines[last + 1 :]], tolerance)
+
+
+def test_a_rapid_away_from_a_hole_that_is_not_tapped_is_the_cl_files_own() -> None:
+    cl = (
+        "UNITS/MM\nLOADTL/3\nRAPID\nGOTO/1,2,-5,0,0,1\nCYCLE/TAP,FEDTO,9,MMPM,250,RAPTO,3\nGOTO/1,2,-9\nCYCLE/OFF\n"
+        "RAPID\nGOTO/1,2,50\nLOADTL/4\nRAPID\nGOTO/1,2,40\nFINI\n"
+    )
+    case = Case("fanuc", "g1")
+    program = read(cl.encode(), name="part.cls")
+    stream = io.BytesIO()
+    write(smooth(program, fit_settings(Settings(tolerance=EPS), case.choose(), "mm")), stream, form=case.choose())
+    assert problems(case, program, stream.getvalue().decode().splitlines(), EPS) == ()

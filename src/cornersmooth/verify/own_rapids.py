@@ -15,7 +15,7 @@ _STEPS = 2.0
 
 @dataclass(frozen=True)
 class OwnRapids:
-    """Knows the rapids of the CL file by both of their ends.
+    """Knows where the CL file goes in rapid.
 
     Parameters
     ----------
@@ -30,10 +30,10 @@ class OwnRapids:
         program, pose = self.task.original.program, self.task.original.pose
         rapid = np.flatnonzero(program.kind[pose] == Move.RAPID)
         object.__setattr__(self, "tip", program.tip[pose])
-        object.__setattr__(self, "rapid", rapid[rapid > 0])
+        object.__setattr__(self, "rapid", rapid)
 
     def added(self, start: Floats, end: Floats, step: float, near: Floats) -> bool:
-        """Whether the CL file has no such rapid, but one of its poses at the end nearer to the part.
+        """Whether the CL file goes nowhere to the far end of a rapid, but has a pose at the end nearer to the part.
 
         Out of holes the tool comes without a pose at its bottom, and over them it goes without one above.
 
@@ -45,8 +45,9 @@ class OwnRapids:
         near : (3,) float64, mm
             That of both which is nearer to the part.
         """
-        if not (np.abs(self.tip - near) <= _STEPS * step).all(axis=1).any():
-            return False
-        ways = ((self.tip[self.rapid - 1], start), (self.tip[self.rapid], end))
-        same = np.all([(np.abs(tips - tip) <= _STEPS * step).all(axis=1) for tips, tip in ways], axis=0)
-        return not same.any()
+        far = end if np.array_equal(near, start) else start
+        known, gone_to = (
+            bool((np.abs(tips - tip) <= _STEPS * step).all(axis=1).any())
+            for tips, tip in ((self.tip, near), (self.tip[self.rapid], far))
+        )
+        return known and not gone_to
