@@ -42,7 +42,9 @@ METHODS = ("direct_exact_stop", "direct_velocity_jump", "zhang2016", "proportion
 FEED = 1800.0
 COLOURS = {"proportional": "#c8402f", "global": "#1463b8"}
 #: part of the path that is drawn, as shares of its time, and pixels of a chart
-PART, WIDE, HIGH = (0.25, 0.4), 820.0, 150.0
+PART, WIDE, HIGH = (0.235, 0.3), 820.0, 150.0
+#: points of a line, about
+MOST = 600
 
 
 def say(line: str) -> None:
@@ -154,6 +156,7 @@ def picture(file: Path) -> str:
         law = plan(cornersmooth.smooth(program, Settings(method=method)), Limits(feed=FEED), machine=machine)
         times = law.every_period()
         times = times[(times >= PART[0] * law.total) & (times <= PART[1] * law.total)]
+        times = times[:: max(1, len(times) // MOST)]
         states = law.at(times)
         moving = states.v > 1e-3
         curvature = np.where(moving, states.centripetal / np.maximum(states.v, 1e-3) ** 2, 0.0)

@@ -30,7 +30,7 @@ ENDS_RUN = (
 
 #: degrees: where the axis turns by more in a segment, output in curves (which cannot change F inside one) has no run.
 #: Between two control points so far apart nothing but the curve itself tells where the tool is.
-STEEPEST = 60.0
+STEEPEST = 30.0
 
 
 #: what `Corners.extra` has: largest curvature of the curve of a run beside each of its corners, 1/mm
