@@ -75,7 +75,8 @@ class WayBack:
             return False
         whole = Elements.joined(parts)
         ends = whole.part(len(whole) - 2, len(whole))
-        if not (_is_above(ends, 1, 0) and self.added(ends.tip[0], ends.tip[1], ends.tip_step, ends.tip[0])):
+        near = ends.tip[0]
+        if not (_is_above(ends, 1, 0) and self.added(near, ends.tip[1], ends.tip_step, near)):
             return False
         ready[-1].tip[-1], ready[-1].second[-1] = ends.tip[0], ends.second[0]
         return True

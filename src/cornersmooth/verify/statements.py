@@ -343,7 +343,14 @@ def compare(
     unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
     found = [token for token in found if token.kind not in unsaid]
-    stops = [token for token in asked_for if token.kind == "stop" and token.value == 1.0]
+    plain = [token for token in found if token.kind == "stop" and token.value == 1.0 and not token.habit]
+    stops = [
+        token
+        for token in asked_for
+        if token.kind == "stop"
+        and token.value == 1.0
+        and all(_away(token.place, ours, room, apart) for ours in plain)  # else it is there anyway
+    ]
     found = [
         token for token in found if not token.habit or any(not _away(stop.place, token, room, apart) for stop in stops)
     ]

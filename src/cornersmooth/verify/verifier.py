@@ -296,17 +296,19 @@ class _Measured:
 
         order = sorted(known)
 
+        def stands(element: int) -> int:
+            """The element at whose end one leaves the tool that leads nowhere, as a second rapid to the same place."""
+            at = bisect_right(order, element) - 1
+            return order[at] if element >= first and at >= 0 else element
+
         def place(element: int) -> float:
-            """Where an element ends: one that leads nowhere, as a second rapid to the same place, as those before."""
-            if element < first or not order:
-                return known.get(element, _BEFORE if element < first else 0.0)
-            return known[order[max(bisect_right(order, element) - 1, 0)]]
+            return known.get(stands(element), _BEFORE if element < first else 0.0)
 
         # the way back from the last hole may be the CL file's next move; at holes that are not drilled nothing moves
         for element, behind in self.batches.shared.items():
             self.rooms[element] = self.rooms.get(element, 0.0) + abs(length_at(behind) - place(element))
         places = [place(event.element - 1) for event in self.events]
-        rooms = [self.rooms.get(event.element - 1, 0.0) for event in self.events]
+        rooms = [self.rooms.get(stands(event.element - 1), 0.0) for event in self.events]
         apart: Callable[[float, float], float] = partial(way_apart, self.task.path)
         return compare(theirs, said(self.events, places, rooms), self.margin, unsaid, apart)
 
