@@ -43,7 +43,8 @@ class Alarm:
     def program(self) -> Program:
         """The CL program."""
         units = "INCHES" if self.inch else "MM"
-        return read(f"UNITS/{units}\nLOADTL/1\nRAPID\n{self.cl}FINI\n".encode(), name="part.cls")
+        feed = "" if "FEDRAT" in self.cl or "FEDTO" in self.cl else "FEDRAT/500,MMPM\n"
+        return read(f"UNITS/{units}\nLOADTL/1\n{feed}RAPID\n{self.cl}FINI\n".encode(), name="part.cls")
 
     @property
     def text(self) -> str:
