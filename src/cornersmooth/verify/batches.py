@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
-from cornersmooth.verify.drilling import HoleRuns, divide_at_holes
+from cornersmooth.verify.drilling import Ahead, Holes
 from cornersmooth.verify.guide import STRIDE, cut, guide
 from cornersmooth.verify.polyline import Polyline, directions
 from cornersmooth.verify.rapids import Rapids, fraction_along, moving_rapids
@@ -124,47 +124,49 @@ class Batches:
             self.elements += len(nc)
             if part is None:
                 if not moves:
-                    self._lacking(0, -1, nc, 0)
+                    self._lacking(0, -1, int(nc.line[0]))
                     return
                 part = _Part(self, nc, 0, moves - 1, 0)
             yield from part.take(nc)
         if part is not None:
             yield from part.end()
         elif moves:
-            self._lacking(0, moves - 1, None, 0)
+            self._lacking(0, moves - 1)
 
     def _between_holes(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
         """Give out the batches of what lies between the holes."""
-        task = self.task
-        held = [nc for nc in chunks if len(nc)]
-        if not held:
-            self._lacking(0, len(task.original.pose) - 1, None, 0)
-            return
-        nc = Elements.joined(held)
-        held.clear()
-        self.elements = len(nc)
-        holes: HoleRuns = divide_at_holes(task.original, nc, task.axis_length)
-        self.problems += holes.problems
-        self.holes.update(holes.element_move)
-        self.shared.update(holes.shared)
-        self.dwells += holes.dwells
-        for move_first, move_last, first, last in holes.parts:
-            if move_last < move_first and last < first:
-                continue
-            if move_last < move_first or last < first:
-                self._lacking(move_first, move_last, nc, first)
-                continue
-            part = _Part(self, nc, move_first, move_last, first)
-            yield from part.take(nc.part(first, last + 1))
-            yield from part.end()
-
-    def _lacking(self, move_first: int, move_last: int, nc: Elements | None, first: int) -> None:
-        """Say that only one of the two motions has anything."""
         original = self.task.original
-        ours = move_last < move_first
-        line = 0 if ours else int(original.program.line[original.pose[move_first]])
-        text = "motion that the CL file does not have" if ours else "the NC text lacks motion of the CL file"
-        self.problems.append(Problem("CS534", line, int(nc.line[first]) if ours and nc is not None else 0, text))
+        ahead = Ahead(nc for nc in chunks if len(nc))
+        if not ahead.has(0):
+            self._lacking(0, len(original.pose) - 1)
+            return
+        holes = Holes(original, ahead, self.task.axis_length)
+        self.holes, self.shared, self.dwells = holes.element_move, holes.shared, holes.dwells
+        part: _Part | None = None
+        surplus: int | None = None
+        for between in holes.between():
+            if between.stop > between.first:
+                nc = ahead.part(between.first, between.stop)
+                if between.move_last >= between.move_first:
+                    part = part or _Part(self, nc, between.move_first, between.move_last, between.first)
+                    yield from part.take(nc)
+                elif surplus is None:
+                    surplus = int(nc.line[0])
+            if between.final:
+                if part is not None:
+                    yield from part.end()
+                elif surplus is not None or between.move_last >= between.move_first:
+                    self._lacking(between.move_first, between.move_last, surplus)
+                part = surplus = None
+        self.elements = ahead.count
+        self.problems += holes.problems
+
+    def _lacking(self, move_first: int, move_last: int, surplus: int | None = None) -> None:
+        """Say that only one of the two motions has anything; `surplus` is the NC line of motion without any."""
+        original = self.task.original
+        line = 0 if surplus is not None else int(original.program.line[original.pose[move_first]])
+        text = "the NC text lacks motion of the CL file" if surplus is None else "motion that the CL file does not have"
+        self.problems.append(Problem("CS534", line, surplus or 0, text))
 
 
 class _Part:

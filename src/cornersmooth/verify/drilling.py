@@ -9,7 +9,9 @@ so without any doubt.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +22,12 @@ from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 
 #: elements looked through at a time for the beginning of a run
 _WINDOW = 512
+
+#: elements behind the pose before a run in which the run is looked for before the pose is taken for a passing one
+_UNDECIDED = 1 << 16
+
+#: elements between runs that are given out together, and those held of what has been given out
+_TOGETHER, _KEPT = 1 << 14, 16
 
 #: last printed digits that a point may be beside its hole
 _STEPS = 1.0
@@ -111,111 +119,182 @@ def drillings(program: Program, poses: list[int]) -> list[Drilling]:
     return found
 
 
-@dataclass
-class HoleRuns:
-    """The parts into which holes divide the two motions.
+class Ahead:
+    """Elements of a text as they are read: those that have been read and are still wanted.
 
     Parameters
     ----------
-    parts : list of (move_first, move_last, element_first, element_last)
-        Moves and elements between the runs of holes, all included.
-    element_move : dict of int to int
-        Move of the hole that an element belongs to.
-    shared : dict of int to int
-        Move as far as which words behind an element may stand: the element leaves the last hole and ends where that
-        move does, or the holes from it to that move are not drilled.
-    dwells : list of (int, float)
-        Moves of the holes at whose bottom the tool waits, and for how many ms.
-    problems : list of Problem
-        CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside a hole, CS564 a feed that is not a hole's.
+    chunks : iterable of Elements
     """
 
-    parts: list[tuple[int, int, int, int]] = field(default_factory=list)
-    element_move: dict[int, int] = field(default_factory=dict)
-    shared: dict[int, int] = field(default_factory=dict)
-    dwells: list[tuple[int, float]] = field(default_factory=list)
-    problems: list[Problem] = field(default_factory=list)
+    def __init__(self, chunks: Iterable[Elements]) -> None:
+        self._chunks = iter(chunks)
+        self._held: Elements | None = None
+        #: number of the first element that is held
+        self.base = 0
+        #: elements read so far
+        self.count = 0
+
+    @property
+    def nc(self) -> Elements:
+        """What is held; at least one element must have been read."""
+        assert self._held is not None
+        return self._held
+
+    def has(self, element: int) -> bool:
+        """Whether there is such an element; reads on as far as need be."""
+        if element >= self.count:
+            # what is long already grows by a half, so that it is not copied too often
+            wanted = max(element + 1, self.count + (self.count - self.base) // 2)
+            parts = [] if self._held is None else [self._held]
+            while self.count < wanted and (chunk := next(self._chunks, None)) is not None:
+                self.count += len(chunk)
+                parts.append(chunk)
+            self._held = Elements.joined(parts) if parts else None
+        return element < self.count
+
+    def part(self, first: int, stop: int) -> Elements:
+        """Elements from `first` to `stop`, the latter excluded, counted anew."""
+        return self.nc.part(first - self.base, stop - self.base)
+
+    def forget(self, element: int) -> None:
+        """Drop all elements before one."""
+        if element > self.base:
+            self._held, self.base = self.part(element, self.count), element
 
 
-def divide_at_holes(original: Original, nc: Elements, axis_length: float) -> HoleRuns:
-    """Find the elements of all holes and check them; say what lies between."""
-    hole = original.program.kind[original.pose] == Move.HOLE
-    found = HoleRuns()
-    moves, elements = len(original.pose), len(nc)
-    if not hole.any():
-        found.parts.append((0, moves - 1, 0, elements - 1))
-        return found
-    edges = np.flatnonzero(np.diff(hole, prepend=False, append=False))
-    search = _Search(original, nc, axis_length)
-    all_cycles = drillings(original.program, original.pose[hole].tolist())
-    move = element = used = 0
-    runs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-    for number, (first, stop) in enumerate(runs):
-        cycles = all_cycles[used : used + stop - first]
-        used += stop - first
-        start = element
-        if first > move and not search.stands(move, first, element):
-            start = search.start(first, element, cycles[0])
-            found.parts.append((move, first - 1, element, start - 1))
-        idle = np.isnan(cycles[-1].depth) and number + 1 < len(runs) and search.same_hole(stop - 1, runs[number + 1][0])
+class Between(NamedTuple):
+    """Elements between two runs of holes, and the moves that they belong to; the elements may come in several parts.
+
+    Parameters
+    ----------
+    move_first, move_last : int
+        Both included.
+    first, stop : int
+        Elements; the latter is excluded.
+    final : bool
+        Whether no more elements belong to these moves.
+    """
+
+    move_first: int
+    move_last: int
+    first: int
+    stop: int
+    final: bool
+
+
+class Holes:
+    """Finds the elements of all holes, and checks them.
+
+    Parameters
+    ----------
+    original : Original
+    ahead : Ahead
+    axis_length : float, mm
+    """
+
+    def __init__(self, original: Original, ahead: Ahead, axis_length: float) -> None:
+        self._original, self._ahead = original, ahead
+        self._search = _Search(original, ahead, axis_length)
+        #: move of the hole that an element belongs to
+        self.element_move: dict[int, int] = {}
+        #: move as far as which words behind an element may stand: the element leaves the last hole and ends where that
+        #: move does, or the holes from it to that move are not drilled
+        self.shared: dict[int, int] = {}
+        #: moves of the holes at whose bottom the tool waits, and for how many ms
+        self.dwells: list[tuple[int, float]] = []
+        #: CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside a hole, CS564 a feed that is not a hole's
+        self.problems: list[Problem] = []
+
+    def between(self) -> Iterator[Between]:
+        """Say what lies before, between and behind the runs of holes, as it is read."""
+        original, ahead = self._original, self._ahead
+        hole = original.program.kind[original.pose] == Move.HOLE
+        moves = len(original.pose)
+        edges = np.flatnonzero(np.diff(hole, prepend=False, append=False))
+        all_cycles = drillings(original.program, original.pose[hole].tolist())
+        move = element = used = 0
+        runs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+        for number, (first, stop) in enumerate(runs):
+            cycles = all_cycles[used : used + stop - first]
+            used += stop - first
+            if first > move and not self._search.stands(move, first, element):
+                for begin, found in self._search.starts(first, element, cycles[0]):
+                    yield Between(move, first - 1, element, begin, found)
+                    element = begin
+                    ahead.forget(element - _KEPT)
+            above = runs[number + 1][0] if number + 1 < len(runs) else None
+            idle = above is not None and np.isnan(cycles[-1].depth) and self._search.same_hole(stop - 1, above)
+            element = self._drilled(first, stop, element, cycles, idle=idle)
+            ahead.forget(element - _KEPT)
+            # the move out of the last hole starts wherever the tool has been left
+            loose = stop < moves and original.program.kind[original.pose[stop]] != Move.RAPID
+            move = stop - 1 if loose else stop
+        while ahead.has(element):
+            yield Between(move, moves - 1, element, ahead.count, False)
+            element = ahead.count
+            ahead.forget(element - _KEPT)
+        yield Between(move, moves - 1, element, element, True)
+
+    def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling], *, idle: bool) -> int:
+        """Check the holes of a run; return the first element behind them."""
+        search, ahead = self._search, self._ahead
         groups, element = search.consume(first, stop, start, idle=idle)
-        if stop < moves:
+        if stop < len(self._original.pose):
             groups[-1], element = search.give_back(stop, groups[-1], cycles[-1], element)
-            if element < elements and search.exact(stop, np.array([element]))[0]:
-                found.shared[element] = stop
-        if all(nc.kind[k] == Element.RAPID for k in groups[-1]):
+            if ahead.has(element) and search.exact(stop, np.array([element]))[0]:
+                self.shared[element] = stop
+        if all(ahead.nc.kind[k - ahead.base] == Element.RAPID for k in groups[-1]):
             before = [k for group in groups[:-1] for k in group]
             last = max(before, default=max(start - 1, 0))
-            found.shared[last] = stop - 1
-            while first and not before and last > 0 and search.exact(first - 1, np.array([last - 1]))[0]:
+            self.shared[last] = stop - 1
+            while first and not before and last > ahead.base and search.exact(first - 1, np.array([last - 1]))[0]:
                 last -= 1  # said twice, as behind a tool change
-                found.shared[last] = stop - 1
+                self.shared[last] = stop - 1
         for k, group in enumerate(groups):
-            found.element_move.update(dict.fromkeys(group, first + k))
-            found.problems += search.check(
-                first + k, group, cycles[k], alone=not search.repeats(first, stop, first + k)
-            )
+            self.element_move.update(dict.fromkeys(group, first + k))
+            again = search.repeats(first, stop, first + k)
+            self.problems += search.check(first + k, group, cycles[k], alone=not again)
             if group and cycles[k].dwell:
-                found.dwells.append((first + k, cycles[k].dwell))
-        # the move out of the last hole starts wherever the tool has been left
-        loose = stop < moves and original.program.kind[original.pose[stop]] != Move.RAPID
-        move = stop - 1 if loose else stop
-    if move < moves or element < elements:
-        found.parts.append((move, moves - 1, element, elements - 1))
-    return found
+                self.dwells.append((first + k, cycles[k].dwell))
+        return element
 
 
 class _Search:
     """Looks for holes in the text."""
 
-    def __init__(self, original: Original, nc: Elements, axis_length: float) -> None:
-        self.original, self.nc, self.axis_length = original, nc, axis_length
+    def __init__(self, original: Original, ahead: Ahead, axis_length: float) -> None:
+        self.ahead, self.axis_length = ahead, axis_length
         program = original.program
         self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]
         self.line = program.line[original.pose]
-        second = nc.second_step * (axis_length if nc.second_is == "vector" else 1.0)
-        self.room = _STEPS * (nc.tip_step + second)
+
+    @property
+    def room(self) -> float:
+        """Distance that the printed digits account for, mm."""
+        nc = self.ahead.nc
+        return _STEPS * (nc.tip_step + nc.second_step * (self.axis_length if nc.second_is == "vector" else 1.0))
 
     def exact(self, move: int, elements: Ints) -> Bools:
         """(k,) whether elements end exactly at a move's pose."""
         tip = np.broadcast_to(self.tip[move], (len(elements), 3))
         axis = np.broadcast_to(self.axis[move], (len(elements), 3))
-        same: Bools = digit_errors(self.nc, elements, tip, axis, self.axis_length)[0]
+        same: Bools = digit_errors(self.ahead.nc, elements - self.ahead.base, tip, axis, self.axis_length)[0]
         return same
 
     def heights(self, move: int, elements: Ints) -> Floats:
         """(k,) mm above the hole's pose at the ends of elements; NaN beside the hole or with another axis."""
-        nc = self.nc
-        away = nc.tip[elements] - self.tip[move]
+        nc, own = self.ahead.nc, elements - self.ahead.base
+        away = nc.tip[own] - self.tip[move]
         height = away @ self.axis[move]
         beside = np.linalg.norm(away - height[:, None] * self.axis[move], axis=1)
-        turned = np.linalg.norm(directions(nc, nc.tip[elements], nc.second[elements]) - self.axis[move], axis=1)
+        turned = np.linalg.norm(directions(nc, nc.tip[own], nc.second[own]) - self.axis[move], axis=1)
         on = (beside <= self.room) & (turned * self.axis_length <= 2 * self.room)
         return np.where(on, height, np.nan)
 
     def stands(self, move: int, hole: int, element: int) -> bool:
         """Whether the moves before a hole lead nowhere: the tool is where they end, and goes on over the hole."""
-        if not 0 < element < len(self.nc) or np.isnan(self.heights(hole, np.array([element]))[0]):
+        if not element or not self.over(hole, element):
             return False
         return all(self.exact(k, np.array([element - 1]))[0] for k in range(move, hole))
 
@@ -224,23 +303,35 @@ class _Search:
         apart = np.linalg.norm(self.tip[one] - self.tip[other]), np.linalg.norm(self.axis[one] - self.axis[other])
         return bool(apart[0] <= self.room and apart[1] * self.axis_length <= 2 * self.room)
 
-    def start(self, hole: int, element: int, cycle: Drilling) -> int:
-        """First element of a run of holes: behind the pose before it, where the text goes over to the first hole.
+    def over(self, move: int, element: int) -> bool:
+        """Whether there is such an element, and it ends in the line of the hole."""
+        return self.ahead.has(element) and not np.isnan(self.heights(move, np.array([element]))[0])
 
-        There need be nothing at a hole whose cycle cannot be carried out.
+    def starts(self, hole: int, element: int, cycle: Drilling) -> Iterator[tuple[int, bool]]:
+        """Look for the first element of a run of holes, and say how far it is not yet met, and where it is.
+
+        It is behind the pose before it, where the text goes over to the first hole. There need be nothing at a hole
+        whose cycle cannot be carried out. A text that never goes over to it has its holes, if any, behind
+        where it has met that pose, or behind what has been given out as before them.
         """
-        reached = None
-        for begin in range(element, len(self.nc), _WINDOW):
-            window = np.arange(begin, min(begin + _WINDOW, len(self.nc)))
+        reached: int | None = None
+        begin = given = element
+        while self.ahead.has(begin + _WINDOW) or self.ahead.has(begin):
+            window = np.arange(begin, min(begin + _WINDOW, self.ahead.count))
             for k in window[self.exact(hole - 1, window)].tolist():
                 reached = k if reached is None or k == reached + 1 else reached  # the same place twice: as new
-                if np.isnan(cycle.depth):
-                    continue
-                if k + 1 < len(self.nc) and not np.isnan(self.heights(hole, np.array([k + 1]))[0]):
-                    return int(k) + 1
+                if not np.isnan(cycle.depth) and self.over(hole, k + 1):
+                    yield k + 1, True
+                    return
+            begin += len(window)
             if reached is not None and np.isnan(cycle.depth):
-                return int(reached) + 1
-        return element if reached is None else int(reached) + 1
+                break
+            if reached is not None and begin - reached > _UNDECIDED:
+                reached = None
+            if reached is None and begin - given >= _TOGETHER:
+                yield begin, False
+                given = begin
+        yield (given if reached is None else reached + 1), True
 
     def consume(self, first: int, stop: int, element: int, *, idle: bool) -> tuple[list[list[int]], int]:
         """Elements of each hole, and the element behind them all.
@@ -254,7 +345,7 @@ class _Search:
             entered = np.nan
             if idle and move == stop - 1 and first:
                 entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
-            while element < len(self.nc):
+            while self.ahead.has(element):
                 height = self.heights(move, np.array([element]))[0]
                 if np.isnan(height) or abs(height - entered) > self.room:
                     break
@@ -266,13 +357,20 @@ class _Search:
             groups.append(group)
         return groups, element
 
+    def feeds(self, group: list[int]) -> list[int]:
+        """Elements of a group that are no rapids."""
+        return [k for k in group if self.ahead.nc.kind[k - self.ahead.base] != Element.RAPID]
+
+    def nc_line(self, element: int) -> int:
+        """NC line of an element."""
+        return int(self.ahead.nc.line[element - self.ahead.base])
+
     def give_back(self, move: int, group: list[int], cycle: Drilling, end: int) -> tuple[list[int], int]:
         """Elements of the last hole, and the first of what follows: a move out of the hole may be the CL file's own.
 
         A rapid may be both, the retreat and the next pose; a feed move is not the hole's then.
         """
-        nc = self.nc
-        feeds = [k for k in group if nc.kind[k] != Element.RAPID]
+        feeds = self.feeds(group)
         deepest = -1
         if feeds and not np.isnan(cycle.depth):
             height = self.heights(move - 1, np.array(feeds))
@@ -284,7 +382,7 @@ class _Search:
         if not len(same):
             return group, end
         first = int(same[0])
-        keep = first if nc.kind[first] != Element.RAPID else first + 1
+        keep = first if self.feeds([first]) else first + 1
         return [k for k in group if k < keep], first
 
     def repeats(self, first: int, stop: int, move: int) -> bool:
@@ -293,16 +391,15 @@ class _Search:
 
     def check(self, move: int, group: list[int], cycle: Drilling, *, alone: bool) -> list[Problem]:
         """Depth, feeds and rapids of one hole; `alone`: it is drilled once."""
-        nc, cl_line = self.nc, int(self.line[move])
-        feeds = [k for k in group if nc.kind[k] != Element.RAPID]
+        cl_line, feeds = int(self.line[move]), self.feeds(group)
         known = not np.isnan(cycle.depth)
         if not feeds:
             if known and cycle.depth > self.room:
-                near = int(nc.line[group[0]]) if group else 0
+                near = self.nc_line(group[0]) if group else 0
                 return [Problem("CS561", cl_line, near, "a hole of the CL file is not drilled")]
             return []
         if not known:
-            return [Problem("CS564", cl_line, int(nc.line[feeds[0]]), "the cycle does not say what is fed here")]
+            return [Problem("CS564", cl_line, self.nc_line(feeds[0]), "the cycle does not say what is fed here")]
         problems = []
         height = dict(zip(group, self.heights(move, np.array(group)).tolist(), strict=True))
         before = self.heights(move, np.array([max(group[0] - 1, 0)]))[0]
@@ -310,11 +407,11 @@ class _Search:
         off = height[deepest] + cycle.depth
         if abs(off) > self.room:
             text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
-            problems.append(Problem("CS562", cl_line, int(nc.line[deepest]), text, abs(off)))
+            problems.append(Problem("CS562", cl_line, self.nc_line(deepest), text, abs(off)))
         drilled = 0.0
         for k in group:
-            line = int(nc.line[k])
-            if nc.kind[k] == Element.RAPID:
+            line = self.nc_line(k)
+            if not self.feeds([k]):
                 if height[k] < -drilled - self.room:
                     amount = -drilled - height[k]
                     text = f"a rapid goes {amount:.4f} mm into the uncut hole"
@@ -322,13 +419,14 @@ class _Search:
             else:
                 if k == group[0] and np.isnan(before):
                     problems.append(Problem("CS563", cl_line, line, "a feed move enters a hole from the side"))
+                nc, own = self.ahead.nc, k - self.ahead.base
                 wrong = not np.isnan(cycle.feed) and (
-                    abs(nc.feed[k] - cycle.feed) > 2 * abs(nc.feed_room[k])
-                    or (np.isnan(nc.feed_room[k]) and nc.feed[k] > cycle.feed + ARITHMETIC)
-                    or nc.per_revolution[k] != cycle.per_revolution
+                    abs(nc.feed[own] - cycle.feed) > 2 * abs(nc.feed_room[own])
+                    or (np.isnan(nc.feed_room[own]) and nc.feed[own] > cycle.feed + ARITHMETIC)
+                    or nc.per_revolution[own] != cycle.per_revolution
                 )
                 if wrong:
-                    text = f"the feed is {nc.feed[k]:g}, the cycle says {cycle.feed:g}"
+                    text = f"the feed is {nc.feed[own]:g}, the cycle says {cycle.feed:g}"
                     problems.append(Problem("CS541", cl_line, line, text))
                 down = height.get(k - 1, np.inf) > height[k]
                 if alone and down and drilled > self.room and self.room < -height[k] <= drilled + self.room:
@@ -336,5 +434,5 @@ class _Search:
                 drilled = max(drilled, -height[k])
         if height[group[-1]] < -self.room:
             text = "the tool leaves a hole sideways"
-            problems.append(Problem("CS563", cl_line, int(nc.line[group[-1]]), text, -height[group[-1]]))
+            problems.append(Problem("CS563", cl_line, self.nc_line(group[-1]), text, -height[group[-1]]))
         return problems
