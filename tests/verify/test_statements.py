@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.model import Move, Program, Source, Statement
-from cornersmooth.nc_reader import reader
+from cornersmooth.nc_reader import block_tables, reader
 from cornersmooth.verify import drilling, verify
 
 from .writing import HEAD, TAIL, encode
@@ -209,17 +209,19 @@ def test_holes_are_the_same_however_the_text_is_read(changes, monkeypatch):
     program = said(CYCLE, OFF, kind=KINDS, tip=HOLES)
     whole = verify(program, drilled(**changes), tolerance=0.01)
     monkeypatch.setattr(reader, "GIVEN_OUT", 1)
+    monkeypatch.setattr(block_tables, "CHUNK", 40)
     assert repr(verify(program, drilled(**changes), tolerance=0.01)) == repr(whole)
     assert whole.passed == (not changes)
 
 
 def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     """What cannot belong to the holes any more is not held, though the pose before them is met early, too."""
-    path = [[0.0, 0, 20], *([float(x), 0, 5] for x in range(40)), *HOLES]
-    kinds = [Move.RAPID, *[Move.LINEAR] * 40, *KINDS]
-    program = said(Statement(42, 3, "CYCLE", CYCLE.args), Statement(44, 9, "CYCLE", ("OFF",)), kind=kinds, tip=path)
-    lines = [("G0", 0, 0, 20), *(("G1", x, 0, 5) for x in range(40)), *DRILLED]
+    path = [[0.0, 0, 20], *([float(x), 3, 5] for x in range(400)), *HOLES]
+    kinds = [Move.RAPID, *[Move.LINEAR] * 400, *KINDS]
+    program = said(Statement(402, 3, "CYCLE", CYCLE.args), Statement(404, 9, "CYCLE", ("OFF",)), kind=kinds, tip=path)
+    lines = [("G0", 0, 0, 20), *(("G1", x, 3, 5) for x in range(400)), *DRILLED]
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
+    monkeypatch.setattr(block_tables, "CHUNK", 60)
     for name, value in (("_WINDOW", 2), ("_TOGETHER", 4), ("_UNDECIDED", 8)):
         monkeypatch.setattr(drilling, name, value)
     held = []
@@ -228,5 +230,5 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
         drilling.Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1]
     )
     assert codes(program, text("G43.5 H1", *lines)) == []
-    assert max(held) < 30
-    assert "CS562" in codes(program, text("G43.5 H1", *lines[:43], ("G1", 0, 0, -7), *lines[44:]))
+    assert max(held) < 200
+    assert "CS562" in codes(program, text("G43.5 H1", *lines[:403], ("G1", 0, 0, -7), *lines[404:]))
