@@ -106,7 +106,7 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
     say("corners", f"{summary['smoothed']} of {summary['corners']} rounded" + (f" ({kept})" if kept else ""))
     say(
         "limited by",
-        f"tolerance at {summary['limited_by_tolerance']} corners, segment length at {summary['limited_by_segment']}",
+        f"the tolerance ({summary['limited_by_tolerance']} of them), segment length ({summary['limited_by_segment']})",
     )
     say(
         "error",
