@@ -68,7 +68,7 @@ def test_functions_of_the_control_are_asked_for_by_name() -> None:
     assert "CYCLE832(0.00500,_ORI_FINISH,0.02865)" in lines
     assert [line for line in lines_of("--with", "aicc") if line.startswith("G5.1")] == ["G5.1 Q1", "G5.1 Q0"]
     code, said = refusal("--control", "heidenhain", "--with", "cycle832")
-    assert (code, said) == (2, "error: heidenhain has no function 'cycle832'; leave it out")
+    assert (code, said) == (2, "error: heidenhain has no function 'cycle832'; choose one of cycle32")
 
 
 def test_comments_may_be_left_out() -> None:

@@ -67,7 +67,7 @@ ENDS = {
         ["M9", "FUNCTION RESET TCPM", "L Z-1 R0 FMAX M91", "M5", "M30", "END PGM CORNERSMOOTH MM"],
     ),
     "linuxcnc": (
-        ["(CORNERSMOOTH)", SAFE, "G64 P0.01250 Q0", "G53 G0 Z0"],
+        ["(CORNERSMOOTH)", SAFE, "G64 P0.01350 Q0", "G53 G0 Z0"],
         ["G53 G0 Z0", "G49", "M5", "G0 A0.000000 C0.000000", "M2"],
     ),
     "mitsubishi": (["%", "O0001", SAFE, *UP], [*UP, "G49", "M5", "M30", "%"]),
@@ -335,4 +335,4 @@ def test_blending_is_never_without_limit(tolerance: float, units: Units, word: s
 
 def test_blending_is_the_share_of_the_tolerance_that_the_table_says() -> None:
     form = Case("linuxcnc", "g1", "xyzac-trt").choose()
-    assert "G64 P0.01250 Q0" in lines_of(form, CL)  # 0.25 of it
+    assert "G64 P0.01350 Q0" in lines_of(form, CL)  # 0.27 of it

@@ -122,7 +122,7 @@ def test_inverse_time_gives_the_tip_its_feed(case: Case) -> None:
 
 
 TURN = (
-    b"UNITS/MM\nLOADTL/4\nSPINDL/9000,RPM,CLW\nRAPID\nGOTO/0,0,0,0,0.6,0.8\nFEDRAT/800,MMPM\nGOTO/9,0,0\n"
+    b"UNITS/MM\nLOADTL/4\nSPINDL/9000,RPM,CLW\nRAPID\nGOTO/0,0,0,0,0.6,0.8\nFEDRAT/100,MMPM\nGOTO/9,0,0\n"
     b"GOTO/9,0,0,0,0.7,0.714142843\nGOTO/18,0,0\nFINI\n"
 )
 
@@ -149,9 +149,9 @@ def test_a_tool_that_only_turns(case: Case) -> None:
     if case.control == "linuxcnc" or not case.tcp:
         assert modes == {"G93"}
         time = sum(1.0 / piece.feed for piece in turns if piece.feed)
-        # the axis point runs with the feed: 10 mm away from the tip, 7.6 degrees
+        # the axis point, 10 mm away from the tip, runs with the feed: 7.6 degrees, slow enough for F of inverse time
         swing = 10.0 * np.arccos(0.6 * 0.7 + 0.8 * 0.714142843)
-        assert time == pytest.approx(swing / 800.0, rel=0.02)
+        assert time == pytest.approx(swing / 100.0, rel=0.02)
     else:
         assert modes == {found.pieces[1].mode}
         assert all(piece.feed is None for piece in turns)
