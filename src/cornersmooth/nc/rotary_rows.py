@@ -130,7 +130,7 @@ def rotary_rows(
             rate = np.minimum(rate, fastest)
         if rate is not None:
             rate = np.round(rate, INVERSE_TIME_DECIMALS)
-        check_travel(machine, filled.tip[own], filled.angles[own], line[here][filled.pose[own]], file)
+        check_travel(machine, filled.tip[own], filled.angles[own], line[filled.pose[own]], file)
         count = len(filled.pose[own])
         yield Rows(
             tip=filled.tip[own],
