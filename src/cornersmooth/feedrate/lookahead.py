@@ -67,7 +67,8 @@ def batch_of(grid: Grid, accel: Floats, jerk: Floats, coefficients: Floats | Non
     for end, at in ((first, first), (last, last - 1)):
         e = grid.width[end]
         with_unit_speed = use[2, end] * (2.0 / 9.0) / e**2 + use[3, end] * (4.0 / 3.0) / e + use[4, end]
-        node_cap[at] = np.minimum(node_cap[at], np.cbrt(with_unit_speed) ** -2)
+        with np.errstate(divide="ignore"):  # where nothing is asked for, nothing is limited
+            node_cap[at] = np.minimum(node_cap[at], np.cbrt(with_unit_speed) ** -2)
     cell_cap = grid.cap.copy()
     cell_cap[first] = FREE
     cell_cap[last] = FREE
