@@ -272,6 +272,9 @@ class NcProgram(Elements):
         Number of blocks that are not empty, ``%`` and comments left out.
     unsaid : frozenset
         Kinds of tokens (see `statements`), or pairs of kind and value, that the control has no words for.
+    along_tool : tuple of (int, bool)
+        Rapids straight along the tool beside retracts, which posts add: the element, and whether it goes back to the
+        retract from the element before or down from it to the element behind.
     """
 
     events: tuple[Event, ...]
@@ -279,6 +282,7 @@ class NcProgram(Elements):
     units: Units
     blocks: int
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
+    along_tool: tuple[tuple[int, bool], ...] = ()
 
     @property
     def mm_per_unit(self) -> float:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import MM_PER_UNIT, Ints, Units
+from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Units
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.dialects import CONTROLS
 from cornersmooth.nc_reader.dialects.base import HIGH_SPEED, INCREMENTAL
@@ -109,6 +109,7 @@ def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, n
         source.finish()
         reader = Reader(label, options, options.steps(source.head(DIGITS_SAMPLE)))
         reader.comments = []
+        reader.way_back.added = reader.note_along_tool
         parts = list(reader.chunks(read_lines(source, label, options.dialect.lexer)))
         return reader.program(parts)
     finally:
@@ -153,6 +154,14 @@ class Reader:
         self.given: list[Elements] = []
         #: elements up to a rapid along the tool before a retract that nobody asked for
         self.withdrawn = -1
+        #: see `NcProgram.along_tool`
+        self.along_tool: list[tuple[int, bool]] = []
+
+    def note_along_tool(self, start: Floats, end: Floats, step: float, near: Floats) -> bool:
+        """Note a rapid along the tool beside a retract; whether the CL file has it must be found out later."""
+        back = np.array_equal(start, near)
+        self.along_tool.append((self.elements - back, bool(back)))
+        return False
 
     def chunks(self, items: Iterable[Table | Line]) -> Iterator[Elements]:
         """Take runs of motion blocks and other lines, and give out the path elements as they come."""
@@ -422,6 +431,7 @@ class Reader:
             units=self.units,
             blocks=self.blocks,
             unsaid=self.dialect.unsaid,
+            along_tool=tuple(self.along_tool),
         )
 
 

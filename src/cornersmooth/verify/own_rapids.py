@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from cornersmooth.model import Floats, Ints, Move
+from cornersmooth.nc_reader.elements import Elements, Event, NcProgram
 from cornersmooth.verify.task import Task
 
 #: printed digits that ends may be off
@@ -51,3 +52,23 @@ class OwnRapids:
             for tips, tip in ((self.tip, near), (self.tip[self.rapid], far))
         )
         return known and not gone_to
+
+    def left_out(self, nc: NcProgram) -> tuple[Elements, list[Event]]:
+        """Elements and events of a text that was read before, where rapids that posts add do not move the tool.
+
+        Parameters
+        ----------
+        nc : NcProgram
+        """
+        elements = Elements(**{column.name: getattr(nc, column.name) for column in fields(Elements)})
+        tip, second = nc.tip.copy(), nc.second.copy()
+        withdrawn = set()
+        for element, back in nc.along_tool:
+            start, end = (element - 1, element) if back else (element, element + 1)
+            near = start if back else end
+            if self.added(tip[start], tip[end], nc.tip_step, tip[near]):
+                tip[element], second[element] = tip[near], second[near]
+                if back:  # words behind it belong where it comes from
+                    withdrawn.add(element + 1)
+        events = [replace(event, element=event.element - (event.element in withdrawn)) for event in nc.events]
+        return replace(elements, tip=tip, second=second), events

@@ -6,7 +6,7 @@ import contextlib
 import os
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from inspect import signature
 from types import TracebackType
@@ -147,8 +147,8 @@ class Verifier:
         return self._of_text(task, self._text) if isinstance(self._text, Source) else self._of_read(task, self._text)
 
     def _of_read(self, task: Task, nc: NcProgram) -> Verification:
-        elements = Elements(**{column.name: getattr(nc, column.name) for column in fields(Elements)})
-        text = _Text(iter([elements.at_most() if self._slower else elements]), list(nc.events))
+        elements, events = OwnRapids(task).left_out(nc)
+        text = _Text(iter([elements.at_most() if self._slower else elements]), events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
         found = measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
         return replace(found, unverified="the words of the text: they are looked at where it is read, not afterwards")
