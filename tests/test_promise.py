@@ -24,7 +24,7 @@ from oracle.judge import feeds_out_of_place, judge, not_passed, runs_of
 from oracle.library import exact_poses, original_motion, write
 from oracle.motion import Path as Motion
 from oracle.motion import written_path
-from oracle.nc_text import Code, Curve, Form, Line, Written, parse
+from oracle.nc_text import Code, Curve, Form, Line, Written, parse, without_way_down
 from oracle.share import how_many, share
 
 TOLERANCES = (0.001, 0.01, 0.04, 0.15)
@@ -186,7 +186,7 @@ def whole_file(path: Path, form: Form, tolerance: float, axis_length: float) -> 
     """The file from its first pose to its last, rapids included, keeps the tolerance and passes its poses."""
     program = cornersmooth.read(path)
     written, smoothed, _ = write(program, form, tolerance, axis_length)
-    start, *rest = written_path(written, axis_length, tolerance, rapids=True)
+    start, *rest = written_path(without_way_down(written), axis_length, tolerance, rapids=True)
     assert not rest
     if not (program.kind == Move.HOLE).any():  # what a hole cycle does between its poses is not of the CL path
         original = original_motion(program, tolerance)

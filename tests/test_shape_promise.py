@@ -20,7 +20,7 @@ from oracle.files import cl_file, of_corpus
 from oracle.judge import feeds_out_of_place, judge, not_passed, runs_of
 from oracle.library import exact_poses, original_motion
 from oracle.motion import written_path
-from oracle.nc_text import Curve, Form, Written, parse
+from oracle.nc_text import Curve, Form, Written, parse, without_way_down
 from oracle.share import how_many, share
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -96,7 +96,7 @@ def keeps_the_promise(path: Path, form: Form, options: dict[str, Any]) -> None:
     tolerance, axis_length = 0.04, 20.0
     program = cornersmooth.read(path)
     written, smoothed = write(program, form, {"tolerance": tolerance, "axis_length": axis_length, **options})
-    start, *rest = written_path(written, axis_length, tolerance, rapids=True)
+    start, *rest = written_path(without_way_down(written), axis_length, tolerance, rapids=True)
     assert not rest
     found = deviation(start, original_motion(program, tolerance), axis_length, tolerance)
     assert found.worst <= tolerance, found

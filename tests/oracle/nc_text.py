@@ -6,8 +6,10 @@ is followed as far as the rules need it. Rules of G06.2: FANUC 15i programming m
 
 from __future__ import annotations
 
+import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Literal
 
 Form = Literal["g1", "g6.2"]
@@ -351,3 +353,29 @@ class _Grammar:
         second = self.scale if self.form == "g6.2" else 1.0
         x, y, z, i, j, k = (float(word) for word in words)
         return (x * self.scale, y * self.scale, z * self.scale, i * second, j * second, k * second)
+
+
+def without_way_down(written: Written) -> Written:
+    """The program without the rapids behind retracts that only begin the way down along the tool."""
+    if written.form == "g1":
+        return written
+    blocks, raised = list(written.blocks), False
+    for index, (one, other) in enumerate(pairwise(blocks)):
+        if isinstance(one, Code):
+            raised = raised or "G28" in one.text
+        elif raised:
+            raised = False
+            if isinstance(one, Line) and isinstance(other, Line) and one.rapid and other.rapid and _above(one, other):
+                blocks[index] = Code(one.line, "(way down)")
+                blocks[index + 1] = replace(other, start=one.start)
+    return replace(written, blocks=tuple(blocks))
+
+
+def _above(one: Line, other: Line) -> bool:
+    """Whether the tool comes straight down along itself, by 20 mm."""
+    up = [second - tip for tip, second in zip(other.end[:3], other.end[3:], strict=True)]
+    length = math.sqrt(sum(part * part for part in up))
+    return all(
+        abs(there - here - 20.0 * part / length) < 1e-3
+        for there, here, part in zip(one.end[:3], other.end[:3], up, strict=True)
+    )
