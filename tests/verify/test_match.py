@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cornersmooth.model import Program
+from cornersmooth.verify import verify
 from cornersmooth.verify.guide import STRIDE, cut, guide
 from cornersmooth.verify.nearest import nearest_from
 from cornersmooth.verify.polyline import Polyline
 
-from .writing import wavy
+from .writing import HEAD, TAIL, encode, place_g1, rapid, unit, wavy
 
 FAR = 0.03
 
@@ -114,3 +116,22 @@ def test_cut_leaves_no_doubt():
     path = Polyline.of(loops)
     found = guide(loops, path.length, path, 0.0, (0, len(loops) - 2), FAR)
     np.testing.assert_allclose(found[1], path.length[found[0]], atol=1e-9)
+
+
+@pytest.mark.parametrize(("off", "doubts"), [(0.01, False), (0.0101, True)], ids=["kept", "not kept"])
+def test_all_of_the_tolerance_is_no_doubt_where_tip_and_axis_point_are_near_other_places(off, doubts, monkeypatch):
+    """Tip and axis point lie 0.003 mm apart along the path: nearest to both, the tip is farther off than by itself."""
+    from cornersmooth.verify import match
+
+    program = Program.from_poses([[0, 0, 0], [10, 0, 0], [20, 0, 0]], [[0, 0, 1.0]] * 3, feed=100.0)
+    tip = np.array([[5, off, 0], [10, 0, 0], [20, 0, 0]])
+    axis = unit([[0.003, -off, 10], [0, 0, 1], [0, 0, 1]])
+    lines = [*HEAD, "G43.5 H1", rapid(program.tip[0], program.axis[0], 10.0, "g1", decimals=6)]
+    lines += ["G1 " + place_g1(*pose, 6) + " F100." * (k == 0) for k, pose in enumerate(zip(tip, axis, strict=True))]
+    assigned = []
+    monkeypatch.setattr(match, "assign", lambda six, *_: assigned.append(six))
+    found = verify(program, encode([*lines, *TAIL]), tolerance=0.01)
+    assert found.together_tip.value > off + 5e-5
+    assert found.passed != doubts
+    assert bool(assigned) == doubts
+    assert found.max_tip_deviation_mm == pytest.approx(off, abs=1e-9)

@@ -18,7 +18,7 @@ from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.assignment import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.batches import Batch
 from cornersmooth.verify.guide import LONG, STRIDE, guide
-from cornersmooth.verify.nearest import nearest_from
+from cornersmooth.verify.nearest import Metric, nearest_from, nearest_places
 from cornersmooth.verify.polyline import CHORD_SHARE, Original, Polyline, Written, written_motion
 from cornersmooth.verify.task import Task
 
@@ -34,6 +34,9 @@ _MOST_FUTILE = 8
 
 #: slack of arithmetic on lengths, mm
 _ARITHMETIC = 1e-9
+
+#: what may be near its path on its own
+_ALONE: tuple[Metric, ...] = ("tip", "axis point")
 
 #: parts of NC blocks beyond which nothing is looked for
 _MOST_PARTS = 16
@@ -285,7 +288,8 @@ class _Search:
             square = np.maximum(
                 np.einsum("ij,ij->i", away[:, :3], away[:, :3]), np.einsum("ij,ij->i", away[:, 3:], away[:, 3:])
             )
-            doubtful[rows] = square > limit**2
+            rows = rows[square > limit**2]
+            doubtful[rows] = ~self._near_alone(rows, limit)
             apart = np.zeros_like(apart)  # looked at once
             windows = doubtful_windows(doubtful, self.number, around, most_windows + 1)
             if around > ROUNDS[0][0] and len(windows) > most_windows:
@@ -297,6 +301,18 @@ class _Search:
                 futile = 0 if self._doubts(part) < before else futile + bool(before)
                 if futile > _MOST_FUTILE:
                     return  # nor here
+
+    def _near_alone(self, rows: Ints, limit: float) -> Bools:
+        """(k,) whether tip and axis point each keep the limit from the segment of the place or from one beside it.
+
+        The place nearest to both together is nearest to neither: a corner that uses all of the tolerance seems to miss
+        it by a little there, which is no doubt about its place. Places that were held or assigned stay in doubt.
+        """
+        near = self.nearest[rows]
+        six, middle, low, high = self.six[rows], self.segment[rows], self.low[rows], self.high[rows]
+        for metric in _ALONE:
+            near &= nearest_places(six, self.path.six, middle, 1, low, high, metric)[2] <= limit**2
+        return near
 
     def _doubts(self, part: slice) -> int:
         """How many vertices are too far away or in the wrong order."""
