@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import pty
 import re
 import stat
 import subprocess
@@ -19,13 +18,12 @@ from oracle.command import (
     DONE,
     SMALL,
     USAGE,
-    command,
-    environment,
     message,
     only,
     quiet,
     run,
     run_process,
+    seen_on_a_terminal,
 )
 from oracle.nc_text import Line, parse
 
@@ -150,27 +148,8 @@ def test_no_colour_and_no_progress_bar_in_a_file(large: Path, tmp_path: Path) ->
 
 @pytest.mark.parametrize("no_color", [True, False])
 def test_colour_on_a_terminal_unless_no_color(small: Path, tmp_path: Path, no_color: bool) -> None:
-    leader, follower = pty.openpty()
     extra = {"NO_COLOR": "1"} if no_color else {}
-    process = subprocess.Popen(
-        command("smooth", small, "-o", tmp_path / "o.nc"),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=follower,
-        env=environment(TERM="xterm-256color", **extra),
-    )
-    os.close(follower)
-    seen = b""
-    while True:
-        try:
-            part = os.read(leader, 65536)
-        except OSError:  # the other end is closed
-            break
-        if not part:
-            break
-        seen += part
-    os.close(leader)
-    assert process.wait() == DONE
+    seen = seen_on_a_terminal("smooth", small, "-o", tmp_path / "o.nc", out=False, TERM="xterm-256color", **extra)
     assert seen
     coloured = re.search(rb"\x1b\[[0-9;]*(?:3[1-7]|9[0-7]|38;5;\d+)m", seen) is not None
     assert coloured is not no_color

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
-import pty
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,7 +11,7 @@ import pytest
 from cornersmooth import extras
 from cornersmooth.cli.files import Beginning
 from cornersmooth.nc import control_aliases, control_names, load_control
-from oracle.command import DONE, SMALL, USAGE, command, environment, run
+from oracle.command import DONE, SMALL, USAGE, run, seen_on_a_terminal
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"
 IMPELLER = SAMPLES / "impeller.cls"
@@ -170,26 +167,7 @@ def test_the_beginning_of_a_text(size: int) -> None:
 
 @pytest.mark.parametrize("options", [(), ("-o", "-")])
 def test_a_terminal_is_not_flooded(options: tuple[str, ...]) -> None:
-    leader, follower = pty.openpty()
-    process = subprocess.Popen(
-        command("smooth", IMPELLER, *options),
-        stdin=subprocess.DEVNULL,
-        stdout=follower,
-        stderr=follower,
-        env=environment(TERM="xterm"),
-    )
-    os.close(follower)
-    seen = b""
-    while True:
-        try:
-            part = os.read(leader, 65536)
-        except OSError:  # the other end is closed
-            break
-        if not part:
-            break
-        seen += part
-    os.close(leader)
-    assert process.wait() == DONE
+    seen = seen_on_a_terminal("smooth", IMPELLER, *options, TERM="xterm")
     lines = seen.decode().splitlines()
     assert lines[0] == "%"
     assert ("M30" in lines) == bool(options)

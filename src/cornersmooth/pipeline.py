@@ -23,7 +23,7 @@ from cornersmooth.errors import Finding, InputError, PromiseError
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
-from cornersmooth.nc_reader import CONTROLS, read_nc
+from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
 from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
 from cornersmooth.provenance import Provenance
 from cornersmooth.report import report
@@ -128,6 +128,12 @@ def reading_back(form: Form) -> dict[str, Any]:
         "tcp": form.orientation != "machine",
         "words": not form.table.own,
     }
+
+
+def read_back(text: bytes | str, form: Form, settings: Settings, name: str | None = None) -> NcProgram:
+    """Read a text of the form, or the file that holds it, as its control does; see `nc_reader.read_nc`."""
+    how = {key: value for key, value in reading_back(form).items() if key != "words"}
+    return read_nc(text, **how, name=name, tolerance=settings.verified_tolerance, axis_length=settings.axis_length)
 
 
 def postprocess(
@@ -262,15 +268,13 @@ def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form:
     from cornersmooth.feedrate import block_feeds, plan_text
     from cornersmooth.nc.planned_feeds import PlannedFeeds
 
-    how = {**reading_back(form), "tolerance": settings.verified_tolerance, "axis_length": settings.axis_length}
-    how.pop("words")
-    read_back = read_nc(text, name=program.source.name, **how)
+    written = read_back(text, form, settings, program.source.name)
     machine = form.machine if form.machine is not None and form.machine.dynamics else None
-    law = plan_text(read_back, limits, name=program.source.name, settings=settings, machine=machine)
+    law = plan_text(written, limits, name=program.source.name, settings=settings, machine=machine)
     line, feed, minutes = block_feeds(law)
     # of several elements of a block, which have one feed, the first
-    element = np.searchsorted(read_back.line, line)
-    return PlannedFeeds(line, feed, minutes, read_back.feed[element]).write(
+    element = np.searchsorted(written.line, line)
+    return PlannedFeeds(line, feed, minutes, written.feed[element]).write(
         text, form, program.units, program.mm_per_unit
     )
 

@@ -15,7 +15,7 @@ from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Arcs, Floats, Ints, Move, Program
 from cornersmooth.nc import Form
-from cornersmooth.nc_reader import read_nc
+from cornersmooth.pipeline import read_back
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import Settings
 
@@ -117,14 +117,7 @@ def _written_time(program: Program, settings: Settings, form: Form, limits: Limi
     """Time of the text from the first to the last pose of the program: without its way there and back."""
     stream = io.BytesIO()
     nc.write(smoothing.smooth(program, settings), stream, form=form)
-    text = read_nc(
-        stream.getvalue(),
-        control=form.table.dialect,
-        machine=form.machine if form.rotary else None,
-        tcp=form.orientation != "machine",
-        tolerance=settings.verified_tolerance,
-        axis_length=settings.axis_length,
-    )
+    text = read_back(stream.getvalue(), form, settings)
     law = plan_text(text, limits, settings=settings, machine=machine)
     moves = written_motion(text, program.source.name, settings.axis_length).program
     begin, end = (_poses_at(moves, program, pose) for pose in (0, len(program) - 1))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import pty
 import signal
 import subprocess
 import sys
@@ -118,6 +119,31 @@ def started(*args: str | Path, session: bool = False) -> Iterator[subprocess.Pop
             yield process
         finally:
             process.kill()
+
+
+def seen_on_a_terminal(*args: str | Path, out: bool = True, **changes: str) -> bytes:
+    """What a terminal shows of a run that ends well: standard error and, unless `out` is false, standard output."""
+    leader, follower = pty.openpty()
+    process = subprocess.Popen(
+        command(*args),
+        stdin=subprocess.DEVNULL,
+        stdout=follower if out else subprocess.DEVNULL,
+        stderr=follower,
+        env=environment(**changes),
+    )
+    os.close(follower)
+    seen = b""
+    while True:
+        try:
+            part = os.read(leader, 65536)
+        except OSError:  # the other end is closed
+            break
+        if not part:
+            break
+        seen += part
+    os.close(leader)
+    assert process.wait() == DONE
+    return seen
 
 
 def wait_for(condition: Callable[[], bool]) -> None:

@@ -101,22 +101,16 @@ def page_and_saving(
 
 def read_written(result: Result, frame: Frame | None = None) -> NcProgram:
     """Read the text of a run of `postprocess`; what went to a stream or a pipe is made once more."""
-    form, settings = result.form, result.smoothed.settings
+    from cornersmooth.pipeline import read_back
+
     text: bytes | str
     if result.path is None or not os.path.isfile(result.path):
         stream = io.BytesIO()
-        write(result.smoothed, stream, form=form, frame=frame)
+        write(result.smoothed, stream, form=result.form, frame=frame)
         text = stream.getvalue()
     else:
         text = result.path
-    return read_nc(
-        text,
-        control=form.table.dialect,
-        machine=form.machine if form.rotary else None,
-        tcp=form.orientation != "machine",
-        tolerance=settings.verified_tolerance,
-        axis_length=settings.axis_length,
-    )
+    return read_back(text, result.form, result.smoothed.settings)
 
 
 def verified_page(
