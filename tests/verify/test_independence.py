@@ -16,6 +16,7 @@ ALLOWED = (
     "cornersmooth.nc_reader",
     "cornersmooth.model",
     "cornersmooth.errors",
+    "cornersmooth.processes",  # who does the work, not how
     "cornersmooth.settings",
     "cornersmooth.text",
     "cornersmooth.kinematics.machine",  # what a machine is; its kinematics are the verification's own

@@ -65,7 +65,7 @@ class Ending:
 
 
 def _kill_children() -> None:
-    """End processes that were forked for the verification."""
+    """End processes that were forked to help."""
     process = sys.modules.get("multiprocessing.process")
     for child in process.active_children() if process else ():
         child.kill()

@@ -29,13 +29,13 @@ Where is what:
 - checks (`checks` lists them): `deviation`, `backtracking`, `feeds`, `continuity`; they share `distances`, with
   `wide_search`, `hull_bounds`; what they find is in `findings`
 - words: `statements` (beside the motion), `word_check` against `nc_reader.word_list`
-- all of it: `verifier`, `result`, with `workers`; `along` for pictures
+- all of it: `verifier`, `result`; `along` for pictures
 """
 
+from cornersmooth.processes import useful_processes
 from cornersmooth.verify.along import Distribution, deviation_along
 from cornersmooth.verify.result import Verification, Where
 from cornersmooth.verify.verifier import Verifier, verify
-from cornersmooth.verify.workers import useful_processes
 
 __all__ = [
     "Distribution",

@@ -21,6 +21,7 @@ from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.reader import CONTROL_WORDS, Reader
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.source import Source, readable_twice
+from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
 from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.checks import Examined, examine
@@ -32,7 +33,6 @@ from cornersmooth.verify.statements import Token, asked, compare, said
 from cornersmooth.verify.task import Task
 from cornersmooth.verify.wide_search import way_apart
 from cornersmooth.verify.word_check import WordCheck
-from cornersmooth.verify.workers import Helper, can_fork, map_in_processes
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine

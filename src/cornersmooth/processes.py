@@ -30,7 +30,7 @@ _AHEAD: Final = 5
 _CONTEXT: Final = get_context("fork" if sys.platform == "linux" else None)
 
 #: what is said of a process that has gone without a word, which is what a system short of memory does
-_ENDED: Final = "a process of the verification was ended"
+_ENDED: Final = "a process that helped was ended"
 
 
 def useful_processes() -> int:

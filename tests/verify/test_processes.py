@@ -12,12 +12,13 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from cornersmooth import processes as crews
 from cornersmooth.model import Move, Program
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify import batches, verifier, verify, workers
+from cornersmooth.verify import batches, verifier, verify
 
 from .writing import wavy
 
@@ -27,7 +28,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux fork
 @pytest.mark.parametrize("processes", [1, 2, 3])
 @pytest.mark.parametrize("count", [0, 1, 4, 5, 40])
 def test_results_come_in_order(processes, count):
-    found = list(workers.map_in_processes(lambda item: (item, os.getpid()), range(count), processes))
+    found = list(crews.map_in_processes(lambda item: (item, os.getpid()), range(count), processes))
     assert [item for item, _ in found] == list(range(count))
     used = {process for _, process in found}
     if processes > 1:
@@ -39,7 +40,7 @@ def test_results_come_in_order(processes, count):
 
 def test_large_items_and_results_do_not_stand_still():
     data = bytes(3_000_000)
-    found = list(workers.map_in_processes(lambda item: item[1] * 2, ((k, data) for k in range(12)), 2))
+    found = list(crews.map_in_processes(lambda item: item[1] * 2, ((k, data) for k in range(12)), 2))
     assert [len(item) for item in found] == [6_000_000] * 12
 
 
@@ -53,7 +54,7 @@ def test_items_are_taken_a_fixed_number_ahead():
                 taken.append(len(given))
                 yield k
 
-        for found in workers.map_in_processes(lambda item: item, items(), processes):
+        for found in crews.map_in_processes(lambda item: item, items(), processes):
             given += [found]
         seen.append(taken)
     assert seen[0] == seen[1] == seen[2]
@@ -66,7 +67,7 @@ def test_error_of_a_process_is_raised_here():
         return item
 
     with pytest.raises(ValueError, match="seventeen"):
-        list(workers.map_in_processes(work, range(30), 2))
+        list(crews.map_in_processes(work, range(30), 2))
 
 
 def test_process_that_is_killed_is_want_of_memory():
@@ -76,13 +77,13 @@ def test_process_that_is_killed_is_want_of_memory():
         return item
 
     with pytest.raises(MemoryError):
-        list(workers.map_in_processes(work, range(30), 2))
+        list(crews.map_in_processes(work, range(30), 2))
 
 
 def test_nobody_is_left_behind():
     from multiprocessing import active_children
 
-    found = workers.map_in_processes(lambda item: item, range(30), 2)
+    found = crews.map_in_processes(lambda item: item, range(30), 2)
     assert next(found) == 0
     assert active_children()
     found.close()
@@ -99,7 +100,7 @@ def test_verification_is_the_same(monkeypatch):
     write(smooth(program, fit_settings(Settings(tolerance=0.02), choose_form(), "mm")), stream)
     nc = read_nc(stream.getvalue())
     used = []
-    monkeypatch.setattr(workers._Crew, "start", _counted(workers._Crew.start, used))
+    monkeypatch.setattr(crews._Crew, "start", _counted(crews._Crew.start, used))
     one, two = (verify(program, nc, tolerance=0.02, processes=processes) for processes in (1, 2))
     for field in fields(one):
         np.testing.assert_equal(getattr(one, field.name), getattr(two, field.name), err_msg=field.name)
@@ -115,7 +116,7 @@ def _counted(start, used):
 
 
 def test_helper_works_meanwhile():
-    helper = workers.Helper(lambda: (os.getpid(), bytes(1_000_000)))
+    helper = crews.Helper(lambda: (os.getpid(), bytes(1_000_000)))
     process, data = helper.result()
     helper.end()
     assert process != os.getpid()
@@ -126,14 +127,14 @@ def test_helper_raises_what_its_work_raises():
     def work():
         raise ValueError("helper")
 
-    helper = workers.Helper(work)
+    helper = crews.Helper(work)
     with pytest.raises(ValueError, match="helper"):
         helper.result()
     helper.end()
 
 
 def test_helper_that_is_killed_is_want_of_memory():
-    helper = workers.Helper(lambda: os.kill(os.getpid(), signal.SIGKILL))
+    helper = crews.Helper(lambda: os.kill(os.getpid(), signal.SIGKILL))
     with pytest.raises(MemoryError):
         helper.result()
     helper.end()
@@ -149,9 +150,9 @@ def test_helper_that_is_sent_away_leaves_nobody_behind(tmp_path):
             time.sleep(0.02)
             return k
 
-        return list(workers.map_in_processes(item, range(10**6), 2))
+        return list(crews.map_in_processes(item, range(10**6), 2))
 
-    helper = workers.Helper(work)
+    helper = crews.Helper(work)
     while len(list(tmp_path.iterdir())) < 2:
         time.sleep(0.005)
     used = [int(path.name) for path in tmp_path.iterdir()]
