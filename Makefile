@@ -10,6 +10,9 @@ WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 run: $(STAMP)  ## install into .venv, smooth the samples, show what came out
 	$(BIN)/python samples/show.py
 
+# the many processes that tests start load what the first has compiled
+test thorough: export PYTHONDONTWRITEBYTECODE =
+
 test: $(STAMP)  ## the whole test suite, on all processors
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 

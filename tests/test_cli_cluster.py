@@ -1,32 +1,55 @@
-"""A batch on a real cluster of two processes, one of which is killed."""
+"""A batch on a real cluster of two processes, one of which is killed; it is started as docs/batch.md says."""
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
+import re
+import shlex
 import signal
 import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from cornersmooth.cli.cluster import do
 from cornersmooth.cli.job import Job
 from interruptions import cl_text
-from oracle.command import USAGE, command, environment, run
+from oracle.command import DONE, SCRIPT, USAGE, command, environment, run, wait_for
 
 FILES = 5
 
 
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "batch.md"
+
+
+def shown(start: str) -> list[str]:
+    """Words of the one line of the page that begins so, without its remark."""
+    (line,) = re.findall(rf"^    ({start}.*)", PAGE.read_text(), re.MULTILINE)
+    return shlex.split(line.replace(" &", ""), comments=True)
+
+
 @pytest.fixture(scope="module")
-def cluster() -> Iterator[Any]:
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
-    ) as made:
-        yield made
+def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The scheduler file of a cluster of two processes, started by the lines of the page but for ports and number."""
+    pytest.importorskip("distributed")
+    shared = tmp_path_factory.mktemp("shared")
+    changed = {"/shared/scheduler.json": str(shared / "scheduler.json"), "16": "2"}
+    with contextlib.ExitStack() as stack:
+        for words, ports in ((shown("dask scheduler"), ["--port", "0"]), (shown("dask worker"), [])):
+            process = subprocess.Popen(
+                [SCRIPT.parent / words[0], *(changed.get(word, word) for word in words[1:]), *ports, "--no-dashboard"],
+                cwd=shared,
+                env=environment(),
+                stderr=subprocess.DEVNULL,
+            )
+            stack.enter_context(process)
+            stack.callback(process.terminate)
+        wait_for(lambda: (shared / "scheduler.json").exists())
+        yield shared / "scheduler.json"
 
 
 @pytest.fixture
@@ -42,11 +65,11 @@ def files_in(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-def test_a_lost_worker_loses_no_file(cluster: Any, folder: Path, tmp_path: Path) -> None:
+def test_a_lost_worker_loses_no_file(scheduler: Path, folder: Path, tmp_path: Path) -> None:
     (folder / "bad.cls").write_text("GOTO/nan\n")
     here, there = tmp_path / "here", tmp_path / "there"
     plain = run("smooth", "cl", "-d", "here", cwd=tmp_path)
-    words = command("smooth", "cl", "-d", "there", "--scheduler", cluster.scheduler_address)
+    words = command("smooth", "cl", "-d", "there", "--scheduler", scheduler)
     process = subprocess.Popen(words, stderr=subprocess.PIPE, env=environment(), cwd=tmp_path)
     while not list(there.rglob(".part*.part")):  # a worker is at one
         assert process.poll() is None
@@ -60,8 +83,22 @@ def test_a_lost_worker_loses_no_file(cluster: Any, folder: Path, tmp_path: Path)
     lines, others = (text.decode().splitlines() for text in (said, plain.stderr))
     assert [line.rpartition(",")[0] for line in lines[:-1]] == [line.rpartition(",")[0] for line in others[:-1]]
     assert lines[-1] == others[-1] == f"{FILES + 1} files: {FILES} done, 1 failed"
-    again = run("smooth", "cl", "-d", "there", "--scheduler", cluster.scheduler_address, cwd=tmp_path)
+    address = json.loads(scheduler.read_text())["address"]
+    again = run("smooth", "cl", "-d", "there", "--scheduler", address, cwd=tmp_path)
     assert again.stderr.decode().splitlines()[-1] == f"{FILES + 1} files: {FILES} skipped, 1 failed"
+
+
+def test_the_commands_of_the_page_work(scheduler: Path, folder: Path, tmp_path: Path) -> None:
+    lines = [line for line in PAGE.read_text().splitlines() if "--scheduler " in line and line.startswith("    corner")]
+    address = json.loads(scheduler.read_text())["address"]
+    assert len(lines) == 2
+    for line in lines:
+        there = line.replace("/shared/scheduler.json", str(scheduler)).replace("tcp://host:8786", address)
+        result = run(*shlex.split(there)[1:], cwd=tmp_path)
+        assert result.returncode == DONE, result.stderr.decode()
+    assert result.stderr.decode().splitlines()[-1] == f"{FILES} files: {FILES} skipped"
+    assert len(files_in(tmp_path / "nc")) == FILES
+    assert len((tmp_path / "made.csv").read_text().splitlines()) == FILES + 1
 
 
 @pytest.mark.parametrize(
