@@ -39,6 +39,17 @@ def test_sample_keeps_the_tolerance(case: Case) -> None:
     assert found.deviation.worst <= 0.02, found
 
 
+def test_line_out_of_the_pole_keeps_the_axis() -> None:
+    """The turntable turns by 90 degrees at the pole: spread over the long line behind it, it would swing the axis."""
+    axis = np.array([[0.25, 0.25, 0.935], [0.0, 0.0, 1.0], [-0.25, 0.25, 0.935]])
+    tip = np.array([[0.0, 0.0, 0.0], [-8.0, 0.0, -8.0], [0.0, 8.0, -16.0]])
+    program = Program.from_poses(tip, axis / np.linalg.norm(axis, axis=1)[:, None], feed=1000.0)
+    case = next(case for case in LONG if str(case) == "linuxcnc-g1-xyzbc-trt")
+    settings = Settings(tolerance=0.1, axis_length=16.0, lines="long")
+    found = verdict(program, runs_of(program, 0.1), case, case.choose(endless=True), settings)
+    assert found.deviation.worst <= 0.1, found
+
+
 def dense_arc(count: int) -> Program:
     """A turn of 90 degrees about (0, 0, 1) with a radius of 50 mm, the tool leaning 20 degrees outwards."""
     angle = np.linspace(0.0, np.pi / 2.0, count)

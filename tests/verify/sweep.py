@@ -1,8 +1,8 @@
 """Does verification judge as an independent reader does? Random programs and files, by hand.
 
-``python -m verify.sweep [--seeds FIRST LAST] [--only CASE] [--eps MM]... [FILE]...`` prints a line for every text that
-is refused although the oracle finds it right, for every text that passes although it does not, and for every failure;
-exit code 1 for any. Programs with holes have no oracle: what is written for them must pass.
+``python -m verify.sweep [--seeds FIRST LAST] [--only CASE] [--method NAME] [--eps MM]... [FILE]...`` prints a line for
+every text that is refused although the oracle finds it right, for every text that passes although it does not, and for
+every failure; exit code 1 for any. Programs with holes have no oracle: what is written for them must pass.
 """
 
 from __future__ import annotations
@@ -103,6 +103,13 @@ def judged(
     return "passed", ""
 
 
+def with_method(one: Trial, method: str) -> Trial:
+    """The trial by another method of smoothing; as it is where that has another idea of its options."""
+    s, own = one.settings, Settings()
+    plain = s.but(shape=own.shape, allocation=own.allocation, weights=own.weights, orientation_tolerance=None)
+    return replace(one, settings=plain.but(method=method))
+
+
 def has_holes(program: Program) -> bool:
     """Whether what is cut is more than the CL file's own moves."""
     return bool((program.kind == Move.HOLE).any())
@@ -113,6 +120,7 @@ def main() -> int:
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--seeds", type=int, nargs=2, default=(0, 0))
     parser.add_argument("--only", default="", help="cases whose name holds this")
+    parser.add_argument("--method", default="", help="for all programs that a form can write with it")
     parser.add_argument("--eps", type=float, action="append", help="for files; may be repeated")
     parser.add_argument("--keep", type=Path, help="folder for the CL files of what goes wrong")
     given = parser.parse_args()
@@ -136,6 +144,8 @@ def main() -> int:
 
     for seed in range(*given.seeds):
         one: Trial = trial(seed, only=given.only)
+        if given.method:
+            one = with_method(one, given.method)
         take(
             str(one), one.case, one.cl.encode(), one.settings, oracle=one.oracle, digits=one.digits, planned=one.planned
         )

@@ -51,6 +51,7 @@ def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> Li
         (lambda position, words: tip_position(machine, position, words))
         if machine is not None and form.orientation == "machine"
         else None,
+        rotary=machine is not None,
     )
 
 

@@ -4,8 +4,9 @@ Many controls run the faster, the longer lines are: each must be able to stop wi
 vertex a line goes to the farthest vertex that it can reach within ε. Vertices are points of the smoothed motion.
 
 A line is compared with the original motion at a common parameter, as transitions are (design 3.2): both run evenly
-between two points at which the original is known, so that their tips are farthest apart at one of these. The parameter
-is the length of the original in six dimensions. It never runs backwards, so the paths are as near, both ways.
+between two points at which the original is known, so that their tips are farthest apart at one of these. Rotary words
+bend the motion between these points, so they are also compared halfway. The parameter is the length of the original in
+six dimensions. It never runs backwards, so the paths are as near, both ways.
 """
 
 from __future__ import annotations
@@ -80,6 +81,8 @@ class LineLimits:
         Unit tool axes (m, 3) of words (m, d).
     tip_of : callable or None
         Tips (m, 3) of positions of the linear axes (m, 3) and words (m, d), where rows have such positions.
+    rotary : bool
+        Whether words are angles: the tool axis then does not run evenly with them.
     blend, lag : float, mm
         How far the tip may be off a corner of lines that the control rounds by itself, and how far the axis point may
         lag behind the tip there by the estimate of `lags`.
@@ -93,6 +96,7 @@ class LineLimits:
     blend: float = 0.0
     lag: float = np.inf
     tip_of: Callable[[Floats, Floats], Floats] | None = None
+    rotary: bool = False
 
 
 def segments_of_rows(move: Ints, begin: int, end: int) -> tuple[Ints, Bools]:
@@ -274,7 +278,7 @@ def _reaches(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bool
 def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
     inner = end - start - 1
     kept = _off(rows, limits, start, end, inner, halves=False) <= _USED
-    if limits.tip_of is not None:  # between positions of the axes the tip runs on a bow, largest between the rows
+    if limits.rotary:  # between rotary words tool axis and tip run on bows, largest about halfway between rows
         kept &= _off(rows, limits, start, end, inner + 1, halves=True) <= _USED
     if rows.position is not None:
         kept &= _in_order(rows, limits, start, end)
@@ -323,9 +327,9 @@ def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints
     if limits.tip_of is not None:
         tip = limits.tip_of(tip, words)
     axis_point = tip + limits.axis_length * limits.axis_of(words)
-    off = np.maximum(
-        norm(tip - at(rows.original_tip)) / limits.tip,
-        norm(axis_point - at(rows.original_axis_point)) / limits.axis_point,
-    )
+    original_tip = at(rows.original_tip)
+    lever = at(rows.original_axis_point) - original_tip
+    lever *= (limits.axis_length / np.maximum(norm(lever), np.finfo(np.float64).tiny))[:, None]
+    off = np.maximum(norm(tip - original_tip) / limits.tip, norm(axis_point - original_tip - lever) / limits.axis_point)
     largest: Floats = np.maximum.reduceat(off, first)
     return largest
