@@ -19,11 +19,11 @@ Where is what:
 - what a text is: `source` (bytes), `reading_options` (control, machine, digits), `dialects` (grammar), `word_list`
 - bytes to tables: `lexer`, `words`, `block_tables`, `line_patterns`
 - tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `long_curves`, `rotary`;
-  `way_back` leads back from retracts
-- what comes out: `elements`; `curves` evaluates them
+  `needed_states` says which words want another state; `way_back` leads back from retracts
+- what comes out: `path_elements`, `elements`; `curves` evaluates them; `reading` puts a whole text together
 """
 
 from cornersmooth.nc_reader.elements import Event, NcProgram, Problem
-from cornersmooth.nc_reader.reader import CONTROLS, read_nc
+from cornersmooth.nc_reader.reading import CONTROLS, read_nc
 
 __all__ = ["CONTROLS", "Event", "NcProgram", "Problem", "read_nc"]

@@ -1,119 +1,32 @@
-"""NC text to `NcProgram`: what a control makes of it, block by block, with nothing known of who wrote it."""
+"""Holds the modal state of a control while lines are read, and gives out path elements as they come."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from typing import Any, Final, NoReturn
 
 import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Units
-from cornersmooth.nc_reader.block_tables import read_lines
-from cornersmooth.nc_reader.dialects import CONTROLS
-from cornersmooth.nc_reader.dialects.base import HIGH_SPEED, INCREMENTAL
-from cornersmooth.nc_reader.elements import (
-    Curves,
-    Element,
-    Elements,
-    Event,
-    NcArcs,
-    NcProgram,
-    Problem,
-    Second,
-    settle,
-)
+from cornersmooth.nc_reader.dialects.base import INCREMENTAL
+from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Executed, Modal, execute
-from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions, Steps
-from cornersmooth.nc_reader.source import Source, readable_twice
+from cornersmooth.nc_reader.needed_states import AxisWords, curve_problem
+from cornersmooth.nc_reader.path_elements import in_mm, path_elements
+from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
 from cornersmooth.nc_reader.way_back import WayBack
-from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Line, Table, joined_tables
-
-if TYPE_CHECKING:
-    from cornersmooth.kinematics.machine import Machine
-
-__all__ = ["CONTROLS", "read_nc"]
+from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables
 
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1
-
-#: code of words that want another state of the control
-CONTROL_WORDS: Final = "CS506"
 
 #: runs of fewer blocks are executed together: each folded block of Klartext is a run of its own
 FEW_ROWS: Final = 64
 
 #: elements that are given out together
 GIVEN_OUT: Final = 1 << 15
-
-#: words that say what is in force when it must be
-_NEEDS = {
-    "vector": "a tool vector",
-    "point": "a second point on the tool axis",
-    "angles": "tip and rotary words",
-    "machine": "words of the machine's axes",
-}
-
-
-def read_nc(
-    data: bytes | str | os.PathLike[str],
-    *,
-    control: str = "fanuc",
-    machine: Machine | None = None,
-    tcp: bool = True,
-    name: str | None = None,
-    tolerance: float = 0.01,
-    axis_length: float = 10.0,
-) -> NcProgram:
-    """Read an NC text.
-
-    Parameters
-    ----------
-    data : bytes or path
-        The text itself, or the file that holds it.
-    control : str
-        One of `CONTROLS`.
-    machine : Machine, optional
-        That the rotary words of the text are for; without one it has tool vectors, axis points or a fixed tool.
-    tcp : bool
-        Whether X Y Z are the tip, or positions of the machine's axes.
-    name : str, optional
-        Name for messages; the file's own by default.
-    tolerance, axis_length : float, mm
-        How fine motion in rotary words is resolved: to a two-hundredth of `tolerance` at tip and axis point.
-
-    Returns
-    -------
-    NcProgram
-        What breaks the rules of the control is in `NcProgram.problems`, as far as the rest can be understood.
-
-    Raises
-    ------
-    InputError
-        CS501 where the text is not made of words, CS503 for words that make it impossible to tell where the tool is.
-    SettingsError
-        CS204 for an unknown control, CS215 for positions of a machine that is not named.
-    """
-    return read_styled(
-        data, ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length), name
-    )
-
-
-def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, name: str | None = None) -> NcProgram:
-    """Read an NC text; see `read_nc`."""
-    label = name if name is not None or isinstance(data, bytes) else str(data)
-    source = Source(readable_twice(data))
-    try:
-        source.finish()
-        reader = Reader(label, options, options.steps(source.head(DIGITS_SAMPLE)))
-        reader.comments = []
-        reader.way_back.added = reader.note_along_tool
-        parts = list(reader.chunks(read_lines(source, label, options.dialect.lexer)))
-        return reader.program(parts)
-    finally:
-        source.close()
 
 
 class Reader:
@@ -141,7 +54,7 @@ class Reader:
         self.late: list[tuple[Line, str, float, str]] = []
         self.comments: list[tuple[int, str]] | None = None
         self.problems: list[Problem] = []
-        self.complained: set[tuple[str, str]] = set()
+        self._axis_words = AxisWords(self.dialect)
         self.lever, self._given_lever = 0.0, lever
         self.elements = self.given_out = self.curves = 0
         #: elements before any word of a second point on the axis
@@ -225,7 +138,7 @@ class Reader:
             self.problems.extend(run.problems)
             unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
             unit = 1.0 if before.inverse_time else unit
-            run = _in_mm(run, factor, unit, points=self.modal.points)
+            run = in_mm(run, factor, unit, points=self.modal.points)
             run.feed_room += self.dialect.feed_step / 2 * unit
             if self.rotary is not None:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
@@ -265,38 +178,10 @@ class Reader:
         if self.rotary is not None:
             lever = self.lever if self._given_lever is None else self._given_lever
             steps = replace(self.rotary, tip_step=steps[0]).steps(lever)
-        curves = run.curves
-        size = curves.points + curves.order
-        self.ready.append(
-            Elements(
-                kind=run.kind,
-                tip=run.tip,
-                second=run.second,
-                line=run.line,
-                feed=run.feed,
-                per_revolution=run.per_revolution,
-                feed_room=run.feed_room,
-                second_room=np.zeros(len(run.kind)),
-                curves=Curves(
-                    run.curve_element,
-                    curves.order,
-                    np.cumsum(curves.points) - curves.points,
-                    curves.points,
-                    np.cumsum(size) - size,
-                    curves.control,
-                    curves.weight,
-                    curves.knot,
-                ),
-                arcs=NcArcs(run.arc_element, run.arc_centre, run.arc_normal, run.arc_sweep),
-                second_is=second_is,
-                tip_step=steps[0],
-                second_step=steps[1],
-                rotary=self.rotary is not None,
-            )
-        )
+        self.ready.append(path_elements(run, second_is, steps, rotary=self.rotary is not None))
         self.way_back.look_along(self.ready[-1])
         self.elements += len(run.kind)
-        self.curves += len(curves)
+        self.curves += len(run.curves)
         if not self.placed and (run.kind != Element.RAPID).any():
             self._settle()
 
@@ -388,83 +273,14 @@ class Reader:
         """Give up: words that make it impossible to tell where the tool is."""
         raise InputError("CS503", what, hint, file=self.name, line=line.number)
 
-    def _check_control(self, table: Table, code: float, approach: frozenset[int] = frozenset()) -> None:
-        """Complain, once for each state, of words that the control would not take for what they are."""
-        needed = self.dialect.curves_need
-        if needed and not self.memory.get(HIGH_SPEED) and (curves := np.flatnonzero(table.column("G") == NURBS)).size:
-            text = f"a curve where {needed} must be in force"
-            self.problems.append(Problem(CONTROL_WORDS, 0, int(table.line[curves[0]]), text))
-        letters = table.columns.keys()
+    def _check_control(self, table: Table, code: float, approach: frozenset[int]) -> None:
+        """Complain of words that the control would not take for what they are."""
         if self.rotary is not None:
-            kind = "angles" if self.rotary.tip_control else "machine"
-            used = letters & set(self.rotary.names)
+            kind, letters = ("angles" if self.rotary.tip_control else "machine"), set(self.rotary.names)
         else:
-            kind = "point" if self.modal.points else "vector"
-            used = letters & set("UVW" if self.modal.points else "IJ")
-        wanted = self.dialect.controls.get(kind)
-        if wanted is None or not used or self.tip_control in wanted or (kind, self.tip_control) in self.complained:
-            return
-        rows = table.rows_with(used, code)
-        if approach:  # from the height of a retract rotary axes turn before the control is told of the tip
-            rows = rows[[int(number) not in approach for number in table.line[rows]]]
-        if not len(rows):
-            return
-        self.complained.add((kind, self.tip_control))
-        need = " or ".join(word or "no tool tip control" for word in wanted)
-        text = f"{_NEEDS[kind]} under {self.tip_control or 'no tool tip control'}, where {need} must be in force"
-        self.problems.append(Problem(CONTROL_WORDS, 0, int(table.line[rows[0]]), text))
-
-    def program(self, parts: list[Elements]) -> NcProgram:
-        """Put all that was given out together."""
-        elements = Elements.joined(parts) if parts else _nothing(self.steps)
-        events = list(self.events)
-        comments = self.comments or []
-        place = np.searchsorted(elements.line, [number for number, _ in comments])
-        events.extend(
-            Event(int(element), number, "(", 0.0, text) for element, (number, text) in zip(place, comments, strict=True)
+            kind, letters = ("point", set("UVW")) if self.modal.points else ("vector", set("IJ"))
+        found = (
+            curve_problem(table, self.dialect, self.memory),
+            self._axis_words.problem(table, kind, letters, self.tip_control, code, approach),
         )
-        events.sort(key=lambda event: event.line)
-        return NcProgram(
-            **vars(elements),
-            events=tuple(events),
-            problems=tuple(self.problems),
-            units=self.units,
-            blocks=self.blocks,
-            unsaid=self.dialect.unsaid,
-            along_tool=tuple(self.along_tool),
-        )
-
-
-def _nothing(steps: Steps) -> Elements:
-    """No elements at all."""
-    none, rows = np.zeros(0), np.zeros((0, 3))
-    return Elements(
-        kind=np.zeros(0, np.uint8),
-        tip=rows,
-        second=rows,
-        line=np.zeros(0, np.int64),
-        feed=none,
-        per_revolution=np.zeros(0, np.bool_),
-        feed_room=none,
-        second_room=none,
-        curves=Curves(),
-        arcs=NcArcs(),
-        second_is="vector",
-        tip_step=steps.tip,
-        second_step=steps.second,
-    )
-
-
-def _in_mm(run: Executed, factor: float, feed: float, *, points: bool) -> Executed:
-    """Lengths in millimetres; a factor of one leaves the numbers untouched."""
-    if factor == 1.0:
-        return run
-    columns = slice(0, 6 if points else 3)
-    run.curves.control[:, columns] *= factor
-    return replace(
-        run,
-        tip=run.tip * factor,
-        second=run.second * factor if points else run.second,
-        feed=run.feed * feed,
-        arc_centre=run.arc_centre * factor,
-    )
+        self.problems += [problem for problem in found if problem is not None]

@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.nc_reader.elements import NcProgram
-from cornersmooth.nc_reader.reader import read_nc
+from cornersmooth.nc_reader.reading import read_nc
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.distances import from_original, owner_fraction
 from cornersmooth.verify.match import Match, match

@@ -2,21 +2,20 @@
 
 A hole is a line through its pose along the tool axis. Between the pose before a run of holes and the pose behind it,
 the text may move only along these lines, one after another in the order of the CL file, and rapidly from line to line
-above the holes. How often it retracts is its own affair. How deep they are the CYCLE statements say, as far as they do
-so without any doubt.
+above the holes. How often it retracts is its own affair. How deep they are the CYCLE statements say
+(`cycles`), as far as they do so without any doubt.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints, Move, Program
+from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.verify.cycles import Drilling, drillings
 from cornersmooth.verify.polyline import Original, directions
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 
@@ -31,92 +30,6 @@ _TOGETHER, _KEPT = 1 << 14, 16
 
 #: last printed digits that a point may be beside its hole
 _STEPS = 1.0
-
-#: words of CYCLE: plain drilling, depths, feeds, and those that say nothing of either
-_PLAIN = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP"}
-_DEPTH = ("FEDTO", "DEPTH")
-_FEEDS = {"MMPM": (1.0, False), "IPM": (25.4, False), "MMPR": (1.0, True), "IPR": (25.4, True)}
-_OTHER = {"RAPTO", "CLEAR", "RTRCTO", "RETURN", "STEP", "INCR", "1STPECK", "SUBPECK", "DWELL"}
-
-
-@dataclass(frozen=True)
-class Drilling:
-    """What a hole should be.
-
-    Parameters
-    ----------
-    depth : float, mm
-        Below the pose, along the tool axis; NaN where the statement leaves it open.
-    feed : float
-        mm/min or mm/rev; NaN for the feed in force.
-    per_revolution : bool
-    dwell : float, ms
-        At the bottom; 0 for none.
-    """
-
-    depth: float = math.nan
-    feed: float = math.nan
-    per_revolution: bool = False
-    dwell: float = 0.0
-
-
-def drilling(args: tuple[float | str, ...], program: Program) -> Drilling:
-    """Interpret the arguments of a CYCLE statement.
-
-    Only pairs of a known word and one number, and words for plain drilling, are interpreted; with anything else in it
-    the whole statement is left open. NX counts depths upwards, all others downwards.
-    """
-    values: dict[str, float] = {}
-    kinds, word = set(), ""
-    for value in args:
-        if isinstance(value, str):
-            if word and word not in values:
-                return Drilling()
-            if value in _PLAIN:
-                kinds.add(value)
-                word = ""
-            elif value in _FEEDS or value in _DEPTH or value in _OTHER:
-                word = value
-            elif value:
-                return Drilling()
-        elif not word or (word in values and word != "STEP"):
-            return Drilling()
-        else:
-            values[word] = value
-    depths = [values[name] for name in _DEPTH if name in values]
-    if not kinds or len(depths) != 1:
-        return Drilling()
-    depth = depths[0]
-    if program.source.dialect == "nx":
-        depth = -depth
-    elif "DEPTH" not in values:
-        depth = abs(depth)
-    if depth < 0:
-        return Drilling()
-    feeds = [(values[name] * scale, turn) for name, (scale, turn) in _FEEDS.items() if name in values]
-    feed, per_revolution = feeds[0] if len(feeds) == 1 else (math.nan, False)
-    dwell = float(round(1000.0 * values.get("DWELL", 0.0)))
-    return Drilling(depth * program.mm_per_unit, feed, per_revolution, dwell)
-
-
-def drillings(program: Program, poses: list[int]) -> list[Drilling]:
-    """Cycle in force at each of the hole poses, ascending."""
-    found: list[Drilling] = []
-    state = last = Drilling()
-    cycles = [statement for statement in program.statements if statement.word == "CYCLE"]
-    k = 0
-    for pose in poses:
-        while k < len(cycles) and cycles[k].pose <= pose:
-            words = [value for value in cycles[k].args if isinstance(value, str) and value]
-            if words[:1] in (["OFF"], ["NOMORE"]):
-                state = Drilling()
-            elif words == ["ON"]:
-                state = last
-            elif words != ["INIT"]:
-                state = last = drilling(cycles[k].args, program)
-            k += 1
-        found.append(state)
-    return found
 
 
 class Ahead:

@@ -18,7 +18,8 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.model import Ints, Program, Units
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
-from cornersmooth.nc_reader.reader import CONTROL_WORDS, Reader
+from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
+from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.processes import Helper, can_fork, map_in_processes

@@ -1,0 +1,77 @@
+"""Motion words that a control takes for something else in another state: those of the axis and of curves (CS506)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Set
+from typing import Any, Final
+
+import numpy as np
+
+from cornersmooth.nc_reader.dialects.base import HIGH_SPEED, Dialect
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.words import NURBS, Table
+
+#: code of words that want another state of the control
+CONTROL_WORDS: Final = "CS506"
+
+#: what words of each kind are
+_KINDS = {
+    "vector": "a tool vector",
+    "point": "a second point on the tool axis",
+    "angles": "tip and rotary words",
+    "machine": "words of the machine's axes",
+}
+
+
+def curve_problem(table: Table, dialect: Dialect, memory: Mapping[str, Any]) -> Problem | None:
+    """Return what is wrong with the first curve of a run: some controls want look ahead of a certain kind with it."""
+    needed = dialect.curves_need
+    if not needed or memory.get(HIGH_SPEED) or not (curves := np.flatnonzero(table.column("G") == NURBS)).size:
+        return None
+    return Problem(CONTROL_WORDS, 0, int(table.line[curves[0]]), f"a curve where {needed} must be in force")
+
+
+class AxisWords:
+    """Complains once for each state of words of the axis that it does not take for what they are.
+
+    Parameters
+    ----------
+    dialect : Dialect
+    """
+
+    def __init__(self, dialect: Dialect) -> None:
+        self._wanted = dialect.controls
+        self._complained: set[tuple[str, str]] = set()
+
+    def problem(
+        self, table: Table, kind: str, letters: Set[str], tip_control: str, code: float, approach: Set[int]
+    ) -> Problem | None:
+        """Return what is wrong with a run of motion blocks.
+
+        Parameters
+        ----------
+        table : Table
+        kind : str
+            What its words of the axis are; a key of `Dialect.controls`.
+        letters : set of str
+            Addresses of such words.
+        tip_control : str
+            Tool tip control in force; empty for none.
+        code : float
+            G word of group 01 before the run.
+        approach : set of int
+            Lines on the way down from a retract: there rotary axes turn before the control is told of the tip.
+        """
+        wanted = self._wanted.get(kind)
+        used = table.columns.keys() & letters
+        if wanted is None or not used or tip_control in wanted or (kind, tip_control) in self._complained:
+            return None
+        rows = table.rows_with(used, code)
+        if approach:
+            rows = rows[[int(number) not in approach for number in table.line[rows]]]
+        if not len(rows):
+            return None
+        self._complained.add((kind, tip_control))
+        need = " or ".join(word or "no tool tip control" for word in wanted)
+        text = f"{_KINDS[kind]} under {tip_control or 'no tool tip control'}, where {need} must be in force"
+        return Problem(CONTROL_WORDS, 0, int(table.line[rows[0]]), text)

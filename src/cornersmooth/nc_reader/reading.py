@@ -1,0 +1,101 @@
+"""NC text to `NcProgram`: what a control makes of it, block by block, with nothing known of who wrote it."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cornersmooth.nc_reader.block_tables import read_lines
+from cornersmooth.nc_reader.dialects import CONTROLS
+from cornersmooth.nc_reader.elements import Elements, Event, NcProgram
+from cornersmooth.nc_reader.path_elements import no_elements
+from cornersmooth.nc_reader.reader import Reader
+from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
+from cornersmooth.nc_reader.source import Source, readable_twice
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
+
+__all__ = ["CONTROLS", "read_nc"]
+
+
+def read_nc(
+    data: bytes | str | os.PathLike[str],
+    *,
+    control: str = "fanuc",
+    machine: Machine | None = None,
+    tcp: bool = True,
+    name: str | None = None,
+    tolerance: float = 0.01,
+    axis_length: float = 10.0,
+) -> NcProgram:
+    """Read an NC text.
+
+    Parameters
+    ----------
+    data : bytes or path
+        The text itself, or the file that holds it.
+    control : str
+        One of `CONTROLS`.
+    machine : Machine, optional
+        That the rotary words of the text are for; without one it has tool vectors, axis points or a fixed tool.
+    tcp : bool
+        Whether X Y Z are the tip, or positions of the machine's axes.
+    name : str, optional
+        Name for messages; the file's own by default.
+    tolerance, axis_length : float, mm
+        How fine motion in rotary words is resolved: to a two-hundredth of `tolerance` at tip and axis point.
+
+    Returns
+    -------
+    NcProgram
+        What breaks the rules of the control is in `NcProgram.problems`, as far as the rest can be understood.
+
+    Raises
+    ------
+    InputError
+        CS501 where the text is not made of words, CS503 for words that make it impossible to tell where the tool is.
+    SettingsError
+        CS204 for an unknown control, CS215 for positions of a machine that is not named.
+    """
+    return read_styled(
+        data, ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length), name
+    )
+
+
+def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, name: str | None = None) -> NcProgram:
+    """Read an NC text; see `read_nc`."""
+    label = name if name is not None or isinstance(data, bytes) else str(data)
+    source = Source(readable_twice(data))
+    try:
+        source.finish()
+        reader = Reader(label, options, options.steps(source.head(DIGITS_SAMPLE)))
+        reader.comments = []
+        reader.way_back.added = reader.note_along_tool
+        parts = list(reader.chunks(read_lines(source, label, options.dialect.lexer)))
+        return _program(reader, parts)
+    finally:
+        source.close()
+
+
+def _program(reader: Reader, parts: list[Elements]) -> NcProgram:
+    """Put all that was given out together."""
+    elements = Elements.joined(parts) if parts else no_elements(reader.steps)
+    events = list(reader.events)
+    comments = reader.comments or []
+    place = np.searchsorted(elements.line, [number for number, _ in comments])
+    events.extend(
+        Event(int(element), number, "(", 0.0, text) for element, (number, text) in zip(place, comments, strict=True)
+    )
+    events.sort(key=lambda event: event.line)
+    return NcProgram(
+        **vars(elements),
+        events=tuple(events),
+        problems=tuple(reader.problems),
+        units=reader.units,
+        blocks=reader.blocks,
+        unsaid=reader.dialect.unsaid,
+        along_tool=tuple(reader.along_tool),
+    )
