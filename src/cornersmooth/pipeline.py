@@ -266,10 +266,11 @@ def postprocess(
 def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form: Form, limits: Limits) -> bytes:
     """The text with the feeds of its own plan."""
     from cornersmooth.feedrate import block_feeds, plan_text
+    from cornersmooth.kinematics import with_dynamics
     from cornersmooth.nc.planned_feeds import PlannedFeeds
 
     written = read_back(text, form, settings, program.source.name)
-    machine = form.machine if form.machine is not None and form.machine.dynamics else None
+    machine = with_dynamics(form.machine)
     law = plan_text(written, limits, name=program.source.name, settings=settings, machine=machine)
     line, feed, minutes = block_feeds(law)
     # of several elements of a block, which have one feed, the first

@@ -12,7 +12,7 @@ from cornersmooth import nc, smoothing
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.feedrate import Limits, direct, plan_text
 from cornersmooth.feedrate.written import written_motion
-from cornersmooth.kinematics import Machine
+from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Arcs, Floats, Ints, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import read_back
@@ -47,7 +47,7 @@ def estimate_saving(
     Saving or None
         None where nothing can be planned: without any feed, or out of reach of the machine.
     """
-    machine = form.machine if form.machine is not None and form.machine.dynamics else None
+    machine = with_dynamics(form.machine)
     feed = feed_times(program, limits)
     before = after = at_feed = 0.0
     planned = 0

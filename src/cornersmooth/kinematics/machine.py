@@ -214,5 +214,10 @@ class Machine:
         return "\n".join(lines)
 
 
+def with_dynamics(machine: Machine | None) -> Machine | None:
+    """Return the machine where it says how fast its axes may go; otherwise the tip alone has limits."""
+    return machine if machine is not None and machine.dynamics else None
+
+
 def _parallel(one: Floats, other: Floats) -> bool:
     return float(np.linalg.norm(np.cross(one, other))) < PARALLEL

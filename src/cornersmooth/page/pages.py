@@ -11,7 +11,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from cornersmooth.feedrate import Comparison, Limits
-from cornersmooth.kinematics import Machine
+from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Program
 from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.nc_reader import NcProgram, read_nc
@@ -243,13 +243,14 @@ def _measured_facts(found: Verification) -> list[tuple[str, str]]:
 def _limit_facts(limits: Limits, machine: Machine | None) -> list[tuple[str, str]]:
     from cornersmooth import __version__
 
+    machine = with_dynamics(machine)
     feed = "as programmed" if limits.feed is None else f"{limits.feed:g} mm/min"
     bundled = json.loads((files("cornersmooth.page") / "assets/vendor/versions.json").read_text(encoding="utf-8"))
     return [
         (
             "planned with",
             f"feed {feed}, {limits.accel:g} mm/s², {limits.jerk:g} mm/s³, period {1000.0 * limits.period:g} ms"
-            + (f", axes of {machine.name}" if machine is not None and machine.dynamics else ""),
+            + (f", axes of {machine.name}" if machine is not None else ""),
         ),
         ("made by", f"cornersmooth {__version__}, three.js {bundled['three']}, uPlot {bundled['uplot']}"),
     ]

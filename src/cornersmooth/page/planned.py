@@ -10,7 +10,7 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, direct, plan, plan_text
 from cornersmooth.feedrate.written import written_motion
-from cornersmooth.kinematics import Machine
+from cornersmooth.kinematics import Machine, with_dynamics
 from cornersmooth.model import Floats, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.motions import OriginalPath, WrittenPath
@@ -62,7 +62,7 @@ def plan_all(
     ways: dict[str, tuple[Floats, Floats]] = {}
     left_out: list[str] = []
     seconds = None
-    machine = machine if machine is not None and machine.dynamics else None
+    machine = with_dynamics(machine)
     try:
         for name, moves in (
             ("direct", len(program)),
