@@ -8,6 +8,7 @@ import re
 import stat
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -164,16 +165,27 @@ def test_help_has_examples(args: list[str]) -> None:
     assert re.search(rb"cornersmooth smooth \S+", result.stdout)
 
 
-@pytest.mark.parametrize("args", [["--help"], ["smooth", "--help"], ["verify", "--help"], ["time", "--help"]])
-def test_help_waits_for_nothing_it_does_not_need(args: list[str]) -> None:
-    """What takes long to import is imported where it is used."""
+def modules_of(args: Sequence[str]) -> set[str]:
+    """What is imported by a run that ends well."""
     code = f"import sys; from cornersmooth.cli import run; code = run({args}); print(code, *sys.modules, sep='\\n')"
     env = {name: value for name, value in os.environ.items() if not name.startswith("CORNERSMOOTH_")}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env)
     said = done.stdout.splitlines()
-    modules = said[said.index("0") :]
+    return set(said[said.index("0") :])
+
+
+@pytest.mark.parametrize("args", [["--help"], ["smooth", "--help"], ["verify", "--help"], ["time", "--help"]])
+def test_help_waits_for_nothing_it_does_not_need(args: list[str]) -> None:
+    """What takes long to import is imported where it is used."""
+    modules = modules_of(args)
     assert "cornersmooth.cli" in modules
-    assert not {"numpy", "scipy", "rich", "matplotlib", "difflib", "multiprocessing", "asyncio"} & set(modules)
+    assert not {"numpy", "scipy", "rich", "matplotlib", "difflib", "multiprocessing", "asyncio"} & modules
+
+
+def test_smoothing_alone_waits_for_no_planner(small: Path, tmp_path: Path) -> None:
+    modules = modules_of(["smooth", str(small), "-q", "-o", str(tmp_path / "out.nc")])
+    assert "cornersmooth.verify" in modules
+    assert not {"scipy", "cornersmooth.feedrate", "cornersmooth.page", "rich"} & modules
 
 
 def test_version() -> None:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.construction import construction_of
-from cornersmooth.smoothing.global_runs import RUN_CURVATURE
+from cornersmooth.smoothing.construction import RUN_CURVATURE, construction_of
 from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.vectors import angle_between, norm
 

@@ -13,6 +13,9 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing.corner_table import CornerTable, Placed, Remainders, ShapedCorners
 from cornersmooth.smoothing.transition import place_corners
 
+#: what `Corners.extra` may have: largest curvature of the curve of a run beside each of its corners, 1/mm
+RUN_CURVATURE = "run_curvature"
+
 
 class Construction(ABC):
     """A method: where it puts transitions, and where the tool is on them and between them."""

@@ -10,6 +10,7 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status
 from cornersmooth.settings import Settings
+from cornersmooth.smoothing.construction import RUN_CURVATURE
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.lines import TURNING, largest_curvature, points_at
@@ -31,10 +32,6 @@ ENDS_RUN = (
 #: degrees: where the axis turns by more in a segment, output in curves (which cannot change F inside one) has no run.
 #: Between two control points so far apart nothing but the curve itself tells where the tool is.
 STEEPEST = 30.0
-
-
-#: what `Corners.extra` has: largest curvature of the curve of a run beside each of its corners, 1/mm
-RUN_CURVATURE = "run_curvature"
 
 
 class GlobalRuns(Proportional):

@@ -106,9 +106,9 @@ def planned_limits_of(given: dict[str, Any]) -> Limits | None:
     UsageError
         Limits without `--feed-from-plan`.
     """
-    from cornersmooth.feedrate import Limits
-
     if given["feed_from_plan"]:
+        from cornersmooth.feedrate import Limits
+
         return Limits(**{name: given[name] for name in _PLANNED})
     context = click.get_current_context()
     for name in _PLANNED:
