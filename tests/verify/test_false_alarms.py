@@ -516,6 +516,27 @@ GOTO/31.3771,14.041,84.0306,0.2887762,0.2516499,0.9237319
 """,
 )
 
+#: a hole that is not drilled, beside the pose above it by digits of the CL file: the rapid to it is none along the tool
+HOLE_BESIDE_ITS_POSE = Alarm(
+    Case("linuxcnc", "g1", "xyzbc-trt", tcp=False),
+    0.008,
+    28.0,
+    """GOTO/-26.3356,-32.5305,-5.6760,-0.0290232,-0.1672982,0.9854791
+CYCLE/TAP,FEDTO,21.3650,MMPM,484.5854,RAPTO,3,RTRCTO,25
+GOTO/-25.6100,-28.3480,-30.3130,-0.0290232,-0.1672982,0.9854791
+CYCLE/OFF
+LOADTL/35
+RAPID
+GOTO/-26.3356,-32.5305,-5.6760,-0.0290232,-0.1672982,0.9854791
+CYCLE/BORE,FEDTO,18.9377,MMPM,838.9355,RAPTO,3,RTRCTO,25
+GOTO/-25.6100,-28.3480,-30.3130,-0.0290232,-0.1672982,0.9854791
+CYCLE/OFF
+LOADTL/19
+RAPID
+GOTO/-27.9319,-41.7319,48.5253,-0.0290232,-0.1672982,0.9854791
+""",
+)
+
 ALARMS = {
     "tapped and drilled": TAPPED_AND_DRILLED,
     "three times there": THREE_TIMES_THERE,
@@ -544,6 +565,7 @@ ALARMS = {
     "rapid within digits": RAPID_WITHIN_DIGITS,
     "stop and repeated": STOP_AND_REPEATED,
     "axis alone": AXIS_ALONE,
+    "hole beside its pose": HOLE_BESIDE_ITS_POSE,
 }
 
 

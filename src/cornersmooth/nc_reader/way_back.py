@@ -16,6 +16,9 @@ from cornersmooth.nc_reader.execution import Executed, Modal
 #: how far, mm and rad, a way along the tool may be off it: printed digits
 _ASIDE, _TURN = 1e-3, 1e-3
 
+#: shorter ways along the tool are none, mm: a pose and the line of its hole are as far apart in the digits of CL files
+_LEAST = 0.01
+
 
 class WayBack:
     """Leaves the rapids of the way back out of the path, and looks whether the tool comes straight down.
@@ -131,7 +134,7 @@ def _is_above(ends: Elements, above: int, below: int) -> bool:
     height = float(way @ axis[below])
     aside = float(np.linalg.norm(way - height * axis[below]))
     turned = float(np.linalg.norm(axis[above] - axis[below]))
-    return height > 0.0 and aside <= _ASIDE + _TURN * height and turned <= _TURN
+    return height > _LEAST and aside <= _ASIDE + _TURN * height and turned <= _TURN
 
 
 def _check_approach(above: Floats, run: Executed, arrival: int, line: int, problems: list[Problem]) -> None:
