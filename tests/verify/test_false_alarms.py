@@ -537,6 +537,37 @@ GOTO/-27.9319,-41.7319,48.5253,-0.0290232,-0.1672982,0.9854791
 """,
 )
 
+#: nothing moves at a hole that is not drilled, so that M5 is said, and M3 behind the tool change, in one place
+STOPPED_BEFORE_A_TOOL = Alarm(
+    Case("linuxcnc", "g1", "table-bc"),
+    0.001,
+    60.0,
+    """SPINDL/2960,RPM,CLW
+RAPID
+GOTO/-9.5380,36.9750,28.9630
+CYCLE/DRILL,FEDTO,7.4967,MMPM,669.3485,RAPTO,3,RTRCTO,25
+GOTO/-9.5380,36.9750,3.9630
+CYCLE/OFF
+SPINDL/OFF
+RAPID
+GOTO/-9.5380,36.9750,28.9630
+CYCLE/TAP,FEDTO,6.8161,MMPM,746.6020,RAPTO,3,RTRCTO,25
+GOTO/-9.5380,36.9750,3.9630
+CYCLE/OFF
+LOADTL/25
+SPINDL/17333,RPM,CLW
+RAPID
+GOTO/-9.5380,36.9750,83.9630
+LOADTL/36
+SPINDL/15357,RPM,CLW
+RAPID
+GOTO/-23.9270,-22.5140,26.2590
+LOADTL/26
+SPINDL/753,RPM,CLW
+SPINDL/OFF
+""",
+)
+
 ALARMS = {
     "tapped and drilled": TAPPED_AND_DRILLED,
     "three times there": THREE_TIMES_THERE,
@@ -565,6 +596,7 @@ ALARMS = {
     "rapid within digits": RAPID_WITHIN_DIGITS,
     "stop and repeated": STOP_AND_REPEATED,
     "axis alone": AXIS_ALONE,
+    "stopped before a tool": STOPPED_BEFORE_A_TOOL,
     "hole beside its pose": HOLE_BESIDE_ITS_POSE,
 }
 

@@ -331,7 +331,9 @@ def _offsets(text: Text, rng: np.random.Generator, each: int) -> Iterator[Mutant
         yield Mutant(
             "length offset lost", text.replaced(k, re.sub(r" H\d+", "", lines[k])), (k - 1, text.motion[0] + 3)
         )
-        yield Mutant("length switched on lost", text.replaced(k), (k - 1, text.motion[0] + 3))
+        # what is missing has no line of its own: named is the word before it that the CL file asks for
+        before = max(j for j in text.statements if j < k and re.search(r"\b[TMS]\d", lines[j]))
+        yield Mutant("length switched on lost", text.replaced(k), (before + 1, text.motion[0] + 3))
     if text.family == "heidenhain":
         for k in [k for k in text.statements if re.search(r"TOOL CALL \d+ Z", lines[k])]:
             other = re.sub(r"CALL (\d+)", lambda found: f"CALL {int(found[1]) + 1}", lines[k])

@@ -30,8 +30,9 @@ from cornersmooth.verify.findings import Findings, Largest, Poses
 from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
-from cornersmooth.verify.statements import Token, asked, compare, said
+from cornersmooth.verify.statements import Token, asked, said
 from cornersmooth.verify.task import Task
+from cornersmooth.verify.token_comparison import compare
 from cornersmooth.verify.wide_search import way_apart
 from cornersmooth.verify.word_check import WordCheck
 

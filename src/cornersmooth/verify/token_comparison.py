@@ -1,0 +1,175 @@
+"""Compares what the CL file asks for with what a text says: the same tokens, in order, between the right poses."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable
+
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.verify.statements import Token
+
+#: names and codes of kinds
+_NAMES = {
+    "tool": ("tool T{:g}", 551),
+    "next tool": ("next tool T{:g}", 551),
+    "offset": ("offset H{:g}", 559),
+    "spindle": ("spindle M{:g}", 552),
+    "speed": ("speed S{:g}", 552),
+    "coolant": ("coolant M{:g}", 553),
+    "compensation": ("cutter compensation G{:g}", 554),
+    "register": ("compensation register D{:g}", 554),
+    "stop": ("stop M{:g}", 555),
+    "dwell": ("dwell of {:g} ms", 556),
+    "end": ("end of program M{:g}", 557),
+    "auxiliary": ("M{:g}", 558),
+}
+
+#: what holds before anything is said; repeating it changes nothing
+_AT_START = {"spindle": 5.0, "coolant": 9.0, "compensation": 40.0, "offset": 1.0}
+
+#: states that a tool change and the end of the program may end by themselves
+_ENDED = {"spindle": 5.0, "coolant": 9.0, "compensation": 40.0}
+
+#: states that a tool change stops, to go on behind it
+_STOPPED = ("spindle", "coolant")
+
+#: kinds of which only changes count
+_STATES = ("tool", "offset", "spindle", "speed", "coolant", "compensation")
+
+
+def way_between(here: float, there: float) -> float:
+    """How far two places are apart along the path, mm."""
+    return abs(there - here)
+
+
+def compare(
+    asked_for: list[Token],
+    found: list[Token],
+    room: float,
+    unsaid: frozenset[str | tuple[str, float]] = frozenset(),
+    apart: Callable[[float, float], float] = way_between,
+) -> list[Problem]:
+    """Compare the two, kind by kind.
+
+    Parameters
+    ----------
+    asked_for, found : list of Token
+    room : float, mm
+        How far apart along the path the places of the same token may be.
+    unsaid : frozenset
+        Kinds, and pairs of kind and value, that the control has no words for.
+    apart : callable
+        How far, in mm, two places along the path are apart that differ by more than the room.
+    """
+    problems: list[Problem] = []
+    # what shifts the path counts wherever it is said
+    unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
+    asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
+    found = [token for token in found if token.kind not in unsaid]
+    plain = [token for token in found if token.kind == "stop" and token.value == 1.0 and not token.habit]
+    stops = [
+        token
+        for token in asked_for
+        if token.kind == "stop"
+        and token.value == 1.0
+        and all(_away(token.place, ours, room, apart) for ours in plain)  # else it is there anyway
+    ]
+    found = [
+        token for token in found if not token.habit or any(not _away(stop.place, token, room, apart) for stop in stops)
+    ]
+    end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
+
+    def tidies(token: Token, kind: str) -> bool:
+        """Whether a token only ends what ends with the program anyway."""
+        if token.kind != kind or token.value != _ENDED[kind]:
+            return False
+        return token.place >= end or not _away(end, token, room, apart)
+
+    def ended(tokens: list[Token], kind: str) -> int:
+        """How often a state is ended."""
+        return sum(token.value == _ENDED[kind] for token in _effective(tokens, kind))
+
+    for kind in _ENDED:
+        if ended(found, kind) > ended(asked_for, kind) and not any(tidies(token, kind) for token in asked_for):
+            found = [token for token in found if not tidies(token, kind)]
+    for kind, (name, code) in _NAMES.items():
+        theirs, ours = _effective(asked_for, kind), _effective(found, kind)
+        if kind in _STOPPED and _values(theirs) != _values(ours):
+            ours = _effective(_without_habits(ours, theirs, _ENDED[kind], room, apart), kind)
+        if kind in _STOPPED and _values(theirs) != _values(ours):
+            theirs, ours = (_effective(_last_of_moments(tokens, kind), kind) for tokens in (asked_for, found))
+        matcher = difflib.SequenceMatcher(None, _values(theirs), _values(ours), autojunk=False)
+        for tag, i0, i1, j0, j1 in matcher.get_opcodes():
+            both = min(i1 - i0, j1 - j0)
+            for i, j in zip(range(i0, i0 + both), range(j0, j0 + both), strict=True):
+                label = name.format(theirs[i].value)
+                if tag != "equal":
+                    text = f"{name.format(ours[j].value)} where the CL file asks for {label}"
+                elif _away(theirs[i].place, ours[j], room, apart):
+                    text = f"{label} is {ours[j].place - theirs[i].place:+.3f} mm of path away from its place"
+                else:
+                    continue
+                problems.append(Problem(f"CS{code}", theirs[i].line, ours[j].line, text))
+            for i in range(i0 + both, i1):
+                near = ours[min(j1, len(ours) - 1)].line if ours else _last_line(found, theirs[i].place + room)
+                problems.append(
+                    Problem(f"CS{code}", theirs[i].line, near, f"{name.format(theirs[i].value)} is missing")
+                )
+            for j in range(j0 + both, j1):
+                text = f"{name.format(ours[j].value)} is nothing that the CL file asks for"
+                problems.append(Problem(f"CS{code}", 0, ours[j].line, text))
+    return problems
+
+
+def _values(tokens: list[Token]) -> list[float]:
+    return [token.value for token in tokens]
+
+
+def _last_line(tokens: list[Token], place: float) -> int:
+    """Line of the last token as far as a place; 0 where there is none."""
+    return next((token.line for token in reversed(tokens) if token.place <= place), 0)
+
+
+def _without_habits(
+    ours: list[Token], theirs: list[Token], off: float, room: float, apart: Callable[[float, float], float]
+) -> list[Token]:
+    """Tokens without those that end a state which begins again before any motion, if the CL file does not ask for them.
+
+    Posts stop spindle and coolant for a tool change on their own.
+    """
+    unasked = [k for k, token in enumerate(ours) if token.value == off]
+    begins_again = {k for k in unasked if k + 1 < len(ours) and ours[k + 1].moment == ours[k].moment}
+    for other in theirs:
+        near = [k for k in unasked if other.value == off and not _away(other.place, ours[k], room, apart)]
+        if near:
+            unasked.remove(min(near, key=lambda k: (k in begins_again, abs(ours[k].place - other.place))))
+    return [token for k, token in enumerate(ours) if k not in begins_again or k not in unasked]
+
+
+def _away(place: float, ours: Token, room: float, apart: Callable[[float, float], float]) -> bool:
+    """Whether a token is elsewhere than asked for."""
+    if abs(place - ours.place) <= room + ours.room:
+        return False
+    # a pose is a rounding off, and its place as far from it as the room
+    return apart(place, ours.place) > 2 * room + ours.room
+
+
+def _last_of_moments(tokens: list[Token], kind: str) -> list[Token]:
+    """Tokens of one kind that the next motion, stop or dwell meets."""
+    mine = [token for token in tokens if token.kind == kind]
+    return [token for k, token in enumerate(mine) if k + 1 == len(mine) or mine[k + 1].moment != token.moment]
+
+
+def _effective(tokens: list[Token], kind: str) -> list[Token]:
+    """Tokens of one kind without those that change nothing."""
+    mine = [token for token in tokens if token.kind == kind]
+    if kind not in _STATES:
+        return mine
+    kept: list[Token] = []
+    state = _AT_START.get(kind)
+    for token in mine:
+        if token.value != state:
+            kept.append(token)
+            state = token.value
+    return kept
