@@ -143,8 +143,9 @@ class Module:
             yield from self._texts(max(given_here, key=lambda node: node.lineno).value)
         if isinstance(around, ast.FunctionDef):
             names = [argument.arg for argument in around.args.args]
+            own = set(ast.walk(around))  # a method that calls that of its base hands the name on
             for call in ast.walk(self.tree) if name.id in names else ():
-                if isinstance(call, ast.Call) and called(call) == around.name:
+                if isinstance(call, ast.Call) and called(call) == around.name and call not in own:
                     given = call.args[names.index(name.id) - (names[0] == "self") :][:1]
                     yield from (text for value in given for text in self._texts(value))
 

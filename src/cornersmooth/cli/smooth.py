@@ -236,6 +236,7 @@ def _frame(given: dict[str, Any]) -> Frame:
         footer=texts["footer"],
         comments=not given["no_comments"],
         skip_taps=given["skip_taps"],
+        cycles=given["cycles"],
         approach=given["approach"] or 0.0,
         retract=given["retract"] or 0.0,
         work_offset="" if given["work_offset"] == "none" else given["work_offset"],

@@ -20,6 +20,7 @@ from cornersmooth.nc.control_tables import (
     load_control,
     parse_control,
 )
+from cornersmooth.nc.cycle_blocks import upright_form, upright_poses
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.form_choice import check_program, choose_form
@@ -194,6 +195,12 @@ def write(
     writer = BlockWriter(chosen, program, statements, findings, circles, stretch)
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
     motion = MotionWriter(program, writer, statements, operation, findings, approach, frame.retract)
+    native = frame.cycles == "native"
+    upright = upright_poses(program, chosen, drills=native, taps=not frame.skip_taps)
+    if upright.any():
+        motion.upright, motion.native = upright, native
+        own = upright_form(chosen)
+        motion.upright_writer = BlockWriter(own, program, statements, findings, circles, own.stretch(1.0))
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
         text.write_blocks(operation.start())
@@ -206,7 +213,8 @@ def write(
         for lines in motion.finish():
             text.write(lines)
         text.write_blocks(motion.end())
-    return Written(text.blocks + motion.blocks + writer.blocks, findings.all())
+    without_tilt = 0 if motion.upright_writer is None else motion.upright_writer.blocks
+    return Written(text.blocks + motion.blocks + writer.blocks + without_tilt, findings.all())
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findings) -> Iterator[Rows]:

@@ -83,6 +83,8 @@ class BlockWriter:
         """Blocks that bring the rotary axes to zero, and to where a row of ticks has them; none without such."""
         if not self.form.rotary or self.form.machine is None:
             return {"rotary_zero": (), "rotary_start": ()}
+        if len(ticks) < self.columns:
+            ticks = np.append(ticks, np.zeros(self.columns - len(ticks), np.int64))
         low, high = self.form.machine.limits.T * 10.0**self.form.table.digits.angle
         order = [self.form.machine.names.index(word) for word in self.form.other_words]
         zero = np.clip(0.0, np.ceil(low), np.floor(high))[order].astype(np.int64)
@@ -127,6 +129,31 @@ class BlockWriter:
         row = self._row_format(spelt, tuple(decimals))
         none = np.zeros(1, np.int64)
         return row.rows(ticks[chosen][None], [prefix], none, [suffix], none)[0].decode()
+
+    @property
+    def columns(self) -> int:
+        """Numbers of a row."""
+        return len(self._format.decimals)
+
+    def take_over(self, other: BlockWriter) -> None:
+        """Go on where another writer has stopped."""
+        self._feed, self._mode = other._feed, other._mode
+
+    def forget_feed(self) -> None:
+        """Say the feed again with the next block: others have changed it."""
+        self._feed = -1
+
+    def feed_mode(self, mode: int) -> list[str]:
+        """Block that selects a feed mode, where it is another than in force."""
+        blocks = [self.statements.words.feed_mode[mode]] if mode != self._mode else []
+        self._mode = mode
+        return blocks
+
+    def feed_word(self, feed: float, mode: int) -> str:
+        """Number of a feed in mm/min or mm/rev, as it is written."""
+        motion = self.form.mode.motion
+        scale = motion.inch_feed if self.program.units == "inch" and mode == FeedMode.PER_MINUTE else 1
+        return self._feed_digits(int(to_ticks(feed / self.program.mm_per_unit * scale, self.form.table.digits.feed)))
 
     def end(self) -> list[str]:
         """Blocks that bring feed mode and plane back to where they were at the start."""

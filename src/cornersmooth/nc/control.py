@@ -283,12 +283,53 @@ class TextStyle:
 
 @dataclass(frozen=True)
 class FormTable:
-    """A form of a control with all its modes."""
+    """A form of a control with all its modes.
+
+    `upright` is how a tool runs that stays along Z from its change to the next, where its holes are cycles of the
+    control: without tool tip control, under which controls take no such cycles. None where that cannot be.
+    """
 
     name: str
     description: str
     curve: CurveStyle
     modes: Mapping[Orientation, Mode]
+    upright: Mode | None = None
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """Hole cycles of the control, for a tool along Z; what is empty is written as plain moves.
+
+    Blocks have, in braces: ``x`` and ``y``; the heights ``travel`` (from hole to hole), ``top``, ``clearance`` (where
+    feeding begins) and ``bottom``; above the top ``setup`` (of the clearance) and ``above`` (of the travel), below it
+    ``depth``; ``step`` of a peck; ``feed``; ``milliseconds`` and ``seconds`` of a dwell; of a tap ``pitch`` and
+    ``speed``. They are written for each hole, but those before the first with ``{x}`` only where they change.
+
+    Parameters
+    ----------
+    drill, dwell : tuple of str
+        In one feed, without and with a dwell at the bottom.
+    peck, chip : tuple of str
+        In steps, out of the hole after each, or up a little to break the chip.
+    ream, ream_dwell : tuple of str
+        Out of the hole at feed.
+    tap : tuple of str
+        A right-hand thread.
+    off : tuple of str
+        Ends the cycle.
+    per_minute : bool
+        Whether their feeds are per minute in millimetres only.
+    """
+
+    drill: Blocks = ()
+    dwell: Blocks = ()
+    peck: Blocks = ()
+    chip: Blocks = ()
+    ream: Blocks = ()
+    ream_dwell: Blocks = ()
+    tap: Blocks = ()
+    off: Blocks = ()
+    per_minute: bool = False
 
 
 @dataclass(frozen=True)
@@ -363,6 +404,7 @@ class Control:
     forms: Mapping[str, FormTable]
     extras: Mapping[str, Extra] = field(default_factory=dict)
     lines: LineStyle = LineStyle()
+    cycles: Cycles = Cycles()
     systems: Mapping[str, Digits] = field(default_factory=dict)
     own: bool = False
 

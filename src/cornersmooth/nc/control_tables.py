@@ -18,6 +18,7 @@ from cornersmooth.nc.control import (
     STEPS,
     Control,
     CurveStyle,
+    Cycles,
     Digits,
     Extra,
     FormTable,
@@ -32,20 +33,32 @@ from cornersmooth.nc.control import (
 from cornersmooth.settings import Lines
 from cornersmooth.tables import Shelf, Table, is_file
 
-Record = TypeVar("Record", Digits, ProgramTable, TextStyle, Words, Motion, Extra, LineStyle)
+Record = TypeVar("Record", Digits, ProgramTable, TextStyle, Words, Motion, Extra, LineStyle, Cycles)
 
 _SHELF = Shelf(
     "control",
     __package__,
     "controls",
-    keys=("name", "description", "digits", "program", "layout", "words", "motion", "forms", "extras", "lines"),
+    keys=(
+        "name",
+        "description",
+        "digits",
+        "program",
+        "layout",
+        "words",
+        "motion",
+        "forms",
+        "extras",
+        "lines",
+        "cycles",
+    ),
     unknown="CS210",
     unreadable="CS212",
     unknown_key="CS214",
     wrong_value="CS213",
 )
 
-_FORM_KEYS = ("description", "curve", *get_args(Orientation))
+_FORM_KEYS = ("description", "curve", "upright", *get_args(Orientation))
 _MODE_KEYS = (
     "words",
     "on",
@@ -68,6 +81,7 @@ _TABLES = (
     "digits",
     "digits.systems",
     "lines",
+    "cycles",
     "program",
     "layout",
     "layout.units",
@@ -95,6 +109,11 @@ _BRACES: dict[str, Table] = {
     **dict.fromkeys(("start", "begin", "tool_end", "between_tools", "end", "retract"), _PROGRAM_BRACES),
     "block_number": {"number": 10},
 }
+#: the same in blocks of hole cycles
+_CYCLE_BRACES: Table = dict.fromkeys(
+    ("x", "y", "travel", "top", "clearance", "bottom", "setup", "above", "depth", "step", "feed", "seconds", "pitch"),
+    "",
+) | {"milliseconds": 1, "speed": ""}
 #: the same in blocks of extras
 _EXTRA_BRACES: Table = {"blend": "0.001", "turn": "0.01"}
 
@@ -158,6 +177,7 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
             forms=_forms(table),
             extras=_extras(table.get("extras", {})),
             lines=_lines(table.get("lines", {})),
+            cycles=_record(Cycles, table.get("cycles", {}), "cycles"),
             systems=_systems(table),
             own=True,
         )
@@ -186,8 +206,8 @@ def _check_tables(table: Table) -> None:
     _check_table(table.get("forms", {}), "forms")
     for name, form in table.get("forms", {}).items():
         _check_table(form, f"forms.{name}")
-        for orientation in get_args(Orientation):
-            _check_table(form.get(orientation, {}), f"forms.{name}.{orientation}")
+        for mode in ("upright", *get_args(Orientation)):
+            _check_table(form.get(mode, {}), f"forms.{name}.{mode}")
 
 
 def _check_table(value: object, where: str) -> None:
@@ -280,7 +300,8 @@ def _form(name: str, entry: Table, motion: Table) -> FormTable:
                 raise _SHELF.wrong(f"{where}.{orientation} has {len(modes[orientation].words)} words", f"give {wanted}")
     if not modes:
         raise _SHELF.wrong(f"{where} says no orientation", f"use one of {', '.join(get_args(Orientation))}")
-    return FormTable(name, _text(entry, "description", ""), curve, modes)
+    upright = _mode(entry["upright"], motion, f"{where}.upright") if "upright" in entry else None
+    return FormTable(name, _text(entry, "description", ""), curve, modes, upright)
 
 
 def _lines(table: Table) -> LineStyle:
@@ -361,7 +382,8 @@ def _strings(table: Any, where: str, keys: tuple[str, ...]) -> dict[str, str]:
 def _string(value: object, where: str) -> str:
     if not isinstance(value, str) or not value.isascii() or not (value.isprintable()):
         raise _SHELF.wrong(f"{where} is {value!r}", "give ASCII text without line ends")
-    places = _EXTRA_BRACES if where.startswith("extras.") else _BRACES.get(where.rpartition(".")[2], {})
+    own = {"extras": _EXTRA_BRACES, "cycles": _CYCLE_BRACES}.get(where.partition(".")[0])
+    places = _BRACES.get(where.rpartition(".")[2], {}) if own is None else own
     if not where.endswith("_pattern") and ("{" in value or "}" in value):
         try:
             value.format(**places)

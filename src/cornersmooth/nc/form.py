@@ -32,6 +32,8 @@ class Form:
         For rotary words.
     extras : tuple of Extra
         Functions of the control that were asked for.
+    upright : Mode or None
+        `FormTable.upright`.
     """
 
     table: Control
@@ -41,6 +43,7 @@ class Form:
     mode: Mode
     machine: Machine | None = None
     extras: tuple[Extra, ...] = ()
+    upright: Mode | None = None
 
     @property
     def control(self) -> str:

@@ -67,7 +67,8 @@ def choose_form(
     for orientation in wanted:
         if orientation in chosen.modes:
             asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
-            return Form(table, name, chosen.curve, orientation, chosen.modes[orientation], machine, asked)
+            mode = chosen.modes[orientation]
+            return Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright)
     raise _refusal(table, chosen, wanted, machine)
 
 

@@ -12,9 +12,10 @@ approached. ``DEEP`` retracts to the clearance after every ``STEP``, ``INCR`` or
 `PECK_GAP` only. ``REAM`` and ``BORE`` come out at feed. HSM's ``CLEAR`` is an absolute height and is passed over for
 its ``RAPTO`` and ``RETURN``.
 
-Not understood, and so never drilled by guess: taps and threads, bores that orient or stop the spindle, countersinks by
+Not understood, and so never drilled by guess: threads, bores that orient or stop the spindle, countersinks by
 diameter, numbers without a word that says what they are (CATIA's ``CYCLE/DRILL, 3.0, 5.0`` depends on the PP table).
-Such holes are approached at the height from which the cycle was entered, and no further.
+Such holes are approached at the height from which the cycle was entered, and no further. A plain ``TAP`` is understood,
+but it is no moves: only a cycle of the control can do it (`cycle_blocks`).
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ _MOST_PECKS = 1000
 #: axes whose directions differ by less, in the cosine, are the same for the height of travel
 _SAME_AXIS = 1e-9
 
-_KINDS = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP"}
+_KINDS = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
 _PECKING = {"DEEP", "DEEP2", "BRKCHP"}
 _AT_FEED = {"REAM", "BORE"}
 _DEPTHS = ("FEDTO", "DEPTH")
@@ -76,6 +77,8 @@ class Cycle:
     feed_out : bool
     pecking : bool
         Whether `steps` are to be taken; without any the hole is drilled in one feed.
+    tap : bool
+        Whether a thread is cut: the spindle turns with the feed.
     """
 
     depth: float
@@ -88,6 +91,7 @@ class Cycle:
     full_retract: bool = True
     feed_out: bool = False
     pecking: bool = False
+    tap: bool = False
 
 
 def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | None) -> Cycle | None:
@@ -126,6 +130,8 @@ def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | N
         dwell = time
     elif "REV" in kinds:
         return None
+    if "TAP" in kinds and (len(kinds) > 1 or steps or dwell or not depth > 0.0):
+        return None
     cycle = Cycle(
         depth=depth * scale,
         clearance=clearances[0] * scale if clearances else None,
@@ -135,6 +141,7 @@ def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | N
         full_retract="BRKCHP" not in kinds,
         feed_out=bool(_AT_FEED & kinds),
         pecking=bool(_PECKING & kinds),
+        tap="TAP" in kinds,
     )
     for word, (per_unit, mode) in _FEEDS.items():
         if word in values:
@@ -199,8 +206,7 @@ def hole_moves(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> H
     HoleMoves
         `hole` counts from 0 in the order of `poses`.
     """
-    travel = np.maximum(travel_height(program, poses, approach), max(cycle.retract, cycle.clearance or 0.0))
-    clearance = travel if cycle.clearance is None else np.full(len(poses), cycle.clearance)
+    travel, clearance = travel_of(cycle, program, poses, approach)
     heights, rapid, dwell = [travel, clearance], [True, True], [False, False]
 
     def go(height: Floats, *, fast: bool) -> None:
@@ -231,6 +237,12 @@ def hole_moves(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> H
         hole=np.repeat(np.arange(count), len(rapid)),
         dwell=np.tile(dwell, count),
     )
+
+
+def travel_of(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> tuple[Floats, Floats]:
+    """(h,) mm each: heights above the holes at which the tool goes from hole to hole, and where feeding begins."""
+    travel = np.maximum(travel_height(program, poses, approach), max(cycle.retract, cycle.clearance or 0.0))
+    return travel, travel if cycle.clearance is None else np.full(len(poses), cycle.clearance)
 
 
 def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:

@@ -12,11 +12,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Bools, Floats, Ints, Move, Program, Statement
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.control import INVERSE_TIME
+from cornersmooth.nc.cycle_blocks import Hole, first_of_hole, hole_blocks, hole_feeds, kind_of
 from cornersmooth.nc.findings import Findings
-from cornersmooth.nc.holes import approaches, hole_moves, travel_height
+from cornersmooth.nc.holes import Cycle, approaches, hole_moves, travel_height, travel_of
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.rewinds import rows_that_swing
 from cornersmooth.nc.run import Run
@@ -42,6 +43,12 @@ class MotionWriter:
     statements : StatementWriter
     operation : Operation
     findings : Findings
+    upright : (n,) bool
+        `cycle_blocks.upright_poses`.
+    upright_writer : BlockWriter or None
+        Writes what those say.
+    native : bool
+        Whether holes are cycles of the control, where they can be.
     """
 
     program: Program
@@ -51,6 +58,9 @@ class MotionWriter:
     findings: Findings
     approach: float = 0.0  #: mm along the tool, behind a retract
     retract: float = 0.0  #: mm along the tool, before a retract
+    upright: Bools | None = None
+    upright_writer: BlockWriter | None = None
+    native: bool = False
     blocks: int = 0  #: those that are not `writer`'s
     _repeated: int = 0
     _position: NDArray[np.int64] | None = None
@@ -64,8 +74,10 @@ class MotionWriter:
     _ticks: Ints = field(init=False)  #: of the block that is written
     _said: tuple[Statement, ...] = field(init=False)
     _approach: Ints | None = field(init=False)
+    _tilting: BlockWriter = field(init=False)  #: the writer of all other tools
 
     def __post_init__(self) -> None:
+        self._tilting = self.writer
         self._said = _with_starts(self.program)
         self.operation.withdraw = self._withdraw
         self._approach = approaches(self.program) if (self.program.kind == Move.HOLE).any() else None
@@ -100,7 +112,7 @@ class MotionWriter:
         last = [*self.statements.end_compensation(), *self.writer.end()]
         if self._last is None:
             return [*last, *self.operation.end()]
-        return [*last, *self.operation.end(self.writer.rotary_blocks(self._last))]
+        return [*last, *self.operation.end(self._rotary_blocks(self._last))]
 
     def _statements_until(self, pose: int) -> Sequence[Statement]:
         begin = self._next_statement
@@ -125,6 +137,7 @@ class MotionWriter:
         """Rows between statements, holes apart from the others."""
         if start >= stop:
             return
+        self._stand(int(rows.move[start]))
         if self._approach is None:
             yield from self._lines(rows, start, stop)
             return
@@ -136,10 +149,26 @@ class MotionWriter:
             else:
                 yield from self._lines(rows, first, last)
 
+    def _stand(self, pose: int) -> None:
+        """Take the writer of the tool at hand: without words of its axis where it stays along Z."""
+        if self.upright is None or self.upright_writer is None or self.operation.begun:
+            return
+        writer = self.upright_writer if self.upright[pose] else self._tilting
+        if writer is self.writer:
+            return
+        writer.take_over(self.writer)
+        self.writer, self.operation.mode, self._position = writer, writer.form.mode, None
+
+    def _rotary_blocks(self, ticks: Ints) -> dict[str, tuple[str, ...]]:
+        """Blocks of the rotary axes, with where a row has them; a tool that stays along Z has them at zero."""
+        return self._tilting.rotary_blocks(ticks)
+
     def _lines(self, rows: Rows, start: int, stop: int) -> Iterator[bytes]:
         part = slice(start, stop)
         move, program = rows.move[part], self.program
         ticks = self._ticks[part]
+        if self.writer is not self._tilting:
+            ticks = self.writer.ticks(rows.tip[part], rows.other[part])
         arc = rows.arc[part] if rows.arc is not None else None
         yield from self._go_back(int(move[0]))
         if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
@@ -212,21 +241,36 @@ class MotionWriter:
     def _go_back(self, move: int) -> Iterator[bytes]:
         """Go to the pose behind a tool change even if it repeats the last one before, and so is no row."""
         begin, self._return_to = self._return_to, _NOWHERE
-        if self._last is not None and (self.program.kind[begin:move] != Move.FROM).any():
-            yield from self._emit(self._run(self._last[None], np.array([move])))
+        passed = begin + np.flatnonzero(self.program.kind[begin:move] != Move.FROM)
+        if self._last is None or not len(passed):
+            return
+        again = self._last[None]
+        if again.shape[1] != self.writer.columns:  # one of both tools stays along Z, so that pose does
+            pose = passed[:1]
+            other = np.zeros((1, 2)) if self.writer.form.rotary else self.program.axis[pose]
+            again = self.writer.ticks(self.program.tip[pose], other)
+        yield from self._emit(self._run(again, np.array([move])))
 
     def _go_to(self, ticks: Ints, move: Ints) -> Iterator[bytes]:
         """Go to a place at the feed of a move, if the tool is elsewhere."""
         yield from self._emit(self._moving(self._run(ticks, move)))
 
     def _holes(self, rows: Rows, part: slice, approach: Ints) -> Iterator[bytes]:
-        """Holes of one cycle as plain moves; those not understood are only approached."""
+        """Holes of one cycle, of the control or as plain moves; those not understood are only approached."""
         cycle, program, poses = self.statements.cycle, self.program, rows.move[part]
         line = int(program.line[poses[0]])
+        kind = self._cycle_of_control(cycle, poses)
+        if cycle is not None and cycle.tap and not kind:
+            if not self.statements.skip_taps:
+                self.statements.refuse_tap(line, self._why_no_tap(cycle, poses))
+            cycle = None
         if cycle is None:
             text = "hole of a cycle that is not understood; it is not drilled, the tool only goes over it"
             self.findings.add("CS315", "warning", line, text, len(poses))
             yield from self._over_holes(rows, part, travel_height(program, poses, approach[poses]))
+            return
+        if kind:
+            yield from self._cycles(cycle, kind, poses, approach)
             return
         self.findings.add("CS316", "note", line, "hole of a cycle written as plain moves", len(poses))
         moves = hole_moves(cycle, program, poses, approach[poses])
@@ -236,6 +280,60 @@ class MotionWriter:
         if not np.isnan(cycle.feed):
             run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
         yield from self._emit_above(self._moving(run), cycle.dwell)
+
+    def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> str:
+        """Cycle of the control that drills holes, as `kind_of` names it; empty for none."""
+        if cycle is None or self.writer is self._tilting or not (self.native or cycle.tap):
+            return ""
+        if cycle.tap and not (self.statements.clockwise and self.statements.speed and self.operation.spindle):
+            return ""
+        return kind_of(cycle, self.writer.form, self.program, poses)
+
+    def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
+        """Why the control's cycle cannot do a tap, in words."""
+        if self.writer is self._tilting:
+            return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
+        if not kind_of(cycle, self.writer.form, self.program, poses):
+            return "the control has no such cycle for it"
+        return "it takes a spindle that turns clockwise at a known speed"
+
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, approach: Ints) -> Iterator[bytes]:
+        """Holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
+        program, writer = self.program, self.writer
+        line, unit = int(program.line[poses[0]]), program.mm_per_unit
+        self.findings.add("CS347", "note", line, "hole written as a cycle of the control", len(poses))
+        if kind == "tap":
+            text = "a tap is left to the control's cycle: see that it turns the spindle with the feed"
+            self.findings.add("CS348", "warning", line, text, len(poses))
+        feeds, modes = hole_feeds(cycle, program, poses)
+        travel, clearance = travel_of(cycle, program, poses, approach[poses])
+        speed, table = self.statements.speed or 0.0, writer.form.table.cycles
+        once = first_of_hole(getattr(table, kind))
+        said: tuple[str, ...] = ()
+        for k, pose in enumerate(poses.tolist()):
+            above = self._run(
+                writer.ticks(program.tip[[pose]] + [0.0, 0.0, travel[k]], program.axis[[pose]]), poses[[k]]
+            )
+            level = above.ticks[0, 2]
+            if not said or self._position is None or self._position[2] != level:
+                yield from self._blocks(table.off if said else ())
+                said = ()
+                yield from self._emit(self._moving(replace(above, rapid=np.ones(1, np.bool_))))
+                yield from self._blocks(writer.feed_mode(int(modes[0])))
+            hole = Hole(
+                program.tip[pose] / unit,
+                travel[k] / unit,
+                clearance[k] / unit,
+                cycle.depth / unit,
+                writer.feed_word(feeds[k], int(modes[k])),
+            )
+            pitch = float(feeds[k]) / unit / (1.0 if modes[k] == FeedMode.PER_REVOLUTION or not speed else speed)
+            blocks = hole_blocks(hole, cycle, kind, writer.form, speed, pitch, unit)
+            yield from self._blocks(blocks[once:] if said == blocks[:once] and said else blocks)
+            said = blocks[:once] or blocks
+            self._position = self._last = above.ticks[0]
+        yield from self._blocks(table.off)
+        writer.forget_feed()
 
     def _over_holes(self, rows: Rows, part: slice, height: Floats) -> Iterator[bytes]:
         program = self.program
@@ -248,7 +346,7 @@ class MotionWriter:
             place = " ".join(
                 f"{letter}{format_number(value, decimals)}" for letter, value in zip("XYZ", tip, strict=True)
             )
-            yield from self._blocks(self.statements.comment(f"NOT DRILLED: HOLE AT {place}"))
+            yield from self._blocks(self.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
             run = replace(self._run(ticks[index : index + 1], poses[index : index + 1]), rapid=np.ones(1, np.bool_))
             yield from self._emit_above(self._moving(run))
 
@@ -291,7 +389,7 @@ class MotionWriter:
             return
         first = run.ticks[0]
         if not self.operation.begun:
-            yield from self._blocks(self.operation.begin(self.writer.rotary_blocks(first)))
+            yield from self._blocks(self.operation.begin(self._rotary_blocks(first)))
         if self.operation.retracted:
             self.operation.retracted = False
             self._warn_of_tilt(int(run.move[0]))

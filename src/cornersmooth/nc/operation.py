@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from cornersmooth.nc.control import Blocks
+from cornersmooth.nc.control import Blocks, Mode
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 
@@ -47,11 +47,15 @@ class Operation:
     begun: bool = False  #: the blocks of `begin` hold
     withdraw: Callable[[], list[str]] = list  #: blocks along the tool before a retract, of who knows where it is
     halted: bool = False  #: the CL file has stopped the program since the last motion
+    mode: Mode = field(init=False)  #: what tool tip control is for the tool at hand
     _tip_control: bool = False
     _functions: bool = False
     _moved: bool = False  # the tool has been used
     _stopped: dict[str, Blocks] = field(default_factory=dict)  # what a tool change has switched off, as it was on
     _stopped_line: int = 0
+
+    def __post_init__(self) -> None:
+        self.mode = self.form.mode
 
     def start(self) -> list[str]:
         """Blocks before everything else."""
@@ -61,7 +65,7 @@ class Operation:
         """Blocks before the next motion of a tool; what a tool change stopped goes on again."""
         self._moved = self.begun = True
         self.halted = False
-        own = self.form.mode.begin
+        own = self.mode.begin
         blocks = [block for was_on in self._stopped.values() for block in was_on]
         if self._stopped:
             text = f"{' and '.join(self._stopped)} not given again behind a tool change: on as before"
@@ -145,21 +149,21 @@ class Operation:
 
     def _tip_control_on(self) -> list[str]:
         self._tip_control = self._functions = True
-        on = [block.format(offset=self.offset) for block in self.form.mode.on]
-        return [*self._extras("on", outside=True), *on, *self.form.mode.within_on, *self._extras("on", outside=False)]
+        on = [block.format(offset=self.offset) for block in self.mode.on]
+        return [*self._extras("on", outside=True), *on, *self.mode.within_on, *self._extras("on", outside=False)]
 
     def _functions_off(self) -> list[str]:
         if not self._functions:
             return []
         self._functions = False
-        return [*self._extras("off", outside=False), *self.form.mode.within_off]
+        return [*self._extras("off", outside=False), *self.mode.within_off]
 
     def _tip_control_off(self) -> list[str]:
         self.begun = False
         if not self._tip_control:
             return []
         self._tip_control = False
-        return [*self._functions_off(), *self.form.mode.off, *self._extras("off", outside=True)]
+        return [*self._functions_off(), *self.mode.off, *self._extras("off", outside=True)]
 
     def _extras(self, side: str, *, outside: bool) -> list[str]:
         extras = self.form.extras if side == "on" else self.form.extras[::-1]

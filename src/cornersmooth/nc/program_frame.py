@@ -61,6 +61,9 @@ class Frame:
         a retract; 0 for neither. A form with a point on the axis comes down by `POINT_APPROACH` at least.
     skip_taps : bool
         Whether holes that are to be tapped are only gone over, with a warning; an error otherwise.
+    cycles : {"moves", "native"}
+        How holes are written: as plain moves, or as the control's own cycles where it has such and the tool stays along
+        Z. Taps are its own cycles anyway.
     stem : str
         Name of the CL file without its ending, for the program where `program` is None; empty for none.
     """
@@ -74,6 +77,7 @@ class Frame:
     provenance: tuple[str, ...] = ()
     stem: str = ""
     skip_taps: bool = True
+    cycles: str = "moves"
     approach: float = 0.0
     retract: float = 0.0
 

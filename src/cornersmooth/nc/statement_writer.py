@@ -11,11 +11,13 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NoReturn
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.control import Blocks, Words
+from cornersmooth.nc.cycle_blocks import TOOL_WORDS, loaded_tool
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.holes import Cycle, read_cycle
@@ -35,8 +37,6 @@ _DESCRIBING = frozenset(
 
 #: words that say nothing beside what the NC text shows anyway
 _SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})
-
-_TOOL_WORDS = frozenset({"LOADTL", "LOAD", "TURRET"})
 
 _NC_WORDS = re.compile(r"\s*(?:[A-Z][+-]?(?:\d+\.?\d*|\.\d+)\s*)+[$%]?\s*", re.IGNORECASE)
 
@@ -78,7 +78,7 @@ class StatementWriter:
     def __post_init__(self) -> None:
         self.words = self.form.table.words
         said = {statement.word for statement in self.program.statements}
-        self.toolno_loads = not _TOOL_WORDS & said
+        self.toolno_loads = not TOOL_WORDS & said
 
     def blocks(self, statement: Statement) -> list[str]:
         """NC blocks of one statement, without line ends."""
@@ -104,6 +104,11 @@ class StatementWriter:
         self.paint(statement)
         return True
 
+    @property
+    def clockwise(self) -> bool:
+        """Whether the spindle was last told to turn clockwise, or nothing."""
+        return self._direction == "clockwise"
+
     def end_compensation(self) -> list[str]:
         """Blocks that switch cutter compensation off, where it is on."""
         blocks = list(self.words.compensation_off) if self._compensated else []
@@ -112,8 +117,10 @@ class StatementWriter:
 
     def comment(self, text: str) -> list[str]:
         """Comments that hold a text."""
-        if not self.comments:
-            return []
+        return self.warning_comment(text) if self.comments else []
+
+    def warning_comment(self, text: str) -> list[str]:
+        """Comments that are written in any case."""
         layout = self.form.table.layout
         return comment_lines(text, layout.comment, layout.comment_orders)
 
@@ -123,16 +130,10 @@ class StatementWriter:
 
     def load(self, statement: Statement) -> list[str] | None:
         """LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]."""
-        words, numbers = words_of(statement), numbers_of(statement)
-        if statement.word == "LOAD" and words[:1] != ["TOOL"]:
+        loaded = loaded_tool(statement)
+        if loaded is None:
             return None
-        if not numbers and statement.word == "LOADTL" and words and re.fullmatch(r"T\d+", words[0]):
-            numbers = [float(words[0][1:])]
-        number = whole_number(numbers[:1])
-        if number is None:
-            return None
-        offset = whole_number(number_after(statement, "ADJUST") or number_after(statement, "OSETNO"))
-        offset = number if offset is None else offset
+        number, offset = loaded
         if (number, offset) == (self.tool, self.operation.offset):  # CATIA loads a tool twice
             return self.comment(statement.text)
         blocks = self.operation.end_tool(statement.line, another=number != self.tool)
@@ -321,8 +322,8 @@ class StatementWriter:
         if words == ["ON"]:
             self.cycle = self._last_cycle
         elif words != ["INIT"]:  # SolidWorks announces a cycle by it
-            self._refuse_tap(statement, words)
             self.cycle = self._last_cycle = read_cycle(statement.args, self.program, self.speed)
+            self._refuse_tap(statement, words)
         if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
             text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
             self.findings.add("CS321", "warning", statement.line, text)
@@ -330,14 +331,18 @@ class StatementWriter:
 
     def _refuse_tap(self, statement: Statement, words: list[str]) -> None:
         """A tap cannot be written as moves, and a hole without its thread is nothing to be silent about."""
-        if "TAP" in words and not self.skip_taps:
-            raise InputError(
-                "CS342",
-                "a tap, which is not written: plain moves cannot turn the spindle with the feed",
-                "give --skip-taps, and put the control's own cycle where the text says NOT DRILLED",
-                file=self.program.source.name,
-                line=statement.line,
-            )
+        if "TAP" in words and self.cycle is None and not self.skip_taps:
+            self.refuse_tap(statement.line, "its words are not understood")
+
+    def refuse_tap(self, line: int, reason: str) -> NoReturn:
+        """Give up at a tap that the control's cycle cannot do."""
+        raise InputError(
+            "CS342",
+            f"a tap, which is not written, as {reason}: plain moves cannot turn the spindle with the feed",
+            "give --skip-taps, and put the control's own cycle where the text says NOT DRILLED",
+            file=self.program.source.name,
+            line=line,
+        )
 
     def end(self, statement: Statement) -> list[str]:
         """END: the end of the text; in the middle of the path a stop."""

@@ -13,6 +13,7 @@ from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Units
 from cornersmooth.nc_reader.dialects.base import INCREMENTAL
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Executed, Modal, execute
+from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
 from cornersmooth.nc_reader.needed_states import AxisWords, curve_problem
 from cornersmooth.nc_reader.path_elements import in_mm, path_elements
 from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
@@ -103,6 +104,8 @@ class Reader:
             self.blocks += 1
         if self.comments is not None:
             self.comments.extend((line.number, text) for text in line.comments)
+        elif any(text.startswith(NOT_DRILLED) for text in line.comments):
+            self.event(line, "(", 0.0, NOT_DRILLED)
         row = self.dialect.row(line) if line.words else None
         if row is not None:
             self.waiting.append((line.number, row))

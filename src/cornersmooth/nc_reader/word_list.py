@@ -22,7 +22,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     that must have been said since the last time. ``then``, ``behind``: the next block, the block before. ``share``:
     what the number in brackets may be of the tolerance. ``zero``: the rotary axes must have been sent to zero before:
     where a parameter says so, the part program turns with the angles of that moment. ``never``: the control has no such
-    word. ``high``: only behind a retract; a control with such a word wants the tool high at the end, too.
+    word. ``tool``: in a text with a ``cycle`` of the control it may differ from tool to tool. ``high``: only behind a
+    retract; a control with such a word wants the tool high at the end, too.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.
@@ -64,6 +65,8 @@ class WordRule:
     high: bool = False
     retract: bool = False
     zero: bool = False
+    tool: bool = False
+    cycle: bool = False
 
 
 @dataclass(frozen=True)

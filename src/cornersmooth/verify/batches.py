@@ -108,6 +108,8 @@ class Batches:
         self.shared: dict[int, int] = {}
         #: moves of holes at whose bottom the tool waits, and ms
         self.dwells: list[tuple[int, float]] = []
+        self.taps: list[int] = []
+        self.untapped: list[Problem] = []
         self.elements = 0
 
     def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
@@ -142,6 +144,7 @@ class Batches:
             return
         holes = Holes(original, ahead, self.task.axis_length)
         self.holes, self.shared, self.dwells = holes.element_move, holes.shared, holes.dwells
+        self.taps, self.untapped = holes.taps, holes.untapped
         part: _Part | None = None
         surplus: int | None = None
         for between in holes.between():

@@ -1,4 +1,4 @@
-"""What CYCLE statements say of holes: depth, feed, dwell."""
+"""What CYCLE statements say of holes: depth, feed, dwell, threads."""
 
 from __future__ import annotations
 
@@ -6,12 +6,18 @@ import math
 from dataclasses import dataclass
 
 from cornersmooth.model import Program
+from cornersmooth.verify.statements import Asking
 
 #: words of CYCLE: plain drilling, depths, feeds, and those that say nothing of either
-_PLAIN = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP"}
+_PLAIN = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
+_AT_FEED = {"REAM", "BORE"}
 _DEPTH = ("FEDTO", "DEPTH")
 _FEEDS = {"MMPM": (1.0, False), "IPM": (25.4, False), "MMPR": (1.0, True), "IPR": (25.4, True)}
 _OTHER = {"RAPTO", "CLEAR", "RTRCTO", "RETURN", "STEP", "INCR", "1STPECK", "SUBPECK", "DWELL"}
+
+
+#: statements that say how fast the spindle turns
+_TURNING = ("SPINDL", "CUTTER", "TLDATA")
 
 
 @dataclass(frozen=True)
@@ -27,19 +33,26 @@ class Drilling:
     per_revolution : bool
     dwell : float, ms
         At the bottom; 0 for none.
+    tap : bool
+        Whether the spindle turns with the feed, and back on the way out.
+    feed_out : bool
+        Whether the tool comes out at feed.
     """
 
     depth: float = math.nan
     feed: float = math.nan
     per_revolution: bool = False
     dwell: float = 0.0
+    tap: bool = False
+    feed_out: bool = False
 
 
-def drilling(args: tuple[float | str, ...], program: Program) -> Drilling:
+def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0) -> Drilling:
     """Interpret the arguments of a CYCLE statement.
 
     Only pairs of a known word and one number, and words for plain drilling, are interpreted; with anything else in it
-    the whole statement is left open. NX counts depths upwards, all others downwards.
+    the whole statement is left open. NX counts depths upwards, all others downwards. The feed of a tap is its pitch,
+    which needs the speed of the spindle.
     """
     values: dict[str, float] = {}
     kinds, word = set(), ""
@@ -71,24 +84,34 @@ def drilling(args: tuple[float | str, ...], program: Program) -> Drilling:
     feeds = [(values[name] * scale, turn) for name, (scale, turn) in _FEEDS.items() if name in values]
     feed, per_revolution = feeds[0] if len(feeds) == 1 else (math.nan, False)
     dwell = float(round(1000.0 * values.get("DWELL", 0.0)))
-    return Drilling(depth * program.mm_per_unit, feed, per_revolution, dwell)
+    if "TAP" not in kinds:
+        feed_out = bool(kinds & _AT_FEED)
+        return Drilling(depth * program.mm_per_unit, feed, per_revolution, dwell, feed_out=feed_out)
+    if len(kinds) > 1 or math.isnan(feed) or not (per_revolution or speed):
+        return Drilling()
+    return Drilling(
+        depth * program.mm_per_unit, feed if per_revolution else feed / speed, True, dwell, tap=True, feed_out=True
+    )
 
 
 def drillings(program: Program, poses: list[int]) -> list[Drilling]:
     """Cycle in force at each of the hole poses, ascending."""
     found: list[Drilling] = []
     state = last = Drilling()
-    cycles = [statement for statement in program.statements if statement.word == "CYCLE"]
+    asking = Asking(program)
+    cycles = [statement for statement in program.statements if statement.word in ("CYCLE", *_TURNING)]
     k = 0
     for pose in poses:
         while k < len(cycles) and cycles[k].pose <= pose:
             words = [value for value in cycles[k].args if isinstance(value, str) and value]
-            if words[:1] in (["OFF"], ["NOMORE"]):
+            if cycles[k].word != "CYCLE":
+                asking.take(cycles[k], 0.0)
+            elif words[:1] in (["OFF"], ["NOMORE"]):
                 state = Drilling()
             elif words == ["ON"]:
                 state = last
             elif words != ["INIT"]:
-                state = last = drilling(cycles[k].args, program)
+                state = last = drilling(cycles[k].args, program, asking.speed)
             k += 1
         found.append(state)
     return found

@@ -116,6 +116,10 @@ class Holes:
         self.shared: dict[int, int] = {}
         #: moves of the holes at whose bottom the tool waits, and for how many ms
         self.dwells: list[tuple[int, float]] = []
+        #: moves of the holes to be tapped in which something is fed
+        self.taps: list[int] = []
+        #: CS561 for holes to be tapped that are only gone over: on purpose where a comment says so
+        self.untapped: list[Problem] = []
         #: CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside a hole, CS564 a feed that is not a hole's
         self.problems: list[Problem] = []
 
@@ -152,7 +156,7 @@ class Holes:
     def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling], *, idle: bool) -> int:
         """Check the holes of a run; return the first element behind them."""
         search, ahead = self._search, self._ahead
-        groups, element = search.consume(first, stop, start, idle=idle)
+        groups, element = search.consume(first, stop, start, cycles, idle=idle)
         if stop < len(self._original.pose):
             groups[-1], element = search.give_back(stop, groups[-1], cycles[-1], element)
             if ahead.has(element) and search.exact(stop, np.array([element]))[0]:
@@ -167,9 +171,13 @@ class Holes:
         for k, group in enumerate(groups):
             self.element_move.update(dict.fromkeys(group, first + k))
             again = search.repeats(first, stop, first + k)
-            self.problems += search.check(first + k, group, cycles[k], alone=not again)
+            problems = search.check(first + k, group, cycles[k], alone=not again)
+            fed = bool(search.feeds(group))
+            (self.problems if fed or not cycles[k].tap else self.untapped).extend(problems)
             if group and cycles[k].dwell:
                 self.dwells.append((first + k, cycles[k].dwell))
+            if fed and cycles[k].tap:
+                self.taps.append(first + k)
         return element
 
 
@@ -246,8 +254,12 @@ class _Search:
                 given = begin
         yield (given if reached is None else reached + 1), True
 
-    def consume(self, first: int, stop: int, element: int, *, idle: bool) -> tuple[list[list[int]], int]:
+    def consume(
+        self, first: int, stop: int, element: int, cycles: list[Drilling], *, idle: bool
+    ) -> tuple[list[list[int]], int]:
         """Elements of each hole, and the element behind them all.
+
+        Where the next cycle is for the same hole, the first rapid out of it behind its depth ends this one.
 
         `idle`: nothing is drilled in the last of them, and the next run begins in the same hole: only what stays where
         the cycle was entered belongs to this one.
@@ -258,12 +270,18 @@ class _Search:
             entered = np.nan
             if idle and move == stop - 1 and first:
                 entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
+            depth = cycles[move - first].depth
+            other = move + 1 < stop and cycles[move + 1 - first] != cycles[move - first]
+            twice, deep = other and self.same_hole(move, move + 1), False
             while self.ahead.has(element):
                 height = self.heights(move, np.array([element]))[0]
                 if np.isnan(height) or abs(height - entered) > self.room:
                     break
                 group.append(element)
                 element += 1
+                deep = deep or height <= self.room - depth
+                if twice and deep and height > self.room and not self.feeds(group[-1:]):
+                    break
             if not group and groups and groups[-1]:  # the same hole again
                 again = np.array(groups[-1])
                 group = again[~np.isnan(self.heights(move, again))].tolist()
@@ -321,6 +339,10 @@ class _Search:
         if abs(off) > self.room:
             text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
             problems.append(Problem("CS562", cl_line, self.nc_line(deepest), text, abs(off)))
+        behind = [k for k in group if k > deepest][:1]
+        if cycle.feed_out and behind and not self.feeds(behind):
+            text = "a rapid leaves a hole that the tool is to leave at feed"
+            problems.append(Problem("CS563", cl_line, self.nc_line(behind[0]), text))
         drilled = 0.0
         for k in group:
             line = self.nc_line(k)
@@ -334,7 +356,8 @@ class _Search:
                     problems.append(Problem("CS563", cl_line, line, "a feed move enters a hole from the side"))
                 nc, own = self.ahead.nc, k - self.ahead.base
                 wrong = not np.isnan(cycle.feed) and (
-                    abs(nc.feed[own] - cycle.feed) > 2 * abs(nc.feed_room[own])
+                    np.isnan(nc.feed[own])
+                    or abs(nc.feed[own] - cycle.feed) > 2 * abs(nc.feed_room[own])
                     or (np.isnan(nc.feed_room[own]) and nc.feed[own] > cycle.feed + ARITHMETIC)
                     or nc.per_revolution[own] != cycle.per_revolution
                 )

@@ -14,6 +14,9 @@ from cornersmooth.nc_reader.elements import Event
 #: decimals of a spindle speed that count: FANUC's S takes whole numbers only
 SPEED_DECIMALS = 0
 
+#: value of a tap, whatever the control calls it
+TAP = 84.0
+
 #: cutting speeds in mm per minute
 _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}
 
@@ -29,7 +32,8 @@ class Token:
     Parameters
     ----------
     kind : str
-        ``"tool"``, ``"spindle"``, ``"speed"``, ``"coolant"``, ``"compensation"``, ``"stop"``, ``"dwell"``, ``"end"``.
+        ``"tool"``, ``"spindle"``, ``"speed"``, ``"coolant"``, ``"compensation"``, ``"stop"``, ``"dwell"``, ``"tap"``,
+        ``"end"``.
     value : float
     place : float, mm
         Path length from the start of the original motion.
@@ -56,7 +60,7 @@ class Token:
 _PAUSES = ("stop", "dwell")
 
 
-class _Asking:
+class Asking:
     """Goes through the CL statements and notes what they ask for. What it cannot interpret asks for nothing."""
 
     def __init__(self, program: Program) -> None:
@@ -210,7 +214,7 @@ def asked(program: Program, places: Sequence[float], end: float, dwells: Sequenc
     dwells : sequence of Token
         What the cycles of holes ask for, in order.
     """
-    asking = _Asking(program)
+    asking = Asking(program)
     for statement, place in zip(program.statements, places, strict=True):
         asking.take(statement, place)
     line = max((item.line for item in program.statements if item.word in ("FINI", "END")), default=0)
@@ -264,6 +268,8 @@ def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float
             tokens += _of_m(value, place, line)
         elif event.letter == "G" and value == 4:
             tokens.append(Token("dwell", round(float(event.text)), place, line))
+        elif event.letter == "G" and value == TAP:
+            tokens.append(Token("tap", value, place, line))
         elif event.letter == "G" and value in (40, 41, 42):
             tokens.append(Token("compensation", value, place, line))
         elif event.letter in _PLAIN:

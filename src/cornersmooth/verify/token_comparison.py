@@ -21,6 +21,7 @@ _NAMES = {
     "register": ("compensation register D{:g}", 554),
     "stop": ("stop M{:g}", 555),
     "dwell": ("dwell of {:g} ms", 556),
+    "tap": ("tap G{:g}", 566),
     "end": ("end of program M{:g}", 557),
     "auxiliary": ("M{:g}", 558),
 }

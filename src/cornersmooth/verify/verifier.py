@@ -18,6 +18,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.model import Ints, Program, Units
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
+from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
@@ -30,7 +31,7 @@ from cornersmooth.verify.findings import Findings, Largest, Poses
 from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
-from cornersmooth.verify.statements import Token, asked, said
+from cornersmooth.verify.statements import TAP, Token, asked, said
 from cornersmooth.verify.task import Task
 from cornersmooth.verify.token_comparison import compare
 from cornersmooth.verify.wide_search import way_apart
@@ -261,6 +262,9 @@ class _Measured:
             problems.append(Problem("CS505", 0, 1, text))
         problems += self.batches.problems + self.findings.feeds.problems + self.findings.violations.problems()
         problems += half_turns(program)
+        left_out = sum(event.letter == "(" and event.text.startswith(NOT_DRILLED) for event in self.events)
+        if left_out < len(self.batches.untapped):
+            problems += self.batches.untapped
         if self.words and self.batches.elements:  # without any motion nothing has a place
             problems += self._statement_problems(unsaid)
         return Verification.of(
@@ -290,6 +294,9 @@ class _Measured:
         dwells = [
             Token("dwell", time, length_at(move), int(program.line[original.pose[move]]))
             for move, time in self.batches.dwells
+        ]
+        dwells += [
+            Token("tap", TAP, length_at(move), int(program.line[original.pose[move]])) for move in self.batches.taps
         ]
         theirs = asked(program, np.where(move >= 0, there, _BEFORE).tolist(), end, dwells)
         known = self.lengths | self.batches.stops.lengths()

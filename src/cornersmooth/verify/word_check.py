@@ -87,6 +87,8 @@ class WordCheck:
         #: where the rotary axes have been sent, as far as that is said
         self._angles: dict[str, float] = {}
         self._arc: tuple[str, int] | None = None
+        #: complaints that count only where the text has no hole cycles; None where it has
+        self._by_tool: list[Problem] | None = []
         self._code = -1.0
         self._weights = None if weights is None else np.array(tuple(weights))
         self._line = 0
@@ -233,6 +235,7 @@ class WordCheck:
 
     def _end(self) -> None:
         """Look at what holds when all is read."""
+        self.problems += self._by_tool or []
         texts = [text for _, text in self._tail]
         whole = len(texts) == len(self.list.end) and all(
             pattern.fullmatch(text) for pattern, text in zip(self.list.end, texts, strict=True)
@@ -324,6 +327,8 @@ class WordCheck:
                 self._said = {told for told in self._said if not rule.after.fullmatch(told)}
             if rule.behind is not None and not rule.behind.fullmatch(before):
                 self._wrong(NOT_LISTED, number, f"{word} does not follow what it belongs to")
+            if rule.cycle:
+                self._by_tool = None
             if rule.share is not None:
                 match = rule.pattern.fullmatch(word)
                 if match and float(match[1]) > rule.share * self.tolerance * (1 + 1e-9) + 1e-5:
@@ -396,7 +401,12 @@ class WordCheck:
                 continue
             self._complained.add((state, line))
             before = self._first.get(state, "nothing")
-            self._wrong(NOT_LISTED, line, f"{state}: {word} where {before} holds for the whole program")
+            text = f"{state}: {word} where {before} holds for the whole program"
+            if any(rule.state == state and rule.tool for rule in self.list.words):
+                if self._by_tool is not None:
+                    self._by_tool.append(Problem(NOT_LISTED, 0, line, text))
+            else:
+                self._wrong(NOT_LISTED, line, text)
 
 
 def said(word: Word) -> str:

@@ -73,8 +73,13 @@ retract = click.option(
     type=LENGTH,
     help="How far the tool goes back along its axis before it goes up. [default: straight up]",
 )
-skip_taps = click.option(
-    "--skip-taps", is_flag=True, help="Only go over holes that are to be tapped, with a warning, instead of an error."
+skip_taps = click.option("--skip-taps", is_flag=True, help="Only go over holes that are to be tapped, with a warning.")
+cycles = click.option(
+    "--cycles",
+    type=click.Choice(["moves", "native"]),
+    default="moves",
+    show_default=True,
+    help="Holes as plain moves, or as the control's own cycles where it has such and the tool stays along Z.",
 )
 header = click.option(
     "--header",
@@ -124,6 +129,7 @@ def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
             approach,
             retract,
             skip_taps,
+            cycles,
             header,
             footer,
             block_numbers,

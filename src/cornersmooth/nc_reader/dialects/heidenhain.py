@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect, State, values
+from cornersmooth.nc_reader.hole_cycles import DEFINED, HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.words import SPL, Columns, Line, Word
 
@@ -29,6 +32,15 @@ _SILENT = (
     "*-",
     "LBL",
 )
+#: parameters of hole cycles, and their names
+_PARAMETER: Final = re.compile(rf" Q(\d+)=({NUMBER})")
+_CYCLES: Final = {
+    200: {200, 201, 206, 202, 210, 203, 204, 211},
+    201: {200, 201, 206, 211, 208, 203, 204},
+    207: {200, 201, 239, 203, 204},
+}
+_CYCLE_NAMES: Final = {200: "DRILLING", 201: "REAMING", 207: "RIGID TAPPING NEW"}
+
 _SIDES = {"R0": 40.0, "RL": 41.0, "RR": 42.0}
 
 
@@ -60,8 +72,11 @@ class Heidenhain(Dialect):
             self._to_machine(line, state)
             return
         motion: dict[str, float] = {}
+        called = False
         for name, value, text, *_ in line.words:
-            if name == "M":
+            if (name, value) == ("M", 99.0):
+                called = True
+            elif name == "M":
                 self._miscellaneous(value, text, line, state)
             elif name == "side":
                 state.event(line, "G", value, text)
@@ -87,6 +102,42 @@ class Heidenhain(Dialect):
                     line, "words that this kind of block does not take", "give L, LN or SPL what belongs to it"
                 )
             state.move(line, values(columns or {}))
+        if called:
+            self._call(line, state)
+
+    def _call(self, line: Line, state: State) -> None:
+        """M99: the hole cycle that was defined last, where the block ends."""
+        defined, modal = state.memory.get(DEFINED), state.modal
+        if not isinstance(defined, HoleCycle):
+            state.refuse(line, "M99 without a cycle before it", "define the cycle that it calls")
+            return
+        if state.tip_control:
+            state.wrong("CS506", line, f"a hole cycle under {state.tip_control}")
+        drill(defined, modal.tip[0], modal.tip[1], line, state)
+        state.change(line, code=math.nan, feed=modal.feed, per_revolution=modal.per_revolution)
+
+    def _define(self, number: int, text: str, line: Line, state: State) -> None:
+        """CYCL DEF 200, 201, 207 with their parameters."""
+        given = {int(q): float(value) for q, value in _PARAMETER.findall(text)}
+        rest = _PARAMETER.sub("", text).split("CYCL DEF", 1)[1].split()
+        if given.keys() != _CYCLES[number] or rest[1:] != _CYCLE_NAMES[number].split():
+            state.refuse(
+                line, f"CYCL DEF {number} with other parameters", f"give {_shown(_CYCLES[number])} and no others"
+            )
+        top, depth = given[203], -given[201]
+        cycle = HoleCycle(top + given[204], top + given[200], top - depth, top=top, from_clearance=False)
+        if number == 207:
+            cycle = replace(cycle, pitch=given[239], feed=given[239])
+        else:
+            cycle = replace(cycle, feed=given[206], dwell=1000.0 * given[211])
+        if number == 200:
+            cycle = replace(cycle, step=given[202])
+        if number == 201:
+            cycle = replace(cycle, feed_out=True)
+        wrong = (number == 200 and (given[210] != 0.0 or not given[202] > 0.0)) or depth < 0.0
+        if wrong or given.get(208, given.get(206)) != given.get(206) or given.get(239, 1.0) <= 0.0:
+            state.refuse(line, f"CYCL DEF {number} with values that are not understood", "see its parameters")
+        state.memory[DEFINED] = cycle
 
     def _to_machine(self, line: Line, state: State) -> None:
         """M91: a rapid in machine coordinates."""
@@ -141,6 +192,8 @@ class Heidenhain(Dialect):
             state.event(line, "T", float(match[1]), text)
         elif match := re.fullmatch(rf"CYCL DEF 9\.1 (?:DWELL|V\.ZEIT) ?({NUMBER})", text):
             state.event(line, "G", 4.0, f"{1000.0 * float(match[1]):.10g}")
+        elif match := re.match(r"CYCL DEF (200|201|207) ", text):
+            self._define(int(match[1]), text, line, state)
         elif text == "STOP":
             state.event(line, "M", 0.0, text, late=True)
         elif match := re.fullmatch(r"FUNCTION TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (AXIS|VECTOR)(?: .*)?", text):
@@ -149,6 +202,10 @@ class Heidenhain(Dialect):
             state.tip_control = ""
         elif not text.startswith(_SILENT):
             state.refuse(line, f"{text} is not understood", "see that the control is the one the text is for")
+
+
+def _shown(parameters: set[int]) -> str:
+    return ", ".join(f"Q{number}" for number in sorted(parameters))
 
 
 class _KlartextLexer(Lexer):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, Dialect, State
+from cornersmooth.nc_reader.hole_cycles import INITIAL_HEIGHT, HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word
@@ -20,6 +22,12 @@ _SILENT = frozenset((80.0, 90.0, *map(float, range(54, 60))))
 _TO_REFERENCE = (28.0, 30.0)
 _IN_MACHINE = 53.0
 _COMPENSATION = (40.0, 41.0, 42.0)
+#: hole cycles with what they take besides X Y Z R F, and the codes that stand beside them
+_CYCLES = {73.0: "Q", 81.0: "", 82.0: "P", 83.0: "Q", 84.0: "P", 85.0: "", 89.0: "P"}
+_BACK_TO_START = 98.0
+#: names in `State.memory` of the speed of the spindle, and of whether M29 asks it to turn with the feed
+_SPEED, _RIGID = "speed", "rigid"
+_NO_CYCLE = 80.0
 
 
 @dataclass(frozen=True)
@@ -46,6 +54,10 @@ class IsoWords:
         Whether a comment may begin with one.
     retracts : bool
         `Dialect.retracts`.
+    cycles_in : str or None
+        Name of the tool tip control under which hole cycles are taken; None where they are not known.
+    rigid : bool
+        Whether ``M29 S`` asks for taps that turn the spindle with the feed.
     """
 
     tip_control: Mapping[float, str]
@@ -57,6 +69,8 @@ class IsoWords:
     curves_need: str = ""
     semicolon: bool = False
     retracts: bool = True
+    cycles_in: str | None = "G43"
+    rigid: bool = False
 
 
 _FANUC = {43.0: "G43", 43.4: "G43.4", 43.5: "G43.5", 49.0: ""}
@@ -67,7 +81,7 @@ _NO_THROUGH: frozenset[str | tuple[str, float]] = frozenset((("coolant", 88.0),)
 _HIGH_SPEED = frozenset((5.0, 5.1, 8.0))
 
 ISO_WORDS: Mapping[str, IsoWords] = {
-    "fanuc": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH),
+    "fanuc": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH, rigid=True),
     # high-speed high-accuracy control II, or III (P20000): program error P29 without it
     "mitsubishi": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH, curves_need="G5 P10000"),
     "haas": IsoWords(
@@ -85,7 +99,7 @@ ISO_WORDS: Mapping[str, IsoWords] = {
         unsaid=_NO_THROUGH,
         semicolon=True,
     ),
-    "generic": IsoWords(_FANUC, unsaid=_NO_THROUGH | {"offset"}, retracts=False),
+    "generic": IsoWords(_FANUC, unsaid=_NO_THROUGH | {"offset"}, retracts=False, cycles_in=None),
 }
 
 
@@ -114,6 +128,12 @@ class Iso(Dialect):
         if codes & {*_TO_REFERENCE, _IN_MACHINE}:
             self._to_machine(line, codes, state)
             return
+        if codes & _CYCLES.keys():
+            self._cycle(line, codes, state)
+            return
+        if _NO_CYCLE in codes:
+            state.memory.pop(INITIAL_HEIGHT, None)
+            state.memory.pop(_RIGID, None)
         motion: dict[str, float] = {}
         given = {letter: value for letter, value, *_ in line.words}
         if given.get("G") == 5.0:
@@ -127,7 +147,11 @@ class Iso(Dialect):
                     return
                 else:
                     self._mode(value, line, state)
+            elif (letter, value) == ("M", 29.0) and self.iso.rigid:
+                state.memory[_RIGID] = True
             elif letter in _EVENT_LETTERS:
+                if letter == "S":
+                    state.memory[_SPEED] = value
                 state.event(line, letter, value, text, late=letter == "M" and value in AFTER_MOTION)
             elif letter in self.lexer.letters:
                 motion[letter] = value
@@ -138,6 +162,43 @@ class Iso(Dialect):
         if self.lexer.odd_vector(motion.keys(), motion.get("G")):
             state.refuse(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
         state.move(line, motion)
+
+    def _cycle(self, line: Line, codes: set[float], state: State) -> None:
+        """A hole cycle, with G98: all that it takes stands in its block."""
+        code = next(iter(codes & _CYCLES.keys()))
+        given = {letter: value for letter, value, *_ in line.words if letter != "N"}
+        needed = {*"GXYZR", *_CYCLES[code]} - ({"P"} if code == 84.0 else set())
+        if codes != {code, _BACK_TO_START} or len(given) + 1 != len([w for w in line.words if w[0] != "N"]):
+            state.refuse(line, f"G{code:g} beside other words", "give it G98 and nothing else")
+        if not needed <= given.keys() <= needed | {"F", *_CYCLES[code]} or self.iso.cycles_in is None:
+            state.refuse(
+                line, f"G{code:g} with words that are missing or not understood", "give X Y Z R and F in its block"
+            )
+        if state.tip_control != self.iso.cycles_in:
+            state.wrong("CS506", line, f"a hole cycle under {state.tip_control or 'no length of the tool'}")
+        travel = state.memory.setdefault(INITIAL_HEIGHT, state.modal.tip[2])
+        feed, turning = given.get("F", state.modal.feed), state.modal.per_revolution
+        speed = state.memory.get(_SPEED, math.nan)
+        cycle = HoleCycle(
+            travel,
+            given["R"],
+            given["Z"],
+            given.get("F"),
+            step=given.get("Q", 0.0),
+            chip=code == 73.0,
+            dwell=self.iso.dwell * given.get("P", 0.0),
+            feed_out=code in (85.0, 89.0),
+        )
+        if state.modal.inverse_time:
+            state.wrong("CS506", line, "a hole cycle at inverse time feed (G93)")
+        tap = code == 84.0
+        if tap:
+            if self.iso.rigid and not state.memory.get(_RIGID):
+                state.wrong("CS506", line, "a tap without M29, which turns the spindle with the feed")
+            pitch = feed if turning else feed / speed
+            cycle = replace(cycle, feed=pitch, pitch=pitch)
+        drill(cycle, given["X"], given["Y"], line, state)
+        state.change(line, code=math.nan, feed=feed, per_revolution=turning)
 
     def _to_machine(self, line: Line, codes: set[float], state: State) -> None:
         """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""

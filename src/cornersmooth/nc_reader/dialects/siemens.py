@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Final
 
 from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect, State
+from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.words import BSPLINE, POLY, Columns, Line, Word
 
@@ -33,6 +36,12 @@ _SILENT_CODES = frozenset((9.0, 53.0, *map(float, range(54, 60)), 60.0, 64.0, 90
 _SILENT_CODES |= frozenset(map(float, (153, 601, 602, 641, 642, 643, 644, 645)))
 _ORIENTATIONS = ("ORIVECT", "ORIPLANE", "ORICURVE", "ORIAXES")
 _CODES = (0.0, 1.0, 2.0, 3.0)
+
+#: name in `State.memory` of the speed of the spindle
+_SPEED: Final = "speed"
+
+#: hole cycles, and how many arguments they may have
+_CYCLES: Final = {"CYCLE81": (4,), "CYCLE82": (6,), "CYCLE83": (12,), "CYCLE84": (12,), "CYCLE85": (8,)}
 
 #: a BSPLINE says its degree, which is 3
 _DEGREES: Final = ((None, False), (3.0, True))
@@ -73,6 +82,9 @@ class Siemens(Dialect):
         if any(word[0] == "SUPA" for word in line.words):
             self._to_machine(line, state)
             return
+        if any(word[0] in _CYCLES for word in line.words):
+            self._cycle(line, state)
+            return
         motion: dict[str, float] = {}
         for name, value, text, *_ in line.words:
             if name == "G" and value in _CODES:
@@ -80,6 +92,8 @@ class Siemens(Dialect):
             elif name == "G":
                 self._mode(value, line, state)
             elif name in ("M", "T", "S"):
+                if name == "S":
+                    state.memory[_SPEED] = value
                 state.event(line, name, value, text, late=name == "M" and value in AFTER_MOTION)
             elif name == "SPOS":
                 state.event(line, "M", 19.0, text)
@@ -90,6 +104,43 @@ class Siemens(Dialect):
             elif name not in ("D", "N", "%") and name not in _SILENT_CALLS:
                 self._refuse(line, name, text, state)
         state.move(line, motion)
+
+    def _cycle(self, line: Line, state: State) -> None:
+        """CYCLE81 to CYCLE85, called where the tool stands."""
+        words = [word for word in line.words if word.name != "N"]
+        name, (_, _, inside) = words[0].name, words[0].text.partition("(")
+        try:
+            args = numbers(inside.rstrip(") "))
+        except ValueError:
+            args = []
+        if len(words) > 1 or len(args) not in _CYCLES[name] or None in args[:4]:
+            state.refuse(
+                line, f"{words[0].text} is not understood", "give RTP, RFP, SDIS and DP first, in its own block"
+            )
+        if state.tip_control:
+            state.wrong("CS506", line, f"a hole cycle under {state.tip_control}")
+        whole = [value if value is not None else 0.0 for value in args] + [0.0] * 12
+        travel, top, setup, bottom, depth, fifth = whole[:6]
+        known = HoleCycle(travel, top + setup, bottom, top=top, from_clearance=False)
+        if name == "CYCLE82":
+            known = replace(known, dwell=1000.0 * fifth)
+        elif name == "CYCLE83":
+            if depth or fifth or whole[7:11] != [0.0, 0.0, 0.0, 1.0] or not whole[6] > 0.0:
+                state.refuse(line, f"{words[0].text} is not understood", "give pecks of one depth (FDPR) alone")
+            known = replace(known, step=whole[6], chip=whole[11] == 0.0)
+        elif name == "CYCLE84":
+            if args[6:8] != [3.0, None] or not whole[8] > 0.0 or whole[10] != whole[11]:
+                state.refuse(line, f"{words[0].text} is not understood", "give a pitch, SDAC 3 and one speed")
+            known = replace(known, pitch=whole[8], feed=whole[8], dwell=1000.0 * fifth)
+            if state.memory.get(_SPEED) != whole[10]:
+                state.wrong("CS506", line, f"CYCLE84 at {whole[10]:g} revolutions, where S says otherwise")
+        elif name == "CYCLE85":
+            if whole[6] != whole[7] or not whole[6] > 0.0:
+                state.refuse(line, f"{words[0].text} is not understood", "give one feed for both ways")
+            known = replace(known, feed=whole[6], feed_out=True, dwell=1000.0 * fifth)
+        modal = state.modal
+        drill(known, modal.tip[0], modal.tip[1], line, state)
+        state.change(line, code=math.nan, feed=modal.feed, per_revolution=modal.per_revolution)
 
     def _to_machine(self, line: Line, state: State) -> None:
         """SUPA: a rapid in machine coordinates, without frames."""

@@ -1,0 +1,213 @@
+"""Holes as cycles of the control: which tools may have them, and the blocks of each hole.
+
+Controls take no hole cycles under tool tip control. So a tool has them only where it stays along Z from its change to
+the next, and where the rotary axes are known to stand at zero: then it runs without tool tip control (`Form.upright`),
+and X Y Z mean the same. All its other motion is written without orientation. Everything else stays plain moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.kinematics import machine_position, tool_axis
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
+from cornersmooth.nc.control import Blocks
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.holes import Cycle
+from cornersmooth.nc.statement_args import number_after, numbers_of, whole_number, words_of
+from cornersmooth.text import format_number
+
+#: words that load a tool
+TOOL_WORDS: Final = frozenset({"LOADTL", "LOAD", "TURRET"})
+
+#: by how much a tool axis along Z may be off, and a position at angles of zero, mm
+_ALONG_Z, _SAME_PLACE = 1e-9, 1e-9
+
+
+def loaded_tool(statement: Statement) -> tuple[int, int] | None:
+    """Tool and length register of LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]; None where it loads none."""
+    words, numbers = words_of(statement), numbers_of(statement)
+    if statement.word == "LOAD" and words[:1] != ["TOOL"]:
+        return None
+    if not numbers and statement.word == "LOADTL" and words and words[0][:1] == "T" and words[0][1:].isdigit():
+        numbers = [float(words[0][1:])]
+    number = whole_number(numbers[:1])
+    if number is None:
+        return None
+    offset = whole_number(number_after(statement, "ADJUST") or number_after(statement, "OSETNO"))
+    return number, number if offset is None else offset
+
+
+def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> Bools:
+    """(n,) whether a pose belongs to a tool that runs without tool tip control, as its holes are cycles of the control.
+
+    Parameters
+    ----------
+    program : Program
+    form : Form
+    drills, taps : bool
+        What is to be written as a cycle.
+    """
+    chosen = np.zeros(len(program), np.bool_)
+    holes = program.kind == Move.HOLE
+    if not (drills or taps) or not holes.any() or not _can_stand_upright(form):
+        return chosen
+    tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
+    tilted &= program.kind != Move.FROM
+    starts, tapped = _tools(program)
+    if not form.rotary and tilted.any():  # without a machine no words bring the rotary axes back
+        tilted[int(np.argmax(tilted)) :] = True
+    for first, stop in zip(starts, [*starts[1:], len(program)], strict=True):
+        here = slice(first, stop)
+        wanted = drills or any(first <= pose <= stop for pose in tapped)
+        chosen[here] = wanted and bool(holes[here].any()) and not tilted[here].any()
+    return chosen
+
+
+def _tools(program: Program) -> tuple[list[int], list[int]]:
+    """Poses at which another tool begins, the first among them; and poses at which a tap is asked for."""
+    said = {statement.word for statement in program.statements}
+    words = TOOL_WORDS if TOOL_WORDS & said else {"TOOLNO"}
+    starts, tapped, tool = [0], [], None
+    for statement in program.statements:
+        if statement.word in words:
+            loaded = loaded_tool(statement)
+            if loaded is not None and loaded != tool:
+                starts.append(statement.pose)
+                tool = loaded
+        elif statement.word == "CYCLE" and "TAP" in statement.args:
+            tapped.append(statement.pose)
+    return sorted({min(pose, len(program)) for pose in starts}), tapped
+
+
+def _can_stand_upright(form: Form) -> bool:
+    """Whether the form has such blocks, and X Y Z are the tip while the rotary axes stand at zero."""
+    if form.upright is None or form.curves or not form.table.program.retract:
+        return False
+    if form.machine is None or not form.rotary:
+        return True
+    zero = np.zeros((1, 2))
+    if (form.machine.limits[:, 0] > 0.0).any() or (form.machine.limits[:, 1] < 0.0).any():
+        return False
+    place = np.array([[11.0, -7.0, 5.0]])
+    upright = np.abs(tool_axis(form.machine, zero) - (0.0, 0.0, 1.0)).max() <= _ALONG_Z
+    return bool(upright and np.abs(machine_position(form.machine, place, zero) - place).max() <= _SAME_PLACE)
+
+
+def upright_form(form: Form) -> Form:
+    """Return the form of a tool that stays along Z, without words of its axis."""
+    assert form.upright is not None
+    return replace(form, orientation="fixed", mode=form.upright)
+
+
+def hole_feeds(cycle: Cycle, program: Program, poses: Ints) -> tuple[Floats, Ints]:
+    """(h,) feed of every hole, mm/min or mm/rev, NaN where there is none, and (h,) its `FeedMode`."""
+    if np.isnan(cycle.feed):
+        return program.feed[poses], program.feed_mode[poses].astype(np.int64)
+    return np.full(len(poses), cycle.feed), np.full(len(poses), int(cycle.feed_mode))
+
+
+def kind_of(cycle: Cycle, form: Form, program: Program, poses: Ints) -> str:
+    """Name of the cycle of the control that does the same, as in `Cycles`; empty for none."""
+    cycles, (feed, modes) = form.table.cycles, hole_feeds(cycle, program, poses)
+    stepped = cycle.pecking and bool(cycle.steps)
+    if cycle.clearance is None or np.isnan(feed).any() or (modes != modes[0]).any():
+        return ""
+    if stepped and (len(set(cycle.steps)) > 1 or cycle.dwell or cycle.feed_out):
+        return ""
+    if cycles.per_minute and not cycle.tap and (modes[0] != FeedMode.PER_MINUTE or program.units != "mm"):
+        return ""
+    if cycle.tap:
+        name = "tap"
+    elif stepped:
+        name = "peck" if cycle.full_retract else "chip"
+    elif cycle.feed_out:
+        name = "ream_dwell" if cycle.dwell else "ream"
+    else:
+        name = "dwell" if cycle.dwell else "drill"
+    return name if getattr(cycles, name) else ""
+
+
+@dataclass(frozen=True)
+class Hole:
+    """One hole, in units of the text.
+
+    Parameters
+    ----------
+    place : (3,) float64
+        Its top.
+    travel, clearance : float
+        Heights above it.
+    depth : float
+        Below it.
+    feed : str
+        As it is written.
+    """
+
+    place: Floats
+    travel: float
+    clearance: float
+    depth: float
+    feed: str
+
+
+def hole_blocks(hole: Hole, cycle: Cycle, kind: str, form: Form, speed: float, pitch: float, unit: float) -> Blocks:
+    """Blocks of one hole.
+
+    Parameters
+    ----------
+    hole : Hole
+    cycle : Cycle
+    kind : str
+        As `kind_of` gives it.
+    form : Form
+    speed : float
+        Of the spindle, revolutions per minute.
+    pitch : float
+        Of a thread, in units of the text.
+    unit : float
+        Millimetres per unit of the text.
+
+    Returns
+    -------
+    tuple of str
+        Distances are those between the heights as they are written.
+    """
+    decimals = form.tip_decimals("mm" if unit == 1.0 else "inch")
+    plus = form.mode.motion.signs
+
+    def number(value: float) -> str:
+        return format_number(value, decimals, plus=plus)
+
+    def rounded(value: float) -> float:
+        return float(format_number(value, decimals))
+
+    x, y, top = hole.place.tolist()
+    heights = {name: rounded(top + above) for name, above in (("travel", hole.travel), ("clearance", hole.clearance))}
+    top, bottom = rounded(top), rounded(top - hole.depth)
+    values = {
+        "x": number(x),
+        "y": number(y),
+        "top": number(top),
+        "bottom": number(bottom),
+        "travel": number(heights["travel"]),
+        "clearance": number(heights["clearance"]),
+        "setup": number(heights["clearance"] - top),
+        "above": number(heights["travel"] - top),
+        "depth": format_number(top - bottom, decimals),
+        "step": format_number(cycle.steps[0] / unit if cycle.steps else 0.0, decimals),
+        "feed": hole.feed,
+        "milliseconds": cycle.dwell,
+        "seconds": format_number(cycle.dwell / 1000.0, 3, trim=True),
+        "pitch": format_number(pitch, decimals),
+        "speed": format_number(speed, form.table.digits.speed, trim=True).rstrip("."),
+    }
+    return tuple(block.format(**values) for block in getattr(form.table.cycles, kind))
+
+
+def first_of_hole(blocks: Blocks) -> int:
+    """How many of the blocks of a cycle in the table stand before those that are written for each hole."""
+    return next((k for k, block in enumerate(blocks) if "{x}" in block), 0)

@@ -1,0 +1,105 @@
+"""Hole cycles of controls as the moves that they mean.
+
+A cycle goes over its place in rapid, at the height where the tool is, down in rapid to where feeding begins, at feed to
+the bottom, and out again. Everything that is measured of holes is measured on these moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from cornersmooth.nc_reader.dialects.base import State
+from cornersmooth.nc_reader.words import Line
+
+#: how a comment begins that says that a hole is left out on purpose
+NOT_DRILLED: Final = "NOT DRILLED"
+
+#: name in `State.memory` of the height at which a run of modal cycles began (G98), in units of the text
+INITIAL_HEIGHT: Final = "initial height"
+
+#: name in `State.memory` of the cycle that a block defines for others to call
+DEFINED: Final = "cycle"
+
+#: share of a peck that the tool stays above the last depth when it comes back
+_ABOVE: Final = 0.05
+
+#: more pecks in one hole are not carried out
+_MOST_PECKS: Final = 10_000
+
+
+@dataclass(frozen=True)
+class HoleCycle:
+    """A hole cycle, in units of the text; heights are those of Z.
+
+    Parameters
+    ----------
+    travel : float
+        Where the tool goes in the end.
+    clearance : float
+        Where feeding begins.
+    bottom : float
+    feed : float or None
+        In units of F; None for the one in force.
+    step : float
+        Of a peck; 0 for one feed.
+    from_clearance : bool
+        Whether pecks are counted from `clearance`, or from `top`.
+    top : float
+    chip : bool
+        Whether a peck only moves up a little.
+    dwell : float, ms
+    feed_out : bool
+    pitch : float or None
+        Of a tap, per revolution.
+    """
+
+    travel: float
+    clearance: float
+    bottom: float
+    feed: float | None = None
+    step: float = 0.0
+    from_clearance: bool = True
+    top: float = 0.0
+    chip: bool = False
+    dwell: float = 0.0
+    feed_out: bool = False
+    pitch: float | None = None
+
+
+def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> None:
+    """Carry out a cycle at a place.
+
+    Raises
+    ------
+    InputError
+        CS503 where the height at which it begins is not known, or its heights make no hole.
+    """
+    if not cycle.bottom <= cycle.clearance <= cycle.travel:
+        state.refuse(line, "a cycle whose heights are not one below another", "give them in their order")
+    if cycle.step and (cycle.clearance - cycle.bottom) / cycle.step > _MOST_PECKS:
+        state.refuse(line, "a cycle of more pecks than anybody wants", "give a larger step")
+    state.move(line, {"G": 0.0, "X": x, "Y": y})
+    state.move(line, {"G": 0.0, "Z": cycle.clearance})
+    if cycle.pitch is not None:
+        state.event(line, "G", 84.0)
+        state.change(line, per_revolution=True)
+    feed = {} if cycle.feed is None else {"F": cycle.feed}
+    done = cycle.clearance if cycle.from_clearance else cycle.top
+    while cycle.step and done - cycle.step > cycle.bottom:
+        done -= cycle.step
+        state.move(line, {"G": 1.0, "Z": done, **feed})
+        above = done + _ABOVE * cycle.step
+        for height in (above,) if cycle.chip else (cycle.clearance, above):
+            state.move(line, {"G": 0.0, "Z": min(height, cycle.clearance)})
+    state.move(line, {"G": 1.0, "Z": cycle.bottom, **feed})
+    if cycle.dwell:
+        state.event(line, "G", 4.0, f"{cycle.dwell:.10g}")
+    if cycle.feed_out or cycle.pitch is not None:
+        state.move(line, {"G": 1.0, "Z": cycle.clearance})
+    state.move(line, {"G": 0.0, "Z": cycle.travel})
+
+
+def numbers(text: str) -> list[float | None]:
+    """Arguments of a call, None for those that are left out; raises ValueError for what is no number."""
+    return [float(part) if part.strip() else None for part in text.split(",")]
