@@ -262,7 +262,7 @@ class MotionWriter:
         kind = self._cycle_of_control(cycle, poses)
         if cycle is not None and cycle.tap and not kind:
             if not self.statements.skip_taps:
-                self.statements.refuse_tap(line, self._why_no_tap(cycle, poses))
+                self.statements.refuse_tap(self._why_no_tap(cycle, poses))
             cycle = None
         if cycle is None:
             text = "hole of a cycle that is not understood; it is not drilled, the tool only goes over it"

@@ -72,6 +72,7 @@ class StatementWriter:
     _direction: str = "clockwise"
     _diameter: float = 0.0
     _last_cycle: Cycle | None = None
+    _cycle_line: int = 0
     words: Words = field(init=False)
     _toolno_loads: bool = field(init=False)
 
@@ -322,26 +323,27 @@ class StatementWriter:
         if words == ["ON"]:
             self.cycle = self._last_cycle
         elif words != ["INIT"]:  # SolidWorks announces a cycle by it
+            self._cycle_line = statement.line
             self.cycle = self._last_cycle = read_cycle(statement.args, self.program, self.speed)
-            self._refuse_tap(statement, words)
+            self._refuse_tap(words)
         if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
             text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
             self.findings.add("CS321", "warning", statement.line, text)
         return self.comment(statement.text)
 
-    def _refuse_tap(self, statement: Statement, words: list[str]) -> None:
+    def _refuse_tap(self, words: list[str]) -> None:
         """A tap cannot be written as moves, and a hole without its thread is nothing to be silent about."""
         if "TAP" in words and self.cycle is None and not self.skip_taps:
-            self.refuse_tap(statement.line, "its words are not understood")
+            self.refuse_tap("its words are not understood")
 
-    def refuse_tap(self, line: int, reason: str) -> NoReturn:
+    def refuse_tap(self, reason: str) -> NoReturn:
         """Give up at a tap that the control's cycle cannot do."""
         raise InputError(
             "CS342",
             f"a tap, which is not written, as {reason}: plain moves cannot turn the spindle with the feed",
             "give --skip-taps, and put the control's own cycle where the text says NOT DRILLED",
             file=self.program.source.name,
-            line=line,
+            line=self._cycle_line,
         )
 
     def end(self, statement: Statement) -> list[str]:
