@@ -218,14 +218,14 @@ def test_a_tap_left_out_on_purpose_is_no_problem_and_any_other_is() -> None:
     assert sum("NOT DRILLED" in line for line in lines) == 2
     assert problems(case, lines) == []
     without = [line for line in lines if "NOT DRILLED" not in line]
-    assert problems(case, without) == ["CS561 a hole of the CL file is not drilled"] * 2
+    assert problems(case, without) == ["CS561 a hole of the CL file is not tapped"] * 2
 
 
 def test_a_thread_cut_by_plain_feeds_is_found() -> None:
     lines = text_of(CASES[0])
     at = lines.index(ISO.splitlines()[-1])
     moves = ["G0 X31. Y7. Z30.", "G0 X31. Y7. Z6.", "G1 X31. Y7. Z-14. F500.", "G1 X31. Y7. Z6.", "G0 X31. Y7. Z30."]
-    assert "CS566 tap G84 is missing" in problems(CASES[0], [*lines[:at], "G80", *moves, *lines[at + 1 :]])
+    assert "CS561 a hole of the CL file is not tapped" in problems(CASES[0], [*lines[:at], "G80", *moves, *lines[at + 1 :]])
 
 
 @dataclass(frozen=True)

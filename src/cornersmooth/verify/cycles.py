@@ -46,6 +46,11 @@ class Drilling:
     tap: bool = False
     feed_out: bool = False
 
+    @property
+    def if_drilled(self) -> Drilling:
+        """The same, open where nothing need be drilled: a tap may be left out."""
+        return Drilling(tap=True) if self.tap else self
+
 
 def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0) -> Drilling:
     """Interpret the arguments of a CYCLE statement.

@@ -118,7 +118,7 @@ class Holes:
         self.dwells: list[tuple[int, float]] = []
         #: moves of the holes to be tapped in which something is fed
         self.taps: list[int] = []
-        #: CS561 for holes to be tapped that are only gone over: on purpose where a comment says so
+        #: CS561 for holes that are not tapped: on purpose where a comment says so
         self.untapped: list[Problem] = []
         #: CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside a hole, CS564 a feed that is not a hole's
         self.problems: list[Problem] = []
@@ -136,13 +136,13 @@ class Holes:
             cycles = all_cycles[used : used + stop - first]
             used += stop - first
             if first > move and not self._search.stands(move, first, element):
-                for begin, found in self._search.starts(first, element, cycles[0]):
+                for begin, found in self._search.starts(first, element, cycles[0].if_drilled):
                     yield Between(move, first - 1, element, begin, found)
                     element = begin
                     ahead.forget(element - _KEPT)
             above = runs[number + 1][0] if number + 1 < len(runs) else None
-            idle = above is not None and np.isnan(cycles[-1].depth) and self._search.same_hole(stop - 1, above)
-            element = self._drilled(first, stop, element, cycles, idle=idle)
+            again = above is not None and self._search.same_hole(stop - 1, above)
+            element = self._drilled(first, stop, element, cycles, again=again)
             ahead.forget(element - _KEPT)
             # the move out of the last hole starts wherever the tool has been left
             loose = stop < moves and original.program.kind[original.pose[stop]] != Move.RAPID
@@ -153,10 +153,10 @@ class Holes:
             ahead.forget(element - _KEPT)
         yield Between(move, moves - 1, element, element, True)
 
-    def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling], *, idle: bool) -> int:
+    def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling], *, again: bool) -> int:
         """Check the holes of a run; return the first element behind them."""
         search, ahead = self._search, self._ahead
-        groups, element = search.consume(first, stop, start, cycles, idle=idle)
+        groups, element = search.consume(first, stop, start, cycles, again=again)
         if stop < len(self._original.pose):
             groups[-1], element = search.give_back(stop, groups[-1], cycles[-1], element)
             if ahead.has(element) and search.exact(stop, np.array([element]))[0]:
@@ -171,13 +171,15 @@ class Holes:
         for k, group in enumerate(groups):
             self.element_move.update(dict.fromkeys(group, first + k))
             again = search.repeats(first, stop, first + k)
-            problems = search.check(first + k, group, cycles[k], alone=not again)
-            fed = bool(search.feeds(group))
-            (self.problems if fed or not cycles[k].tap else self.untapped).extend(problems)
+            self.problems += search.check(first + k, group, cycles[k], alone=not again)
             if group and cycles[k].dwell:
                 self.dwells.append((first + k, cycles[k].dwell))
-            if fed and cycles[k].tap:
+            if cycles[k].tap and not np.isnan(cycles[k].depth):
                 self.taps.append(first + k)
+            elif cycles[k].tap:
+                near = search.nc_line(group[0]) if group else 0
+                text = "a hole of the CL file is not tapped"
+                self.untapped.append(Problem("CS561", int(search.line[first + k]), near, text))
         return element
 
 
@@ -255,20 +257,24 @@ class _Search:
         yield (given if reached is None else reached + 1), True
 
     def consume(
-        self, first: int, stop: int, element: int, cycles: list[Drilling], *, idle: bool
+        self, first: int, stop: int, element: int, cycles: list[Drilling], *, again: bool
     ) -> tuple[list[list[int]], int]:
         """Elements of each hole, and the element behind them all.
 
         Where the next cycle is for the same hole, the first rapid out of it behind its depth ends this one.
 
-        `idle`: nothing is drilled in the last of them, and the next run begins in the same hole: only what stays where
-        the cycle was entered belongs to this one.
+        A hole that is not tapped as its cycle says becomes one of a cycle that asks for nothing, in `cycles`, too.
+
+        `again`: the next run begins in the last of these holes. Where nothing is drilled in it now, only what stays
+        where the cycle was entered belongs to this run.
         """
         groups: list[list[int]] = []
         for move in range(first, stop):
             group: list[int] = []
             entered = np.nan
-            if idle and move == stop - 1 and first:
+            if cycles[move - first].tap and not self.tapped(move, element, cycles[move - first]):
+                cycles[move - first] = cycles[move - first].if_drilled
+            if again and np.isnan(cycles[-1].depth) and move == stop - 1 and first:
                 entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
             depth = cycles[move - first].depth
             other = move + 1 < stop and cycles[move + 1 - first] != cycles[move - first]
@@ -283,10 +289,19 @@ class _Search:
                 if twice and deep and height > self.room and not self.feeds(group[-1:]):
                     break
             if not group and groups and groups[-1]:  # the same hole again
-                again = np.array(groups[-1])
-                group = again[~np.isnan(self.heights(move, again))].tolist()
+                before = np.array(groups[-1])
+                group = before[~np.isnan(self.heights(move, before))].tolist()
             groups.append(group)
         return groups, element
+
+    def tapped(self, move: int, element: int, cycle: Drilling) -> bool:
+        """Whether the first feed in a hole, from an element on, is that of its thread."""
+        while self.over(move, element):
+            if self.feeds([element]):
+                nc, own = self.ahead.nc, element - self.ahead.base
+                return bool(nc.per_revolution[own] and abs(nc.feed[own] - cycle.feed) <= 2 * abs(nc.feed_room[own]))
+            element += 1
+        return False
 
     def feeds(self, group: list[int]) -> list[int]:
         """Elements of a group that are no rapids."""
