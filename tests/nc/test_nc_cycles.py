@@ -225,7 +225,8 @@ def test_a_thread_cut_by_plain_feeds_is_found() -> None:
     lines = text_of(CASES[0])
     at = lines.index(ISO.splitlines()[-1])
     moves = ["G0 X31. Y7. Z30.", "G0 X31. Y7. Z6.", "G1 X31. Y7. Z-14. F500.", "G1 X31. Y7. Z6.", "G0 X31. Y7. Z30."]
-    assert "CS561 a hole of the CL file is not tapped" in problems(CASES[0], [*lines[:at], "G80", *moves, *lines[at + 1 :]])
+    found = problems(CASES[0], [*lines[:at], "G80", *moves, *lines[at + 1 :]])
+    assert "CS561 a hole of the CL file is not tapped" in found
 
 
 @dataclass(frozen=True)
