@@ -296,3 +296,28 @@ def test_linuxcnc_makes_the_same_moves_of_its_cycles(tmp_path: Path) -> None:
     assert lowest == pytest.approx({place: tops[place] - depths[place] for place in tops})
     heights = np.array([place[2] for kind, place in rows if kind == "rapid"][2:])
     assert heights.max() < 31.0
+
+
+@pytest.mark.parametrize(
+    "cycles",
+    [
+        ("TAP,FEDTO,9,MMPM,500,RAPTO,5",) * 2,
+        ("DRILL,FEDTO,12,MMPM,90,RAPTO,3", "TAP,FEDTO,9,MMPM,500,RAPTO,5"),
+        ("TAP,FEDTO,9,MMPR,1,RAPTO,5", "FACE,FEDTO,1,MMPM,90,RAPTO,3,DWELL,0.5"),
+    ],
+    ids=["tapped twice", "tapped behind a drill", "tapped before a chamfer"],
+)
+def test_one_hole_by_several_cycles_is_right(cycles: tuple[str, ...]) -> None:
+    holes = "".join(f"CYCLE/{cycle}\nGOTO/9,3,0\n" for cycle in cycles)
+    cl = f"UNITS/MM\nSPINDL/500,RPM,CLW\nRAPID\nGOTO/0,0,30\n{holes}GOTO/19,3,0\nCYCLE/OFF\nFINI\n"
+    for case in CASES[:4]:
+        assert problems(case, text_of(case, cl), cl) == []
+
+
+def test_without_any_cycle_of_the_control_a_tool_along_z_is_written_as_before() -> None:
+    case = Case("heidenhain", "g1", "table-ac")
+    cl = (
+        TILTED[: TILTED.index("CYCLE/DRILL")]
+        + "CYCLE/BRKCHP,FEDTO,9,INCR,4,MMPM,90,RAPTO,3\nGOTO/0,7,1\nCYCLE/OFF\nFINI\n"
+    )
+    assert text_of(case, cl) == text_of(case, cl, cycles="moves")

@@ -16,7 +16,7 @@ from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.holes import Cycle
+from cornersmooth.nc.holes import Cycle, read_cycle
 from cornersmooth.nc.statement_args import number_after, numbers_of, whole_number, words_of
 from cornersmooth.text import format_number
 
@@ -62,9 +62,24 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
         tilted[int(np.argmax(tilted)) :] = True
     for first, stop in zip(starts, [*starts[1:], len(program)], strict=True):
         here = slice(first, stop)
-        wanted = drills or any(first <= pose <= stop for pose in tapped)
-        chosen[here] = wanted and bool(holes[here].any()) and not tilted[here].any()
+        if holes[here].any() and not tilted[here].any():
+            chosen[here] = any(first <= pose <= stop for pose in tapped) or (
+                drills and _any_as_cycle(program, form, first, stop)
+            )
     return chosen
+
+
+def _any_as_cycle(program: Program, form: Form, first: int, stop: int) -> bool:
+    """Whether any hole from one pose to another can be a cycle of the control, apart from taps."""
+    said = [statement for statement in program.statements if statement.word == "CYCLE" and len(statement.args) > 1]
+    for k, statement in enumerate(said):
+        until = said[k + 1].pose if k + 1 < len(said) else len(program)
+        poses = np.arange(max(statement.pose, first), min(until, stop))
+        poses = poses[program.kind[poses] == Move.HOLE]
+        cycle = read_cycle(statement.args, program, None) if len(poses) else None
+        if cycle is not None and kind_of(cycle, form, program, poses[:1]):
+            return True
+    return False
 
 
 def _tools(program: Program) -> tuple[list[int], list[int]]:

@@ -269,10 +269,14 @@ class _Search:
         where the cycle was entered belongs to this run.
         """
         groups: list[list[int]] = []
+        asked = tuple(cycles)
         for move in range(first, stop):
             group: list[int] = []
             entered = np.nan
-            if cycles[move - first].tap and not self.tapped(move, element, cycles[move - first]):
+            repeated = move > first and asked[move - 1 - first] == asked[move - first]
+            if repeated and self.same_hole(move - 1, move):
+                cycles[move - first] = cycles[move - 1 - first]
+            elif cycles[move - first].tap and not self.tapped(move, element, cycles[move - first]):
                 cycles[move - first] = cycles[move - first].if_drilled
             if again and np.isnan(cycles[-1].depth) and move == stop - 1 and first:
                 entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
