@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from oracle.command import large, small
+from oracle.command import large, medium, small
 from oracle.files import NO_CORPUS, corpus_folder
 
-__all__ = ["corpus", "large", "small"]
+__all__ = ["corpus", "large", "medium", "small"]
 
 ROOT = Path(__file__).resolve().parent.parent
 

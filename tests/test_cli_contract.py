@@ -140,11 +140,12 @@ def test_quiet_still_says_errors(tmp_path: Path) -> None:
 # ---------------------------------------------------------------- looks
 
 
-def test_no_colour_and_no_progress_bar_in_a_file(large: Path, tmp_path: Path) -> None:
-    result = run("smooth", large, "-o", tmp_path / "o.nc", "-v")
-    assert result.returncode == DONE
-    assert ESCAPE not in result.stderr
-    assert b"\r" not in result.stderr
+def test_no_colour_and_no_progress_bar_in_a_file(medium: Path, small: Path, tmp_path: Path) -> None:
+    for part, more in ((medium, []), (small, ["-v"])):
+        result = run("smooth", part, "-o", tmp_path / f"{part.stem}.nc", *more)
+        assert result.returncode == DONE
+        assert ESCAPE not in result.stderr
+        assert b"\r" not in result.stderr
 
 
 @pytest.mark.parametrize("no_color", [True, False])

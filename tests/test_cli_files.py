@@ -160,7 +160,7 @@ def test_full_disk_on_standard_output(small: Path) -> None:
 
 
 @pytest.mark.parametrize("old", [None, b"old program\n"])
-def test_full_disk_leaves_the_old_file_or_none(large: Path, tmp_path: Path, old: bytes | None) -> None:
+def test_full_disk_leaves_the_old_file_or_none(medium: Path, tmp_path: Path, old: bytes | None) -> None:
     out = tmp_path / "out.nc"
     if old is not None:
         out.write_bytes(old)
@@ -168,7 +168,7 @@ def test_full_disk_leaves_the_old_file_or_none(large: Path, tmp_path: Path, old:
     def small_files() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536))
 
-    result = run_process("smooth", large, "-o", out, "--force", prepare=small_files)
+    result = run_process("smooth", medium, "-o", out, "--force", prepare=small_files)
     assert result.returncode == BAD_OUTPUT
     assert quiet(result.stderr)
     assert "out.nc" in message(result.stderr)
@@ -177,8 +177,8 @@ def test_full_disk_leaves_the_old_file_or_none(large: Path, tmp_path: Path, old:
         assert out.read_bytes() == old
 
 
-def test_closed_pipe(large: Path) -> None:
-    with started("smooth", large) as process:
+def test_closed_pipe(medium: Path) -> None:
+    with started("smooth", medium) as process:
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.read(10)
@@ -335,10 +335,10 @@ def test_names_with_brackets_are_names(tmp_path: Path, name: str) -> None:
         assert one.encode() in result.stderr
 
 
-def test_interruption_of_several_processes_leaves_whole_files(large: Path, tmp_path: Path) -> None:
+def test_interruption_of_several_processes_leaves_whole_files(medium: Path, tmp_path: Path) -> None:
     paths = [tmp_path / f"part{k}.cls" for k in range(4)]
     for path in paths:
-        path.write_bytes(large.read_bytes())
+        path.write_bytes(medium.read_bytes())
     out = tmp_path / "out"
     out.mkdir()
     with started("smooth", *paths, "-d", out, "-j", "2", session=True) as process:

@@ -180,6 +180,14 @@ def small(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
+def medium(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Some two thousand corners: more text than a pipe or a small disk holds."""
+    path = tmp_path_factory.mktemp("medium") / "medium.cls"
+    path.write_bytes(cl_text(random_chains(7, 500, tame=True))[0])
+    return path
+
+
+@pytest.fixture(scope="session")
 def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Some ten thousand corners: enough text to be interrupted while it is written."""
     path = tmp_path_factory.mktemp("large") / "large.cls"
