@@ -10,7 +10,9 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -69,7 +71,7 @@ class Shelf:
     def aliases(self) -> dict[str, str]:
         """Name of the table for each of its other names."""
         folder = resources.files(self.package) / self.folder
-        tables = {name: tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8")) for name in self.names()}
+        tables = {name: _read((folder / f"{name}.toml").read_text(encoding="utf-8")) for name in self.names()}
         return {alias: name for name, table in tables.items() for alias in table.get("aliases", ())}
 
     def find(self, name: str) -> str:
@@ -128,7 +130,7 @@ class Shelf:
             The text is not TOML, has an unknown key, or is like a table that is not known.
         """
         try:
-            table = tomllib.loads(text) if isinstance(text, str) else dict(text)
+            table = deepcopy(_read(text)) if isinstance(text, str) else dict(text)
         except tomllib.TOMLDecodeError as error:
             raise SettingsError(self.unreadable, f"not TOML: {error}", "correct the text") from error
         self.check_keys(table, (*self.keys, "like", "aliases"), "")
@@ -159,6 +161,12 @@ class Shelf:
     def wrong(self, what: str, hint: str) -> SettingsError:
         """Error that says that a value is of a wrong kind."""
         return SettingsError(self.wrong_value, what, hint)
+
+
+@lru_cache(maxsize=64)
+def _read(text: str) -> Table:
+    """Return the table of a TOML text; it must not be changed."""
+    return tomllib.loads(text)
 
 
 def _merged(base: Table, changes: Table) -> Table:

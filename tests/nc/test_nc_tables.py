@@ -56,7 +56,7 @@ def test_wrong_values_are_refused_by_file_and_key(control: str) -> None:
     for place in places(table):
         for value in WRONG:
             try:
-                parse_control(text_of(put(table, place, value)), file="own.toml")
+                parse_control(put(table, place, value), file="own.toml")
             except SettingsError as refusal:
                 refused += 1
                 said = str(refusal)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from oracle.frechet import frechet_distance, leash_is_enough
 from oracle.motion import Original, Path, angle_between
+from oracle.motion import length as length_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,7 +29,6 @@ Ints = NDArray[np.int64]
 #: how much longer than its segment a stretch of path may be when the nearest sample is looked for, in limits
 SLACK = 6.0
 NEWTON_STEPS = 5
-LAST_PART = 1 - 1e-12
 #: of a distance above the limit, in limits
 RESOLUTION = 1e-3
 
@@ -51,7 +51,7 @@ class Deviation:
 def match_poses(path: Path, original: Original, axis_length: float, limit: float) -> Ints:
     """(n,) sample paired with every pose, ascending; the ends with the ends."""
     tip, point = original.at(np.arange(len(original), dtype=float), axis_length)
-    steps = np.linalg.norm(np.diff(path.tip, axis=0), axis=1) + np.linalg.norm(np.diff(path.point, axis=0), axis=1)
+    steps = length_of(np.diff(path.tip, axis=0)) + length_of(np.diff(path.point, axis=0))
     length = np.concatenate(([0.0], np.cumsum(steps)))
     turn = angle_between(original.axis[:-1], original.axis[1:])
     room = 2 * np.linalg.norm(np.diff(original.tip, axis=0), axis=1) + axis_length * turn + SLACK * limit
@@ -72,16 +72,9 @@ def match_samples(path: Path, original: Original, poses: Ints, axis_length: floa
     """(m,) parameter on the original of every sample, never falling: the foot on the segment between matched poses."""
     if len(original) < 2:
         return np.zeros(len(path))
-    tip, point = original.at(np.arange(len(original), dtype=float), axis_length)
     segment = np.clip(np.searchsorted(poses, np.arange(len(path)), side="left") - 1, 0, len(original) - 2)
-    part = np.full(len(path), 0.5)
-    for _ in range(NEWTON_STEPS):  # least squares of tip and b together; any outcome is a matching
-        tip, point = original.at(segment + part, axis_length)
-        tip_slope, point_slope = original.slope(segment + part, axis_length)
-        square = np.sum(tip_slope**2 + point_slope**2, axis=1)
-        towards = np.sum((path.tip - tip) * tip_slope + (path.point - point) * point_slope, axis=1)
-        # short of 1, which would be the next segment to `at`
-        part = np.clip(part + towards / np.where(square > 0, square, 1.0), 0.0, LAST_PART)
+    # least squares of tip and b together; any outcome is a matching
+    part = original.feet(segment, np.full(len(path), 0.5), path, axis_length, NEWTON_STEPS)
     return np.maximum.accumulate(segment + part)
 
 
@@ -92,8 +85,8 @@ def _strays(path: Path, original: Original, axis_length: float, limit: float) ->
     parameter = np.concatenate((matched, np.arange(len(original), dtype=float)))
     sample = np.concatenate((np.arange(len(path)), poses))
     tip, point = original.at(parameter, axis_length)
-    strays_tip = np.linalg.norm(path.tip[sample] - tip, axis=1)
-    strays_point = np.linalg.norm(path.point[sample] - point, axis=1)
+    strays_tip = length_of(path.tip[sample] - tip)
+    strays_point = length_of(path.point[sample] - point)
     return parameter, strays_tip, strays_point
 
 

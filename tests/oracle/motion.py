@@ -27,6 +27,8 @@ CURVE_PARAMETERS = np.linspace(0.0, 1.0, 97)
 #: share of the limit that a chord may hide of the path of b
 SAGITTA_SHARE = 0.2
 COARSEST_STEP = math.radians(2)
+#: of a segment: the next begins behind
+LAST_PART = 1 - 1e-12
 FLIP = math.radians(179.9)
 #: a block that turns the axis by more has at least so many samples: what happens in its middle counts
 STRAIGHT, FEWEST = 1e-3, 4
@@ -55,9 +57,15 @@ class Path:
         )
 
 
+def length(vectors: Floats) -> Floats:
+    """(...) lengths of (..., 3) vectors."""
+    lengths: Floats = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    return lengths
+
+
 def unit(vectors: Floats) -> Floats:
     """(..., 3) vectors over their lengths."""
-    directions: Floats = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    directions: Floats = vectors / length(vectors)[..., None]
     return directions
 
 
@@ -198,15 +206,23 @@ class Original:
         axis = unit(self.axis[pose] + (self.axis[after] - self.axis[pose]) * part)
         return tip, tip + axis_length * axis
 
-    def slope(self, parameter: Floats, axis_length: float) -> tuple[Floats, Floats]:
-        """Derivatives of `at` within the segment (m,3), mm per segment."""
-        pose = np.clip(np.floor(parameter).astype(int), 0, max(0, len(self) - 2))
-        after = np.minimum(pose + 1, len(self) - 1)
-        along, turning = self.tip[after] - self.tip[pose], self.axis[after] - self.axis[pose]
-        chord = self.axis[pose] + turning * (parameter - pose)[:, None]
-        axis = unit(chord)
-        across = turning - axis * np.sum(axis * turning, axis=1, keepdims=True)
-        return along, along + axis_length * across / np.linalg.norm(chord, axis=1, keepdims=True)
+    def feet(self, segment: Ints, part: Floats, path: Path, axis_length: float, steps: int) -> Floats:
+        """Parts of segments nearest to samples (m,), tip and b together, by steps of Gauss and Newton from parts."""
+        start, along = self.tip[segment], self.tip[segment + 1] - self.tip[segment]
+        first, turning = self.axis[segment], self.axis[segment + 1] - self.axis[segment]
+        for _ in range(steps):
+            chord = first + turning * part[:, None]
+            size = length(chord)[:, None]
+            axis = chord / size
+            tip = start + along * part[:, None]
+            across = axis_length * (turning - axis * np.einsum("ij,ij->i", axis, turning)[:, None]) / size
+            slope = along + across  # of b
+            square = np.einsum("ij,ij->i", along, along) + np.einsum("ij,ij->i", slope, slope)
+            towards = np.einsum("ij,ij->i", path.tip - tip, along)
+            towards += np.einsum("ij,ij->i", path.point - tip - axis_length * axis, slope)
+            # short of 1, which would be the next segment to `at`
+            part = np.clip(part + towards / np.where(square > 0, square, 1.0), 0.0, LAST_PART)
+        return part
 
     def dense(self, axis_length: float, limit: float) -> tuple[Floats, Floats]:
         """Tip polyline (n,3) and finely sampled path of b (m,3)."""
