@@ -15,6 +15,9 @@ SAMPLES = 48
 #: mm and degrees from the end of the block before to the start of an SPL: rounding of both, a third of what is allowed
 SPL_START = 3e-4
 
+#: a feed behind a block; only the first block of a curve of G6.2 may have one
+FEED = r"(?: F(?:0|[1-9]\d*)(?:\.\d*)?)?"
+
 
 def rational(points: Floats, weights: Floats, knots: Floats, parameters: Floats) -> Floats:
     """(m, c) points of a rational cubic spline."""
@@ -70,7 +73,7 @@ class SiemensSplines:
 
     def __call__(self, reader: Reader, line: str, at: int, position: Floats | None, reading: Reading) -> Floats | None:
         words = " ".join(f"{word}{number(d)}" for word, d in zip(reader.words, reader.decimals, strict=True))
-        pattern = rf"(BSPLINE SD=3 )?{words} PL=(0|0\.[1-9]\d*|[1-9]\d*\.?\d*) PW=(\d+(?:\.\d{{1,4}})?)"
+        pattern = rf"(BSPLINE SD=3 )?{words} PL=(0|0\.[1-9]\d*|[1-9]\d*\.?\d*) PW=(\d+(?:\.\d{{1,4}})?){FEED}"
         match = re.fullmatch(pattern, line)
         if match is None:
             if line.startswith(";") and self.last == at - 1:
@@ -101,7 +104,7 @@ class SiemensPolynomials:
         words = " ".join(
             rf"PO\[{word.rstrip('=')}\]=\({number(tip)},{number(7)},{number(7)}\)" for word in reader.words
         )
-        match = re.fullmatch(f"POLY {words} PL=1", line)
+        match = re.fullmatch(f"POLY {words} PL=1{FEED}", line)
         if match is None:
             return None
         assert position is not None
@@ -127,7 +130,7 @@ class HeidenhainSplines:
         ends = " ".join(rf"{word}([+-]\d+\.\d{{{d}}})" for word, d in zip(reader.words, reader.decimals, strict=True))
         factor = r"([+-]\d\.\d{8}|[+-][1-9]\.\d{8}E[+-]\d{3})"
         factors = " ".join(f"K{power}{word}{factor}" for word in reader.words for power in (3, 2, 1))
-        match = re.fullmatch(f"SPL {ends} {factors}", line)
+        match = re.fullmatch(f"SPL {ends} {factors}{FEED}", line)
         if match is None:
             return None
         if position is None:
@@ -164,7 +167,8 @@ class KnotSplines:
     def __call__(self, reader: Reader, line: str, at: int, position: Floats | None, reading: Reading) -> Floats | None:
         words = " ".join(f"{word}{number(d)}" for word, d in zip(reader.words, reader.decimals, strict=True))
         knot, weight = r"K(\d+\.\d{0,3})", rf"R(\d+\.\d{{0,{self.weight_decimals}}})"
-        if match := re.fullmatch(rf"(G6\.2 P4 )?{knot} {words} {weight}", line):
+        block = rf"{knot} {words} {weight}"
+        if match := re.fullmatch(rf"(G6\.2 P4 ){block}{FEED}", line) or re.fullmatch(rf"(){block}", line):
             values = reader.numbers(at, match.groups()[2:-1])
             if match[1]:
                 if self.points or position is None or (values != position).any():

@@ -1,8 +1,9 @@
 """Does verification judge as an independent reader does? Random programs and files, by hand.
 
-``python -m verify.sweep [--seeds FIRST LAST] [--only CASE] [--method NAME] [--eps MM]... [FILE]...`` prints a line for
-every text that is refused although the oracle finds it right, for every text that passes although it does not, and for
-every failure; exit code 1 for any. Programs with holes have no oracle: what is written for them must pass.
+``python -m verify.sweep [--seeds FIRST LAST] [--only CASE] [--method NAME] [--programmed] [--eps MM]... [FILE]...``
+prints a line for every text that is refused although the oracle finds it right, for every text that passes although it
+does not, and for every failure; exit code 1 for any. Programs with holes have no oracle: what is written for them must
+pass.
 """
 
 from __future__ import annotations
@@ -120,6 +121,7 @@ def main() -> int:
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--seeds", type=int, nargs=2, default=(0, 0))
     parser.add_argument("--only", default="", help="cases whose name holds this")
+    parser.add_argument("--programmed", action="store_true", help="no planned feeds")
     parser.add_argument("--method", default="", help="for all programs that a form can write with it")
     parser.add_argument("--eps", type=float, action="append", help="for files; may be repeated")
     parser.add_argument("--keep", type=Path, help="folder for the CL files of what goes wrong")
@@ -144,6 +146,8 @@ def main() -> int:
 
     for seed in range(*given.seeds):
         one: Trial = trial(seed, only=given.only)
+        if given.programmed:
+            one = replace(one, planned=False)
         if given.method:
             one = with_method(one, given.method)
         take(
