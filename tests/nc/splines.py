@@ -12,8 +12,8 @@ from nc.reading import Floats, Piece, Reader, Reading, TextError
 
 #: samples of a knot interval; an even number, so that the middle is one
 SAMPLES = 48
-#: mm and degrees from the end of the block before to the start of an SPL: rounding of both, a third of what is allowed
-SPL_START = 3e-4
+#: mm and degrees from the end of the block before to the start of an SPL: rounding of its factors; 1e-3 is allowed
+SPL_START = 2e-6
 
 #: a feed behind a block; only the first block of a curve of G6.2 may have one
 FEED = r"(?: F(?:0|[1-9]\d*)(?:\.\d*)?)?"

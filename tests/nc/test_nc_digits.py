@@ -14,6 +14,7 @@ from cornersmooth.model import Program
 from cornersmooth.nc import Form, choose_form, load_control
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
+from nc.grammars import reader
 
 #: control, form, machine, and decimals of X and of the last word in mm
 AGREED = (
@@ -65,6 +66,15 @@ def test_text_has_the_digits_asked_for_and_is_verified(
     text = re.sub(r"(?m)^\d+ (?=G1 )", "", text)
     assert decimals(text, "X") == {tip}
     assert decimals(text, chosen.other_words[-1]) == {other}
+
+
+def test_splines_of_few_digits_begin_where_the_block_before_ended() -> None:
+    """A micrometre is allowed, half of which the rounding of an end to three decimals may be."""
+    chosen = choose_form("heidenhain", "spl", machine=load_machine("xyzac-trt"), digits="3")
+    text = written(chosen)
+    assert text.count(" SPL ") > 10
+    read = reader("heidenhain", "spl", "xyzac-trt", True, "mm", "3").read(text, 10.0, 0.02)
+    assert len(read.pieces) > 20
 
 
 @pytest.mark.parametrize(("control", "tip"), [("fanuc", 5), ("siemens", 7)])

@@ -46,12 +46,24 @@ class _Polynomials(NoCurves):
         self._line_decimals = decimals
 
     def prepare(self, run: Run) -> Run:
-        """Leave the rows that carry an interval; curves begin where the block before ended, digit for digit."""
-        first = np.flatnonzero(run.curve == 1)
-        if len(first):
-            assert run.bezier is not None
-            run.bezier[first + _DEGREE, 0] = run.ticks[first] / 10.0 ** np.array(self._line_decimals)
-        return run.only((run.curve == 0) | (run.curve > _DEGREE))
+        """Leave the rows that carry an interval; each begins and ends in printed digits, where the one before ended.
+
+        Its tangents stay: their control points move with the ends.
+        """
+        kept = run.only((run.curve == 0) | (run.curve > _DEGREE))
+        curved = np.flatnonzero(kept.curve > 0)
+        if len(curved):
+            assert kept.bezier is not None
+            scale = 10.0 ** np.array(self._line_decimals)
+            first = kept.curve[curved] == _DEGREE + 1
+            end = to_ticks(kept.bezier[curved, 3], self._line_decimals) / scale
+            start = np.concatenate((end[:1], end[:-1]))
+            start[first] = run.ticks[run.curve == 1] / scale
+            for points, place in (((0, 1), start), ((3, 2), end)):
+                shift = place - kept.bezier[curved, points[0]]
+                for point in points:
+                    kept.bezier[curved, point] += shift
+        return kept
 
     def _intervals(self, run: Run, curved: Bools) -> NDArray[np.float64]:
         """Bézier points (4, r, c) of the rows on curves."""
