@@ -39,6 +39,8 @@ class RotaryAxis:
         the table itself (LinuxCNC's trunnions). For a head both are the same, and only ``"tool"`` is accepted.
     limits : (float, float) or None, degrees
         Lowest and highest word; None for an axis that turns without end.
+    modulo : bool
+        Whether its words are from 0 to 360 degrees, and it goes the shorter way to each.
     """
 
     name: str
@@ -47,6 +49,7 @@ class RotaryAxis:
     point: Vector = (0.0, 0.0, 0.0)
     positive: Literal["tool", "table"] = "tool"
     limits: tuple[float, float] | None = None
+    modulo: bool = False
 
     def __post_init__(self) -> None:
         where = f"rotary axis {self.name}"
@@ -62,6 +65,8 @@ class RotaryAxis:
                 raise SettingsError("CS253", f"{where}: {key} is not a point of space", "give three numbers")
         if not any(self.direction):
             raise SettingsError("CS253", f"{where}: direction is zero", "give a vector along the axis")
+        if self.limits is not None and self.modulo:
+            raise SettingsError("CS253", f"{where}: a modulo axis with limits", "leave out one of both")
         if self.limits is not None:
             low, high = self.limits
             if not (math.isfinite(low) and math.isfinite(high) and low < high):
@@ -181,6 +186,11 @@ class Machine:
     def limits(self) -> Floats:
         """(2, 2) lowest and highest word of each axis, degrees; infinite where there is none."""
         return np.array([(axis.low, axis.high) for axis in self.axes])
+
+    @property
+    def modulo(self) -> tuple[str, ...]:
+        """Names of the axes whose words are from 0 to 360 degrees."""
+        return tuple(axis.name for axis in self.axes if axis.modulo)
 
     @property
     def kind(self) -> str:

@@ -30,7 +30,7 @@ _SHELF = Shelf(
     unknown_key="CS252",
     wrong_value="CS253",
 )
-_AXIS_KEYS = ("name", "direction", "carrier", "point", "positive", "limits")
+_AXIS_KEYS = ("name", "direction", "carrier", "point", "positive", "limits", "modulo")
 _DYNAMICS_KEYS = ("velocity", "acceleration", "jerk")
 
 
@@ -72,8 +72,8 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
     text : str or dict
         Keys: ``like`` (a machine that comes with the program; then only what is different), ``name``, ``description``,
         ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``part_zero`` and two tables ``[[axis]]`` with
-        ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``; ``[travel]`` with ``X``, ``Y`` and
-        ``Z``, each ``[lowest, highest]``, any of which may be left out; and for the planning of the time
+        ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``, ``modulo``; ``[travel]`` with ``X``,
+        ``Y`` and ``Z``, each ``[lowest, highest]``, any of which may be left out; and for the planning of the time
         tables ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min
         or deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which may be left out.
     file : str
@@ -120,6 +120,9 @@ def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
         if not isinstance(limits, list) or len(limits) != 2:
             raise _SHELF.wrong(f"{where}limits is {limits!r}", "write limits = [lowest, highest] in degrees")
         limits = (_number(limits[0], f"{where}limits"), _number(limits[1], f"{where}limits"))
+    modulo = entry.get("modulo", False)
+    if not isinstance(modulo, bool):
+        raise _SHELF.wrong(f"{where}modulo is {modulo!r}", "write true or false")
     return RotaryAxis(
         name=_text(entry, "name", ""),
         direction=_vector(entry, "direction", (0.0, 0.0, 0.0), where),
@@ -127,6 +130,7 @@ def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
         point=_vector(entry, "point", (0.0, 0.0, 0.0), where),
         positive=entry.get("positive", "tool"),
         limits=limits,
+        modulo=modulo,
     )
 
 

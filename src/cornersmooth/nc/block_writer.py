@@ -60,18 +60,41 @@ class BlockWriter:
     _curves: Curves = field(init=False)
     _blank: str = field(init=False)
     _share: SplineShare | None = field(init=False)
+    _modulo: list[int] = field(init=False)  #: columns of modulo axes
+    _closing: bytes = field(init=False)
 
     def __post_init__(self) -> None:
         motion = self.form.mode.motion
         self._blank = " " if motion.spaces else ""
-        words = [word.encode() for word in (*motion.coordinates, *self.form.other_words)]
+        words = (*motion.coordinates, *self.form.other_words)
         decimals = self.form.decimals(self.program.units)
-        spaced = (words[0], *(self._blank.encode() + word for word in words[1:]))
+        modulo = self.form.machine.modulo if self.form.machine is not None and self.form.rotary else ()
+        self._modulo = [k for k, word in enumerate(words) if k > 2 and word in modulo]
+        spaced, self._closing = self._spelt(range(len(words)))
         self._format = self._row_format(spaced, decimals)
         radius = f"{self._blank}{motion.radius}".encode()
         self._arc_format = self._row_format((*spaced[:3], radius), decimals[:3] + decimals[:1])
         self._curves = curves_for(self.form, self.program.units)
         self._share = SplineShare(self.program.line, self.findings) if self.form.curve == "bspline" else None
+
+    def _spelt(self, columns: Sequence[int]) -> tuple[tuple[bytes, ...], bytes]:
+        """What stands before the numbers of columns, and behind the last of them."""
+        motion = self.form.mode.motion
+        words, end = [], ""
+        for place, column in enumerate(columns):
+            word = (*motion.coordinates, *self.form.other_words)[column]
+            before, behind = motion.shortest if column in self._modulo else ("", "")
+            words.append(f"{end}{self._blank if place else ''}{word}{before}".encode())
+            end = behind
+        return tuple(words), end.encode()
+
+    def _said(self, ticks: Ints) -> Ints:
+        """Ticks of rows with those of modulo axes from 0 to 360 degrees."""
+        if not self._modulo:
+            return ticks
+        said = ticks.copy()
+        said[..., self._modulo] %= 360 * 10**self.form.table.digits.angle
+        return said
 
     def _row_format(self, words: tuple[bytes, ...], decimals: tuple[int, ...]) -> RowFormat:
         motion = self.form.mode.motion
@@ -121,14 +144,13 @@ class BlockWriter:
     def _rapid(self, ticks: Ints, chosen: slice | Bools) -> str:
         """Rapid block of some words of a row."""
         motion = self.form.mode.motion
-        words = np.array([*motion.coordinates, *self.form.other_words])[chosen].tolist()
+        columns = np.arange(self.columns)[chosen].tolist()
         decimals = np.array(self.form.decimals(self.program.units))[chosen].tolist()
-        blank = self._blank.encode()
-        spelt = (words[0].encode(), *(blank + word.encode() for word in words[1:]))
-        prefix, suffix = f"{motion.rapid}{self._blank}".encode(), motion.rapid_end.encode()
+        spelt, closing = self._spelt(columns)
+        prefix, suffix = f"{motion.rapid}{self._blank}".encode(), closing + motion.rapid_end.encode()
         row = self._row_format(spelt, tuple(decimals))
         none = np.zeros(1, np.int64)
-        return row.rows(ticks[chosen][None], [prefix], none, [suffix], none)[0].decode()
+        return row.rows(self._said(ticks)[chosen][None], [prefix], none, [suffix], none)[0].decode()
 
     @property
     def columns(self) -> int:
@@ -212,7 +234,8 @@ class BlockWriter:
         if self._curves.format is not None and (curved := run.curve > 0).any():
             apart.append((curved, self._curves.format, self._curves.numbers(run, curved)))
         if not apart:
-            return self._format.rows(run.ticks, prefix, prefix_id, suffix, suffix_id)[0]
+            suffix = [self._closing + end for end in suffix]
+            return self._format.rows(self._said(run.ticks), prefix, prefix_id, suffix, suffix_id)[0]
         which = np.zeros(len(run), np.int64)
         for number, (rows, _, _) in enumerate(apart, start=1):
             which[rows] = number

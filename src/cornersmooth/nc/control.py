@@ -94,6 +94,9 @@ class Motion:
         refused by the control before it runs.
     endless_words : bool
         Whether words of endless rotary axes beyond 0 to 360 degrees are taken on every machine.
+    shortest : tuple of str
+        What stands before and behind the number of a modulo axis that goes the shorter way; none where the control has
+        no words for that.
     inch_feed : int
         What one inch per minute is written as: 10 where F counts tenths.
     fastest : float, 1/min
@@ -115,6 +118,7 @@ class Motion:
     trailing_zeros: bool = True
     feed_needed: bool = False
     endless_words: bool = True
+    shortest: tuple[str, ...] = ()
     inch_feed: int = 1
     fastest: float = 9999.999
 

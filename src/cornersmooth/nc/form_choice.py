@@ -10,7 +10,7 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Move, Program
-from cornersmooth.nc.control import Control, Extra, FormTable, Orientation
+from cornersmooth.nc.control import Control, Extra, FormTable, Mode, Orientation
 from cornersmooth.nc.control_tables import load_control
 from cornersmooth.nc.form import ROTARY_SHARE, Form
 from cornersmooth.settings import Settings
@@ -68,8 +68,22 @@ def choose_form(
         if orientation in chosen.modes:
             asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
             mode = chosen.modes[orientation]
+            _check_modulo(table, chosen, mode, machine)
             return Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright)
     raise _refusal(table, chosen, wanted, machine)
+
+
+def _check_modulo(table: Control, form: FormTable, mode: Mode, machine: Machine | None) -> None:
+    """Refuse modulo axes that the control does not send the shorter way, or whose words a curve would have."""
+    if machine is None or not machine.modulo:
+        return
+    axes, hint = " and ".join(machine.modulo), "leave out modulo in the machine file"
+    if form.curve:
+        lines = next((name for name, other in table.forms.items() if not other.curve), "")
+        text = f"{table.name} form {form.name} has curves of the words of {axes}, which a modulo axis cannot follow"
+        raise SettingsError("CS215", text, f"use -f {lines}" if lines else hint)
+    if not mode.motion.shortest:
+        raise SettingsError("CS215", f"{table.name} has no words by which {axes} goes the shorter way", hint)
 
 
 def _extra(table: Control, form: str, name: str) -> Extra:

@@ -427,7 +427,7 @@ class MotionWriter:
         form = self.writer.form
         if self._said_turns or form.mode.motion.endless_words or form.machine is None or not form.rotary:
             return
-        endless = np.isinf(form.machine.limits).all(axis=1)
+        endless = np.array([axis.limits is None and not axis.modulo for axis in form.machine.axes])
         angles = self.writer.angles(run.ticks)[:, endless]
         rows = np.flatnonzero(((angles < 0.0) | (angles >= 360.0)).any(axis=1))
         if len(rows):
@@ -435,7 +435,7 @@ class MotionWriter:
             names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
             text = (
                 f"words of {names} beyond 0 to 360 deg: a modulo axis takes them only where the builder allows it "
-                "(MD30455 bit 0, else alarm 16830); give the axis its limits in a machine file where it does not"
+                "(MD30455 bit 0, else alarm 16830); else write modulo = true for the axis in a machine file"
             )
             self.findings.add("CS346", "warning", int(self.program.line[run.move[rows[0]]]), text)
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Set
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.dialects.base import HIGH_SPEED, Dialect
+from cornersmooth.nc_reader.dialects.base import BY_WORD, HIGH_SPEED, Dialect
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.words import NURBS, Table
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
 
 #: code of words that want another state of the control
 CONTROL_WORDS: Final = "CS506"
@@ -29,6 +32,38 @@ def curve_problem(table: Table, dialect: Dialect, memory: Mapping[str, Any]) -> 
     if not needed or memory.get(HIGH_SPEED) or not (curves := np.flatnonzero(table.column("G") == NURBS)).size:
         return None
     return Problem(CONTROL_WORDS, 0, int(table.line[curves[0]]), f"a curve where {needed} must be in force")
+
+
+def modulo_problems(table: Table, machine: Machine, words: str, memory: Mapping[str, Any]) -> list[Problem]:
+    """Return what is wrong with words of modulo axes in a run: from 0 to 360 degrees, and told to go the shorter way.
+
+    Parameters
+    ----------
+    table : Table
+    machine : Machine
+    words : str
+        `Dialect.shorter_way`.
+    memory : mapping
+        `State.memory`.
+    """
+    problems = []
+    for axis in machine.axes:
+        values = table.column(axis.name)
+        given = ~np.isnan(values)
+        beyond = given & ((values < 0.0) | (values >= 360.0)) if axis.modulo else np.zeros_like(given)
+        found = [(beyond, f"a word of {axis.name} that is not from 0 to 360 degrees")]
+        if words == BY_WORD:
+            told = ~np.isnan(table.column(f"{BY_WORD} {axis.name}"))
+            if axis.modulo:
+                found.append((given & ~told, f"{axis.name} without {BY_WORD}(), which sends it the shorter way"))
+            else:
+                found.append((told, f"{axis.name} with {BY_WORD}(), which is for modulo axes"))
+        elif words and axis.modulo and not memory.get(words):
+            found.append((given, f"{axis.name} without {words} in force, which sends it the shorter way"))
+        problems += [
+            Problem(CONTROL_WORDS, 0, int(table.line[np.argmax(wrong)]), text) for wrong, text in found if wrong.any()
+        ]
+    return problems
 
 
 class AxisWords:

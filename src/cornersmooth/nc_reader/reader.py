@@ -14,7 +14,7 @@ from cornersmooth.nc_reader.dialects.base import INCREMENTAL
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Executed, Modal, execute
 from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
-from cornersmooth.nc_reader.needed_states import AxisWords, curve_problem
+from cornersmooth.nc_reader.needed_states import AxisWords, curve_problem, modulo_problems
 from cornersmooth.nc_reader.path_elements import in_mm, path_elements
 from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
 from cornersmooth.nc_reader.way_back import WayBack
@@ -146,6 +146,8 @@ class Reader:
             if self.rotary is not None:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
                 rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
+                self.problems += modulo_problems(table, rotary.machine, self.dialect.shorter_way, self.memory)
+                run = replace(run, second=rotary.unwrapped(run.second, before.second))
                 if self.dialect.retracts:
                     self._check_swings(rotary.swung(run, start), run)
                 run = rotary.resolve(run, start, inverse_time=before.inverse_time)

@@ -138,6 +138,16 @@ class Rotary:
         linear = self.tip_step if self.tip_control else np.sqrt(3) * self.tip_step
         return float(linear + lever * turn), 2 * turn
 
+    def unwrapped(self, angles: Floats, before: tuple[float, ...]) -> Floats:
+        """Return (n, 3) rotary words with those of modulo axes taken the shorter way, each from the one before."""
+        found = angles
+        for column, axis in enumerate(self.machine.axes):
+            if axis.modulo and len(angles):
+                start = before[column] if not np.isnan(before[column]) else angles[0, column]
+                found = found.copy() if found is angles else found
+                found[:, column] = np.unwrap(np.append(start, angles[:, column]), period=360.0)[1:]
+        return found
+
     def resolve(self, run: Executed, before: Modal, *, inverse_time: bool) -> Executed:
         """Return a run in tips and tool vectors, all in mm, the second triple being degrees before.
 

@@ -24,6 +24,10 @@ INCREMENTAL = "incremental"
 HIGH_SPEED = "high speed"
 
 
+#: word around the number of a modulo axis that sends it the shorter way; a column of tables with the axis behind it
+BY_WORD = "DC"
+
+
 class State(Protocol):
     """What a dialect may ask of the reader, and tell it."""
 
@@ -72,6 +76,8 @@ class Dialect:
     controls: Mapping[str, tuple[str, ...]] = {}
     #: whether texts can send the tool up, so that rotary axes turn there
     retracts: bool = True
+    #: what sends a modulo axis the shorter way: `BY_WORD`, a name in `State.memory`, or empty for a parameter
+    shorter_way: str = ""
     #: what must be in force for curves; empty for nothing
     curves_need: str = ""
     #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
@@ -80,7 +86,9 @@ class Dialect:
     def __init__(self, lexer: Lexer, rotary: str = "") -> None:
         self.lexer, self.rotary = lexer, rotary
         if rotary:
-            self.digits = re.compile(rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b]))[-+]?\d*\.(\d*)" % rotary.encode())
+            self.digits = re.compile(
+                rb"(?<!K\d)(?:([XYZ])|(?<![A-Z0-9])([%b])(?:=DC\()?)[-+]?\d*\.(\d*)" % rotary.encode()
+            )
 
     def row(self, line: Line) -> dict[str, float] | None:
         """Words of a motion block; None where the line is something else."""

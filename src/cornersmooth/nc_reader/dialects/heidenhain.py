@@ -41,6 +41,9 @@ _CYCLES: Final = {
 }
 _CYCLE_NAMES: Final = {200: "DRILLING", 201: "REAMING", 207: "RIGID TAPPING NEW"}
 
+#: name in `State.memory` of whether rotary axes go the shorter way
+_SHORTER: Final = "M126"
+
 _SIDES = {"R0": 40.0, "RL": 41.0, "RR": 42.0}
 
 
@@ -54,6 +57,7 @@ class Heidenhain(Dialect):
     """
 
     lexer: _KlartextLexer
+    shorter_way = _SHORTER
     feed_step = 1e-3
     inch_feed = 0.1
     unsaid = frozenset(("offset", "compensation", "register", ("spindle", 19.0), ("coolant", 7.0), ("coolant", 88.0)))
@@ -168,7 +172,7 @@ class Heidenhain(Dialect):
         elif value in (128.0, 129.0):
             state.tip_control = "M128" if value == 128.0 else ""
         elif value in (126.0, 127.0):
-            pass  # which way rotary axes turn between two positions: less than half a turn either way
+            state.memory[_SHORTER] = value == 126.0  # for others turns are less than half a turn either way
         elif value in (91.0, 92.0):
             state.refuse(line, f"{text}: positions of the machine", "only positions of the part are read")
         else:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect, State
+from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, BY_WORD, Dialect, State
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.words import BSPLINE, POLY, Columns, Line, Word
@@ -59,6 +59,7 @@ class Siemens(Dialect):
         Addresses of the rotary axes; empty without a machine.
     """
 
+    shorter_way = BY_WORD
     unsaid = frozenset(("offset", "register", ("coolant", 88.0)))
     controls = {  # noqa: RUF012
         "vector": ("TRAORI ORIVECT", "TRAORI ORIPLANE", "TRAORI"),
@@ -97,7 +98,7 @@ class Siemens(Dialect):
                 state.event(line, name, value, text, late=name == "M" and value in AFTER_MOTION)
             elif name == "SPOS":
                 state.event(line, "M", 19.0, text)
-            elif name in ("X", "Y", "Z", "F", *self.rotary):
+            elif name in ("X", "Y", "Z", "F", *self.rotary) or name.removeprefix(f"{BY_WORD} ") in self.rotary:
                 motion[name] = value
             elif name in ("TRAORI", "TRAFOOF", *_ORIENTATIONS):
                 self._transform(name, state)
@@ -191,7 +192,8 @@ class _SiemensLexer(Lexer):
     """
 
     word = re.compile(
-        r"PO\[(?P<po>\w+)\]=\((?P<factors>[-+.\d, \t]+)\)"
+        rf"(?P<axis>[ABC])[ \t]*=[ \t]*{BY_WORD}\([ \t]*(?P<angle>{NUMBER})[ \t]*\)"
+        r"|PO\[(?P<po>\w+)\]=\((?P<factors>[-+.\d, \t]+)\)"
         rf"|(?P<name>[A-Z][A-Z]?\d?|SPOS)[ \t]*=[ \t]*(?P<given>{NUMBER})"
         rf"|(?P<letter>[A-Z])[ \t]*(?P<value>{NUMBER})(?!=)"
         r"|(?P<call>[A-Z_][A-Z_0-9]*)[ \t]*(?:\([^()]*\))?"
@@ -200,7 +202,20 @@ class _SiemensLexer(Lexer):
     begins = re.compile(rb"\n[ /]*(?:N\d+ *)?(?:G|BSPLINE|POLY)")
 
     def __init__(self, rotary: str) -> None:
-        self._names = {"G", "X", "Y", "Z", "F", "PL", "PW", "SD", "POLY", "BSPLINE", *rotary}
+        self._names = {
+            "G",
+            "X",
+            "Y",
+            "Z",
+            "F",
+            "PL",
+            "PW",
+            "SD",
+            "POLY",
+            "BSPLINE",
+            *rotary,
+            *(f"{BY_WORD} {axis}" for axis in rotary),
+        }
         self._names |= {f"{axis}{power}" for axis in "XYZUVW" for power in "23"}
         self._second = frozenset() if rotary else frozenset("IJKUVW")
         self.places = frozenset("XYZ" + (rotary or "IJKUVW"))
@@ -213,6 +228,9 @@ class _SiemensLexer(Lexer):
 
     def named(self, match: re.Match[str]) -> Iterable[Word] | None:
         """Words of one match: an axis of a polynomial has several."""
+        if match["axis"]:
+            flag = f"{BY_WORD} {match['axis']}"
+            return [number_of(match, "angle", match["axis"]), fixed(match, flag, 1.0)]
         if match["po"]:
             return _factors(match)
         if word := match["name"]:
