@@ -104,6 +104,26 @@ def test_limits_hold_on_random_chains(chain: Callable[[int], Program], name: str
     assert peaks.max() > 0.9  # a limit is used, not only kept
 
 
+def test_limits_hold_where_the_tip_all_but_stands() -> None:
+    """Turns on the spot in a run: the tip swings within ε while the axes go their whole way."""
+    lean = np.array([0.5, 0.5, 0.8, 0.8, 0.4, 0.4, 0.7])
+    swing = np.array([0.0, 0.0, 0.1, 0.1, 0.3, 0.3, 0.0])
+    axis = np.stack((np.sin(lean) * np.cos(swing), np.sin(lean) * np.sin(swing), np.cos(lean)), axis=1)
+    tip = np.outer([0.0, 4.0, 4.0, 8.0, 8.0, 12.0, 12.0], [0.8, 0.6, 0.0])
+    smoothed = smooth(Program.from_poses(tip, axis, feed=1800.0), Settings(method="global"))
+    assert smoothed.runs is not None
+    law = plan(smoothed, machine=load_machine("table-ac"))
+    assert law.machine_axes is not None
+    # by exact derivatives: those of the tip's way are too large for differences over time
+    _, *orders = law.axes_at(np.arange(0.0, law.total, STEP))
+    peaks = np.stack([np.abs(order).max(axis=0) for order in orders]) / law.machine_axes.limits
+    assert peaks.max() <= 1.001
+    assert peaks.max() > 0.9
+    t, angles = observed(law)
+    assert (np.abs(np.diff(angles, axis=0)).max(axis=0) / STEP <= 1.001 * law.machine_axes.limits[0]).all()
+    assert np.ptp(angles[:, 3:], axis=0).min() > 10.0, t[-1]
+
+
 def test_limits_hold_on_the_fan(corpus: FilePath) -> None:
     name = "hust_5x_toolpath_fan.txt"
     program = read((corpus / name).read_bytes(), name=name, units="mm")

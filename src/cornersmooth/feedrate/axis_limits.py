@@ -103,11 +103,12 @@ def find_limit_coefficients(
     """Coefficients of the limits that go beyond those of the path speed; None where there are none.
 
     Transitions between a motion of the tip and a turn on the spot are left out but for the jerk of the tip: by the way
-    of the tip the derivatives of everything else have no bound there.
+    of the tip the derivatives of everything else have no bound there. Pieces of runs and of texts on which the tip all
+    but stands while the axis turns are looked at closely where it is slowest.
     """
     if not len(path):
         return None
-    steady = ~(_stalling(path) | stalling(path))
+    steady = ~_stalling(path)
     vectors = [
         (AxisLimits(_tip, *limits.vector_limits[0]), ~path.turning),
         (AxisLimits(_tool_axis, *limits.vector_limits[1]), ~path.turning & steady),
@@ -116,11 +117,12 @@ def find_limit_coefficients(
     given: list[tuple[Orders, Floats, Bools]] = [
         (_orders(path, item), np.array([[item.speed], [item.accel], [item.jerk]]), where) for item, where in vectors
     ]
-    close = np.zeros(len(path), np.bool_)
+    slow = stalling(path)
+    close = slow.copy()
     if machine_axes is not None:
         machine_axes = replace(machine_axes, cone=WITHIN * machine_axes.cone)
         given.append((_signed(machine_axes), machine_axes.limits, steady))
-        close = machine_axes.near_pole() & steady
+        close |= machine_axes.near_pole() & steady
     given = [(orders, bounds, where) for orders, bounds, where in given if np.isfinite(bounds).any()]
     if not given:
         return None
@@ -136,7 +138,7 @@ def find_limit_coefficients(
             chosen = np.flatnonzero(asked & (bent == curve) & (close == near))
             for at in range(0, len(chosen), _TOGETHER // 8 if near else _TOGETHER):
                 element = chosen[at : at + (_TOGETHER // 8 if near else _TOGETHER)]
-                graded = _around(*machine_axes.closest(element)) if machine_axes is not None and near else None
+                graded = _graded(path, element, slow[element], machine_axes) if near else None
                 borders, share = _borders(path, element, curve, graded)
                 into = begin[element][:, None] + np.arange(borders.shape[1] - 1)
                 width[into] = share * path.length[element][:, None]
@@ -186,10 +188,23 @@ def _stalling(path: Path) -> Bools:
     return stalling
 
 
-def _around(closest: Floats, felt: Floats) -> Floats:
-    """Borders (g, p + 1) of intervals that grow on either side of the point nearest to the pole."""
+def _graded(path: Path, element: Ints, slow: Bools, machine_axes: MachineAxes | None) -> Floats:
+    """Borders (g, p + 1) of intervals that are small where the axis is nearest to the pole, or the tip slowest."""
+    borders = np.zeros((len(element), 2 * POLE_INTERVALS + 1))
+    swift = np.flatnonzero(~slow)
+    if len(swift) and machine_axes is not None:
+        borders[swift] = _around(*machine_axes.closest(element[swift]), POLE_INTERVALS)
+    if slow.any():
+        places, _, felt = bezier_halves.slowest(cubics(path, element[slow]).tip)
+        both = [_around(places[:, k], felt[:, k], POLE_INTERVALS // 2) for k in range(2)]
+        borders[slow] = np.sort(np.concatenate(both, axis=1), axis=1)[:, :-1]  # two of them are the end
+    return borders
+
+
+def _around(closest: Floats, felt: Floats, intervals: int) -> Floats:
+    """Borders (g, p + 1) of so many intervals on either side of a point, which grow with the distance from it."""
     smallest = FIRST_INTERVAL * felt[:, None]
-    steps = np.linspace(0.0, 1.0, POLE_INTERVALS + 1)
+    steps = np.linspace(0.0, 1.0, intervals + 1)
     away = smallest * np.sinh(steps * np.arcsinh(1.0 / smallest))
     both = np.concatenate((closest[:, None] - away[:, :0:-1], closest[:, None] + away), axis=1)
     borders: Floats = np.clip(both, 0.0, 1.0)

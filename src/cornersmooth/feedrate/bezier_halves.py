@@ -38,6 +38,9 @@ _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 INTERVALS = 12
 _PROGRESS = 1.0 - np.linspace(1.0, 0.0, INTERVALS + 1) ** 1.7
 _NEWTON_STEPS = 3
+#: points among which the slowest of a curve is searched for, rounds of closer search, and the least share of the curve
+#: over which a slow point may be felt
+_SEARCHED, _ROUNDS, _LEAST_FELT = 25, 4, 1e-6
 #: parameter beside an end at which the tangent is taken where there is none at the end itself
 _BESIDE = 1e-3
 #: a radius of curvature below this is a cusp and is passed with the speed for this radius, mm
@@ -205,6 +208,36 @@ def interval_curvatures(powers: Floats, borders: Floats) -> Floats:
         low, high = near[rows, np.maximum(at - 1, 0)], near[rows, np.minimum(at + 1, 8)]
     found: Floats = largest
     return found
+
+
+def slowest(powers: Floats) -> tuple[Floats, Floats, Floats]:
+    """Where curves are slowest by their parameter, that speed (mm), and the share over which it is felt, (g, 2) each.
+
+    The square of the speed of a cubic has up to two minima; where there is one, both columns are the same. Sampled, and
+    sampled again ever more closely.
+    """
+    g = len(powers)
+    t = np.broadcast_to(np.linspace(0.0, 1.0, _SEARCHED), (g, _SEARCHED))
+    speed = np.broadcast_to(_size(_derivatives(powers, t, 1)[1]), t.shape)
+    wide = np.concatenate((speed[:, :1], speed, speed[:, -1:]), axis=1)
+    smallest = np.where((speed <= wide[:, :-2]) & (speed <= wide[:, 2:]), speed, np.inf)
+    both = np.argsort(smallest, axis=1, kind="stable")[:, :2]
+    rows = np.arange(g)
+    both[:, 1] = np.where(np.isfinite(smallest[rows, both[:, 1]]), both[:, 1], both[:, 0])
+    places, speeds, shares = np.zeros((g, 2)), np.zeros((g, 2)), np.zeros((g, 2))
+    for column, at in enumerate(both.T):
+        low, high = t[rows, np.maximum(at - 1, 0)], t[rows, np.minimum(at + 1, _SEARCHED - 1)]
+        for _ in range(_ROUNDS):
+            near = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, 9)
+            _, d1, d2 = _derivatives(powers, near, 2)
+            speed = np.broadcast_to(_size(d1), near.shape)
+            at = speed.argmin(axis=1)
+            low, high = near[rows, np.maximum(at - 1, 0)], near[rows, np.minimum(at + 1, 8)]
+        least, bend = speed[rows, at], np.broadcast_to(_size(d2), near.shape)[rows, at]
+        places[:, column], speeds[:, column] = near[rows, at], least
+        felt = least / np.maximum(bend, np.maximum(least, np.finfo(np.float64).tiny))
+        shares[:, column] = np.clip(felt, _LEAST_FELT, 1.0)
+    return places, speeds, shares
 
 
 def curvature(powers: Floats, t: Floats) -> Floats:

@@ -15,12 +15,19 @@ from cornersmooth.model import Bools, Floats, Ints, Program, Runs
 from cornersmooth.smoothing.runs.lines import polylines_of
 from cornersmooth.smoothing.runs.samples import Pieces
 from cornersmooth.smoothing.runs.splines import Splines
+from cornersmooth.vectors import norm
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate.path import Path
 
 #: what stands for the half where a cubic is a piece of a run
 WHOLE = 2
+
+#: part of its mean speed below which the tip of a piece is slow
+_SLOW = 0.8
+
+#: speed of the tip over that of the axis point below which the tip stands
+_STANDING = 3e-4
 
 #: pieces measured together
 _GROUP = 4096
@@ -95,12 +102,20 @@ class RunPieces:
 
 
 def measured(tip: Floats, axis_point: Floats) -> tuple[Floats, Floats]:
-    """Lengths of the tip (p,) on whole pieces, mm, and angles that the axis turns (p,), rad, where the tip stands."""
+    """Lengths of the tip (p,) on whole pieces, mm, and angles that the axis turns (p,), rad, where the tip stands.
+
+    Where the tip comes all but to a stand beside the turning axis, nothing can be said by its way: the piece is a turn
+    on the spot, of length 0.
+    """
     length, angle = np.zeros(len(tip)), np.zeros(len(tip))
     for at in range(0, len(tip), _GROUP):
         rows = np.arange(at, min(at + _GROUP, len(tip)))
         half = np.full(len(rows), WHOLE)
         length[rows] = bezier_halves.interval_lengths(tip[rows], bezier_halves.interval_borders(half)).sum(axis=1)
+        _, slowest, _ = bezier_halves.slowest(tip[rows])
+        ends = np.tile([0.0, 1.0], (len(rows), 1))
+        lever = bezier_halves.evaluate(axis_point[rows], ends) - bezier_halves.evaluate(tip[rows], ends)
+        length[rows[slowest.min(axis=1) < _STANDING * norm(lever[:, 1] - lever[:, 0])]] = 0.0
         still = rows[length[rows] <= bezier_halves.STANDSTILL]
         angle[still] = bezier_halves.turned_angle(tip[still], axis_point[still], half[: len(still)])
     return length, angle
@@ -141,22 +156,19 @@ def curved(path: Path) -> Bools:
 
 
 def stalling(path: Path) -> Bools:
-    """(m,) bool: pieces of runs on which the tip all but stands while the axis turns."""
+    """(m,) bool: pieces of runs and of texts on which the tip gets much slower, by their parameter, than it is."""
     from cornersmooth.feedrate.path import Kind
 
     found = np.zeros(len(path), np.bool_)
     runs = path.run_pieces
     rows = np.flatnonzero((path.kind == Kind.PIECE) & ~path.turning)
-    if runs is None or not len(rows):
+    if runs is None:
         return found
-    piece = path.corner[rows]
-    swing = np.abs(np.diff((runs.axis_point - runs.tip)[piece, :, :3], axis=1)).sum(axis=(1, 2))
-    found[rows] = runs.length[piece] < _STANDING * swing
+    for at in range(0, len(rows), _GROUP):
+        some = rows[at : at + _GROUP]
+        _, least, _ = bezier_halves.slowest(runs.tip[path.corner[some]])
+        found[some] = least.min(axis=1) < _SLOW * path.length[some]
     return found
-
-
-#: way of the tip over that of the axis point below which the tip all but stands
-_STANDING = 1e-3
 
 
 def along_runs(path: Path, runs: Runs | None, feeds: Floats, angular: float) -> Path:
@@ -191,7 +203,10 @@ def along_runs(path: Path, runs: Runs | None, feeds: Floats, angular: float) -> 
     turning[mine] = pieces.length[row] <= bezier_halves.STANDSTILL
     length[mine] = np.where(turning[mine], pieces.angle[row], pieces.length[row])
     speed[mine] = np.where(turning[mine], angular, feeds[path.move[element[mine]]])
-    junction = np.where(mine & ((place > 0) | pieces.inner[path.start[element]]), np.inf, path.junction_speed[element])
+    inside = mine & ((place > 0) | pieces.inner[path.start[element]])
+    # from turn to turn on the spot the axis may change its rate: the machine says how fast that may be passed
+    turns = turning & np.concatenate(([False], turning[:-1]))
+    junction = np.where(inside, np.where(turns, angular, np.inf), path.junction_speed[element])
 
     keep = np.flatnonzero(~mine | ~turning | (length > NO_TURN))
     begin = np.concatenate(([0], keep[:-1] + 1))

@@ -31,7 +31,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solveh_banded
+from scipy.linalg import LinAlgError, solveh_banded
 
 from cornersmooth.model import Bools, Floats, Ints
 
@@ -41,6 +41,8 @@ GAP = 2e-4
 SETTLED = 1e-3
 #: Newton steps after which the profile is taken as it is; it is feasible at every step
 MAX_STEPS = 500
+#: what is added to the main diagonal of the normal equations, relative to it, where they cannot be solved without
+_RIDGES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 #: part of the way to the nearest limit that a step may take
 TO_LIMIT = 0.95
 #: the profile that the iteration starts from, over the largest constant one that keeps the limits
@@ -304,9 +306,26 @@ def _newton_step(batch: Batch, c: Floats, slack: Floats, dual: Floats, barrier: 
     beside += _behind(_behind(bb * r1 * r2 + r1 * k2 + r2 * k1))
     beyond += _behind(_behind(bb * r0 * r2 + r0 * k2 + r2 * k0))
     _eliminate(batch, bands, gradient)
-    step = solveh_banded(bands, -gradient, overwrite_ab=True, overwrite_b=True, check_finite=False)
+    step = _solved(bands, -gradient)
     batch.follow(step)
-    return np.asarray(step, np.float64)
+    return step
+
+
+def _solved(bands: Floats, right: Floats) -> Floats:
+    """Solve the normal equations; where rounding leaves no positive pivot they are stiffened.
+
+    A stiffened step is shorter or points a little aside: it costs rounds, never a limit.
+    """
+    for ridge in _RIDGES:
+        matrix = bands.copy()
+        matrix[-1] *= 1.0 + ridge
+        try:
+            step = solveh_banded(matrix, right, overwrite_ab=True, check_finite=False)
+        except LinAlgError:
+            continue
+        if np.isfinite(step).all():
+            return np.asarray(step, np.float64)
+    return np.zeros_like(right)
 
 
 def _eliminate(batch: Batch, bands: Floats, gradient: Floats) -> None:
