@@ -95,6 +95,7 @@ def smooth(
     *,
     form: Form | None = None,
     progress: Callable[[int, int], None] | None = None,
+    processes: int = 1,
 ) -> SmoothProgram:
     """Round every corner of the program within the tolerance.
 
@@ -108,6 +109,8 @@ def smooth(
         it ε holds for the path itself, as for plans and plots, and `write` refuses it.
     progress : callable, optional
         Called now and then with (corners done, corners in all).
+    processes : int
+        Processes that a method that takes long may work in; the result does not depend on it.
 
     Raises
     ------
@@ -117,7 +120,7 @@ def smooth(
     settings = Settings() if settings is None else settings
     if form is not None:
         settings = nc.fit_settings(settings, form, program.units)
-    return smoothing.smooth(program, settings, progress=progress)
+    return smoothing.smooth(program, settings, progress=progress, processes=processes)
 
 
 def reading_back(form: Form) -> dict[str, Any]:
@@ -183,7 +186,7 @@ def postprocess(
     mark : mapping of str to str, optional
         Kept with the file where the file system can (`cornersmooth.output.read_mark`).
     processes : int, optional
-        Processes to verify with; by default as many as are useful. The result does not depend on it.
+        Processes to smooth and to verify with; by default as many as are useful. The result does not depend on it.
     progress : callable, optional
         Called now and then with the stage, what is done and all there is to do.
 
@@ -196,6 +199,7 @@ def postprocess(
         As `read`, `choose_form`, `write` and `open_output` say it.
     """
     form = nc.choose_form() if form is None else form
+    processes = useful_processes() if processes is None else processes
     may_replace = check_output(target, [] if isinstance(source, (Program, bytes)) else [source], force=force)
     back = reading_back(form)
     unverified = "" if verify else "it was not asked for"
@@ -207,7 +211,8 @@ def postprocess(
         if feed is not None:
             program = replace(program, feed=np.where(np.isnan(program.feed), feed, program.feed))
     with _timed(seconds, "smooth"):
-        smoothed = smooth(program, settings, form=form, progress=_stage(progress, "smoothing"))
+        told = _stage(progress, "smoothing")
+        smoothed = smooth(program, settings, form=form, progress=told, processes=processes)
     provenance = _provenance(source, program, smoothed.settings, form)
     provenance = replace(provenance, planned_feeds=plan_feeds is not None)
     frame = replace(frame or Frame(), provenance=provenance.lines())
@@ -225,7 +230,7 @@ def postprocess(
                 trusted=_users_blocks(frame, form, program, smoothed.settings),
                 weights=provenance.weights,
                 slower=provenance.planned_feeds,
-                processes=useful_processes() if processes is None else processes,
+                processes=processes,
                 **back,
             )
             stack.enter_context(verifier)

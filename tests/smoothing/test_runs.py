@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 from scipy.optimize import NonlinearConstraint, minimize
 
-from cornersmooth.smoothing.runs.banded import Gather, solve_blocks
+from cornersmooth.smoothing.runs import groups
+from cornersmooth.smoothing.runs.banded import Gather, couplings, solve_blocks
 from cornersmooth.smoothing.runs.fitting import fit
+from cornersmooth.smoothing.runs.groups import solve_groups
 from cornersmooth.smoothing.runs.interior import COLD, Task, smoothest
 from cornersmooth.smoothing.runs.lines import largest_curvature
 from cornersmooth.smoothing.runs.polylines import Polylines
@@ -82,7 +84,10 @@ def test_banded_sums_and_solutions_are_those_of_full_matrices() -> None:
     matrix = np.einsum("ma,mb,mij->aibj", full, full, blocks)[free][:, :, free].reshape(3 * free.sum(), -1)
     expected = np.zeros((size, 3))
     expected[free] = np.linalg.solve(matrix, right[free].ravel()).reshape(-1, 3)
-    np.testing.assert_allclose(solve_blocks(gather.bands(six), right, free), expected, rtol=1e-8, atol=1e-10)
+    np.testing.assert_array_equal(gather.apply_rows(rng_like(size).T), gather.apply(rng_like(size)).T)
+    np.testing.assert_allclose(gather.sum_rows(off.T), gather.sums(off).T, atol=1e-12)
+    found = solve_blocks(gather.bands(six), np.ascontiguousarray(right.T), couplings(free))
+    np.testing.assert_allclose(found.T, expected, rtol=1e-8, atol=1e-10)
 
 
 def rng_like(size: int) -> np.ndarray:
@@ -297,3 +302,22 @@ def test_axis_that_does_not_turn_does_not_tremble() -> None:
     own = curves.control[: curves.splines.control_first[1]]
     np.testing.assert_allclose(own[:, 3:] - own[:, :3], [H * np.array([0.36, 0.48, 0.8])] * len(own), atol=1e-11)
     assert curves.axis_bound[0] <= 0.01
+
+
+def test_groups_of_runs_are_solved_as_all_of_them_by_any_number_of_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = random_runs(7, 12, 14, H)
+    whole = solve_runs(lines, (0.01, 0.01), H)
+    monkeypatch.setattr(groups, "GROUP", 30)
+    told: list[tuple[int, int]] = []
+    found = [
+        solve_groups(lines, (0.01, 0.01), H, lambda *now: told.append(now), processes=processes) for processes in (1, 2)
+    ]
+    assert len(told) > 4  # three groups or more, twice
+    assert told[-1] == (len(lines.s), len(lines.s))
+    for curves, at_poses in found:
+        np.testing.assert_array_equal(curves.splines.knot, whole.splines.knot)
+        np.testing.assert_allclose(curves.control, whole.control, rtol=0, atol=1e-9)
+        for name in ("tip", "axis", "turn", "curvature"):
+            np.testing.assert_array_equal(getattr(at_poses, name), getattr(found[0][1], name))
+    np.testing.assert_array_equal(found[0][0].control, found[1][0].control)
+    assert found[0][1].tip.max() <= whole.tip_bound.max()

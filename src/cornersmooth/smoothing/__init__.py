@@ -18,6 +18,7 @@ def smooth(
     settings: Settings | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
+    processes: int = 1,
 ) -> SmoothProgram:
     """Round every corner of the program within the tolerance.
 
@@ -28,6 +29,8 @@ def smooth(
         Defaults: ε 0.01 mm, H 10 mm, the proportional method.
     progress : callable, optional
         Called now and then with (corners done, corners in all).
+    processes : int
+        Processes that a method that takes long may work in; the result does not depend on it.
 
     Returns
     -------
@@ -41,5 +44,5 @@ def smooth(
     """
     settings = Settings() if settings is None else settings
     refuse_flips(program)
-    smoothed = construction_of(settings.method).smooth(program, settings, progress)
+    smoothed = construction_of(settings.method).smooth(program, settings, progress, processes)
     return replace(smoothed, findings=(*smoothed.findings, *axis_step_findings(program, settings)))

@@ -24,7 +24,11 @@ class Construction(ABC):
     extra: ClassVar[tuple[str, ...]] = ()
 
     def smooth(
-        self, program: Program, settings: Settings, progress: Callable[[int, int], None] | None = None
+        self,
+        program: Program,
+        settings: Settings,
+        progress: Callable[[int, int], None] | None = None,
+        processes: int = 1,
     ) -> SmoothProgram:
         """Smooth a whole program, corner by corner.
 
@@ -34,6 +38,8 @@ class Construction(ABC):
         settings : Settings
         progress : callable, optional
             Called now and then with (corners done, corners in all).
+        processes : int
+            Processes that a method that takes long may work in; the result does not depend on it.
         """
         corners = place_corners(program, settings, self, progress)
         return SmoothProgram(program=program, corners=corners, settings=settings, findings=program.findings)

@@ -8,17 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.errors import Finding
-from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status
+from cornersmooth.model import Bools, Corners, Ints, LimitedBy, Program, Runs, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import RUN_CURVATURE
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
-from cornersmooth.smoothing.runs.lines import TURNING, largest_curvature, points_at
+from cornersmooth.smoothing.runs.groups import AtPoses, solve_groups
+from cornersmooth.smoothing.runs.lines import TURNING
 from cornersmooth.smoothing.runs.polylines import Polylines
-from cornersmooth.smoothing.runs.ranges import ranges, spread, starts
-from cornersmooth.smoothing.runs.solving import STEP, RunCurves, solve_runs
+from cornersmooth.smoothing.runs.ranges import ranges, spread
+from cornersmooth.smoothing.runs.solving import STEP, RunCurves
 from cornersmooth.smoothing.transition import place_corners
-from cornersmooth.vectors import angle_between, norm
+from cornersmooth.vectors import angle_between
 
 #: corners that a run ends at: what keeps the pose, or what no curve within ε can follow
 ENDS_RUN = (
@@ -38,7 +39,11 @@ class GlobalRuns(Proportional):
     """Corners of a run are rounded together; those of runs that cannot be are rounded one by one."""
 
     def smooth(
-        self, program: Program, settings: Settings, progress: Callable[[int, int], None] | None = None
+        self,
+        program: Program,
+        settings: Settings,
+        progress: Callable[[int, int], None] | None = None,
+        processes: int = 1,
     ) -> SmoothProgram:
         """Round every corner by itself, then replace whole runs by one pair of curves."""
         corners = place_corners(program, settings, self)
@@ -49,12 +54,12 @@ class GlobalRuns(Proportional):
         point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
         tolerances = settings.tip_tolerance, settings.axis_point_tolerance - TURNING * settings.tolerance
         lines = Polylines.through(point, count, STEP * min(tolerances))
-        curves = solve_runs(lines, tolerances, settings.axis_length, progress)
+        curves, found = solve_groups(lines, tolerances, settings.axis_length, progress, processes=processes)
         runs = _kept(curves, pose)
         if not curves.kept.all():
             first = int(pose[lines.first[:-1][~curves.kept][0]])
             findings = (*findings, _one_by_one(program, first, curves, count))
-        return SmoothProgram(program, _with_runs(corners, runs, curves, len(program)), settings, findings, runs)
+        return SmoothProgram(program, _with_runs(corners, runs, curves, found), settings, findings, runs)
 
 
 def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[Ints, Ints, Ints]:
@@ -111,22 +116,19 @@ def _kept(curves: RunCurves, pose: Ints) -> Runs:
     )
 
 
-def _with_runs(corners: Corners, runs: Runs, curves: RunCurves, poses: int) -> Corners:
+def _with_runs(corners: Corners, runs: Runs, curves: RunCurves, found: AtPoses) -> Corners:
     """Corners with those of the runs marked, and what is known of them."""
     run, place = spread(runs.count)
     inner = np.flatnonzero((place > 0) & (place < runs.count[run] - 1))
-    row_of = np.full(poses, -1, np.int64)
-    row_of[corners.pose] = np.arange(len(corners))
-    rows = row_of[runs.pose[inner]]
+    rows = np.searchsorted(corners.pose, runs.pose[inner])
     status, limited_by = corners.status.copy(), corners.limited_by.copy()
     status[rows], limited_by[rows] = Status.IN_RUN, LimitedBy.TOLERANCE
     values = {name: getattr(corners, name).copy() for name in ("tip_error", "axis_error", "orientation_error")}
-    tip, axis, turn = _at_poses(curves)
     known = np.repeat(curves.kept, curves.lines.count)
-    for name, found in (("tip_error", tip), ("axis_error", axis), ("orientation_error", turn)):
-        values[name][rows] = found[known][inner]
+    for name, column in (("tip_error", found.tip), ("axis_error", found.axis), ("orientation_error", found.turn)):
+        values[name][rows] = column[known][inner]
     curvature = np.full(len(corners), np.nan)
-    curvature[rows] = largest_curvature(curves.lines, curves.splines, curves.control)[known][inner]
+    curvature[rows] = found.curvature[known][inner]
     trim_in, trim_out = corners.trim_in.copy(), corners.trim_out.copy()
     trim_in[rows] = trim_out[rows] = 0.0
     return replace(
@@ -140,22 +142,6 @@ def _with_runs(corners: Corners, runs: Runs, curves: RunCurves, poses: int) -> C
         extra={**corners.extra, RUN_CURVATURE: curvature},
         **values,
     )
-
-
-def _at_poses(curves: RunCurves) -> tuple[Floats, Floats, Floats]:
-    """Deviation of tip and axis point (mm) and of the axis (rad) at the poses of all runs, at common parameters."""
-    lines, splines = curves.lines, curves.splines
-    run, _ = spread(lines.count)
-    base = starts(splines.knot[splines.first[1:] - 1].astype(np.int64) + 1)[:-1]
-    keys = splines.knot + np.repeat(base, splines.count)
-    knot = np.searchsorted(keys, lines.s + base[run], side="right") - 1
-    knot = np.clip(knot, splines.first[run], splines.first[run + 1] - 2)
-    tip, axis = points_at(curves.control, splines, knot - run, lines.s)
-    lever = lines.point[:, 3:] - lines.point[:, :3]
-    size = norm(lever)[:, None]
-    off = tip - lines.point[:, :3]
-    top = off + size * axis - lever
-    return norm(off), norm(top), angle_between(axis, lever / size)
 
 
 def _steep(program: Program, pose: Ints) -> Finding:

@@ -115,10 +115,14 @@ class Zhang2016(Construction):
     extra = EXTRA
 
     def smooth(
-        self, program: Program, settings: Settings, progress: Callable[[int, int], None] | None = None
+        self,
+        program: Program,
+        settings: Settings,
+        progress: Callable[[int, int], None] | None = None,
+        processes: int = 1,
     ) -> SmoothProgram:
         """Smooth a whole program; corners whose transitions stray by more than the method's bound stay sharp."""
-        smoothed = super().smooth(program, settings, progress)
+        smoothed = super().smooth(program, settings, progress, processes)
         rows = np.flatnonzero(smoothed.corners.smoothed)
         strays = [_strays(smoothed, rows[at : at + _MEASURED]) for at in range(0, len(rows), _MEASURED)]
         if not any(part.any() for part in strays):

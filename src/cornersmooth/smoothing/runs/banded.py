@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from scipy.linalg import LinAlgError, solveh_banded
+from scipy.linalg.lapack import dpbsv
 from scipy.sparse import csc_array, csr_array
 
 from cornersmooth.model import Bools, Floats, Ints
@@ -50,6 +52,14 @@ class Gather:
         """(c, d) sums of values (m, d), times the coefficients, at the control points."""
         return np.asarray(self._sum @ values)
 
+    def apply_rows(self, points: Floats) -> Floats:
+        """(d, m) points (d, c), as `apply`; neighbouring numbers belong together, which is faster."""
+        return np.stack([self._apply @ row for row in points])
+
+    def sum_rows(self, values: Floats) -> Floats:
+        """(d, c) sums of values (d, m), as `sums`."""
+        return np.stack([self._sum @ row for row in values])
+
     def bands(self, weights: Floats) -> Floats:
         """(4, c, d) diagonals of the sums of weights (m, d) times products of two coefficients.
 
@@ -59,53 +69,62 @@ class Gather:
         return np.asarray(self._pairs @ weights).reshape(TAPS, self.size, -1)
 
 
-def hold(bands: Floats, free: Bools) -> None:
-    """Take control points that are not free out of diagonals (4, c, ...): nothing but ones on the main diagonal."""
-    bands[0][~free] = 0.0
+def couplings(free: Bools) -> Floats:
+    """(4, c) 1 where control points j and j + o are both free, else 0."""
+    both = np.zeros((TAPS, len(free)))
+    both[0] = free
     for offset in range(1, TAPS):
-        both = free.copy()
-        both[: len(free) - offset] &= free[offset:]
-        both[len(free) - offset :] = False
-        bands[offset][~both] = 0.0
+        both[offset, : len(free) - offset] = free[: len(free) - offset] & free[offset:]
+    return both
 
 
 def solve_scalar(bands: Floats, right: Floats, free: Bools) -> Floats:
     """Solve with diagonals (4, c) for right sides (c, d); what is not free gets 0."""
-    hold(bands, free)
+    bands = bands * couplings(free)
     bands[0][~free] = 1.0
-    return _cholesky(bands, np.where(free[:, None], right, 0.0))
+    solution = _cholesky(lambda: np.array(bands, order="F"), np.where(free[:, None], right, 0.0))
+    return np.ascontiguousarray(solution)
 
 
-def solve_blocks(bands: Floats, right: Floats, free: Bools) -> Floats:
-    """Solve with 3 by 3 blocks for a right side (c, 3); what is not free gets 0.
+def solve_blocks(bands: Floats, right: Floats, coupled: Floats) -> Floats:
+    """Solve with 3 by 3 blocks for a right side (3, c); what is not free gets 0.
 
     Parameters
     ----------
     bands : (4, c, 6) float64
         Symmetric blocks xx, yy, zz, xy, xz, yz; row o couples control points j and j + o.
+    coupled : (4, c) float64
+        What `couplings` gives for the control points that are free.
     """
-    size = len(free)
-    hold(bands, free)
-    bands[0][~free, :3] = 1.0
-    lower = np.zeros((size, 3, 3 * TAPS))  # [j, d, k]: element (3j + d + k, 3j + d)
+    bands *= coupled[:, :, None]
+    bands[0, :, :3] += 1.0 - coupled[0, :, None]
+    held = np.ascontiguousarray((right * coupled[0]).T).reshape(-1, 1)
+    return np.ascontiguousarray(_cholesky(lambda: _lower(bands), held).reshape(-1, 3).T)
+
+
+def _lower(bands: Floats) -> Floats:
+    """(12, 3c) the diagonals of the whole matrix from the main one down, column by column as LAPACK wants them."""
+    lower = np.empty((bands.shape[1], 3, 3 * TAPS))  # [j, d, k]: element (3j + d + k, 3j + d)
+    lower[:, 1, 3 * TAPS - 1] = 0.0
+    lower[:, 2, 3 * TAPS - 2 :] = 0.0
     which = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
     for offset in range(TAPS):
         for d in range(3):
             for e in range(d if offset == 0 else 0, 3):
                 lower[:, d, 3 * offset + e - d] = bands[offset, :, which[d][e]]
-    held = np.where(free[:, None], right, 0.0).reshape(-1)
-    return _cholesky(lower.reshape(3 * size, 3 * TAPS).T, held).reshape(size, 3)
+    return lower.reshape(-1, 3 * TAPS).T
 
 
-def _cholesky(lower: Floats, right: Floats) -> Floats:
-    """Solve with diagonals (k, n) from the main one down; where rounding leaves no positive pivot it is stiffened."""
+def _cholesky(lower: Callable[[], Floats], right: Floats) -> Floats:
+    """Solve with diagonals (k, n) from the main one down, made anew for every try: LAPACK leaves its factors there.
+
+    Where rounding leaves no positive pivot the main diagonal is stiffened.
+    """
     for ridge in _RIDGES:
-        matrix = lower.copy()
-        matrix[0] *= 1.0 + ridge
-        try:
-            solution: Floats = solveh_banded(matrix, right, lower=True, overwrite_ab=True, check_finite=False)
-        except LinAlgError:
-            continue
-        if np.isfinite(solution).all():
-            return solution
+        matrix = lower()
+        if ridge:
+            matrix[0] *= 1.0 + ridge
+        _, solution, info = dpbsv(matrix, right, lower=1, overwrite_ab=1)
+        if info == 0 and np.isfinite(solution).all():
+            return np.asarray(solution)
     return np.zeros_like(right)  # no step is a step that keeps all bounds

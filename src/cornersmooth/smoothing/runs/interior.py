@@ -9,11 +9,12 @@ outside is led inside.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing.runs.banded import Gather, solve_blocks
+from cornersmooth.smoothing.runs.banded import Gather, couplings, solve_blocks
 
 #: steps at most, and the share of the way to the bounds that each may go
 STEPS, BACK_OFF = 40, 0.95
@@ -64,9 +65,38 @@ class Task:
     control_window: Ints
     windows: int
 
+    @cached_property
+    def columns(self) -> Floats:
+        """(3, m) O at the samples."""
+        return np.ascontiguousarray(self.axis.T)
+
+    @cached_property
+    def coupled(self) -> Floats:
+        """(4, c) which control points are free together with their neighbours."""
+        return couplings(self.free)
+
+    @cached_property
+    def sample_first(self) -> Ints:
+        """(windows,) where the samples of each window begin; every window has some."""
+        return np.searchsorted(self.sample_window, np.arange(self.windows))
+
+    @cached_property
+    def span_first(self) -> Ints:
+        """(windows,) where the spans of each window begin."""
+        return np.searchsorted(self.span_window, np.arange(self.windows))
+
     def pull(self, off: Floats) -> Floats:
-        """M·x of deviations (m, 3)."""
-        return off + (self.stretch * dot(self.axis, off))[:, None] * self.axis
+        """M·x of deviations (3, m)."""
+        pulled: Floats = off + self.stretch * product(self.columns, off) * self.columns
+        return pulled
+
+    def total(self, values: Floats) -> Floats:
+        """(windows,) sums of values at the samples (m,)."""
+        return np.add.reduceat(values, self.sample_first)
+
+    def cost(self, weight: Floats, jerk: Floats) -> Floats:
+        """(windows,) the objective, from third derivatives (3, spans)."""
+        return np.add.reduceat(weight * product(jerk, jerk), self.span_first)
 
 
 def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float) -> Floats:
@@ -83,55 +113,51 @@ def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float
     begin : float
         The same at the beginning, as far as it is known: `COLD` or `WARM`.
     """
-    change = np.zeros((len(task.free), 3))
-    first = _cost(task, task.weight, jerk)
+    off, jerk = np.ascontiguousarray(off.T), np.ascontiguousarray(jerk.T)
+    change = np.zeros((3, len(task.free)))
+    first = task.cost(task.weight, jerk)
     weight = task.weight / np.where(first > 0.0, first, 1.0)[task.span_window]
     stiff = task.smooth.bands(weight)
-    many = np.maximum(np.bincount(task.sample_window, minlength=task.windows), 1)
+    many = task.total(np.ones(len(task.radius)))
     pull = task.pull(off)
-    slack = (task.radius**2 - dot(off, pull)) / 2.0
+    slack = (task.radius**2 - product(off, pull)) / 2.0
     inside = slack >= _LEAST_SLACK * task.radius
     room = np.where(inside, slack, _LEAST_SLACK * task.radius)
     cost = np.where(first > 0.0, 1.0, 0.0)
     force = np.maximum(begin * cost / many, 1e-12)[task.sample_window] / room  # the multipliers
     ahead: Floats = np.ones(task.windows)  # part of the slope at the beginning that no multipliers hold yet
     for _ in range(STEPS):
-        gap = np.bincount(task.sample_window, room * force, minlength=task.windows)
+        gap = task.total(room * force)
         bent = force / room
         barrier = (_CENTRE * gap / many)[task.sample_window] / room + bent * (room - slack)
-        right = -task.smooth.sums(weight[:, None] * jerk) - task.near.sums(barrier[:, None] * pull)
+        right = -task.smooth.sum_rows(weight * jerk) - task.near.sum_rows(barrier * pull)
         bands = task.near.bands(_bend(task, force, bent, pull))
         bands[..., :3] += stiff
-        step = solve_blocks(bands, right, task.free)
-        step_off, step_jerk = task.near.apply(step), task.smooth.apply(step)
+        step = solve_blocks(bands, right, task.coupled)
+        step_off, step_jerk = task.near.apply_rows(step), task.smooth.apply_rows(step)
         step_pull = task.pull(step_off)
-        along = dot(pull, step_off)
+        along = product(pull, step_off)
         step_force = barrier - force + bent * along
         step_room = slack - room - along
-        square = dot(step_off, step_pull)
+        square = product(step_off, step_pull)
         reach = _reach(task, (inside, slack, room, force), (along, square, step_room, step_force))
-        outside = np.bincount(task.sample_window, slack < -1e-3, minlength=task.windows) > 0
+        outside = task.total((slack < -1e-3).astype(np.float64)) > 0
         done = (gap <= enough * cost) & (ahead <= SETTLED) & ~outside
         reach[done] = 0.0
         ahead = ahead * (1.0 - reach)
-        change += reach[task.control_window][:, None] * step
+        change += reach[task.control_window] * step
         by_sample = reach[task.sample_window]
-        off = off + by_sample[:, None] * step_off
-        pull = pull + by_sample[:, None] * step_pull
-        jerk = jerk + reach[task.span_window][:, None] * step_jerk
+        off += by_sample * step_off
+        pull += by_sample * step_pull
+        jerk += reach[task.span_window] * step_jerk
         force = force + by_sample * step_force
         slack = slack - by_sample * (along + 0.5 * by_sample * square)
         room = np.where(inside, slack, np.maximum(room + by_sample * step_room, slack))
         inside = inside | (slack >= room)
-        cost = _cost(task, weight, jerk)
+        cost = task.cost(weight, jerk)
         if done.all():
             break
-    return change
-
-
-def _cost(task: Task, weight: Floats, jerk: Floats) -> Floats:
-    """(windows,) the objective."""
-    return np.bincount(task.span_window, weight * dot(jerk, jerk), minlength=task.windows).astype(np.float64)
+    return np.ascontiguousarray(change.T)
 
 
 def _reach(
@@ -142,21 +168,19 @@ def _reach(
     along, square, step_room, step_force = step
     with np.errstate(divide="ignore", invalid="ignore"):
         # the root of |off + r·step| = radius, in the form without cancellation
-        root = np.sqrt(np.maximum(along**2 + 2.0 * slack * square, 0.0))
+        root = np.sqrt(np.maximum(along * along + 2.0 * slack * square, 0.0))
         primal = np.where(along > 0.0, 2.0 * slack / (along + root), (root - along) / square)
         primal = np.where(square > 0.0, primal, np.inf)
         linear = np.where(step_room < 0.0, -room / step_room, np.inf)
         dual = np.where(step_force < 0.0, -force / step_force, np.inf)
     bound = np.minimum(np.where(inside, primal, linear), dual)
-    least = np.full(task.windows, np.inf)
-    np.minimum.at(least, task.sample_window, bound)
-    return np.minimum(1.0, BACK_OFF * least)
+    return np.minimum(1.0, BACK_OFF * np.minimum.reduceat(bound, task.sample_first))
 
 
 def _bend(task: Task, force: Floats, bent: Floats, pull: Floats) -> Floats:
     """(m, 6) second derivatives of the bounds: xx, yy, zz, xy, xz, yz."""
-    x, y, z = pull.T
-    own = np.ascontiguousarray(task.axis.T)
+    x, y, z = pull
+    own = task.columns
     lean = force * task.stretch
     bx, by, bz, lx, ly = bent * x, bent * y, bent * z, lean * own[0], lean * own[1]
     out = np.empty((len(force), 6))
@@ -167,6 +191,12 @@ def _bend(task: Task, force: Floats, bent: Floats, pull: Floats) -> Floats:
     out[:, 4] = bx * z + lx * own[2]
     out[:, 5] = by * z + ly * own[2]
     return out
+
+
+def product(one: Floats, other: Floats) -> Floats:
+    """(m,) products of columns (3, m)."""
+    products: Floats = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    return products
 
 
 def dot(one: Floats, other: Floats) -> Floats:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.processes import map_in_processes
 from cornersmooth.smoothing.runs.batches import Problem, solve_windows
 from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.polylines import Polylines
@@ -21,8 +21,8 @@ from cornersmooth.smoothing.runs.windows import Windows
 #: spans of a window that are its own, and spans beside them that settle down to what the neighbour finds
 CORE, BESIDE = 192, 24
 
-#: spans solved at once, whose arrays fit the processor's cache, and batches at a time
-BATCH, THREADS = 2048, 2
+#: spans solved at once, whose arrays fit the processor's cache
+BATCH = 3072
 
 #: step of the parameter over the tolerance
 STEP = 0.01
@@ -72,6 +72,8 @@ def solve_runs(
     tolerances: tuple[float, float],
     axis_length: float,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    processes: int = 1,
 ) -> RunCurves:
     """Find the smoothest pair of splines for every run.
 
@@ -85,6 +87,8 @@ def solve_runs(
         H.
     progress : callable, optional
         Called with (spans done, spans in all).
+    processes : int
+        Processes that solve batches of windows; the result does not depend on it.
     """
     rough = fit(lines, tolerances)
     splines = rough.splines
@@ -93,7 +97,7 @@ def solve_runs(
     control, proven = rough.control.copy(), np.zeros((len(pieces.span), 2))
     tight = np.ones((len(pieces.span), 2))
     windows = _cut(splines)
-    _solve(problem, windows, _own(splines, windows), control, tight, GAPS, progress)
+    _solve(problem, windows, _own(splines, windows), control, tight, GAPS, progress, processes)
     changed = np.arange(len(pieces.span))
     limits = np.array(tolerances)
     for number in range(MENDINGS + 1):
@@ -107,7 +111,7 @@ def solve_runs(
             factor[:, 0] = factor.min(axis=1)
         tight[failed] = np.maximum(tight[failed] * factor, LEAST_SHARE)
         windows = _around(splines, pieces.span[failed])
-        _solve(problem, windows, windows.free, control, tight, MENDING_GAPS, None)
+        _solve(problem, windows, windows.free, control, tight, MENDING_GAPS, None, 1)
         changed = _touched(splines, pieces, windows.control[windows.free])
     run = splines.span_run[pieces.span]
     for part in BLENDS:  # deviations are nearly linear in the control points, and the fit is well within ε
@@ -167,25 +171,29 @@ def _solve(
     tight: Floats,
     gaps: tuple[float, ...],
     progress: Callable[[int, int], None] | None,
+    processes: int,
 ) -> None:
     """Set the control points of the windows that are their `own` (rows of `windows.control`), some windows at once."""
     batch = np.cumsum(windows.count) // BATCH
     first = np.flatnonzero(np.concatenate(([True], batch[1:] != batch[:-1], [True])))
     at = starts(windows.count + 3)
-    before = control.copy()
 
-    def settle(number: int) -> int:
+    def settle(number: int) -> Floats:
         rows = np.arange(first[number], first[number + 1])
         some = Windows.of(problem.splines, windows.begin[rows], windows.count[rows])
-        moved = solve_windows(problem, some, before, tight, gaps, near=gaps is MENDING_GAPS)
-        mine = own[at[rows[0]] : at[rows[-1] + 1]]
-        control[some.control[mine]] = moved[mine]
-        return int(some.span[-1]) + 1
+        moved = solve_windows(problem, some, control, tight, gaps, near=gaps is MENDING_GAPS)
+        return moved[own[at[rows[0]] : at[rows[-1] + 1]]]
 
-    with ThreadPoolExecutor(THREADS) as pool:  # arithmetic on arrays leaves the interpreter free
-        for done in pool.map(settle, range(len(first) - 1)):
-            if progress is not None:
-                progress(done, len(problem.splines.span_run))
+    batches = range(len(first) - 1)
+    # `control` must not change before all are found: neighbours look at it
+    found = []
+    for number, mine in enumerate(map_in_processes(settle, batches, min(processes, len(batches)))):
+        found.append(mine)
+        if progress is not None:
+            last = first[number + 1] - 1
+            progress(int(windows.begin[last] + windows.count[last]), len(problem.splines.span_run))
+    if found:
+        control[windows.control[own]] = np.concatenate(found)
 
 
 def _fade(splines: Splines, spans: Ints, part: float) -> Floats:
