@@ -38,7 +38,8 @@ def test_a_whole_program_is_planned(program):
     assert found.part == 1.0
     assert found.direct == pytest.approx(direct(program, Limits(), "velocity_jump", settings=settings).total, rel=1e-9)
     ideal = plan(cornersmooth.smooth(program, settings), Limits()).total
-    assert ideal * 0.99 < found.written < found.direct
+    # lines may jump in speed where they meet, curves may not: they can be a little faster
+    assert ideal * 0.98 < found.written < found.direct
 
 
 def test_stretches_tell_of_the_whole(program):

@@ -41,7 +41,7 @@ class Settings:
     max_axis_step : float, degrees
         A corner next to a segment whose axis turns by more stays sharp: the ruled motion is not a motion any more.
     chord_tolerance : float or None, mm
-        Distance between the written lines and the curve in dense output; None for a tenth of ε.
+        Distance between the written lines and the curve in dense output; None for a tenth of ε, at most 0.0005 mm.
     axis_step : float or None, degrees
         Largest change of axis in one written line next to a rounded corner; None for what ε and H ask for.
     lines : {"dense", "long"} or None
@@ -151,7 +151,7 @@ class Settings:
     @property
     def chord(self) -> float:
         """Effective chord tolerance of dense output, mm."""
-        return self.tolerance / 10 if self.chord_tolerance is None else self.chord_tolerance
+        return min(self.tolerance / 10, LARGEST_CHORD) if self.chord_tolerance is None else self.chord_tolerance
 
     @property
     def interpolation_tolerance(self) -> float:
@@ -170,6 +170,10 @@ class Settings:
         """Plain values in field order, for the report."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
+
+#: Largest default of the chord tolerance, mm. Where lines meet, the axes jump in speed, and a control slows down for
+#: it: a larger tolerance must not mean coarser lines. docs/feedrate.md has the times that led to this.
+LARGEST_CHORD = 5e-4
 
 #: decimals of a weight that every control keeps (FANUC IS-B, reference manual B-63324EN/03 4.17)
 WEIGHT_DECIMALS = 3

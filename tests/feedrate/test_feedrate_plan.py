@@ -78,6 +78,17 @@ def test_direct_path(chain: Callable[[int], Program], seed: int, baseline: str) 
     assert np.linalg.norm(jump, axis=1).max() <= allowed * SPEED + 1e-3
 
 
+@pytest.mark.parametrize("step", [0.004, 0.03])
+def test_short_lines_of_a_circle_are_as_fast_as_the_circle(step: float) -> None:
+    """Lines that a period covers many of may not jump in speed one by one: together they turn as an arc does."""
+    radius, limits = 1.0, Limits(jerk=1e6)
+    angle = np.arange(0.0, 1.6, step / radius)
+    tip = radius * np.stack((np.cos(angle), np.sin(angle), 0.0 * angle), axis=1)
+    program = Program.from_poses(tip, np.tile([0.0, 0.0, 1.0], (len(tip), 1)), feed=60.0 * 500.0)
+    law = direct(program, limits, "velocity_jump")
+    assert law.at(law.every_period()).v.max() == pytest.approx(np.sqrt(limits.accel * radius), rel=1e-3)
+
+
 def test_order_of_the_times(chain: Callable[[int], Program]) -> None:
     for seed in range(10):
         program = chain(seed)

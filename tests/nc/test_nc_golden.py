@@ -16,7 +16,7 @@ from nc.promise import written
 from nc.reading import TextError
 
 GOLDEN = Path(__file__).parent / "golden"
-TOLERANCE, AXIS_LENGTH = 0.05, 10.0
+TOLERANCE, AXIS_LENGTH, CHORD = 0.05, 10.0, 0.005
 
 #: forms for a tool that stays parallel to Z
 UPRIGHT = (Case("heidenhain", "spl"), Case("mitsubishi", "g6.2"))
@@ -40,7 +40,8 @@ TEXTS = list(
 
 def text_of(source: str, case: Case) -> str:
     program = read((GOLDEN / f"{source}.cls").read_bytes(), name=f"{source}.cls")
-    return written(program, case.choose(), Settings(tolerance=TOLERANCE, axis_length=AXIS_LENGTH))[0]
+    settings = Settings(tolerance=TOLERANCE, axis_length=AXIS_LENGTH, chord_tolerance=CHORD)
+    return written(program, case.choose(), settings)[0]
 
 
 def golden(source: str, case: Case) -> Path:

@@ -85,7 +85,8 @@ def direct(
     limits : Limits, optional
     baseline : {"exact_stop", "velocity_jump"}
         What happens at corners: a stop at the end of every move, or a jump of velocity of at most ``accel · period``,
-        that is a speed of at most ``accel · period / (2·sin(α/2))``.
+        that is a speed of at most ``accel · period / (2·sin(α/2))``; where corners follow one another within a
+        period, that is the limit of all of them together.
     settings : Settings, optional
         Says which repeated poses are one.
     machine : Machine, optional
@@ -104,6 +105,19 @@ def direct(
     return plan_path(path, limits, machine=machine, resolution=resolution, progress=progress)
 
 
+def _not_crowded(path: Path, period: float) -> Floats:
+    """Speeds (m + 1,) at which jumps that follow one another within a period ask for no more together than one may.
+
+    At a speed v a corner uses the share v/v₁ of a jump, where v₁ is its own speed limit. Corners at distances d are
+    d/v apart in time, so the sum over a period stays within one jump where v² ≤ v₁·d/T.
+    """
+    found = path.junction_speed.copy()
+    sharp = np.flatnonzero(np.isfinite(found[1:-1])) + 1
+    apart = (path.length[sharp - 1] + path.length[sharp]) / 2.0
+    found[sharp] = np.minimum(found[sharp], np.sqrt(found[sharp] * apart / period))
+    return found
+
+
 def plan_path(
     path: Path,
     limits: Limits,
@@ -117,6 +131,7 @@ def plan_path(
     machine_axes = None if machine is None else follow(machine, path)
     if machine_axes is not None:
         path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
+    path = replace(path, junction_speed=_not_crowded(path, limits.period))
     speed_limits = find_speed_limits(path, limits)
     runs = len(speed_limits.run) - 1
     lead = speed_limits.element[:-1]  # first element of each run
