@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -41,6 +42,8 @@ class RotaryAxis:
         Lowest and highest word; None for an axis that turns without end.
     modulo : bool
         Whether its words are from 0 to 360 degrees, and it goes the shorter way to each.
+    clamp : (str, str) or None
+        M words that hold it, and let it turn.
     """
 
     name: str
@@ -50,6 +53,7 @@ class RotaryAxis:
     positive: Literal["tool", "table"] = "tool"
     limits: tuple[float, float] | None = None
     modulo: bool = False
+    clamp: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
         where = f"rotary axis {self.name}"
@@ -65,6 +69,8 @@ class RotaryAxis:
                 raise SettingsError("CS253", f"{where}: {key} is not a point of space", "give three numbers")
         if not any(self.direction):
             raise SettingsError("CS253", f"{where}: direction is zero", "give a vector along the axis")
+        if self.clamp is not None and not all(re.fullmatch(r"M[1-9]\d{0,3}", word) for word in self.clamp):
+            raise SettingsError("CS253", f"{where}: clamp is {self.clamp!r}", 'give two M words, as in ["M10", "M11"]')
         if self.limits is not None and self.modulo:
             raise SettingsError("CS253", f"{where}: a modulo axis with limits", "leave out one of both")
         if self.limits is not None:

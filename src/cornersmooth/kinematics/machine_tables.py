@@ -30,7 +30,7 @@ _SHELF = Shelf(
     unknown_key="CS252",
     wrong_value="CS253",
 )
-_AXIS_KEYS = ("name", "direction", "carrier", "point", "positive", "limits", "modulo")
+_AXIS_KEYS = ("name", "direction", "carrier", "point", "positive", "limits", "modulo", "clamp")
 _DYNAMICS_KEYS = ("velocity", "acceleration", "jerk")
 
 
@@ -72,8 +72,9 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
     text : str or dict
         Keys: ``like`` (a machine that comes with the program; then only what is different), ``name``, ``description``,
         ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``part_zero`` and two tables ``[[axis]]`` with
-        ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``, ``modulo``; ``[travel]`` with ``X``,
-        ``Y`` and ``Z``, each ``[lowest, highest]``, any of which may be left out; and for the planning of the time
+        ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``, ``modulo``, ``clamp``;
+        ``[travel]`` with ``X``, ``Y`` and ``Z``, each ``[lowest, highest]``, any of which may be left out; and for the
+        planning of the time
         tables ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min
         or deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which may be left out.
     file : str
@@ -123,6 +124,9 @@ def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
     modulo = entry.get("modulo", False)
     if not isinstance(modulo, bool):
         raise _SHELF.wrong(f"{where}modulo is {modulo!r}", "write true or false")
+    clamp = entry.get("clamp")
+    if clamp is not None and (not isinstance(clamp, list) or [type(word) for word in clamp] != [str, str]):
+        raise _SHELF.wrong(f"{where}clamp is {clamp!r}", 'give two M words, as in ["M10", "M11"]')
     return RotaryAxis(
         name=_text(entry, "name", ""),
         direction=_vector(entry, "direction", (0.0, 0.0, 0.0), where),
@@ -131,6 +135,7 @@ def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
         positive=entry.get("positive", "tool"),
         limits=limits,
         modulo=modulo,
+        clamp=None if clamp is None else (clamp[0], clamp[1]),
     )
 
 

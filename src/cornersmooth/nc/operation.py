@@ -47,7 +47,9 @@ class Operation:
     begun: bool = False  #: the blocks of `begin` hold
     withdraw: Callable[[], list[str]] = list  #: blocks along the tool before a retract, of who knows where it is
     halted: bool = False  #: the CL file has stopped the program since the last motion
+    clamps: tuple[tuple[str, str], ...] = ()  #: words that hold rotary axes, and let them turn
     mode: Mode = field(init=False)  #: what tool tip control is for the tool at hand
+    _clamped: bool = True  # nobody knows what was before
     _tip_control: bool = False
     _functions: bool = False
     _moved: bool = False  # the tool has been used
@@ -56,6 +58,8 @@ class Operation:
 
     def __post_init__(self) -> None:
         self.mode = self.form.mode
+        if self.form.machine is not None and self.form.rotary:
+            self.clamps = tuple(axis.clamp for axis in self.form.machine.axes if axis.clamp is not None)
 
     def start(self) -> list[str]:
         """Blocks before everything else."""
@@ -74,7 +78,19 @@ class Operation:
         self.coolant = self._stopped.get("coolant", self.coolant)
         self._stopped = {}
         steps = self.form.table.program.begin if own is None else own
-        return [*blocks, *self._expand(steps, rotary if self.retracted else _NO_ROTARY)]
+        blocks += self._let_turn()
+        blocks += self._expand(steps, rotary if self.retracted else _NO_ROTARY)
+        return [*blocks, *(self._hold() if self.mode is self.form.upright else ())]
+
+    def _let_turn(self) -> list[str]:
+        """Blocks that let clamped rotary axes turn."""
+        clamped, self._clamped = self._clamped, False
+        return [turn for _, turn in self.clamps] if clamped else []
+
+    def _hold(self) -> list[str]:
+        """Blocks that clamp the rotary axes."""
+        self._clamped = True
+        return [hold for hold, _ in self.clamps]
 
     def end_tool(self, line: int = 0, *, another: bool = False) -> list[str]:
         """Blocks behind the last motion of a tool.
@@ -117,7 +133,13 @@ class Operation:
 
     def end(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks behind everything else."""
-        return [*self.end_tool(), *self._expand(self.form.table.program.end, rotary)]
+        steps, blocks = self.form.table.program.end, self.end_tool()
+        zero = rotary["rotary_zero"]
+        if zero and "{rotary_zero}" in steps:
+            zero = (*self._let_turn(), *zero, *self._hold())
+        elif not self._clamped:
+            blocks += self._hold()
+        return [*blocks, *self._expand(steps, {**rotary, "rotary_zero": zero})]
 
     def turn(self, blocks: Blocks) -> None:
         """Take note of the blocks that turn the spindle, or of none where it stops."""

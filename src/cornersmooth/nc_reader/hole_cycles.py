@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from cornersmooth.nc_reader.dialects.base import State
+from cornersmooth.nc_reader.dialects.base import CLAMPED, State
 from cornersmooth.nc_reader.words import Line
 
 #: how a comment begins that says that a hole is left out on purpose
@@ -79,6 +79,9 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> Non
         state.refuse(line, "a cycle whose heights are not one below another", "give them in their order")
     if cycle.step and (cycle.clearance - cycle.bottom) / cycle.step > _MOST_PECKS:
         state.refuse(line, "a cycle of more pecks than anybody wants", "give a larger step")
+    free = [axis for axis, clamped in state.memory.get(CLAMPED, {}).items() if not clamped]
+    if free:
+        state.wrong("CS538", line, f"a hole cycle while {' and '.join(free)} is not clamped")
     state.move(line, {"G": 0.0, "X": x, "Y": y})
     state.move(line, {"G": 0.0, "Z": cycle.clearance})
     if cycle.pitch is not None:

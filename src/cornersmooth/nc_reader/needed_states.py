@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.dialects.base import BY_WORD, HIGH_SPEED, Dialect
+from cornersmooth.nc_reader.dialects.base import BY_WORD, CLAMPED, HIGH_SPEED, Dialect
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.words import NURBS, Table
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
+    from cornersmooth.nc_reader.execution import Executed
 
 #: code of words that want another state of the control
 CONTROL_WORDS: Final = "CS506"
@@ -64,6 +65,38 @@ def modulo_problems(table: Table, machine: Machine, words: str, memory: Mapping[
             Problem(CONTROL_WORDS, 0, int(table.line[np.argmax(wrong)]), text) for wrong, text in found if wrong.any()
         ]
     return problems
+
+
+def take_clamp(word: float, machine: Machine, memory: dict[str, Any]) -> bool:
+    """Note an M word that clamps a rotary axis or lets it turn; return whether it is one."""
+    for axis in machine.axes:
+        for said, clamped in zip(axis.clamp or (), (True, False), strict=False):
+            if float(said[1:]) == word:
+                memory[CLAMPED] = {**memory.get(CLAMPED, {}), axis.name: clamped}
+                return True
+    return False
+
+
+def clamp_problems(
+    run: Executed, before: Sequence[float], machine: Machine, memory: Mapping[str, Any]
+) -> list[Problem]:
+    """Return which rotary axes turn in a run although they are clamped, or nobody has said that they are not."""
+    problems = []
+    for column, axis in enumerate(machine.axes):
+        if axis.clamp is None or not memory.get(CLAMPED, {}).get(axis.name, True):
+            continue
+        angles = np.append(before[column], run.second[:, column])
+        turned = np.flatnonzero((angles[1:] != angles[:-1]) & ~np.isnan(angles[1:]))
+        if len(turned):
+            text = f"{axis.name} turns without {axis.clamp[1]} before it"
+            problems.append(Problem("CS538", 0, int(run.line[turned[0]]), text))
+    return problems
+
+
+def unclamped_problems(machine: Machine, memory: Mapping[str, Any]) -> list[Problem]:
+    """Return which rotary axes are not clamped at the end of a text."""
+    free = [axis for axis in machine.axes if axis.clamp and not memory.get(CLAMPED, {}).get(axis.name, True)]
+    return [Problem("CS538", 0, 0, f"{axis.name} is not clamped at the end") for axis in free]
 
 
 class AxisWords:

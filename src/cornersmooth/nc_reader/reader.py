@@ -14,7 +14,14 @@ from cornersmooth.nc_reader.dialects.base import INCREMENTAL
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Executed, Modal, execute
 from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
-from cornersmooth.nc_reader.needed_states import AxisWords, curve_problem, modulo_problems
+from cornersmooth.nc_reader.needed_states import (
+    AxisWords,
+    clamp_problems,
+    curve_problem,
+    modulo_problems,
+    take_clamp,
+    unclamped_problems,
+)
 from cornersmooth.nc_reader.path_elements import in_mm, path_elements
 from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
 from cornersmooth.nc_reader.way_back import WayBack
@@ -87,6 +94,8 @@ class Reader:
             if self.placed and self.elements - self.given_out >= GIVEN_OUT:
                 yield self._collected()
         self.flush()
+        if self.rotary is not None:
+            self.problems += unclamped_problems(self.rotary.machine, self.memory)
         self._settle()
         if self.ready:
             yield self._collected()
@@ -128,6 +137,8 @@ class Reader:
                     "CS503", "motion in incremental words (G91)", hint, file=self.name, line=int(table.line[0])
                 )
             run, self.modal = execute(table, before)
+            if self.rotary is not None:
+                self.problems += clamp_problems(run, before.second, self.rotary.machine, self.memory)
             approach: frozenset[int] = frozenset()
             if self.way_back.open:
                 lines = set(run.line.tolist())
@@ -230,6 +241,8 @@ class Reader:
 
     def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
         """Say a word that stands beside the motion; a late one acts after the motion of its block."""
+        if letter == "M" and self.rotary is not None and take_clamp(value, self.rotary.machine, self.memory):
+            return
         if late:
             self.late.append((line, letter, value, text))
         else:

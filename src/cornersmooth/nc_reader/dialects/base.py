@@ -24,6 +24,9 @@ INCREMENTAL = "incremental"
 HIGH_SPEED = "high speed"
 
 
+#: name in `State.memory` of whether each rotary axis that has been spoken of is clamped
+CLAMPED = "clamped"
+
 #: word around the number of a modulo axis that sends it the shorter way; a column of tables with the axis behind it
 BY_WORD = "DC"
 
