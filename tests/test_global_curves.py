@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import re
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 import cornersmooth
+from cornersmooth.nc import choose_form
 from oracle.chains import Chain, cl_text, random_chains
 from oracle.command import run
 from oracle.motion import unit
@@ -138,6 +140,66 @@ def test_random_chains_keep_the_tolerance(control: str, tolerance: float, tmp_pa
             assert farthest(top, tops) <= tolerance + slack
     long = sum(len(stretch.points) > 5 for stretch_list in written for stretch in stretch_list)
     assert long > 0.3 * len(chains)
+
+
+def polynomials(text: str) -> list[list[Stretch]]:
+    """Feed motion between rapids in blocks of Siemens' POLY; lines are curves of degree 1."""
+    letters = ("X", "Y", "Z", "XH", "YH", "ZH")
+    knots, position = np.array([0.0] * 4 + [1.0] * 4), np.full(6, np.nan)
+    runs: list[list[Stretch]] = []
+    for line in text.splitlines():
+        if "SUPA" in line:
+            continue
+        if line.startswith("POLY "):
+            found = [re.search(rf"PO\[{letter}\]=\(([^)]*)\)", line) for letter in letters]
+            end, square, cube = np.array([np.fromstring(part[1], sep=",") for part in found if part]).T
+            slope = end - position - square - cube
+            inner = position + slope / 3, position + 2 * slope / 3 + square / 3
+            runs[-1].append(Stretch(knots, np.array([position, *inner, end]), 3))
+        else:
+            found = [re.search(rf"(?:^|\s){letter}=?(-?[\d.]+)", line) for letter in letters]
+            if not any(found):
+                continue
+            end = np.array([float(word[1]) if word else old for word, old in zip(found, position, strict=True)])
+            if line.startswith("G0 ") or not runs:
+                runs.append([])
+            elif not np.isnan(position).any():
+                runs[-1].append(Stretch(np.array([0.0, 0, 1, 1]), np.array([position, end]), 1))
+        position = end
+    return [run for run in runs if run]
+
+
+@pytest.mark.parametrize("tolerance", [0.003, 0.05])
+def test_polynomials_of_random_chains_keep_the_tolerance(tolerance: float, tmp_path: Path) -> None:
+    chains = [chain for chain in random_chains(32, how_many(6, 18), corners=6) if np.ptp(chain.tip, axis=0).any()]
+    options = ["--control", "siemens", "-f", "poly", "--method", "global", "-e", str(tolerance)]
+    result = run("smooth", "-", "-o", tmp_path / "o.nc", "-q", *options, data=cl_text(chains)[0])
+    assert result.returncode == 0, result.stderr.decode()  # verified, too
+    written = polynomials((tmp_path / "o.nc").read_text())
+    assert len(written) == len(chains)
+    for blocks, chain in zip(written, chains, strict=True):
+        turn = np.linalg.norm(np.diff(unit(chain.axis), axis=0), axis=1).max()
+        places = [dense(block) for block in blocks]
+        assert farthest(np.concatenate([tip for tip, _ in places]), chain.tip) <= tolerance
+        tops = np.concatenate([top for _, top in places])
+        assert farthest(tops, original(chain)) <= tolerance + H * (2.0 * turn / PARTS) ** 2 / 8
+    assert sum(block.degree == 3 for blocks in written for block in blocks) > 4 * len(chains)
+
+
+@pytest.mark.parametrize(("control", "form"), [("heidenhain", "spl"), ("siemens", "poly")])
+def test_polynomials_of_an_upright_tool_are_verified_and_fewer(control: str, form: str) -> None:
+    rng = np.random.default_rng(1)
+    tip = np.cumsum(rng.normal(size=(80, 3)) * 0.5 + np.array([1.0, 0.0, 0.0]), axis=0)
+    program = cornersmooth.Program.from_poses(tip, np.tile([0.0, 0.0, 1.0], (80, 1)), feed=1000.0)
+    blocks = []
+    for method in ("global", "proportional"):
+        settings = cornersmooth.Settings(method=method, tolerance=0.1)
+        chosen = choose_form(control, form, machine=None)
+        result = cornersmooth.postprocess(program, io.BytesIO(), settings, form=chosen)
+        assert result.verification is not None
+        assert result.verification.passed
+        blocks.append(result.written.blocks)
+    assert blocks[0] < 0.9 * blocks[1]
 
 
 @pytest.mark.parametrize("control", FORMS)

@@ -55,9 +55,6 @@ __all__ = [
 #: curve styles without weights
 _POLYNOMIAL = ("poly", "spl")
 
-#: curve styles that hold curves through whole runs of corners
-_LONG = ("g6.2", "bspline")
-
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
 _TURNING = ("bspline", "poly")
 
@@ -93,10 +90,10 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
         The form cannot hold what the settings ask for.
     """
     tolerance = settings.tolerance
-    if settings.method == "global" and form.curves and (form.rotary or form.curve not in _LONG):
+    if settings.method == "global" and form.curves and form.rotary:
         raise SettingsError(
             "CS227",
-            f"{form.control} form {form.name} has no curves through whole runs of corners",
+            f"{form.control} form {form.name} holds no curves through whole runs of corners: its words are rotary",
             "use --method proportional, or a form of lines",
         )
     if form.curve in _POLYNOMIAL and (settings.weights != (1.0, 1.0) or settings.shape != "paper"):

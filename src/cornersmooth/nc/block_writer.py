@@ -195,11 +195,13 @@ class BlockWriter:
         ticks: Ints = to_ticks(self._numbers(tip, other), self._format.decimals)
         return ticks
 
-    def bezier(self, tip: Floats, other: Floats, curve: NDArray[np.int8]) -> Floats | None:
+    def bezier(
+        self, tip: Floats, other: Floats, curve: NDArray[np.int8], spline: Floats | None = None
+    ) -> Floats | None:
         """`Run.bezier` where the form writes polynomials."""
         if self._curves.format is None or not (curve > 0).any():
             return None
-        return bezier_points(self._numbers(tip, other), curve)
+        return bezier_points(self._numbers(tip, other), curve, spline)
 
     def _numbers(self, tip: Floats, other: Floats) -> Floats:
         """Numbers of rows in units of the text, (r, c)."""

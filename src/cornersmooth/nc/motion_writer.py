@@ -170,6 +170,7 @@ class MotionWriter:
         if self.writer is not self._tilting:
             ticks = self.writer.ticks(rows.tip[part], rows.other[part])
         arc = rows.arc[part] if rows.arc is not None else None
+        spline = rows.spline[part] if rows.spline is not None else None
         yield from self._go_back(int(move[0]))
         if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
             yield from self._go_to(self.writer.ticks(program.tip[move[:1] - 1], rows.other[part][:1]), move[:1])
@@ -191,8 +192,8 @@ class MotionWriter:
             curve=rows.curve[part],
             weights=rows.weights[part] if rows.weights is not None else None,
             arc=arc,
-            bezier=self.writer.bezier(rows.tip[part], rows.other[part], rows.curve[part]),
-            spline=rows.spline[part] if rows.spline is not None else None,
+            bezier=self.writer.bezier(rows.tip[part], rows.other[part], rows.curve[part], spline),
+            spline=spline,
         )
         before = len(run)
         run = self._moving(run)

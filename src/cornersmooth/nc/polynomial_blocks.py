@@ -12,6 +12,8 @@ from cornersmooth.model import Bools, Floats, Ints, Units
 from cornersmooth.nc.curve_blocks import Curves, KnotBlocks, NoCurves, RotaryKnotBlocks, SplineBlocks
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
+from cornersmooth.smoothing.runs.ranges import ranges
+from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.text import RowFormat, format_number, to_ticks
 
 #: control points that a curve has more than knot intervals
@@ -171,15 +173,16 @@ class _SplFormat:
         return f"{mantissa}E{exponent[0]}{int(exponent[1:]):03d}"
 
 
-def bezier_points(points: Floats, curve: NDArray[np.int8]) -> Floats:
+def bezier_points(points: Floats, curve: NDArray[np.int8], spline: Floats | None = None) -> Floats:
     """Bézier points of the knot intervals of curves, in the last rows of each; zero elsewhere.
 
     Parameters
     ----------
     points : (r, c) float64
-        Control points; p rows for a curve of p − 3 equal knot intervals, all weights 1.
+        Control points; p rows for a curve of p − 3 knot intervals, all weights 1.
     curve : (r,) int8
-        As in `Rows`.
+    spline : (r, 3) float64, optional
+        As in `Rows`; without it the intervals of a curve are equal.
 
     Returns
     -------
@@ -189,12 +192,28 @@ def bezier_points(points: Floats, curve: NDArray[np.int8]) -> Floats:
     first = np.flatnonzero(curve == 1)
     ends = np.append(np.flatnonzero((curve[1:] <= 1) & (curve[:-1] > 0)) + 1, len(curve) if curve[-1] > 0 else [])
     counts = (ends - first).astype(np.int64)
+    if spline is not None:
+        rows = ranges(first, counts)
+        own = _splines(curve[rows], spline[rows], counts)
+        low = own.knot[own.span_knot]
+        matrix = own.bernstein(np.arange(len(low)), low, low + own.width)
+        taps = rows[own.span_control[:, None] + np.arange(4)]
+        intervals[taps[:, -1]] = matrix @ points[taps]
+        return intervals
     for count in np.unique(counts).tolist():
         begin = first[counts == count]
         own = points[begin[:, None] + np.arange(count)]
         bezier = (_bezier_matrix(count) @ own).reshape(len(begin), count - _DEGREE, 4, -1)
         intervals[begin[:, None] + np.arange(_DEGREE, count)] = bezier
     return intervals
+
+
+def _splines(curve: NDArray[np.int8], spline: Floats, counts: Ints) -> Splines:
+    """Knot vectors of clamped curves: rows 1, 5, 6 and so on of each have the distinct knots but for the last."""
+    knot, last = spline[:, 0], np.cumsum(counts) - 1
+    chosen = (curve == 1) | (curve > _DEGREE + 1)
+    knots = np.insert(knot[chosen], np.cumsum(chosen)[last], spline[last, 2])
+    return Splines(knots, counts - 2)
 
 
 @cache
