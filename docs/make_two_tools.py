@@ -31,14 +31,21 @@ RUNS = (
     ("fanuc", "", True),
     ("fanuc", "table-ac", True),
     ("fanuc", "table-ac", False),
+    ("mitsubishi", "", True),
     ("mitsubishi", "table-ac", True),
+    ("mitsubishi", "table-ac", False),
     ("haas", "table-bc", True),
+    ("haas", "table-bc", False),
     ("siemens", "", True),
     ("siemens", "table-ac", True),
+    ("siemens", "table-ac", False),
     ("heidenhain", "", True),
     ("heidenhain", "table-ac", True),
     ("linuxcnc", "xyzac-trt", True),
+    ("linuxcnc", "xyzac-trt", False),
     ("generic", "", True),
+    ("generic", "table-ac", True),
+    ("generic", "table-ac", False),
 )
 
 #: why a line stands where it stands; the first that fits

@@ -1,0 +1,137 @@
+"""Mutants of the words that a shop's habits ask for: stops between tools, the control's own smoothing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.errors import InputError
+from cornersmooth.kinematics import load_machine
+from cornersmooth.nc import choose_form
+from cornersmooth.verify import verify
+from nc.writing import lines_of
+
+CL = """UNITS/MM
+LOADTL/1
+SPINDL/2000,RPM,CLW
+COOLNT/ON
+RAPID
+GOTO/0,0,30,0.28,0,0.96
+FEDRAT/MMPM,300
+GOTO/0,0,0
+GOTO/9,1,0,0.28,0.1,0.95
+GOTO/20,0,0
+RAPID
+GOTO/0,0,60,0.28,0,0.96
+LOADTL/3
+SPINDL/500,RPM,CLW
+COOLNT/ON
+RAPID
+GOTO/20,5,30,0,0,1
+GOTO/20,5,2
+FEDRAT/MMPM,200
+GOTO/40,5,2
+RAPID
+GOTO/20,5,30
+FINI
+"""
+#: control, what `--with` asks for, machine
+FORMS = {
+    "fanuc": ("aicc", "table-ac"),
+    "haas": ("g187", "table-bc"),
+    "heidenhain": ("cycle32", ""),
+    "siemens": ("cycle832", ""),
+    "mitsubishi": ("", ""),
+}
+
+
+@cache
+def text_of(control: str) -> list[str]:
+    extra, machine = FORMS[control]
+    form = choose_form(control, machine=load_machine(machine) if machine else None, extras=[extra] if extra else [])
+    return lines_of(form, CL)
+
+
+def problems(control: str, lines: list[str]) -> list[str]:
+    machine = FORMS[control][1]
+    text = ("\n".join(lines) + "\n").encode()
+    try:
+        found = verify(
+            read(CL.encode(), name="part.cls"),
+            text,
+            tolerance=0.05,
+            axis_length=10.0,
+            control=control,
+            machine=load_machine(machine) if machine else None,
+        )
+    except InputError as error:
+        return [str(error)]
+    return [f"{problem.code} {problem.text}" for problem in found.problems]
+
+
+def bare(line: str) -> str:
+    return re.sub(r"^\d+ ", "", line)
+
+
+@pytest.mark.parametrize("control", FORMS)
+def test_the_right_text_passes(control: str) -> None:
+    assert problems(control, text_of(control)) == []
+
+
+Change = Callable[[str], list[str]]
+
+
+def sub(old: str, new: str) -> Change:
+    """Another word in the line."""
+    return lambda line: [re.sub(old, new, line)]
+
+
+def gone(line: str) -> list[str]:
+    """No line."""
+    return []
+
+
+#: control, the line (a regular expression) and which of those, and what becomes of it
+MUTANTS = {
+    "M0 between tools": ("mitsubishi", "M1", 0, sub("M1", "M0")),
+    "M30 between tools": ("fanuc", "M1", 0, sub("M1", "M30")),
+    "M1 twice between tools": ("fanuc", "M1", 0, lambda line: [line, "G4 P500", line]),
+    "a stop in the cut": ("siemens", r"G1 .*", 3, lambda line: [line, "M1"]),
+    "a stop in the cut, Klartext": ("heidenhain", r"LN .*", 6, lambda line: [line, "M1"]),
+    "smoothing on twice as much": ("haas", r"G187 P3 .*", 0, sub(r"E\S+", "E0.05")),
+    "smoothing of the second tool": ("haas", r"G187 P3 .*", 1, sub(r"E\S+", "E0.5")),
+    "smoothing in another mode": ("haas", r"G187 P3 .*", 1, sub("P3", "P1")),
+    "smoothing not off at the end": ("haas", "G187", 1, gone),
+    "smoothing on alone": ("haas", r"G187 P3 .*", 1, gone),
+    "P without G187": ("haas", r"G187 P3 .*", 0, sub("G187 ", "")),
+    "cycle 32 wide": ("heidenhain", r"CYCL DEF 32\.1 T.*", 0, sub(r"T\S+$", "T0.2")),
+    "cycle 32 of the second tool": ("heidenhain", r"CYCL DEF 32\.1 T.*", 1, sub(r"T\S+$", "T0.2")),
+    "cycle 32 without its tolerance": ("heidenhain", r"CYCL DEF 32\.1 T.*", 0, gone),
+    "cycle 32 without its beginning": ("heidenhain", r"CYCL DEF 32\.0 .*", 0, gone),
+    "cycle 32 not off": ("heidenhain", r"CYCL DEF 32\.1", 1, gone),
+    "cycle 32 of another number": ("heidenhain", r"CYCL DEF 32\.2 .*", 0, sub(r"32\.2", "33.2")),
+    "cycle 832 wide": ("siemens", r"CYCLE832\(0\.\d+,.*", 0, sub(r"\(0\.\d+", "(0.3")),
+    "cycle 832 not off": ("siemens", r"CYCLE832\(0,.*", 1, gone),
+    "cycle 832 of the second tool off": ("siemens", r"CYCLE832\(0\.\d+,.*", 1, sub(r"\(.*", "(0,_OFF,1)")),
+    "contour control not on": ("fanuc", r"G5\.1 Q1", 1, sub("Q1", "Q0")),
+    "contour control without Q": ("fanuc", r"G5\.1 Q1", 0, sub(" Q1", "")),
+    "retract left out": ("fanuc", r"G91 G28 Z0\.", 1, gone),
+    "retract left out at the end": ("siemens", r"SUPA G0 Z0 D0", -1, gone),
+    "another work offset": ("haas", "G54", 1, sub("G54", "G55")),
+    "another preset": ("heidenhain", r"CYCL DEF 247 .*", 0, gone),
+    "tip control at a turned table": ("fanuc", r"G0 A0\.0000 C0\.0000", 1, gone),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_are_found(name: str) -> None:
+    control, pattern, which, change = MUTANTS[name]
+    lines = text_of(control)
+    at = [k for k, line in enumerate(lines) if re.fullmatch(pattern, bare(line))][which]
+    changed = [*lines[:at], *change(lines[at]), *lines[at + 1 :]]
+    assert changed != lines
+    assert problems(control, changed) != []
