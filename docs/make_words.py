@@ -45,6 +45,8 @@ def roles(entry: dict[str, Any], kind: str) -> str:
             said.append(text.format(shown(entry[key])))
     if "share" in entry:
         said.append(f"at most {entry['share']:g} ε")
+    if entry.get("varies"):
+        said.append("may change from line to line")
     if entry.get("before"):
         said.append("before an arc")
     if entry.get("zero"):

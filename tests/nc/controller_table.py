@@ -7,14 +7,16 @@ machine have the limits of `linuxcnc_controller.STATED`, the feed is 1800 mm/min
 that the load of this computer does not matter. FOLDER holds the real CL files of the tests; without it the sample alone
 is run.
 Exit code 0 where long lines keep the tolerance in what is executed, and are nowhere slower than the fastest unsmoothed
-text that does.
+text that does, whatever blend it gives.
 """
 
 from __future__ import annotations
 
 import io
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +36,10 @@ FILES = (("hecc_point_zigzag.csv", 120), ("hust_5x_impeller_yelun.cls", 52))
 #: one pass of the sample, between two rapids
 FIRST, LAST = 4, 80
 FEED, AXIS_LENGTH = 1800.0, 10.0
-#: tolerances, and what the unsmoothed program tells G64 for them, mm
-TOLERANCES = {0.01: (0.002, 0.003), 0.04: (0.01, 0.015)}
+#: mm
+TOLERANCES = (0.01, 0.04)
+#: parts of the tolerance that the unsmoothed program tells G64: the largest that keeps it is looked for
+BLENDS = (0.1, 0.15, 0.2, 0.3, 0.45, 0.65, 0.9)
 #: part of the tolerance by which rotary axes may leave the tool axis between two points of an unsmoothed program: as
 #: far as they like, and so far that points have to be put in
 LOOSE, CLOSE = 5.0, 0.3
@@ -50,6 +54,11 @@ class Executed:
     tip: float
     axis_point: float
     jerk: float
+
+    @property
+    def deviation(self) -> float:
+        """Larger one of tip and axis point, mm."""
+        return max(self.tip, self.axis_point)
 
 
 def paths(folder: Path | None) -> dict[str, Program]:
@@ -75,18 +84,29 @@ def unsmoothed(program: Program, blend: float, turn: float) -> bytes:
     return _text(kept, Settings(tolerance=tolerance, lines="dense", blend_share=blend / tolerance))
 
 
-def rivals(program: Program, tolerance: float) -> dict[str, bytes]:
-    """Unsmoothed programs that may keep a tolerance."""
-    return {
-        f"unsmoothed{how}, G64 P{blend:g}": unsmoothed(program, blend, part * tolerance)
-        for how, part in (("", LOOSE), (" with points", CLOSE))
-        for blend in TOLERANCES[tolerance]
-    }
+def rivals(program: Program, tolerance: float) -> Iterator[tuple[str, bytes, Executed]]:
+    """Unsmoothed programs, with their names and what became of them, each with larger blends while it keeps ε."""
+    for how, part in (("", LOOSE), (" with points", CLOSE)):
+        low, high = -1, len(BLENDS)  # kept, and not
+        while high - low > 1:
+            middle = (low + high) // 2
+            blend = BLENDS[middle] * tolerance
+            text = unsmoothed(program, blend, part * tolerance)
+            did = execute(program, text)
+            yield f"unsmoothed{how}, G64 P{blend:g}", text, did
+            low, high = (middle, high) if did.deviation <= tolerance else (low, middle)
 
 
 def ours(program: Program, tolerance: float, lines: str) -> bytes:
     """What the program writes."""
     return _text(program, Settings(tolerance=tolerance, axis_length=AXIS_LENGTH, lines=lines))
+
+
+def own_texts(program: Program, tolerance: float) -> Iterator[tuple[str, bytes, Executed]]:
+    """What the program writes, with names and what became of it."""
+    for lines in ("dense", "long"):
+        text = ours(program, tolerance, lines)
+        yield f"--lines {lines}", text, execute(program, text)
 
 
 def _text(program: Program, settings: Settings) -> bytes:
@@ -120,20 +140,17 @@ def _arrival(poses: Floats, start: Floats) -> int:
 
 def main(arguments: list[str]) -> int:
     """Print the table."""
-    print("| path | tolerance | text | lines | time s | tip mm | axis point mm | rms jerk of rotary axes deg/s3 |")
+    print("| path | tolerance | text | blocks | time s | tip mm | axis point mm | rms jerk of rotary axes deg/s3 |")
     print("|---|---|---|---|---|---|---|---|")
     good = True
     for name, program in paths(Path(arguments[0]) if arguments else None).items():
         for tolerance in TOLERANCES:
-            texts = rivals(program, tolerance)
-            texts |= {f"--lines {lines}": ours(program, tolerance, lines) for lines in ("dense", "long")}
             kept: dict[str, float] = {}
-            for label, text in texts.items():
-                did = execute(program, text)
+            for label, text, did in chain(rivals(program, tolerance), own_texts(program, tolerance)):
                 good &= did.word == "done"
                 numbers = f"{did.seconds:.2f} | {did.tip:.4f} | {did.axis_point:.4f} | {did.jerk:.0f}"
                 print(f"| {name} | {tolerance:g} | {label} | {len(text.splitlines())} | {numbers} |", flush=True)
-                if max(did.tip, did.axis_point) <= tolerance:
+                if did.deviation <= tolerance:
                     kept[label] = did.seconds
             own = kept.pop("--lines long", np.inf)
             best = min((kept[label] for label in kept if label.startswith("unsmoothed")), default=np.inf)

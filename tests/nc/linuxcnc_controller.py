@@ -12,6 +12,7 @@ to it (the axis point within twice of that: G64 bounds the linear axes only), 1 
 from __future__ import annotations
 
 import argparse
+import fcntl
 import io
 import os
 import shutil
@@ -19,7 +20,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -247,7 +249,7 @@ def run_samples(
     text: bytes, seconds: float, dynamics: Dynamics | None = None, height: float = 0.0
 ) -> tuple[str, Floats]:
     """What became of a program, and every servo cycle: commands to the motors and the kind of motion (m, 6)."""
-    with tempfile.TemporaryDirectory(prefix="linuxcnc-") as name:
+    with one_at_a_time(), tempfile.TemporaryDirectory(prefix="linuxcnc-") as name:
         folder = Path(name)
         write_configuration(folder, text, seconds, dynamics, height)
         user: list[str] = []
@@ -272,6 +274,14 @@ def run_samples(
         overrun = (folder / "samples.txt").read_text().count("overrun")
         word = result.read_text() if not overrun else f"{overrun} samples lost"
         return word, samples[:, 1:].reshape(-1, 6)
+
+
+@contextmanager
+def one_at_a_time() -> Iterator[None]:
+    """Wait until no other controller runs: all of them share one memory."""
+    with (Path(tempfile.gettempdir()) / "linuxcnc-controller.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def tool(joints: Floats) -> tuple[Floats, Floats]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -120,3 +121,44 @@ def test_curves_have_no_long_lines(control: str, form: str) -> None:
     with pytest.raises(SettingsError, match="cannot be written in long lines") as caught:
         fit_settings(Settings(lines="long"), choose_form(control, form), "mm")
     assert caught.value.code == "CS223"
+
+
+def told_blends(text: str) -> list[tuple[float, str]]:
+    """What G64 says while each motion block runs."""
+    blend, found = 0.0, []
+    for line in text.splitlines():
+        if line.startswith("G64 "):
+            blend = float(line.split()[1][1:])
+        elif line.startswith(("G0 ", "G1 ")):
+            found.append((blend, line))
+    return found
+
+
+def test_every_corner_has_its_own_blend() -> None:
+    """More than the usual one where lines leave room, never more than the tolerance, and the usual one in rapids."""
+    program = without_holes(read((SAMPLES / "impeller.cls").read_bytes(), name="impeller.cls"))
+    settings = Settings(tolerance=0.02)
+    form = Case("linuxcnc", "g1", "xyzac-trt").choose(endless=True)
+    text, _ = written(program, form, settings)
+    told = told_blends(text)
+    usual = round(0.27 * settings.tolerance, 5)
+    assert all(1e-5 <= blend <= settings.tolerance for blend, _ in told)
+    assert {blend for blend, line in told if line.startswith("G0 ")} == {usual}
+    assert np.mean([blend > usual for blend, _ in told]) > 0.5
+    blocks = [line for line in text.splitlines() if line.startswith("G64 ")]
+    assert all(one != other for one, other in pairwise(blocks))
+    dense, _ = written(program, form, settings.but(lines="dense"))
+    assert dense.count("G64 ") == 1
+
+
+def test_no_blend_is_told_while_the_cutter_is_compensated() -> None:
+    """LinuxCNC refuses G64 there."""
+    rows = "".join(f"GOTO/{x},{0.02 * (x % 3)},0,{0.02 * (x % 4)},0,1\n" for x in range(1, 30))
+    text = f"CUTCOM/LEFT,XYPLAN,1\n{rows}CUTCOM/OFF\n{rows}"
+    program = read(f"FEDRAT/MMPM,500\nGOTO/-9,0,0,0,0,1\n{text}FINI\n".encode(), name="a.cls")
+    form = Case("linuxcnc", "g1", "xyzac-trt").choose(endless=True)
+    lines, _ = written(program, form, Settings(tolerance=0.05))
+    inside = lines[lines.index("G41") : lines.index("G40", lines.index("G41"))]
+    assert "G1 " in inside
+    assert "G64" not in inside
+    assert "G64" in lines[lines.index("G40", lines.index("G41")) :]

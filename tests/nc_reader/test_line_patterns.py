@@ -100,7 +100,7 @@ def test_fast_path_is_taken():
     lines = lines_of(b"X1.5 Y-2.25\nX-1.5 Y2.25 Z12345.678\n(A)\n", LinePatterns(dialect_of("fanuc").lexer))
     assert lines is not None
     assert lines.bulk().tolist() == [True, True, False]
-    columns = lines.columns(0, 2)
+    columns = lines.columns(np.arange(2))
     assert columns["X"].tolist() == [1.5, -1.5]
     assert columns["Y"].tolist() == [-2.25, 2.25]
     assert np.isnan(columns["Z"][0])

@@ -189,7 +189,7 @@ def write(
     circles = plan_circles(program, smoothed.settings, chosen)
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
-    writer = BlockWriter(chosen, program, statements, findings, circles, stretch)
+    writer = BlockWriter(chosen, program, statements, findings, circles, stretch, values["blend"])
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
     motion = MotionWriter(program, writer, statements, operation, findings, approach, frame.retract)
     native = frame.cycles == "native"

@@ -23,10 +23,14 @@ from cornersmooth.nc.curve_blocks import Curves, RowWriter
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.polynomial_blocks import bezier_points, curves_for
+from cornersmooth.nc.program_frame import BLEND_STEP, blend_word
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.spline_share import SplineShare
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.text import RowFormat, format_number, to_ticks
+
+#: steps of the last digit that a number may be below a whole one and still is it
+_ROUNDING = 1e-6
 
 
 @dataclass
@@ -44,6 +48,8 @@ class BlockWriter:
         How arcs are written.
     stretch : float
         `Form.stretch`.
+    blend : str
+        How far the head lets the control round the corners of lines; empty where nothing else is said.
     """
 
     form: Form
@@ -52,6 +58,7 @@ class BlockWriter:
     findings: Findings
     circles: Circles
     stretch: float = 1.0
+    blend: str = ""
     blocks: int = 0
     _feed: int = -1  # ticks and feed mode of the last F, as one number
     _mode: int = FeedMode.PER_MINUTE
@@ -62,6 +69,7 @@ class BlockWriter:
     _share: SplineShare | None = field(init=False)
     _modulo: list[int] = field(init=False)  #: columns of modulo axes
     _closing: bytes = field(init=False)
+    _said_blend: int = field(init=False)  # in steps of its last digit
 
     def __post_init__(self) -> None:
         motion = self.form.mode.motion
@@ -76,6 +84,7 @@ class BlockWriter:
         self._arc_format = self._row_format((*spaced[:3], radius), decimals[:3] + decimals[:1])
         self._curves = curves_for(self.form, self.program.units)
         self._share = SplineShare(self.program.line, self.findings) if self.form.curve == "bspline" else None
+        self._said_blend = self._usual_blend
 
     def _spelt(self, columns: Sequence[int]) -> tuple[tuple[bytes, ...], bytes]:
         """What stands before the numbers of columns, and behind the last of them."""
@@ -284,7 +293,32 @@ class BlockWriter:
             if entry == len(table):
                 table.append(text)
             chosen[row] = entry
-        return table, chosen, extra
+        return table, chosen, extra + self._say_blends(run, table, chosen)
+
+    @property
+    def _usual_blend(self) -> int:
+        return round(float(self.blend or 0.0) / BLEND_STEP)
+
+    def _say_blends(self, run: Run, table: list[bytes], chosen: Ints) -> int:
+        """Put blocks before rows from which on the control may round otherwise than before; returns how many."""
+        block, usual = self.form.table.lines.rounding, self._usual_blend
+        if not block or not usual or (run.blend is None and self._said_blend == usual):
+            return 0
+        if self.statements.compensated:  # LinuxCNC refuses the block then; what held before was for the usual blend
+            return 0
+        blend = np.full(len(run), usual)
+        if run.blend is not None:
+            steps = np.floor(run.blend / (self.program.mm_per_unit * BLEND_STEP) + _ROUNDING)
+            blend = np.maximum(steps, 1.0).astype(np.int64)
+        rows = np.flatnonzero(np.diff(blend, prepend=self._said_blend))
+        self._said_blend = int(blend[-1])
+        pairs, which = np.unique(np.column_stack((blend[rows], chosen[rows])), axis=0, return_inverse=True)
+        chosen[rows] = len(table) + which.reshape(-1)
+        table += [
+            block.format(blend=blend_word(value * BLEND_STEP)).encode() + b"\n" + table[prefix]
+            for value, prefix in pairs.tolist()
+        ]
+        return len(rows)
 
     def _block(self, table: Mapping[int, str], key: int) -> bytes:
         return table[key].encode() + b"\n" if key in table else b""

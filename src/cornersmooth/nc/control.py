@@ -375,6 +375,12 @@ class LineStyle:
     lag : float
         By how many times ε the axis point may lag behind the tip where the control rounds corners of lines by itself,
         as `cornersmooth.smoothing.long_lines.lags` estimates it; 0 where it does no such thing.
+    rounding : str
+        Block that says with ``{blend}`` how far the control may round the corners of lines from the next line on, where
+        it may stand between any two lines; empty for none. Then every corner gets what
+        `cornersmooth.smoothing.blending.largest_blends` finds, up to ε.
+    executed_share : float
+        Part of ε that is left to what the control executes at those corners, by that estimate.
     """
 
     lines: str = "dense"
@@ -382,6 +388,8 @@ class LineStyle:
     line_share: float = 1.0
     blend_share: float = 0.1
     lag: float = 0.0
+    rounding: str = ""
+    executed_share: float = 0.85
 
 
 @dataclass(frozen=True)

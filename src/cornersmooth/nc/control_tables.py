@@ -108,6 +108,7 @@ _BRACES: dict[str, Table] = {
     "file_name": {"stem": "PART", "number": "0001"},
     **dict.fromkeys(("start", "begin", "tool_end", "between_tools", "end", "retract"), _PROGRAM_BRACES),
     "block_number": {"number": 10},
+    "rounding": {"blend": "0.001"},
 }
 #: the same in blocks of hole cycles
 _CYCLE_BRACES: Table = dict.fromkeys(
@@ -308,7 +309,7 @@ def _lines(table: Table) -> LineStyle:
     lines = _record(LineStyle, table, "lines")
     if lines.lines not in get_args(Lines):
         raise _SHELF.wrong(f"lines.lines is {lines.lines!r}", f"use {' or '.join(get_args(Lines))}")
-    for name in ("curve_share", "line_share", "blend_share"):
+    for name in ("curve_share", "line_share", "blend_share", "executed_share"):
         if not 0.0 < getattr(lines, name) <= 1.0:
             raise _SHELF.wrong(f"lines.{name} is {getattr(lines, name)}", "give a part of 1")
     if not 0.0 <= lines.lag <= _MOST_LAG:

@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.kinematics import tip_position, tool_axis
-from cornersmooth.model import Ints, SmoothProgram
+from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
+from cornersmooth.smoothing.blending import largest_blends
+from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 from cornersmooth.vectors import unit
 
@@ -53,6 +54,20 @@ def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> Li
         else None,
         rotary=machine is not None,
     )
+
+
+def corner_blends(
+    rows: Vertices, kept: Ints, rapid: Bools, limits: LineLimits, settings: Settings, form: Form
+) -> Floats | None:
+    """How far the control may round the corner at each kept row, mm: the usual blend behind rapids.
+
+    None where it is not told for each.
+    """
+    style = form.table.lines
+    if not style.rounding:
+        return None
+    found = largest_blends(rows, kept, limits, settings.tolerance, style.executed_share * settings.tolerance)
+    return np.where(rapid, limits.blend, found)
 
 
 def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form) -> Iterator[Rows]:

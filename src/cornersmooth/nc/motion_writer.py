@@ -194,6 +194,7 @@ class MotionWriter:
             arc=arc,
             bezier=self.writer.bezier(rows.tip[part], rows.other[part], rows.curve[part], spline),
             spline=spline,
+            blend=rows.blend[part] if rows.blend is not None else None,
         )
         before = len(run)
         run = self._moving(run)

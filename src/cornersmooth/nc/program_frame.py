@@ -18,8 +18,9 @@ from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
 
-#: decimals of that
+#: decimals of how far the control may round the corners of lines, and the step of the last
 _BLEND_DECIMALS = 5
+BLEND_STEP = 10.0**-_BLEND_DECIMALS
 
 #: mm along the tool in forms with a point on the axis, which go to their first position on all axes at once
 POINT_APPROACH = 20.0

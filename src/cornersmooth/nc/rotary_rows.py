@@ -18,7 +18,7 @@ from cornersmooth.kinematics.travel import check_travel
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
-from cornersmooth.nc.long_rows import line_limits
+from cornersmooth.nc.long_rows import corner_blends, line_limits
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves, rotary_angles
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
@@ -108,11 +108,14 @@ def rotary_rows(
         unsolved += line[more.unsolved + 1].tolist()
         filled = fill(tip[here], axis[here], angles[here], more)
         start, at_pose = segments_of_rows(move, here.start, here.stop)
+        blend = None
         if long:
             row = filled.pose
             exact = at_pose[row] & ~filled.inserted
             found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move[here][row], start[row], exact)
-            filled = filled.only(fewest_lines(found, limits))
+            kept = fewest_lines(found, limits)
+            filled = filled.only(kept)
+            blend = corner_blends(found, kept, rapid[here][filled.pose], limits, settings, form)
         own = slice(1 if begin else 0, None)
         of_timed, fastest = None if timed is None else timed[here], form.mode.motion.fastest
         rate = _rates(filled, move[here], of_timed, program, settings, form)
@@ -139,6 +142,7 @@ def rotary_rows(
             curve=np.zeros(count, np.int8),
             joined=np.zeros(count, np.bool_),
             rate=None if rate is None else rate[own],
+            blend=None if blend is None else blend[own],
         )
     if unsolved:
         text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"

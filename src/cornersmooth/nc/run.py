@@ -35,6 +35,7 @@ class Run:
     bezier : (r, 4, c) float64 or None
         Bézier points of the knot intervals of curves, in units of the text, for polynomials.
     spline : (r, 3) float64 or None
+    blend : (r,) float64 or None, mm
         As in `Rows`.
     """
 
@@ -49,6 +50,7 @@ class Run:
     dwell: Bools | None = None
     bezier: Floats | None = None
     spline: Floats | None = None
+    blend: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.ticks)

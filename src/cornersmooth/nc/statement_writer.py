@@ -67,7 +67,7 @@ class StatementWriter:
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
     cycle: Cycle | None = None  #: the hole cycle in force, None where it is not understood
     speed: float | None = None  #: of the spindle, revolutions per minute
-    _compensated: bool = False
+    compensated: bool = False
     tool: int | None = None  #: loaded last
     _direction: str = "clockwise"
     _diameter: float = 0.0
@@ -112,8 +112,8 @@ class StatementWriter:
 
     def end_compensation(self) -> list[str]:
         """Blocks that switch cutter compensation off, where it is on."""
-        blocks = list(self.words.compensation_off) if self._compensated else []
-        self._compensated = False
+        blocks = list(self.words.compensation_off) if self.compensated else []
+        self.compensated = False
         return blocks
 
     def comment(self, text: str) -> list[str]:
@@ -262,7 +262,7 @@ class StatementWriter:
         """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF."""
         words, numbers = words_of(statement), numbers_of(statement)
         if words[:1] in (["OFF"], ["NOMORE"]):
-            self._compensated = False
+            self.compensated = False
             return list(self.words.compensation_off) or None
         if not self.words.compensation_left and words[:1] in (["LEFT"], ["RIGHT"]):
             raise InputError(
@@ -285,7 +285,7 @@ class StatementWriter:
             "cutter compensation is left to the control, which offsets the path in the plane and not along the tool; "
             "see that it may be used with tool tip control, and that the register holds what the CAM system meant",
         )
-        self._compensated = True
+        self.compensated = True
         blocks = []
         plane = planes[words[1]] if len(words) > 1 else 17
         if plane != self.plane:

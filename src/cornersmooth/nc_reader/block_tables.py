@@ -15,7 +15,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import Bools, Floats
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.line_patterns import Group, LinePatterns, lines_of, merged
 from cornersmooth.nc_reader.words import Line, Table
@@ -42,8 +42,8 @@ class RunLines(Protocol):
     def bulk(self) -> Bools:
         """(l,) whether each line can be read in a run."""
 
-    def columns(self, first: int, last: int) -> dict[str, Floats] | None:
-        """Numbers of lines ``first`` to ``last`` (excluded), NaN where a line has none; None if the run is none."""
+    def columns(self, rows: Ints) -> dict[str, Floats] | None:
+        """Numbers of lines that stand in a run, NaN where a line has none; None if the run is none."""
 
 
 def read_lines(
@@ -108,17 +108,30 @@ def _read_chunk(
 def _in_order(
     lines: RunLines, chunk: bytes, number: int, lexer: Lexer, name: str | None
 ) -> Generator[Table | Line, None, int]:
-    """Runs as tables, and one by one the other lines and those of runs that turn out to be none."""
+    """Runs as tables, and one by one the other lines and those of runs that turn out to be none.
+
+    Asides within a run follow it.
+    """
     bulk = lines.bulk()
-    edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
-    written: list[bytes] = []
+    written = [] if bulk.all() else chunk.split(b"\n")
+    within = bulk.copy()
+    if lexer.aside is not None:
+        others = np.flatnonzero(~bulk).tolist()
+        within[[row for row in others if lexer.aside.fullmatch(written[row])]] = True
+    edges = np.flatnonzero(np.diff(within, prepend=~within[0], append=~within[-1]))
     for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        columns = lines.columns(start, stop) if bulk[start] else None
+        rows = start + np.flatnonzero(bulk[start:stop])
+        columns = lines.columns(rows) if len(rows) else None
+        single = np.arange(start, stop)
         if columns is not None:
-            yield Table(np.arange(number + start, number + stop), columns)
-            continue
+            single = single[~bulk[start:stop]]
+            before = int(np.searchsorted(single, rows[0]))
+            for row in single[:before].tolist():
+                yield lexer.line(written[row], number + row, name)
+            yield Table(number + rows, columns)
+            single = single[before:]
         written = written or chunk.split(b"\n")
-        for row in range(start, stop):
+        for row in single.tolist():
             yield lexer.line(written[row], number + row, name)
     return len(bulk)
 
@@ -144,10 +157,11 @@ class LetteredLines:
         """(l,) whether each line can be read in a run."""
         return np.array([kind is not None for kind in self._kinds])
 
-    def columns(self, first: int, last: int) -> dict[str, Floats] | None:
-        """Numbers of lines ``first`` to ``last`` (excluded), NaN where a line has none; None if the run is none."""
-        kinds = self._kinds[first:last]
-        found = self._measure.findall(b"\n".join(self._lines[first:last]))
+    def columns(self, rows: Ints) -> dict[str, Floats] | None:
+        """Numbers of lines that stand in a run, NaN where a line has none; None if the run is none."""
+        chosen = rows.tolist()
+        kinds = [self._kinds[row] for row in chosen]
+        found = self._measure.findall(b"\n".join([self._lines[row] for row in chosen]))
         try:
             values = parse_numbers(b" ".join(found))
         except NumberError:  # too large
@@ -159,13 +173,13 @@ class LetteredLines:
         groups: list[Group] = []
         for kind, k in order.items():
             assert kind is not None
-            rows = np.flatnonzero(label == k)
+            own = np.flatnonzero(label == k)
             numbers = [
-                np.full(len(rows), column) if isinstance(column, float) else values[begin[rows] + column]
+                np.full(len(own), column) if isinstance(column, float) else values[begin[own] + column]
                 for column in kind.columns.values()
             ]
-            groups.append((rows, tuple(kind.columns), numbers))
-        return merged(groups, last - first)
+            groups.append((own, tuple(kind.columns), numbers))
+        return merged(groups, len(rows))
 
 
 @dataclass(frozen=True, eq=False)

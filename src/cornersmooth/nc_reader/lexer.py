@@ -35,6 +35,8 @@ class Lexer:
     measure = re.compile(rb"(?<![G.\d])[-+]?(?:\d+\.\d*|\.\d+)")
     #: what a line begins with that can begin a curve, behind a line end
     begins: re.Pattern[bytes]
+    #: lines between motion blocks that say nothing of the motion; None for a control without such
+    aside: re.Pattern[bytes] | None = None
     #: names of words that make a block move the tool or belong to a curve
     places: frozenset[str] = frozenset()
     #: names of words that are worth something else without a decimal point: read on their own, to be complained of

@@ -195,13 +195,14 @@ class Lines:
         """(l,) whether each line can be read in a run."""
         return np.array([pattern.names is not None for pattern in self.patterns])[self.label]
 
-    def columns(self, first: int, last: int) -> dict[str, Floats]:
-        """Numbers of lines ``first`` to ``last`` (excluded), all of them of a run; NaN where a line has none."""
-        return merged(self._groups(first, last), last - first)
+    def columns(self, chosen: Ints) -> dict[str, Floats]:
+        """Numbers of lines that stand in a run, NaN where a line has none."""
+        first, last = int(chosen[0]), int(chosen[-1]) + 1
+        return merged(self._groups(slice(first, last) if last - first == len(chosen) else chosen), len(chosen))
 
-    def _groups(self, first: int, last: int) -> Iterator[Group]:
+    def _groups(self, chosen: slice | Ints) -> Iterator[Group]:
         """Lines of a run by the letters that they have."""
-        label = self.label[first:last]
+        label, starts = self.label[chosen], self.start[chosen]
         used = np.flatnonzero(np.bincount(label, minlength=len(self.patterns))).tolist()
         of_names: dict[tuple[str, ...], list[int]] = {}
         for k in used:
@@ -212,7 +213,7 @@ class Lines:
         kinds = kind[label] if len(of_names) > 1 else None
         for number, (names, mine) in enumerate(of_names.items()):
             rows = slice(None) if kinds is None else np.flatnonzero(kinds == number)
-            start, own = self.start[first:last][rows], place[label[rows]]
+            start, own = starts[rows], place[label[rows]]
             fields = np.frombuffer(b"".join([self.patterns[k].fields for k in mine]), np.int64)
             constants = np.frombuffer(b"".join([self.patterns[k].constants for k in mine])).reshape(len(mine), -1)
             numbers = self._numbers(start, own, fields.reshape(len(mine), -1, 5))

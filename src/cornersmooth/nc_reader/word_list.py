@@ -20,10 +20,11 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     ``needs``: a word that must stand in the same block, of whose state it may say more. ``must``: the same, for a word
     that is nothing without. ``alone``: no other words may stand beside it. ``before``: ``"arc"``. ``after``: a word
     that must have been said since the last time. ``then``, ``behind``: the next block, the block before. ``share``:
-    what the number in brackets may be of the tolerance. ``zero``: the rotary axes must have been sent to zero before:
-    where a parameter says so, the part program turns with the angles of that moment. ``never``: the control has no such
-    word. ``tool``: in a text with a ``cycle`` of the control it may differ from tool to tool. ``high``: only behind a
-    retract; a control with such a word wants the tool high at the end, too.
+    what the number in brackets may be of the tolerance. ``varies``: it may change within the program. ``zero``: the
+    rotary axes must have been sent to zero before: where a parameter says so, the part program turns with the angles of
+    that moment. ``never``: the control has no such word. ``tool``: in a text with a ``cycle`` of the control it may
+    differ from tool to tool. ``high``: only behind a retract; a control with such a word wants the tool high at the
+    end, too.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.
@@ -61,6 +62,7 @@ class WordRule:
     then: re.Pattern[str] | None = None
     behind: re.Pattern[str] | None = None
     share: float | None = None
+    varies: bool = False
     never: bool = False
     high: bool = False
     retract: bool = False

@@ -51,6 +51,8 @@ class Rows:
     spline : (r, 3) float64 or None
         Of control points where not all curves are five-point curves: knot, weight and, in the last row of a curve, the
         last knot.
+    blend : (r,) float64 or None, mm
+        How far the control may round the corner at each row by itself; None where it is not told for each.
     """
 
     tip: Floats
@@ -62,6 +64,7 @@ class Rows:
     arc: Ints | None = None
     rate: Floats | None = None
     spline: Floats | None = None
+    blend: Floats | None = None
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,7 @@ class WordCheck:
         self._begun = 0
         self._tail: list[tuple[int, str]] = []
         self._state: dict[str, tuple[str, int]] = {}
+        self._fitted: dict[str, list[WordRule | None]] = {}
         self._first: dict[str, str] | None = None
         self._complained: set[tuple[str, int]] = set()
         self._changed = True
@@ -264,6 +265,12 @@ class WordCheck:
 
     def _fitting(self, words: list[str], text: str) -> list[WordRule | None]:
         """Rule of every word, or of the whole block; None for a word that is not on the list, or not beside these."""
+        known = self._fitted.get(text)
+        if known is None:
+            known = self._fitted[text] = self._found(words, text)
+        return known
+
+    def _found(self, words: list[str], text: str) -> list[WordRule | None]:
         whole = next((rule for rule in self.list.blocks if rule.pattern.fullmatch(text)), None)
         if whole is not None:
             return [whole]
@@ -366,7 +373,7 @@ class WordCheck:
             beside = [
                 other
                 for other, theirs in zip(words, rules, strict=True)
-                if theirs and theirs.needs and theirs.needs.fullmatch(word) and not theirs.compared
+                if theirs and theirs.needs and theirs.needs.fullmatch(word) and not (theirs.compared or theirs.varies)
             ]
             self._state[rule.state] = (" ".join([word, *beside]), number)
             self._changed = True

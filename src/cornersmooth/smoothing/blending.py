@@ -1,0 +1,188 @@
+"""How far a control may round the corners of lines by itself so that what it executes keeps ε.
+
+A control that blends (LinuxCNC's G64 P) slows down towards the end of a line and starts the next one meanwhile. Where
+the lines keep less than ε of the original motion, it may round more, and runs faster. What it does is taken from how
+LinuxCNC's planner works (tp.c, parabolic blends), and was compared with what its controller executes
+(docs/linuxcnc.md): the line before has b₁·(1 − τ)² left while the next one has gone b₂·τ², τ from 0 to 1. b₁ is at
+most half of its line, and at most 4·P/|Δt| for a blend tolerance P and a difference Δt of the unit tangents of the
+tip. Both take the same time, so b₂/b₁ is the ratio of their accelerations; b₂ is at most half of its line. Rotary words
+go along evenly: P bounds the tip only, the axis point is what this module looks after.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.smoothing.long_lines import LineLimits, Vertices
+from cornersmooth.vectors import norm
+
+#: b₁ over P/|Δt|: 4, and what its controller was found to go beyond that
+_REACH = 4.8
+
+#: where a blend is looked at: where both lines are as far from the corner, 0, and before and behind that, -1 and 1
+_PLACES = (-0.35, 0.0, 0.35)
+
+#: Degrees per mm by which rotary axes may speed up while linear ones do by one mm. Lines that turn more are as fast as
+#: the rotary axes allow. What a machine can is not known well; the ratio of two lines is the largest of these.
+_TURNS = (0.1, 0.4, 1.0)
+
+#: what stands still has this much of a way, so that nothing is divided by zero
+_STANDING = 1e-9
+
+#: blend tolerances go in steps of this ratio, so that few lines change them
+_STEP = 1.5
+
+#: part of what makes a difference that is as good as all of it
+_NEARLY = 0.6
+
+#: part of what a blend may be by proportion that is tried next
+_SURELY = 0.95
+
+#: rounds of making blends smaller; what still goes too far gets the smallest
+_ROUNDS = 6
+
+#: part of ε that is the least blend tolerance
+_LEAST = 0.005
+
+
+@dataclass(frozen=True)
+class _Corners:
+    """Vertices between two lines, v of them, and the lines before and behind (each (v, ...))."""
+
+    tip: Floats
+    words: Floats
+    parameter: Floats
+    way: tuple[Floats, Floats]  # unit tangents of the tip
+    turn: tuple[Floats, Floats]  # change of words per mm
+    rate: tuple[Floats, Floats]  # change of the parameter per mm
+    half: tuple[Floats, Floats]  # half of the lengths, mm
+    bend: Floats  # |Δt|
+    quicker: Floats  # acceleration of the line behind over that of the one before
+
+    @classmethod
+    def of(cls, rows: Vertices, kept: Ints) -> _Corners:
+        tip, words, parameter = rows.tip[kept], rows.words[kept], rows.parameter[kept]
+        step = np.diff(tip, axis=0)
+        length = norm(step)
+        per = np.where(length > 0.0, length, 1.0)
+        way, turn, rate = step / per[:, None], np.diff(words, axis=0) / per[:, None], np.diff(parameter) / per
+        most_way, most_turn = np.abs(way).max(axis=1), np.abs(turn).max(axis=1)
+        slow = [np.maximum(np.maximum(most_way, most_turn / ratio), _STANDING) for ratio in _TURNS]
+        quicker = np.max([of_lines[:-1] / of_lines[1:] for of_lines in slow], axis=0)
+
+        def beside(values: Floats) -> tuple[Floats, Floats]:
+            return values[:-1], values[1:]
+
+        return cls(
+            tip[1:-1],
+            words[1:-1],
+            parameter[1:-1],
+            beside(way),
+            beside(turn),
+            beside(rate),
+            beside(length / 2.0),
+            norm(np.diff(way, axis=0)),
+            quicker,
+        )
+
+    def only(self, chosen: Ints) -> _Corners:
+        columns: dict[str, Any] = {
+            name: tuple(part[chosen] for part in values) if isinstance(values, tuple) else values[chosen]
+            for name, values in vars(self).items()
+        }
+        return _Corners(**columns)
+
+
+def largest_blends(rows: Vertices, kept: Ints, limits: LineLimits, most: float, deviation: float) -> Floats:
+    """Blend tolerances with which what the control executes stays near the original motion.
+
+    Parameters
+    ----------
+    rows : Vertices
+    kept : (k,) int64
+        Rows at which lines end, from `cornersmooth.smoothing.long_lines.fewest_lines`.
+    limits : LineLimits
+    most : float, mm
+        Largest blend tolerance.
+    deviation : float, mm
+        What tip and axis point may be off the original motion while the control blends.
+
+    Returns
+    -------
+    (k,) float64, mm
+        For the corner at each row. `LineLimits.blend` at both ends and where the tip stands still beside it, and not
+        more than that where a line ends in any case.
+    """
+    blends = np.full(len(kept), limits.blend)
+    if len(kept) < 3:
+        return blends
+    corners = _Corners.of(rows, kept)
+    moving = np.minimum(*corners.half) > 0.0
+    enough = np.minimum(corners.half[0] * corners.bend / _REACH, most)  # more makes no difference
+    enough[~moving] = 0.0
+    found = np.full(len(moving), most)
+    asked = np.flatnonzero(moving)
+    for _ in range(_ROUNDS):
+        off = _deviation(rows, limits, corners.only(asked), found[asked])
+        far = off > deviation
+        asked = asked[far]
+        if not len(asked):
+            break
+        found[asked] = np.minimum(found[asked], enough[asked]) * (_SURELY * deviation / off[far])
+    least = _LEAST * most
+    found[asked] = least
+    found = np.maximum(most * _STEP ** np.floor(np.log(np.maximum(found, least) / most) / np.log(_STEP) + 1e-9), least)
+    found = np.where(moving, _carried(found, enough), limits.blend)
+    blends[1:-1] = np.where(rows.fixed[kept[1:-1]], np.minimum(found, limits.blend), found)
+    return blends
+
+
+def _carried(blends: Floats, enough: Floats) -> Floats:
+    """Blends of corners that lie further apart than needed are those of the corner before, if these are enough."""
+    bound = blends < _NEARLY * enough
+    last = np.maximum.accumulate(np.where(bound, np.arange(len(blends)), 0))
+    before = blends[last]
+    carried: Floats = np.where(~bound & bound[last] & (before >= _NEARLY * enough), np.minimum(before, blends), blends)
+    return carried
+
+
+def _deviation(rows: Vertices, limits: LineLimits, corners: _Corners, blend: Floats) -> Floats:
+    """(v,) largest distance of tip or axis point from the original at a common parameter, within blends."""
+    bend = np.maximum(corners.bend, np.finfo(np.float64).tiny)
+    before = np.minimum(corners.half[0], _REACH * blend / bend)
+    behind = np.minimum(corners.half[1], corners.quicker * before)
+    largest = np.zeros(len(blend))
+    middle = 1.0 / (1.0 + np.sqrt(behind / np.maximum(before, np.finfo(np.float64).tiny)))
+    for place in _PLACES:
+        part = middle + place * (middle if place < 0.0 else 1.0 - middle)
+        left, gone = -before * (1.0 - part) ** 2, behind * part**2
+
+        def at(place: Floats, per_mm: tuple[Floats, Floats], left: Floats = left, gone: Floats = gone) -> Floats:
+            shape = (-1,) + (1,) * (place.ndim - 1)
+            moved: Floats = place + left.reshape(shape) * per_mm[0] + gone.reshape(shape) * per_mm[1]
+            return moved
+
+        tip = at(corners.tip, corners.way)
+        axis_point = tip + limits.axis_length * limits.axis_of(at(corners.words, corners.turn))
+        original_tip, original_axis_point = _original(rows, at(corners.parameter, corners.rate))
+        largest = np.maximum(largest, norm(tip - original_tip))
+        largest = np.maximum(largest, norm(axis_point - original_axis_point))
+    return largest
+
+
+def _original(rows: Vertices, parameter: Floats) -> tuple[Floats, Floats]:
+    """Tip and axis point of the original motion at parameters."""
+    s = rows.parameter
+    row = np.clip(np.searchsorted(s, parameter) - 1, 0, len(s) - 2)
+    step = s[row + 1] - s[row]
+    share = np.clip((parameter - s[row]) / np.where(step > 0.0, step, 1.0), 0.0, 1.0)[:, None]
+
+    def between(values: Floats) -> Floats:
+        place: Floats = values[row] + share * (values[row + 1] - values[row])
+        return place
+
+    return between(rows.original_tip), between(rows.original_axis_point)
