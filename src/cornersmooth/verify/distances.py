@@ -18,7 +18,8 @@ from cornersmooth.nc_reader.elements import Element
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import Gap, Metric, climb, gap_between, nearest_segments
 from cornersmooth.verify.polyline import directions, written_at
-from cornersmooth.verify.wide_search import look_farther
+from cornersmooth.verify.rapids import ARITHMETIC
+from cornersmooth.verify.wide_search import look_farther, nearest_alone
 
 #: a Newton step from a knot longer than this part of the parameter range is followed up
 _SHORT_STEP = 0.02
@@ -333,7 +334,15 @@ def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Flo
                 )
             )
         )
-    return result[0], result[1]
+    tip, axis = result
+    for values, column in ((tip, slice(0, 3)), (axis, slice(3, 6))):
+        far = np.flatnonzero(values > match.tolerance + ARITHMETIC)
+        own = vertex[far]
+        near = nearest_alone(
+            match.six[own], match.path.six, match.segment[own], match.low[own], match.high[own], match.near, column
+        )
+        values[far] = np.minimum(values[far], near[2])
+    return tip, axis
 
 
 #: segments looked at on either side for the distance of tip or axis point alone
@@ -376,5 +385,12 @@ def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Fl
         near, at = nearest_segments(point, match.six, segment, _REACH * match.parts, low, high, metric)
         climb(point, match.six, segment, low, high, near, at, metric)
         elements = _elements_around(match, near)
-        result.append(np.minimum(search_elements(match, elements, point, column=column)[2], known))
+        values = np.minimum(search_elements(match, elements, point, column=column)[2], known)
+        far = np.flatnonzero(values > match.tolerance + ARITHMETIC)
+        own = point[far], match.six, segment[far], low[far], high[far]
+        there, _, distance = nearest_alone(*own, match.near, column)
+        known_near = np.isfinite(distance)
+        far, elements = far[known_near], _elements_around(match, there[known_near])
+        values[far] = np.minimum(values[far], search_elements(match, elements, point[far], column=column)[2])
+        result.append(values)
     return result[0], result[1]

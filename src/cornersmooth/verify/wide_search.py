@@ -58,6 +58,57 @@ def look_farther(match: Match, vertex: Ints, low: Ints, high: Ints, segment: Int
             segment[k], at[k] = first + best, share[best]
 
 
+def nearest_alone(
+    point: Floats, six: Floats, segment: Ints, low: Ints, high: Ints, radius: float, column: slice
+) -> tuple[Ints, Floats, Floats]:
+    """Nearest place for tip or axis point alone, as far as the path stays near on either side of a known place.
+
+    Where tool axes turn much, tip and axis point may keep the tolerance many short segments apart. Only what is
+    connected within `radius` counts, so that another turn of a spiral does not.
+
+    Parameters
+    ----------
+    point : (k, 6) float64
+    six : (v, 6) float64
+        Vertices of the path.
+    segment : (k,) int64
+        Where on it the points are.
+    low, high : (k,) int64
+        First and last segment allowed.
+    radius : float, mm
+    column : slice
+        Which of tip and axis point counts.
+
+    Returns
+    -------
+    segment : (k,) int64
+    fraction : (k,) float64
+    distance : (k,) float64, mm
+        inf where the known segment itself is not that near, and beyond the first `_MOST_ROWS` rows.
+    """
+    found, fraction, distance = segment.copy(), np.zeros(len(point)), np.full(len(point), np.inf)
+    for k in range(min(len(point), _MOST_ROWS)):
+        first = max(int(low[k]), int(segment[k]) - _MOST_SEGMENTS // 2)
+        last = min(int(high[k]) + 1, int(segment[k]) + _MOST_SEGMENTS // 2)
+        vertex = six[first : last + 1, column]
+        rest = point[k, column] - vertex
+        outside = np.einsum("ij,ij->i", rest, rest) > radius**2
+        here = int(segment[k]) - first
+        before, behind = np.flatnonzero(outside[: here + 1]), np.flatnonzero(outside[here + 1 :])
+        begin = max(int(before[-1]) if len(before) else 0, 0)
+        end = here + 1 + int(behind[0]) if len(behind) else len(vertex) - 1
+        way, rest = np.diff(vertex[begin : end + 1], axis=0), rest[begin:end]
+        size = np.einsum("ij,ij->i", way, way)
+        share = np.einsum("ij,ij->i", rest, way)
+        share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+        rest = rest - share[:, None] * way
+        off = np.sqrt(np.einsum("ij,ij->i", rest, rest))
+        if off[here - begin] <= radius:
+            best = int(np.argmin(off))
+            found[k], fraction[k], distance[k] = first + begin + best, share[best], off[best]
+    return found, fraction, distance
+
+
 def passed_nearby(match: Match, vertex: Ints, tip: Floats, axis: Floats) -> Bools:
     """(k,) whether poses are named exactly by any element whose place is within `Matcher.near` of theirs.
 
