@@ -13,6 +13,7 @@ from cornersmooth.verify.distances import Distances, Reached
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import nearest_segments
+from cornersmooth.verify.wide_search import nearest_alone
 
 #: segments looked at on either side
 _REACH = 3
@@ -48,6 +49,8 @@ def written_backwards(match: Match, written: Reached) -> Found | None:
     gain = _distance(own, _on(six, held)) - _distance(own, _on(six, free))
     wrong = (gain > match.slack) & (free < held)
     wrong &= _way(length, free, held) <= _STRAIGHT * _distance(_on(six, held), _on(six, free)) + match.slack
+    rows = np.flatnonzero(wrong)
+    wrong[rows] = _gain_alone(match, vertex[rows], held[rows], free[rows]) > match.slack
     if not wrong.any():
         return None
     original = match.original
@@ -56,8 +59,27 @@ def written_backwards(match: Match, written: Reached) -> Found | None:
     return held[wrong], original.program.line[original.pose[move]], nc_line, gain[wrong]
 
 
+def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Floats:
+    """By how much tip or axis point alone would be nearer at a place before the one that it must not go back behind.
+
+    Where the tip turns round while its axis turns, a rounding that has turned already is nearest to the way before the
+    turn, though tip and axis point each are near the way behind it.
+    """
+    own, six = match.six[vertex], match.path.six
+    here, there = _on(six, held), _on(six, free)
+    high = match.high[vertex]
+    ahead = np.minimum(held.astype(np.int64) + 1, high)
+    gain = np.zeros(len(vertex))
+    for column in (slice(0, 3), slice(3, 6)):
+        off = _distance(own[:, column], here[:, column])
+        beyond = nearest_alone(own, six, ahead, ahead, high, match.near, column)[2]
+        off = np.where(ahead > held, np.minimum(off, beyond), off)
+        gain = np.maximum(gain, off - _distance(own[:, column], there[:, column]))
+    return gain
+
+
 def original_backwards(match: Match, theirs: Reached) -> Found | None:
-    """Neighbouring original vertices that the text clearly passes in reverse: part of the path is missing.
+    """Neighbouring original vertices that the text clearly passes in reverse: part of the path, beyond ε, is missing.
 
     Returns
     -------
@@ -92,7 +114,7 @@ def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: b
     gain : (k,) float64, mm
         How much farther it is from them then.
     comes : (k,) bool
-        Whether it comes back to them there, within the tolerance: a reversal that is run, if not to its very end.
+        Whether it is within the tolerance of them there, in order: what it leaves out is no more than a rounding.
     """
     own, six = match.path.six[vertex], match.six
     middle = np.minimum(bound.astype(np.int64), len(six) - 2)
@@ -117,7 +139,7 @@ def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: b
     best[rows] = np.minimum(best[rows], away)
     off = own - reached
     own_way = np.maximum(_distance(off[:, :3], 0.0), _distance(off[:, 3:], 0.0))
-    comes = (own_way <= match.tolerance) & (_distance(own, _on(six, bound)) - best > match.slack)
+    comes = own_way <= match.tolerance
     return best - _distance(own, _on(six, free)), comes
 
 
