@@ -75,6 +75,8 @@ class MotionWriter:
     _said: tuple[Statement, ...] = field(init=False)
     _approach: Ints | None = field(init=False)
     _tilting: BlockWriter = field(init=False)  #: the writer of all other tools
+    _writers: dict[int | None, BlockWriter] = field(default_factory=dict)  #: for tools of different lengths
+    _last_writer: BlockWriter | None = None
 
     def __post_init__(self) -> None:
         self._tilting = self.writer
@@ -151,13 +153,31 @@ class MotionWriter:
 
     def _stand(self, pose: int) -> None:
         """Take the writer of the tool at hand: without words of its axis where it stays along Z."""
-        if self.upright is None or self.upright_writer is None or self.operation.begun:
+        if self.operation.begun:
             return
-        writer = self.upright_writer if self.upright[pose] else self._tilting
+        standing = self.upright is not None and bool(self.upright[pose])
+        writer = self.upright_writer if standing and self.upright_writer else self._of_tool()
         if writer is self.writer:
             return
         writer.take_over(self.writer)
         self.writer, self.operation.mode, self._position = writer, writer.form.mode, None
+
+    def _of_tool(self) -> BlockWriter:
+        """Writer for a tool that tilts: of its own where its length goes into every position."""
+        machine = self._tilting.form.machine
+        if machine is None or not machine.tool_lengths or self._tilting.form.orientation != "machine":
+            return self._tilting
+        number = self.statements.tool
+        if number not in self._writers:
+            form = replace(self._tilting.form, machine=machine.with_tool(number))
+            self._writers[number] = replace(self._tilting, form=form, blocks=0)
+        return self._writers[number]
+
+    @property
+    def written(self) -> int:
+        """Blocks written so far."""
+        writers = [self._tilting, *self._writers.values(), *([self.upright_writer] if self.upright_writer else [])]
+        return self.blocks + sum(writer.blocks for writer in writers)
 
     def _rotary_blocks(self, ticks: Ints) -> dict[str, tuple[str, ...]]:
         """Blocks of the rotary axes, with where a row has them; a tool that stays along Z has them at zero."""
@@ -247,9 +267,11 @@ class MotionWriter:
         if self._last is None or not len(passed):
             return
         again = self._last[None]
-        if again.shape[1] != self.writer.columns:  # one of both tools stays along Z, so that pose does
+        if self._last_writer is not self.writer:
             pose = passed[:1]
-            other = np.zeros((1, 2)) if self.writer.form.rotary else self.program.axis[pose]
+            other = self.program.axis[pose]
+            if self.writer.form.rotary:  # else one of both tools stays along Z, so that pose does
+                other = self.writer.angles(again) if again.shape[1] == self.writer.columns else np.zeros((1, 2))
             again = self.writer.ticks(self.program.tip[pose], other)
         yield from self._emit(self._run(again, np.array([move])))
 
@@ -285,7 +307,7 @@ class MotionWriter:
 
     def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> str:
         """Cycle of the control that drills holes, as `kind_of` names it; empty for none."""
-        if cycle is None or self.writer is self._tilting or not (self.native or cycle.tap):
+        if cycle is None or self.writer is not self.upright_writer or not (self.native or cycle.tap):
             return ""
         if cycle.tap and not (self.statements.clockwise and self.statements.speed and self.operation.spindle):
             return ""
@@ -293,7 +315,7 @@ class MotionWriter:
 
     def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
         """Why the control's cycle cannot do a tap, in words."""
-        if self.writer is self._tilting:
+        if self.writer is not self.upright_writer:
             return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
         if not kind_of(cycle, self.writer.form, self.program, poses):
             return "the control has no such cycle for it"
@@ -402,6 +424,7 @@ class MotionWriter:
         self._warn_of_standing_still(run)
         self._warn_of_turns(run)
         self._position = self._last = run.ticks[-1]
+        self._last_writer = self.writer
         yield self.writer.text(run, dwell)
 
     def _approaches(self, first: Ints, rapid: bool) -> list[str]:
