@@ -271,6 +271,18 @@ def test_turns_between_knots_far_apart_are_verified(tmp_path: Path) -> None:
     assert result.returncode == 0, result.stderr.decode()
 
 
+@pytest.mark.parametrize(("seed", "row"), [(1000, 35), (1002, 31), (5010, 47)])
+def test_long_elements_beside_short_ones_are_no_false_alarm(seed: int, row: int) -> None:
+    """Knots stand close at a corner, far apart behind it: the nearest sample is on a short element, the path is not."""
+    chain = random_chains(seed, 50, corners=12)[row]
+    settings = cornersmooth.Settings(method="global", tolerance=0.001, axis_length=50.0)
+    form = choose_form("fanuc", "g6.2", machine=None)
+    result = cornersmooth.postprocess(cl_text([chain])[0], io.BytesIO(), settings, form=form)
+    assert result.verification is not None
+    assert result.verification.passed
+    assert result.smoothed.runs is not None
+
+
 def test_runs_with_steep_turns_are_named_where_curves_are_written() -> None:
     tilt = np.radians([0.0, 5.0, 70.0, 75.0, 80.0])
     tip = np.stack((np.arange(5) * 5.0, [0.0, 1, 0, 1, 0], np.zeros(5)), axis=1)

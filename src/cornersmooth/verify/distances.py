@@ -287,8 +287,16 @@ def search_elements(
         )
 
     grid = np.linspace(0.0, width, width * (_SAMPLES - 1) + 1)
-    at = grid[np.argmin(look(np.broadcast_to(grid, (rows, len(grid))))[2], axis=1)]
     step = grid[1]
+    # elements may be of very different length: the nearest sample may lie on a short one beside a long one that passes
+    # nearer, so chords are what is compared; between elements that do not follow one another there is none
+    which = np.minimum(grid.astype(np.int64), width - 1)
+    tip, axis, near = look(np.broadcast_to(grid, (rows, len(grid))))
+    share, off = _on_chords(np.concatenate((tip, tip + length * axis), axis=2)[..., column], point[:, column])
+    follows = (np.diff(elements[:, which], axis=1) == 1) | (np.diff(which) == 0)
+    share, off = np.where(follows, share, 0.0), np.where(follows, off, near[:, :-1])
+    chord = np.argmin(off, axis=1)
+    at = grid[chord] + share[here, chord] * step
     for _ in range(_ROUNDS):
         place = np.clip(at[:, None] + np.linspace(-step, step, _ZOOM), 0.0, width)
         at = place[here, np.argmin(look(place)[2], axis=1)]
@@ -306,6 +314,17 @@ def search_elements(
     tip, axis, distance = look(np.hstack((ends[:, :-1] + share * np.diff(ends, axis=1), at[:, None])))
     best = np.argmin(distance, axis=1)
     return tip[here, best], axis[here, best], distance[here, best]
+
+
+def _on_chords(points: Floats, target: Floats) -> tuple[Floats, Floats]:
+    """Of rows (k, m, d) of points: shares (k, m − 1) of the chords nearest to the targets (k, d), and the distances."""
+    way = np.diff(points, axis=1)
+    size = np.einsum("kmi,kmi->km", way, way)
+    from_start = target[:, None] - points[:, :-1]
+    share = np.einsum("kmi,kmi->km", from_start, way)
+    share = np.clip(np.divide(share, size, out=np.full(size.shape, 0.5), where=size > 0), 0.0, 1.0)
+    off = from_start - share[..., None] * way
+    return share, np.sqrt(np.einsum("kmi,kmi->km", off, off))
 
 
 def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
