@@ -210,7 +210,8 @@ def write(
         for lines in motion.finish():
             text.write(lines)
         text.write_blocks(motion.end())
-    return Written(text.blocks + motion.written, findings.all())
+    without_tilt = 0 if motion.upright_writer is None else motion.upright_writer.blocks
+    return Written(text.blocks + motion.blocks + writer.blocks + without_tilt, findings.all())
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findings) -> Iterator[Rows]:

@@ -15,8 +15,11 @@ from cornersmooth.model import Floats, Ints, Program, Runs
 from cornersmooth.smoothing.runs.ranges import spread, starts
 from cornersmooth.smoothing.runs.splines import Splines
 
-#: knot intervals of a section, and its longest parameter in steps
+#: knot intervals of a section, and its parameter in steps beyond which it ends as soon as it can
 SPANS, LONGEST = 100, 5e6
+
+#: knot intervals among which the widest is looked for where a section is to end
+CHOICE = 12
 
 #: knots are written in thousands of steps: three decimals hold them
 STEPS_PER_UNIT = 1000.0
@@ -82,21 +85,34 @@ def section_rows(runs: Runs, program: Program) -> SectionRows:
 
 
 def _cuts(runs: Runs, splines: Splines, program: Program) -> tuple[Ints, Floats, Floats]:
-    """Run, start and end of every section."""
+    """Run, start and end of every section.
+
+    Sections end in the middle of wide knot intervals: beside a sharp corner, where knots are close together, a place on
+    the path may belong to either segment, and whoever reads the text would have to guess.
+    """
     row, place = spread(splines.count)
-    at_knot = place % SPANS == 0
+    outermost = (place == 0) | (place == splines.count[row] - 1)
+    # where so many intervals are full, the widest of the next few; never the last ones of a run
+    step = SPANS - CHOICE - 1
+    full = np.flatnonzero((place % step == 0) & (place > 0))
+    near = full[:, None] + np.arange(CHOICE)
+    left = splines.count[row[full]] - 1 - place[full]
+    allowed = np.arange(CHOICE) < left[:, None] - 4
+    width = np.diff(splines.knot, append=0.0)[np.minimum(near, len(splines.knot) - 1)]
+    widest = near[np.arange(len(full)), np.where(allowed, width, -1.0).argmax(axis=1)][allowed.any(axis=1)]
+    # the intervals in which a section gets too long
     long = np.floor(splines.knot / LONGEST)
-    at_knot[1:] |= (long[1:] != long[:-1]) & (row[1:] == row[:-1])
-    at_knot |= place == splines.count[row] - 1
-    near_end = (splines.count[row] - 1 - place < 4) & (place > 0) & (place < splines.count[row] - 1)
-    at_knot &= ~near_end
+    crossing = np.flatnonzero((long[1:] != long[:-1]) & (row[1:] == row[:-1]))
+    crossing = crossing[splines.count[row[crossing]] - 1 - place[crossing] > 4]
+    inside = np.concatenate((widest, crossing))
+    middle = np.floor((splines.knot[inside] + splines.knot[inside + 1]) / 2.0)
     stands = np.zeros(len(program) + 1, np.bool_)
     for statement in program.statements:
         stands[statement.pose] = True
     run, index = spread(runs.count)
     at_pose = stands[runs.pose + 1] & (index > 0) & (index < runs.count[run] - 1)
-    all_run = np.concatenate((row[at_knot], run[at_pose]))
-    all_s = np.concatenate((splines.knot[at_knot], runs.s[at_pose]))
+    all_run = np.concatenate((row[outermost], row[inside], run[at_pose]))
+    all_s = np.concatenate((splines.knot[outermost], middle, runs.s[at_pose]))
     pairs = np.unique(np.stack((all_run, all_s.astype(np.int64)), axis=1), axis=0)
     same = np.flatnonzero(pairs[1:, 0] == pairs[:-1, 0])
     return pairs[same, 0], pairs[same, 1].astype(np.float64), pairs[same + 1, 1].astype(np.float64)
