@@ -27,6 +27,9 @@ _GROUP: Final = 64
 #: how much longer one motion may be than the other, where the last group tells nothing else
 _LOW, _HIGH = 0.8, 1.25
 
+#: how much of a written path that mistakes have made longer belongs to the original; what is near it is on its way
+_LEAST = 0.25
+
 #: how much longer than the written path the original may be where the way is lost, and segments looked at
 _REACH, _MOST_SEGMENTS = 2.5, 1 << 17
 
@@ -80,13 +83,14 @@ def guide(
         low, high = (np.full(len(group), limit) for limit in limits)
         segment, fraction, square = nearest_from(point, path, here + ratio * way, low, high)
         found = path.length_at(segment, fraction)
-        good = square <= far * far
-        step = np.diff(found, prepend=here)
-        own = np.diff(way, prepend=0.0)
-        good &= (step >= own - 2 * far) & (step >= 0) & (step <= _HIGH * own + 2 * STRIDE * far)
-        count = len(good) if good.all() else int(np.argmin(good))
-        if not count and len(good) > 1:
-            size = 1
+        # those that are off are left out, as long as what is behind them follows what is before
+        close = np.flatnonzero(square <= far * far)
+        step, own = np.diff(found[close], prepend=here), np.diff(way[close], prepend=0.0)
+        good = (step >= _LEAST * own - 2 * far) & (step >= 0) & (step <= _HIGH * own + 2 * STRIDE * far)
+        good = close if good.all() else close[: int(np.argmin(good))]
+        count = len(good)
+        if not count and len(group) > 1:
+            size //= 2
             continue
         if not count:
             lost += 1
@@ -97,15 +101,15 @@ def guide(
             ahead = _farther_on(point[0], path, here, float(way[0]), limits, far)
             if ahead is None:
                 continue
-            found, square, count = np.array([ahead[0]]), np.array([ahead[1]]), 1
+            found, square, good = np.array([ahead[0]]), np.array([ahead[1]]), np.zeros(1, np.int64)
         else:
-            k += count
-            ratio = float(np.clip((found[count - 1] - here) / max(way[count - 1], 1e-9), _LOW, _HIGH))
-        vertices.append(group[:count])
-        places.append(found[:count])
-        distances.append(np.sqrt(square[:count]))
-        here, gone, lost = float(found[count - 1]), float(length[group[count - 1]]), 0
-        size = min(2 * size, _GROUP) if count == len(good) else 1
+            k += int(good[-1]) + 1
+            ratio = float(np.clip((found[good[-1]] - here) / max(way[good[-1]], 1e-9), _LOW, _HIGH))
+        vertices.append(group[good])
+        places.append(found[good])
+        distances.append(np.sqrt(square[good]))
+        here, gone, lost = float(found[good[-1]]), float(length[group[good[-1]]]), 0
+        size = min(2 * size, _GROUP) if 2 * count > len(group) else max(size // 2, 1)
     return np.concatenate(vertices), np.concatenate(places), np.concatenate(distances)
 
 
