@@ -31,7 +31,7 @@ TOLERANCES = (0.001, 0.01, 0.04, 0.15)
 AXIS_LENGTHS = (10.0, 50.0)
 FORMS: tuple[Form, ...] = ("g1", "g6.2")
 #: for each tolerance and axis length; half of them in either form
-CHAINS = how_many(480, 1000)
+CHAINS = how_many(240, 1000)
 #: statuses of the report under which a pose need not be passed
 ROUNDED = "smoothed"
 REPEATED = "duplicate"
@@ -197,8 +197,11 @@ def whole_file(path: Path, form: Form, tolerance: float, axis_length: float) -> 
     assert not lost, [int(program.line[exact[k]]) for k in lost]
 
 
-@pytest.mark.parametrize("name", SAMPLES)
-@pytest.mark.parametrize(("form", "tolerance", "axis_length"), CASES)
+def _every(names: tuple[str, ...], cases: list[tuple[Form, float, float]]) -> list[tuple[str, Form, float, float]]:
+    return [(name, *case) for case in cases for name in names]
+
+
+@pytest.mark.parametrize(("name", "form", "tolerance", "axis_length"), share(_every(SAMPLES, CASES), 2))
 def test_samples(name: str, form: Form, tolerance: float, axis_length: float) -> None:
     whole_file(ROOT / "samples" / name, form, tolerance, axis_length)
 
@@ -221,13 +224,9 @@ OWN_OTHERS = (
 )
 
 
-def _every(names: tuple[str, ...], cases: list[tuple[Form, float, float]]) -> list[tuple[str, Form, float, float]]:
-    return [(name, *case) for case in cases for name in names]
-
-
 @pytest.mark.parametrize(
     ("name", "form", "tolerance", "axis_length"),
-    [*share(_every(OWN_FIVE_AXIS, CASES), 2), *of_corpus(share(_every(FIVE_AXIS, CASES), 2))],
+    [*share(_every(OWN_FIVE_AXIS, CASES), 4), *of_corpus(share(_every(FIVE_AXIS, CASES), 4))],
 )
 def test_five_axis_files(name: str, form: Form, tolerance: float, axis_length: float) -> None:
     whole_file(cl_file(name), form, tolerance, axis_length)

@@ -60,7 +60,7 @@ def write(program: Program, form: Form, options: dict[str, Any]) -> tuple[Writte
 def test_random_chains(form: Form, tolerance: float, axis_length: float, options: dict[str, Any]) -> None:
     # every case sees other chains
     case = FORMS.index(form) + 2 * list(OPTIONS.values()).index(options) + 10 * int(tolerance > 0.1)
-    chains = random_chains(100 + case, how_many(60, 150))
+    chains = random_chains(100 + case, how_many(30, 150))
     program = cornersmooth.read(cl_text(chains)[0])
     written, smoothed = write(program, form, {"tolerance": tolerance, "axis_length": axis_length, **options})
     assert smoothed.corners.smoothed.mean() > 0.6
@@ -86,7 +86,7 @@ def test_own_files(name: str, options: dict[str, Any], form: Form) -> None:
     keeps_the_promise(cl_file(name), form, options)
 
 
-@pytest.mark.parametrize(("name", "options", "form"), of_corpus(share(product(FILES, OPTIONS, FORMS), 3)))
+@pytest.mark.parametrize(("name", "options", "form"), of_corpus(share(product(FILES, OPTIONS, FORMS), 7)))
 def test_real_files(name: str, options: str, form: Form) -> None:
     keeps_the_promise(cl_file(name), form, OPTIONS[options])
 

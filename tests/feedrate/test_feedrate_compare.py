@@ -16,6 +16,7 @@ from cornersmooth.feedrate.compare import peaks, slowest
 from cornersmooth.model import Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from oracle.share import share
 
 TABLE_1 = Path(__file__).resolve().parents[2] / "samples" / "paper_table1.csv"
 
@@ -85,13 +86,16 @@ def test_published_paths(corpus: Path, case: str) -> None:
 @pytest.mark.corpus
 @pytest.mark.parametrize(
     "name",
-    [
-        "hust_5x_impeller_yelun.cls",
-        "hecc_flank_nx.cls",
-        "nx_clsf_varcontour5x_ust_a.cls",
-        "nx_clsf_cutcom_arcs.cls",
-        "hust_5x_PathPointsFile.cls",
-    ],
+    share(
+        (
+            "hust_5x_impeller_yelun.cls",
+            "hecc_flank_nx.cls",
+            "nx_clsf_varcontour5x_ust_a.cls",
+            "nx_clsf_cutcom_arcs.cls",
+            "hust_5x_PathPointsFile.cls",
+        ),
+        2,
+    ),
 )
 def test_limits_on_real_files(corpus: Path, name: str) -> None:
     limits = Limits(feed=1800.0)

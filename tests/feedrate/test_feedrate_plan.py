@@ -13,6 +13,7 @@ from cornersmooth.feedrate.grid import Resolution
 from cornersmooth.model import Arcs, Move, Program, Statement
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from oracle.share import how_many
 
 SPEED, JERK = 1.001, 1.005  # what the acceptance allows
 METHODS = ("proportional", "zhang2016")
@@ -31,7 +32,7 @@ def check_limits(law: TimeLaw, limits: Limits, feed: float) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(how_many(10, 20)))
 def test_limits_hold_every_period(chain: Callable[[int], Program], seed: int, method: str) -> None:
     program, limits = chain(seed), Limits()
     law = plan(smooth(program, Settings(tolerance=0.02, method=method)), limits)

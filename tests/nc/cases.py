@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
 
 from cornersmooth.errors import SettingsError
@@ -27,10 +28,7 @@ class Case:
 
     def choose(self, *, endless: bool = False) -> Form:
         """Form of the control; SettingsError where it has none such. `endless` takes the limits off the machine."""
-        machine = load_machine(self.machine) if self.machine else None
-        if machine is not None and endless:
-            machine = without_limits(machine)
-        return choose_form(self.control, self.form, machine=machine, tcp=self.tcp)
+        return _form(self, endless)
 
     @property
     def runs(self) -> bool:
@@ -40,6 +38,14 @@ class Case:
         except SettingsError:
             return False
         return True
+
+
+@cache
+def _form(case: Case, endless: bool) -> Form:
+    machine = load_machine(case.machine) if case.machine else None
+    if machine is not None and endless:
+        machine = without_limits(machine)
+    return choose_form(case.control, case.form, machine=machine, tcp=case.tcp)
 
 
 def without_limits(machine: Machine) -> Machine:

@@ -138,7 +138,7 @@ def test_tip_and_axis_by_its_own_formulas_keep_the_tolerance(
     machine: str, tcp: bool, units: str, tmp_path: Path
 ) -> None:
     """The published kinematics of trtfuncs.c over the positions that the interpreter produces."""
-    cl, chains = flat(2, how_many(30, 60) if tcp else how_many(8, 12))
+    cl, chains = flat(2, how_many(15, 60) if tcp else how_many(6, 12))
     if units == "inch":
         cl, chains = in_inches(cl), [replace(chain, tip=25.4 * chain.tip) for chain in chains]
     axis_length, tolerance = 10.0, 0.01
@@ -251,7 +251,7 @@ def test_its_splines_are_our_curves(weights: tuple[float, float], tmp_path: Path
     rng = np.random.default_rng(5)
     cl, _ = flat(7, 12)
     smoothed = smooth(read(cl, name="chains.cls"), Settings(tolerance=0.5, weights=weights))
-    rows = rng.choice(np.flatnonzero(smoothed.corners.smoothed), 6, replace=False)
+    rows = rng.choice(np.flatnonzero(smoothed.corners.smoothed), how_many(3, 6), replace=False)
     curves = [
         np.round(curve[:, plane], 9)
         for points in nurbs.control_points(smoothed.program, smoothed.corners, rows, 10.0)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from nc.cases import ALL, RUNNABLE, Case
 from nc.grammars import reader
 from nc.promise import written
 from nc.reading import Reading
+from oracle.share import share
 
 POSES = "RAPID\nGOTO/0,0,50{up}\n{feed}\nGOTO/0,0,0{up}\nGOTO/20,0,0{tilted}\nGOTO/20,15,1{other}\nGOTO/0,15,1{other}\n"
 AXES = {"up": ",0,0.099503719,0.995037190", "tilted": ",0.098058068,0,0.995180702", "other": ",0,0.2,0.979795897"}
@@ -54,13 +56,12 @@ def followed(case: Case, hint: str) -> Case:
 
 @pytest.mark.parametrize("case", RUNNABLE, ids=str)
 def test_what_runs_is_text_of_the_control(case: Case) -> None:
-    for feed in FEEDS:
-        for units in ("mm", "inch"):
-            found = read_back(case, feed, units)
-            # forms with a point on the axis come down to the first position along the tool
-            down = case.choose().orientation == "point" and case.control != "generic"
-            assert sum(piece.rapid for piece in found.pieces) == 1 + down
-            assert len(found.pieces) > 4
+    for feed, units in share(product(FEEDS, ("mm", "inch")), 2, RUNNABLE.index(case)):
+        found = read_back(case, feed, units)
+        # forms with a point on the axis come down to the first position along the tool
+        down = case.choose().orientation == "point" and case.control != "generic"
+        assert sum(piece.rapid for piece in found.pieces) == 1 + down
+        assert len(found.pieces) > 4
 
 
 @pytest.mark.parametrize("case", [case for case in ALL if case not in RUNNABLE], ids=str)

@@ -18,6 +18,7 @@ from cornersmooth.pipeline import postprocess, reading_back
 from cornersmooth.provenance import read_provenance
 from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
+from oracle.share import share
 
 CASES = (
     ("fanuc", "g1", "", True),
@@ -55,8 +56,10 @@ def made(form: Form, units: str = "mm", *, planned: bool = True) -> bytes:
     return stream.getvalue()
 
 
-@pytest.mark.parametrize("units", ["mm", "inch"])
-@pytest.mark.parametrize(("control", "form", "machine", "tcp"), CASES)
+@pytest.mark.parametrize(
+    ("control", "form", "machine", "tcp", "units"),
+    share([(*case, units) for units in ("mm", "inch") for case in CASES], 2),
+)
 def test_blocks_have_the_mean_speed_of_the_plan(control: str, form: str, machine: str, tcp: bool, units: str) -> None:
     chosen = form_of(control, form, machine, tcp)
     how = {key: value for key, value in reading_back(chosen).items() if key != "words"} | {"tolerance": 0.02}

@@ -20,7 +20,7 @@ from cornersmooth.surface import (
     parse_tool,
     tools_of,
 )
-from oracle.share import how_many
+from oracle.share import how_many, share
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -202,8 +202,16 @@ def brute_force(point, motion, tool, edge):
     return found.min()
 
 
-@pytest.mark.parametrize("tolerance", [0.01, 0.04])
-@pytest.mark.parametrize("name", ["impeller", pytest.param("hecc_flank_nx", marks=pytest.mark.corpus)])
+@pytest.mark.parametrize(
+    ("name", "tolerance"),
+    [
+        *share((("impeller", 0.01), ("impeller", 0.04)), 2),
+        *(
+            pytest.param("hecc_flank_nx", tolerance, marks=pytest.mark.corpus)
+            for tolerance in share((0.01, 0.04), 2, 1)
+        ),
+    ],
+)
 def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance, request):
     from cornersmooth.nc_reader import read_nc
     from cornersmooth.surface import original_cuts, written_cuts

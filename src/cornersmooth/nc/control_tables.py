@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import fields, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -144,9 +145,16 @@ def load_control(name_or_path: str | Path) -> Control:
     SettingsError
         The name is unknown (with the closest known one), the file cannot be read, or it does not describe a control.
     """
+    if not is_file(name_or_path):
+        return _built_in(str(name_or_path))
     text, file, name = _SHELF.choose(name_or_path)
-    control = parse_control(text, file=file, name=name)
-    return control if is_file(name_or_path) else replace(control, own=False)
+    return parse_control(text, file=file, name=name)
+
+
+@lru_cache(maxsize=32)
+def _built_in(given: str) -> Control:
+    text, file, name = _SHELF.choose(given)
+    return replace(parse_control(text, file=file, name=name), own=False)
 
 
 def parse_control(text: str | Table, *, file: str = "<control>", name: str = "control") -> Control:

@@ -86,8 +86,8 @@ def guide(
         # those that are off are left out, as long as what is behind them follows what is before
         close = np.flatnonzero(square <= far * far)
         step, own = np.diff(found[close], prepend=here), np.diff(way[close], prepend=0.0)
-        good = (step >= _LEAST * own - 2 * far) & (step >= 0) & (step <= _HIGH * own + 2 * STRIDE * far)
-        good = close if good.all() else close[: int(np.argmin(good))]
+        follows = (step >= _LEAST * own - 2 * far) & (step >= 0) & (step <= _HIGH * own + 2 * STRIDE * far)
+        good = close if follows.all() else close[: int(np.argmin(follows))]
         count = len(good)
         if not count and len(group) > 1:
             size //= 2
