@@ -24,6 +24,7 @@ from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
 from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
+from cornersmooth.nc_reader.elements import Element
 from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
 from cornersmooth.provenance import Provenance
 from cornersmooth.report import report
@@ -278,6 +279,9 @@ def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form:
     machine = with_dynamics(form.machine)
     law = plan_text(written, limits, name=program.source.name, settings=settings, machine=machine)
     line, feed, minutes = block_feeds(law)
+    # the feed of a hole cycle, whose block has rapids, too, is its own: of a tap it is the pitch
+    own = ~np.isin(line, written.line[written.kind == Element.RAPID])
+    line, feed, minutes = line[own], feed[own], minutes[own]
     # of several elements of a block, which have one feed, the first
     element = np.searchsorted(written.line, line)
     return PlannedFeeds(line, feed, minutes, written.feed[element]).write(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import shutil
 from collections.abc import Iterator
@@ -14,7 +15,13 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError
+from cornersmooth.feedrate import Limits
+from cornersmooth.feedrate.written import written_motion
+from cornersmooth.model import FeedMode
 from cornersmooth.nc import Frame
+from cornersmooth.nc_reader import read_nc
+from cornersmooth.pipeline import postprocess
+from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
 from nc.cases import Case
 from nc.test_nc_linuxcnc import accepted, positions
@@ -321,3 +328,23 @@ def test_without_any_cycle_of_the_control_a_tool_along_z_is_written_as_before() 
         + "CYCLE/BRKCHP,FEDTO,9,INCR,4,MMPM,90,RAPTO,3\nGOTO/0,7,1\nCYCLE/OFF\nFINI\n"
     )
     assert text_of(case, cl) == text_of(case, cl, cycles="moves")
+
+
+@pytest.mark.parametrize("case", [CASES[0], CASES[2], CASES[3]], ids=str)
+def test_taps_have_a_feed_per_minute_in_plans(case: Case) -> None:
+    text = ("\n".join(text_of(case)) + "\n").encode()
+    program = written_motion(read_nc(text, control=case.control), "part.nc").program
+    assert set(program.feed_mode.tolist()) == {FeedMode.PER_MINUTE}
+    fed = program.feed[~np.isnan(program.feed)]
+    assert np.isclose(fed, 500.0).sum() == 4
+
+
+@pytest.mark.parametrize("case", [CASES[0], CASES[2], CASES[3]], ids=str)
+def test_planned_feeds_leave_cycles_alone(case: Case) -> None:
+    program, stream = read(PLAIN.encode(), name="part.cls"), io.BytesIO()
+    frame, settings = Frame(cycles="native", skip_taps=False), Settings(tolerance=EPS)
+    result = postprocess(program, stream, settings, form=case.choose(), frame=frame, plan_feeds=Limits())
+    assert result.verification is not None
+    assert result.verification.problems == ()
+    lines = stream.getvalue().decode("ascii").splitlines()
+    assert [match[1] for match in map(_CYCLE.fullmatch, lines) if match] == EXPECTED[case.control].splitlines()

@@ -104,7 +104,14 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
     move = np.array([_MOVES[Element(kind)] for kind in sorted(Element)], np.uint8)[nc.kind]
     arcs = nc.arcs
     proper = arcs.element > 0
-    feed = np.where(nc.kind == Element.RAPID, np.nan, nc.feed)
+    feed, turning = np.where(nc.kind == Element.RAPID, np.nan, nc.feed), nc.per_revolution
+    if turning.any():  # with the speed of the spindle it is a feed per minute
+        speed = np.full(len(nc), np.nan)
+        for event in nc.events:
+            if event.letter == "S":
+                speed[event.element :] = event.value
+        known = turning & (speed > 0.0)
+        feed, turning = np.where(known, feed * speed, feed), turning & ~known
     first = np.append(last - count + 1, len(owner))
     program = Program(
         tip=tip,
@@ -112,7 +119,7 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
         kind=move[owner],
         feed=feed[owner],
         line=nc.line[owner],
-        feed_mode=np.where(nc.per_revolution, FeedMode.PER_REVOLUTION, FeedMode.PER_MINUTE).astype(np.uint8)[owner],
+        feed_mode=np.where(turning, FeedMode.PER_REVOLUTION, FeedMode.PER_MINUTE).astype(np.uint8)[owner],
         keep=np.zeros(len(owner), np.uint8),
         arcs=Arcs(last[arcs.element[proper]], arcs.centre[proper], arcs.normal[proper], arcs.sweep[proper]),
         statements=tuple(

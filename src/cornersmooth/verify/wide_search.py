@@ -103,7 +103,7 @@ def nearest_alone(
         share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
         rest = rest - share[:, None] * way
         off = np.sqrt(np.einsum("ij,ij->i", rest, rest))
-        if off[here - begin] <= radius:
+        if here < end and off[here - begin] <= radius:  # else the known place is not on what is allowed
             best = int(np.argmin(off))
             found[k], fraction[k], distance[k] = first + begin + best, share[best], off[best]
     return found, fraction, distance
