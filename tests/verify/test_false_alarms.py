@@ -608,8 +608,9 @@ def test_what_is_written_passes(alarm: Alarm) -> None:
     assert alarm.verified(alarm.text).problems == ()
 
 
-#: random programs by seed: tip and axis point far apart along the path by the paper's method; a reversal cut within ε
-SEEDS = (22640, 60791)
+#: random programs by seed: tip and axis point far apart along the path by the paper's method; a reversal cut within ε;
+#: a stop where the path goes to and fro by less than ε
+SEEDS = (22640, 60791, 61228)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -31,6 +31,10 @@ CHECKS: Final[tuple[Callable[[Distances, Findings], None], ...]] = (
 )
 
 
+#: words whose places are looked at once more in a batch, and poses looked at for each
+_MOST = 1 << 12
+
+
 @dataclass(frozen=True)
 class Examined:
     """What a batch shows.
@@ -75,5 +79,24 @@ def _places(matched: Match, asked: Ints, offset: int) -> tuple[Ints, Floats]:
     own = asked[slice(*np.searchsorted(asked, (first, first + len(last_vertex))).tolist())]
     vertex = last_vertex[own - first]
     on = matched.on[vertex]
-    length = matched.path.length_at(matched.segment[vertex[on]], matched.fraction[vertex[on]])
+    vertex = vertex[on]
+    length = matched.path.length_at(matched.segment[vertex], matched.fraction[vertex])
+    beside = np.isfinite(matched.distance[vertex]) & (matched.distance[vertex] > matched.margin)
+    for k in np.flatnonzero(beside)[:_MOST].tolist():
+        length[k] = _at_pose(matched, int(vertex[k]), float(length[k]))
     return own[on], length
+
+
+def _at_pose(matched: Match, vertex: int, length: float) -> float:
+    """CL path length of the pose that a written vertex names, if there is one near its place; else that of its place.
+
+    Where the path goes to and fro within the tolerance, another segment may be as near.
+    """
+    path, point = matched.path, matched.six[vertex]
+    low, high = np.searchsorted(path.length, (length - matched.near, length + matched.near)).tolist()
+    away = (path.six[low : min(high, low + _MOST)] - point).reshape(-1, 2, 3)
+    named = np.flatnonzero((np.linalg.norm(away, axis=2) <= matched.margin).all(axis=1))
+    if not len(named):
+        return length
+    lengths = path.length[low + named]
+    return float(lengths[np.argmin(np.abs(lengths - length))])
