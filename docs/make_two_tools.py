@@ -20,7 +20,7 @@ from cornersmooth.nc_reader.reading_options import ReadingOptions
 from cornersmooth.nc_reader.word_list import WordRule, word_list
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify.word_check import said
+from cornersmooth.verify.block_texts import said
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "two_tools.md"

@@ -126,17 +126,18 @@ def smooth(
 
 def reading_back(form: Form) -> dict[str, Any]:
     """Keyword arguments with which `cornersmooth.verify` reads a text of the form."""
+    known = form.table.dialect in CONTROLS
     return {
-        "control": form.table.dialect if form.table.dialect in CONTROLS else "",
+        "control": form.table.dialect if known else "",
         "machine": form.machine if form.rotary else None,
         "tcp": form.orientation != "machine",
-        "words": not form.table.own,
+        "trusted": nc.own_words(form.table) if known else (),
     }
 
 
 def read_back(text: bytes | str, form: Form, settings: Settings, name: str | None = None) -> NcProgram:
     """Read a text of the form, or the file that holds it, as its control does; see `nc_reader.read_nc`."""
-    how = {key: value for key, value in reading_back(form).items() if key != "words"}
+    how = {key: value for key, value in reading_back(form).items() if key != "trusted"}
     return read_nc(text, **how, name=name, tolerance=settings.verified_tolerance, axis_length=settings.axis_length)
 
 
@@ -228,11 +229,10 @@ def postprocess(
                 output.path,
                 tolerance=smoothed.settings.verified_tolerance,
                 axis_length=smoothed.settings.axis_length,
-                trusted=_users_blocks(frame, form, program, smoothed.settings),
                 weights=provenance.weights,
                 slower=provenance.planned_feeds,
                 processes=processes,
-                **back,
+                **back | {"trusted": (*back["trusted"], *_users_blocks(frame, form, program, smoothed.settings))},
             )
             stack.enter_context(verifier)
         with _timed(seconds, "write"):
@@ -347,8 +347,8 @@ def _verified(verifier: Verifier, form: Form, frame: Frame) -> tuple[Verificatio
     unsure = [f"{block}, NC line {line}" for line, block in found.trusted[:_TRUSTED_TOLD]]
     if len(found.trusted) > _TRUSTED_TOLD:
         unsure.append(f"{len(found.trusted) - _TRUSTED_TOLD} more blocks of your own")
-    if form.table.own:
-        unsure.append("words beside the motion, which a table of your own may define")
+    if found.unverified:
+        unsure.append(found.unverified)
     return found, "; ".join(unsure)
 
 

@@ -67,6 +67,7 @@ def command(source: str, text: str, **given: Any) -> int:
       cornersmooth verify part.cls part.nc -e 0.04 --report found.html
     """
     from cornersmooth.cl import read
+    from cornersmooth.nc import own_words
     from cornersmooth.nc_reader.source import readable_twice
     from cornersmooth.verify import deviation_along, useful_processes, verify
 
@@ -77,7 +78,7 @@ def command(source: str, text: str, **given: Any) -> int:
     data, name = read_input(source)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     remark, weights = _take_over(given, nc, data)
-    own = nc_text.control_of(given).own
+    own = own_words(nc_text.control_of(given))
     measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
     how = {**measures, **nc_text.reading_back_of(given)}
     program = read(data, name=name, **reading.reading_of(given))
@@ -93,8 +94,7 @@ def command(source: str, text: str, **given: Any) -> int:
         program,
         nc,
         **how,
-        words=not own,
-        trusted=trusted,
+        trusted=(*own, *trusted),
         weights=weights,
         slower=given.get("slower", False),
         processes=useful_processes(),

@@ -27,6 +27,7 @@ from cornersmooth.nc.form_choice import check_program, choose_form
 from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.motion_writer import MotionWriter
 from cornersmooth.nc.operation import Operation
+from cornersmooth.nc.own_words import own_words
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
@@ -47,6 +48,7 @@ __all__ = [
     "find_control",
     "fit_settings",
     "load_control",
+    "own_words",
     "parse_control",
     "write",
 ]

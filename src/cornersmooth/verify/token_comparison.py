@@ -26,6 +26,12 @@ _NAMES = {
     "auxiliary": ("M{:g}", 558),
 }
 
+#: kinds of which there may be others where the user says them in his own words, too
+_LOOSE = frozenset(("tool", "next tool", "stop", "end"))
+
+#: all kinds
+KINDS = frozenset(_NAMES)
+
 #: what holds before anything is said; repeating it changes nothing
 _AT_START = {"spindle": 5.0, "coolant": 9.0, "compensation": 40.0, "offset": 1.0}
 
@@ -50,6 +56,7 @@ def compare(
     room: float,
     unsaid: frozenset[str | tuple[str, float]] = frozenset(),
     apart: Callable[[float, float], float] = way_between,
+    own: frozenset[str] = frozenset(),
 ) -> list[Problem]:
     """Compare the two, kind by kind.
 
@@ -62,12 +69,15 @@ def compare(
         Kinds, and pairs of kind and value, that the control has no words for.
     apart : callable
         How far, in mm, two places along the path are apart that differ by more than the room.
+    own : frozenset of str
+        Kinds that the user says in words of his own, which are no tokens; of most there must be no others.
     """
     problems: list[Problem] = []
+    end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
     # what shifts the path counts wherever it is said
     unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
-    asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & unsaid]
-    found = [token for token in found if token.kind not in unsaid]
+    asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & (unsaid | own)]
+    found = [token for token in found if token.kind not in unsaid | (own & _LOOSE)]
     plain = [token for token in found if token.kind == "stop" and token.value == 1.0 and not token.habit]
     stops = [
         token
@@ -79,7 +89,6 @@ def compare(
     found = [
         token for token in found if not token.habit or any(not _away(stop.place, token, room, apart) for stop in stops)
     ]
-    end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
 
     def tidies(token: Token, kind: str) -> bool:
         """Whether a token only ends what ends with the program anyway."""

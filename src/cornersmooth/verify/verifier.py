@@ -33,7 +33,7 @@ from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.statements import TAP, Token, asked, said
 from cornersmooth.verify.task import Task
-from cornersmooth.verify.token_comparison import compare
+from cornersmooth.verify.token_comparison import KINDS, compare
 from cornersmooth.verify.wide_search import way_apart
 from cornersmooth.verify.word_check import WordCheck
 
@@ -74,7 +74,8 @@ class Verifier:
         Whether words beside the motion must say what the CL file asks for, and be on the list of the control's words;
         not where nobody knows what they mean.
     trusted : sequence of str
-        Blocks that belong where they stand because the user put them there: what they do is taken on trust.
+        Blocks that belong where they stand because the user put them there: what they do is taken on trust. Names of
+        states or statements that are his own; `own_words` of a control table says them.
     weights : sequence of float, optional
         Those that curves have, where that is known: any other is a problem, even if the curve stays within ε.
     slower : bool
@@ -172,10 +173,14 @@ class Verifier:
         text = _Text((part.at_most() for part in chunks) if self._slower else chunks, reader.events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
         problems = [*reader.problems, *check.problems]
+        own = KINDS & set(self._trusted)
+        measured.own = own
         found = measured.verification(
             problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
-        unverified = "" if self._words else "words beside the motion, which a table of your own may define"
+        unverified = f"what your own table says of {', '.join(sorted(own))}" if own else ""
+        if not self._words:
+            unverified = "words beside the motion, which a table of your own may define"
         return replace(found, trusted=tuple(check.trusted), unverified=unverified)
 
 
@@ -233,6 +238,8 @@ class _Measured:
     events : list of Event
     words : bool
     margin : float, mm
+    own : frozenset of str
+        Kinds of statements that the user says in words of his own.
     """
 
     task: Task
@@ -244,6 +251,7 @@ class _Measured:
     events: list[Event]
     words: bool
     margin: float = 0.0
+    own: frozenset[str] = frozenset()
 
     def verification(
         self,
@@ -319,7 +327,7 @@ class _Measured:
         places = [place(event.element - 1) for event in self.events]
         rooms = [self.rooms.get(stands(event.element - 1), 0.0) for event in self.events]
         apart: Callable[[float, float], float] = partial(way_apart, self.task.path)
-        return compare(theirs, said(self.events, places, rooms), self.margin, unsaid, apart)
+        return compare(theirs, said(self.events, places, rooms), self.margin, unsaid, apart, self.own)
 
 
 def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measured:

@@ -13,7 +13,8 @@ from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.word_list import WordList, WordRule, word_list
-from cornersmooth.nc_reader.words import Line, Table, Word
+from cornersmooth.nc_reader.words import Line, Table
+from cornersmooth.verify.block_texts import any_numbers, any_of, numbers_in, said, shown, text_of
 
 #: code of words that are not on the list or not in their place, and of what is not established
 NOT_LISTED: Final = "CS571"
@@ -30,6 +31,9 @@ _MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "B
 
 #: how far a weight may be from one that is asked for: half of the last decimal that controls keep
 _WEIGHT_ROOM: Final = 5e-4
+
+#: name of the blocks around the motion, among what is left to the user
+FRAME: Final = "program frame"
 
 _WEIGHTS: Final = frozenset(("PW", "R"))
 
@@ -49,7 +53,8 @@ class WordCheck:
     tolerance : float
         ε in units of the text.
     trusted : iterable of str
-        Blocks that belong where they stand because the user says so; names of states that the text leaves to him.
+        Blocks that belong where they stand because the user says so, any number where they have braces; names of states
+        that the text leaves to him, and `FRAME` where the blocks around the motion are his.
     weights : iterable of float, optional
         Those that control points of curves have; None where they may have any.
     """
@@ -69,7 +74,10 @@ class WordCheck:
         self.trusted: list[tuple[int, str]] = []
         trusted = tuple(trusted)
         self._left = set(trusted)
-        self._own = {_text(words) for words in map(self._words_of, trusted) if words}
+        plain = [block for block in trusted if "{" not in block]
+        self._own = {text_of(words) for words in map(self._words_of, plain) if words}
+        templates = [(self._words_of(numbers_in(block))) for block in set(trusted) - set(plain)]
+        self._own_patterns = [any_numbers(text_of(words)) for words in templates if words]
         self._blocks = 0
         self._begun = 0
         self._tail: list[tuple[int, str]] = []
@@ -111,8 +119,18 @@ class WordCheck:
             return []
         return [said(word) for word in line.words]
 
+    def _is_own(self, text: str) -> bool:
+        return text in self._own or any(pattern.fullmatch(text) for pattern in self._own_patterns)
+
     def _wrong(self, code: str, line: int, text: str) -> None:
         self.problems.append(Problem(code, 0, line, text))
+
+    def _unframed(self, code: str, line: int, text: str) -> None:
+        """Complain of the blocks around the motion; where they are the user's own, it is taken on trust."""
+        if FRAME in self._left:
+            self.trusted.append((line, text))
+        else:
+            self._wrong(code, line, text)
 
     def _table(self, table: Table) -> None:
         """Look at a run of motion blocks: its words are those of motion, and no others."""
@@ -159,9 +177,9 @@ class WordCheck:
                 self._wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
             return line
         words = [said(word) for word in line.words] or ["%"]
-        text = _text(words)
+        text = text_of(words)
         self._line = line.number
-        if text in self._own:
+        if self._is_own(text):
             return self._users_block(line, words, text)
         if line.skipped:
             self._wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
@@ -195,6 +213,8 @@ class WordCheck:
             self.trusted.append((line.number, text))
             if whole:
                 kept = [rule is not None and not rule.compared for rule in rules]
+                if "tool" in self._left:  # stops for a tool are told by it
+                    kept = [keep or word.name == "T" for keep, word in zip(kept, line.words, strict=True)]
                 line = replace(line, words=tuple(word for word, keep in zip(line.words, kept, strict=True) if keep))
         self._blocks += 1
         self._note(line, [said(word) for word in line.words])
@@ -205,8 +225,8 @@ class WordCheck:
         self._angles |= {word.name: word.value for word in line.words if word.name in _ROTARY}
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
-        still = any(rule.retract and rule.pattern.fullmatch(_text(words)) for rule in self.list.blocks)
-        still |= any(rule.alone and _any(rule.pattern, words) for rule in self.list.words)
+        still = any(rule.retract and rule.pattern.fullmatch(text_of(words)) for rule in self.list.blocks)
+        still |= any(rule.alone and any_of(rule.pattern, words) for rule in self.list.words)
         if not still and any(word.name in _LINEAR for word in line.words):
             self._moved(line.number, self._code)
 
@@ -220,7 +240,7 @@ class WordCheck:
             wanted = self.list.begin[self._begun :]
             place = next((k for k, pattern in enumerate(wanted) if pattern.fullmatch(text)), None)
             if place != 0:
-                self._wrong(NOT_LISTED, number, f"the program must begin with {_shown(wanted[0])}")
+                self._unframed(NOT_LISTED, number, f"the program must begin with {shown(wanted[0])}")
             if place is None:
                 self._begun = len(self.list.begin)
             else:
@@ -230,7 +250,7 @@ class WordCheck:
             self._tail.append((number, text))
             return True
         for line, ending in self._tail:
-            self._wrong(NOT_LISTED, line, f"{ending} ends the program, and more follows")
+            self._unframed(NOT_LISTED, line, f"{ending} ends the program, and more follows")
         self._tail = []
         return False
 
@@ -242,8 +262,8 @@ class WordCheck:
             pattern.fullmatch(text) for pattern, text in zip(self.list.end, texts, strict=True)
         )
         if not whole:
-            wanted = ", ".join(map(_shown, self.list.end))
-            self._wrong(
+            wanted = ", ".join(map(shown, self.list.end))
+            self._unframed(
                 NOT_LISTED, self._tail[0][0] if self._tail else self._line, f"the program must end with {wanted}, once"
             )
         last = self._tail[0][0] if self._tail else self._line
@@ -251,9 +271,9 @@ class WordCheck:
         for state in sorted(off & self._state.keys()):
             word, _ = self._state[state]
             if not self._is_off(state, word):
-                self._wrong(NOT_ESTABLISHED, last, f"{state}: {word} still holds at the end")
+                self._unframed(NOT_ESTABLISHED, last, f"{state}: {word} still holds at the end")
         if not self._high and any(rule.high for rule in self.list.words if not self._shadowed(rule)):
-            self._wrong(NOT_ESTABLISHED, last, "the tool is not retracted at the end")
+            self._unframed(NOT_ESTABLISHED, last, "the tool is not retracted at the end")
 
     def _shadowed(self, rule: WordRule) -> bool:
         return any(self.list.shadows(other, rule) for other in self.list.words)
@@ -280,7 +300,7 @@ class WordCheck:
             fitting = [rule for rule in self.list.words if rule.pattern.fullmatch(word)]
             if fitting and fitting[0].never:
                 fitting = []
-            beside = [rule for rule in fitting if rule.needs is not None and _any(rule.needs, others)]
+            beside = [rule for rule in fitting if rule.needs is not None and any_of(rule.needs, others)]
             plain = [rule for rule in fitting if rule.needs is None]
             rules.append(next(iter(beside + plain), None))
         return rules
@@ -320,9 +340,9 @@ class WordCheck:
             if rule is None:
                 continue
             others = [*words[:k], *words[k + 1 :]]
-            word = words[k] if len(rules) == len(words) else _text(words)
-            if rule.must is not None and not _any(rule.must, others):
-                self._wrong(NOT_LISTED, number, f"{word} without {_shown(rule.must)}")
+            word = words[k] if len(rules) == len(words) else text_of(words)
+            if rule.must is not None and not any_of(rule.must, others):
+                self._wrong(NOT_LISTED, number, f"{word} without {shown(rule.must)}")
             if rule.alone:
                 own = [bool(theirs and theirs.needs and theirs.needs.fullmatch(word)) for theirs in rules]
                 for other, belongs in zip(words, own, strict=True):
@@ -330,7 +350,7 @@ class WordCheck:
                         self._wrong(NOT_LISTED, number, f"{other} in the block of {word}")
             if rule.after is not None:
                 if not any(rule.after.fullmatch(said_before) for said_before in self._said):
-                    self._wrong(NOT_LISTED, number, f"{word} without {_shown(rule.after)} before it")
+                    self._wrong(NOT_LISTED, number, f"{word} without {shown(rule.after)} before it")
                 self._said = {told for told in self._said if not rule.after.fullmatch(told)}
             if rule.behind is not None and not rule.behind.fullmatch(before):
                 self._wrong(NOT_LISTED, number, f"{word} does not follow what it belongs to")
@@ -343,9 +363,9 @@ class WordCheck:
             if rule.then is not None:
                 self._then = (rule, number)
             if rule.zero and (not self._angles or any(self._angles.values())):
-                self._wrong(NOT_LISTED, number, f"{word} without the rotary axes at zero before it")
+                self._unframed(NOT_LISTED, number, f"{word} without the rotary axes at zero before it")
             if rule.high and not self._high:
-                self._wrong(NOT_LISTED, number, f"{word} without a retract before it")
+                self._unframed(NOT_LISTED, number, f"{word} without a retract before it")
             if rule.retract:
                 self._retract, self._high = number, True
             if rule.after is not None or word.startswith("TOOL CALL "):
@@ -356,7 +376,7 @@ class WordCheck:
         if self._then is not None:
             rule, line = self._then
             if rule.then is not None and not rule.then.fullmatch(text):
-                self._wrong(NOT_LISTED, line, f"{_shown(rule.pattern)} without {_shown(rule.then)} behind it")
+                self._wrong(NOT_LISTED, line, f"{shown(rule.pattern)} without {shown(rule.then)} behind it")
             self._then = None
         before, self._before = self._before, text
         return before
@@ -390,8 +410,8 @@ class WordCheck:
             for state, rules in self.list.heads().items():
                 spoken = {word for word in self._said if any(rule.pattern.fullmatch(word) for rule in rules)}
                 if not spoken and state not in self._left:
-                    wanted = " or ".join(_shown(rule.pattern) for rule in rules)
-                    self._wrong(NOT_ESTABLISHED, number, f"{state}: {wanted} must be said before the first motion")
+                    wanted = " or ".join(shown(rule.pattern) for rule in rules)
+                    self._unframed(NOT_ESTABLISHED, number, f"{state}: {wanted} must be said before the first motion")
             self._retract, self._arc = 0, None
             return
         if self._retract:
@@ -414,34 +434,3 @@ class WordCheck:
                     self._by_tool.append(Problem(NOT_LISTED, 0, line, text))
             else:
                 self._wrong(NOT_LISTED, line, text)
-
-
-def said(word: Word) -> str:
-    """Text of a word as the list has it: blanks left out, codes without leading zeros."""
-    if word.name in ("G", "M") and word.text[:1] == word.name:
-        return f"{word.name}{word.value:g}"
-    return word.text if word.name == "block" else word.text.replace(" ", "").replace("\t", "")
-
-
-def _text(words: list[str]) -> str:
-    return " ".join(words)
-
-
-def _any(pattern: re.Pattern[str], words: list[str]) -> bool:
-    return any(pattern.fullmatch(word) for word in words)
-
-
-def _shown(pattern: re.Pattern[str]) -> str:
-    """Regular expression in the user's words."""
-    text = pattern.pattern
-    for old, new in _PLAIN:
-        text = text.replace(old, new)
-    return text
-
-
-_PLAIN: Final = (
-    *((old, "…") for old in (r"\d+", r"\d{1,8}", r"\d{1,5}", r"[\d.]+", r"\w+", ".*", "(\\.\\d*)?")),
-    (r"\.", "."),
-    ("(?:", "("),
-    ("|", " or "),
-)

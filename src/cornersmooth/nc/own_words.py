@@ -1,0 +1,117 @@
+"""What a control table of the user's own adds to the words of the control that it is like."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+
+from cornersmooth.nc.control import Control, Mode
+from cornersmooth.nc.control_tables import load_control
+
+#: names of what verification leaves to such a table, by the fields of `Words` that say it
+_KINDS: dict[str, tuple[str, ...]] = {
+    "tool_change": ("tool", "next tool"),
+    "tool_select": ("next tool",),
+    "spindle_speed": ("spindle", "speed"),
+    "clockwise": ("spindle",),
+    "counterclockwise": ("spindle",),
+    "spindle_off": ("spindle",),
+    "spindle_orient": ("spindle",),
+    "coolant": ("coolant",),
+    "dwell": ("dwell",),
+    "stop": ("stop",),
+    "optional_stop": ("stop",),
+    "compensation_left": ("compensation", "register"),
+    "compensation_right": ("compensation", "register"),
+    "compensation_off": ("compensation",),
+}
+
+#: fields of which only new blocks are the table's own: stops for a tool are told by the words of the tool
+_TOOLS = {"tool_change", "tool_select", "stop", "optional_stop"}
+
+#: blocks around the motion
+_FRAME = ("start", "begin", "tool_end", "between_tools", "end", "retract", "work_offset_block")
+
+#: name of the frame of the program in what is left to a table
+FRAME = "program frame"
+
+
+def own_words(table: Control) -> tuple[str, ...]:
+    """Blocks and names that verification is to take on trust with a table; none with one that comes with the program.
+
+    Parameters
+    ----------
+    table : Control
+        Like one that comes with the program.
+
+    Returns
+    -------
+    tuple of str
+        Blocks that the table has and the other one has not, their braces as they are; names of kinds of statements that
+        it says in its own way, with all blocks of these; `FRAME` where it has its own blocks around the motion.
+    """
+    if not table.own:
+        return ()
+    base = load_control(table.dialect)
+    known = set(_blocks(base))
+    blocks = [block for block in _blocks(table) if block not in known and not _is_step(block)]
+    changed = {name for name in _KINDS if getattr(table.words, name) != getattr(base.words, name)}
+    for _ in _KINDS:  # one field may say several kinds, and several fields one
+        said = {kind for name in changed for kind in _KINDS[name]}
+        changed |= {name for name, own in _KINDS.items() if said & set(own)}
+    names = [kind for name in _KINDS if name in changed for kind in _KINDS[name]]
+    blocks += [block for name in _KINDS if name in changed - _TOOLS for block in _of_field(table, name)]
+    ours, theirs = _modes(table, base), _modes(base, table)
+    if [mode.on for mode in ours] != [mode.on for mode in theirs]:
+        names.append("offset")
+        blocks += [block for mode in ours for block in mode.on]
+    if table.program.end != base.program.end:
+        names.append("end")
+    framed = any(getattr(table.program, name) != getattr(base.program, name) for name in _FRAME)
+    framed |= _around(ours) != _around(theirs)
+    return (*dict.fromkeys(blocks), *dict.fromkeys(names), *((FRAME,) if framed else ()))
+
+
+def _modes(table: Control, other: Control) -> list[Mode]:
+    """Modes of the forms that both tables have."""
+    return [
+        mode
+        for name, form in sorted(table.forms.items())
+        if name in other.forms
+        for turn, mode in sorted(form.modes.items())
+        if turn in other.forms[name].modes
+    ]
+
+
+def _around(modes: list[Mode]) -> list[tuple[object, ...]]:
+    return [(mode.off, mode.within_on, mode.within_off, mode.begin) for mode in modes]
+
+
+def _is_step(block: str) -> bool:
+    return re.fullmatch(r"\{\w+\}", block) is not None
+
+
+def _blocks(table: Control) -> Iterator[str]:
+    """All blocks of a table; the direction of the spindle and the units put in."""
+    for name in _FRAME:
+        for block in getattr(table.program, name):
+            for units in table.layout.units.values():
+                yield block.replace("{units}", units)
+    for item in fields(table.words):
+        yield from _of_field(table, item.name)
+    for form in table.forms.values():
+        for mode in (*form.modes.values(), *((form.upright,) if form.upright is not None else ())):
+            for blocks in (mode.on, mode.off, mode.within_on, mode.within_off, mode.begin or ()):
+                yield from blocks
+    for extra in table.extras.values():
+        yield from (*extra.on, *extra.off)
+
+
+def _of_field(table: Control, name: str) -> Iterator[str]:
+    """Blocks of a field of `Words`."""
+    words, value = table.words, getattr(table.words, name)
+    for blocks in list(value.values()) if isinstance(value, Mapping) else [value]:
+        for block in (blocks,) if isinstance(blocks, str) else blocks if isinstance(blocks, tuple) else ():
+            for turn in (words.clockwise, words.counterclockwise):
+                yield block.replace("{direction}", turn)
