@@ -26,13 +26,16 @@ from cornersmooth.smoothing import smooth
 
 SAMPLE = Path(__file__).parents[1] / "samples" / "impeller.cls"
 FILES = ("hecc_point_zigzag.csv", "hust_5x_impeller_yelun.cls")
-#: control, form and digits of the texts
-TEXTS = (
-    ("fanuc", "g1", ""),
-    ("siemens", "bspline", ""),
-    ("fanuc", "g6.2", "IS-D"),
-    ("fanuc", "g6.2", ""),
-    ("fanuc", "g6.2", "IS-B"),
+#: control, form, digits and other settings of the texts
+TEXTS: tuple[tuple[str, str, str, dict[str, str]], ...] = (
+    ("fanuc", "g1", "", {}),
+    ("siemens", "bspline", "", {}),
+    ("fanuc", "g6.2", "IS-D", {}),
+    ("fanuc", "g6.2", "", {}),
+    ("fanuc", "g6.2", "IS-B", {}),
+    ("fanuc", "g6.2", "IS-B", {"allocation": "fair"}),
+    ("fanuc", "g6.2", "IS-B", {"method": "global"}),
+    ("fanuc", "g1", "IS-B", {}),
 )
 MACHINE, TOLERANCE, FEED = "table-ac", 0.01, 1800.0
 
@@ -54,12 +57,13 @@ def times(program: Program) -> dict[str, float]:
         "unsmoothed, jumps of velocity": direct(program, baseline="velocity_jump", machine=machine).total,
         "ideal curves, proportional": plan(smooth(program, settings), machine=machine).total,
     }
-    for control, name, digits in TEXTS:
+    for control, name, digits, others in TEXTS:
+        settings = Settings(tolerance=TOLERANCE, **others)
         form = choose_form(control, name, digits=digits)
         stream = io.BytesIO()
         write(smooth(program, fit_settings(settings, form, program.units)), stream, form=form)
         law = plan_text(read_nc(stream.getvalue(), control=control), settings=settings, machine=machine)
-        found[" ".join(("as written:", control, name, digits)).strip()] = law.total
+        found[" ".join(filter(None, ("as written:", control, name, digits, *others.values())))] = law.total
     return found
 
 

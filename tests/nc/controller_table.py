@@ -1,11 +1,12 @@
 """How long LinuxCNC's whole controller takes for a text, and how far what it executes is from the CL path.
 
     python tests/nc/controller_table.py [FOLDER]
+    python tests/nc/controller_table.py --short
 
 Prints one table: each path unsmoothed, and as the program writes it for LinuxCNC, at two tolerances. The axes of the
 machine have the limits of `linuxcnc_controller.STATED`, the feed is 1800 mm/min; time is counted in servo cycles, so
 that the load of this computer does not matter. FOLDER holds the real CL files of the tests; without it the sample alone
-is run.
+is run; `--short` runs a few poses of it at one tolerance against one unsmoothed text.
 Exit code 0 where long lines keep the tolerance in what is executed, and are nowhere slower than the fastest unsmoothed
 text that does, whatever blend it gives.
 """
@@ -35,6 +36,8 @@ SAMPLE = Path(__file__).parents[2] / "samples" / "impeller.cls"
 FILES = (("hecc_point_zigzag.csv", 120), ("hust_5x_impeller_yelun.cls", 52))
 #: one pass of the sample, between two rapids
 FIRST, LAST = 4, 80
+#: a part of that, and the part of the tolerance that an unsmoothed text of it gives G64
+SHORT, SHORT_BLEND = (4, 30), 0.9
 FEED, AXIS_LENGTH = 1800.0, 10.0
 #: mm
 TOLERANCES = (0.01, 0.04)
@@ -138,8 +141,23 @@ def _arrival(poses: Floats, start: Floats) -> int:
     return near + int(np.argmin(away[near : near + 400]))
 
 
+def short() -> int:
+    """Run a few poses, as we write them and unsmoothed; 0 where ours keep the tolerance in less time, 2 for no run."""
+    sample = read(SAMPLE.read_bytes(), name=SAMPLE.name)
+    program, tolerance = _feeding(sample, *SHORT), TOLERANCES[-1]
+    theirs = execute(program, unsmoothed(program, SHORT_BLEND * tolerance, LOOSE * tolerance))
+    own = execute(program, ours(program, tolerance, "long"))
+    for name, did in (("unsmoothed", theirs), ("ours", own)):
+        print(f"{name}: {did.word}; {did.seconds:.2f} s, tip {did.tip:.4f} mm, axis point {did.axis_point:.4f} mm")
+    if not theirs.word == own.word == "done":
+        return 2
+    return 0 if own.deviation <= tolerance and theirs.deviation <= tolerance and own.seconds < theirs.seconds else 1
+
+
 def main(arguments: list[str]) -> int:
     """Print the table."""
+    if arguments == ["--short"]:
+        return short()
     print("| path | tolerance | text | blocks | time s | tip mm | axis point mm | rms jerk of rotary axes deg/s3 |")
     print("|---|---|---|---|---|---|---|---|")
     good = True

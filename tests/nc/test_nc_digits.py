@@ -11,9 +11,10 @@ import pytest
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
-from cornersmooth.nc import Form, choose_form, load_control
+from cornersmooth.nc import Form, choose_form, fit_settings, load_control, write
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
 from nc.grammars import reader
 
 #: control, form, machine, and decimals of X and of the last word in mm
@@ -112,3 +113,15 @@ def test_systems_are_those_of_the_table() -> None:
     assert list(load_control("fanuc").systems) == ["IS-B", "IS-C", "IS-D", "IS-E"]
     assert load_control("fanuc").systems["IS-C"] == load_control("fanuc").digits
     assert not load_control("siemens").systems
+
+
+@pytest.mark.parametrize(("digits", "said"), [("IS-B", True), ("", False), ("IS-E", False)])
+def test_digits_that_bend_short_curves_are_named(digits: str, said: bool) -> None:
+    """Segments of 0.3 mm: control points of transitions are 0.05 mm apart, 50 steps of IS-B and 500 of IS-C."""
+    count = 40
+    tip = np.cumsum(np.column_stack((np.full(count, 0.3), 0.1 * (np.arange(count) % 2), np.zeros(count))), axis=0)
+    program = Program.from_poses(tip, np.tile([0.0, 0.0, 1.0], (count, 1)), feed=500.0)
+    form = choose_form("fanuc", "g6.2", digits=digits)
+    stream = io.BytesIO()
+    found = write(smooth(program, fit_settings(Settings(), form, "mm")), stream, form=form).findings
+    assert ("CS349" in {finding.code for finding in found}) == said
