@@ -34,10 +34,10 @@ _TURNS = (0.1, 0.4, 1.0)
 _STANDING = 1e-9
 
 #: blend tolerances go in steps of this ratio, so that few lines change them
-_STEP = 1.5
+_STEP = 1.1
 
 #: part of what makes a difference that is as good as all of it
-_NEARLY = 0.6
+_NEARLY = 0.8
 
 #: part of what a blend may be by proportion that is tried next
 _SURELY = 0.95
