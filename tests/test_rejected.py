@@ -54,7 +54,7 @@ def test_broken_promise_leaves_the_old_file_and_says_where(part, tmp_path, capsy
     rejected = tmp_path / "o.nc.rejected"
     assert rejected.read_text().endswith("M30\n%\n")
     said = capsys.readouterr().err
-    assert f"{part}:8: error: " in said
+    assert f"{part}:9: error: " in said
     assert "the written text breaks its promise; the text is in" in said
     verification = json.loads(story.read_text())["verification"]
     assert not verification["passed"]
