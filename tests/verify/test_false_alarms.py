@@ -570,6 +570,21 @@ SPINDL/OFF
 """,
 )
 
+#: a dwell in revolutions at the bottom of a hole: 200 ms
+DWELL_IN_REVOLUTIONS = Alarm(
+    Case("fanuc", "g1"),
+    0.01,
+    10.0,
+    """GOTO/0,0,30
+SPINDL/900,RPM,CLW
+CYCLE/DRILL,FEDTO,10,MMPM,120,RAPTO,3,RTRCTO,25,DWELL,REV,3
+GOTO/0,0,0
+CYCLE/OFF
+RAPID
+GOTO/0,0,80
+""",
+)
+
 ALARMS = {
     "tapped and drilled": TAPPED_AND_DRILLED,
     "three times there": THREE_TIMES_THERE,
@@ -598,6 +613,7 @@ ALARMS = {
     "rapid within digits": RAPID_WITHIN_DIGITS,
     "stop and repeated": STOP_AND_REPEATED,
     "axis alone": AXIS_ALONE,
+    "dwell in revolutions": DWELL_IN_REVOLUTIONS,
     "stopped before a tool": STOPPED_BEFORE_A_TOOL,
     "hole beside its pose": HOLE_BESIDE_ITS_POSE,
 }
@@ -665,6 +681,13 @@ def test_time_of_a_standing_tip_is_still_compared(factor: float) -> None:
         wrong = [*lines[:k], f"{words} F{factor * float(rate):.4f}", *lines[k + 1 :]]
         found = STANDING.verified("\n".join(wrong)).problems
         assert [(problem.code, problem.nc_line) for problem in found] == [("CS541", k + 1)]
+
+
+def test_time_of_a_dwell_in_revolutions_is_compared() -> None:
+    text = DWELL_IN_REVOLUTIONS.text
+    assert "G4 P200" in text
+    found = DWELL_IN_REVOLUTIONS.verified(text.replace("G4 P200", "G4 P300")).problems
+    assert [problem.code for problem in found] == ["CS556"]
 
 
 def test_cycles_of_one_hole_are_told_apart() -> None:

@@ -57,12 +57,14 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
 
     Only pairs of a known word and one number, and words for plain drilling, are interpreted; with anything else in it
     the whole statement is left open. NX counts depths upwards, all others downwards. The feed of a tap is its pitch,
-    which needs the speed of the spindle.
+    which needs the speed of the spindle, and so does a dwell in revolutions.
     """
     values: dict[str, float] = {}
-    kinds, word = set(), ""
+    kinds, word, in_turns = set(), "", False
     for value in args:
-        if isinstance(value, str):
+        if value == "REV" and word == "DWELL":
+            in_turns = True
+        elif isinstance(value, str):
             if word and word not in values:
                 return Drilling()
             if value in _PLAIN:
@@ -88,7 +90,10 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
         return Drilling()
     feeds = [(values[name] * scale, turn) for name, (scale, turn) in _FEEDS.items() if name in values]
     feed, per_revolution = feeds[0] if len(feeds) == 1 else (math.nan, False)
-    dwell = float(round(1000.0 * values.get("DWELL", 0.0)))
+    dwell = values.get("DWELL", 0.0)
+    if in_turns and (not speed or not dwell):
+        return Drilling()
+    dwell = float(round(1000.0 * (dwell * 60.0 / speed if in_turns else dwell)))
     if "TAP" not in kinds:
         feed_out = bool(kinds & _AT_FEED)
         return Drilling(depth * program.mm_per_unit, feed, per_revolution, dwell, feed_out=feed_out)
