@@ -75,6 +75,8 @@ def run_lines(runs: Runs, lines: Polylines, settings: Settings) -> tuple[Ints, F
     """
     splines = Splines(runs.knot, runs.knot_count)
     pieces = Pieces.of(splines, lines)
+    if not len(pieces.segment):  # no run has been left with a curve
+        return np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3))
     segment, first = np.unique(pieces.segment, return_index=True)  # one piece or more for every segment
     effort = _effort(runs, splines, lines, pieces, settings)
     number = np.clip(np.ceil(np.add.reduceat(effort, first) - 1e-9), 1, _MOST_LINES).astype(np.int64)
