@@ -160,7 +160,8 @@ def test_a_batch_that_was_interrupted_goes_on_where_it_was(tmp_path: Path) -> No
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGTERM)
         _, said = process.communicate()
-        assert process.returncode in (0, 143), said.decode()
+        # -15: before Python took over the signal, or after it gave it back
+        assert process.returncode in (0, 143, -signal.SIGTERM), said.decode()
     result = subprocess.run(words, capture_output=True, check=True)
     counts = result.stderr.decode().splitlines()[-1]
     assert counts.startswith(f"{FILES} files: ")

@@ -120,7 +120,7 @@ def test_program_of_a_single_corner_and_of_none() -> None:
 
 def test_forms_without_long_curves_are_refused(tmp_path: Path) -> None:
     source = Path(__file__).parents[1] / "samples" / "paper_table1.csv"
-    form = ["--control", "mitsubishi", "-f", "g6.2", "--machine", "table-ac"]
+    form = ["--control", "fanuc", "-f", "g6.2", "--machine", "table-ac"]
     result = run("smooth", source, "-o", tmp_path / "o.nc", "--method", "global", *form)
     assert result.returncode == 2
     assert "proportional" in result.stderr.decode()

@@ -260,3 +260,13 @@ def test_programs_without_motion(count: int) -> None:
     for law in (plan(smooth(program)), direct(program)):
         assert law.total == 0.0
         assert len(law.at(law.every_period()).t) >= 1
+
+
+def test_a_slow_start_far_along_the_path_has_a_time() -> None:
+    """The cell next to a stop may be shorter there than the digits of the way."""
+    tip = [[0, 0, 0], [900, 0, 0], [900, 1e-5, 0], [900, 5, 0]]
+    stop = Statement(2, 3, "STOP", ())
+    program = Program.from_poses(tip, [[0, 0, 1]] * 4, feed=[6000.0, 6000.0, 1e-7, 6000.0], statements=(stop,))
+    law = direct(program, Limits(), "velocity_jump")
+    assert np.isfinite(law.total)
+    assert law.total >= 1e-5 / (1e-7 / 60.0)

@@ -168,7 +168,7 @@ def _spoilt(lines):
 @pytest.mark.parametrize("processes", [1, forks])
 def test_what_is_wrong_is_reported_as_for_the_whole(used, processes):
     program = part()
-    lines = text_of(program).decode().splitlines()
+    lines = text_of(program, chord_tolerance=TOLERANCE / 10).decode().splitlines()
     for name, spoilt, code in share(_spoilt(lines), 2, processes != 1):
         # behind a change of units no rapid fits any more: which is missed for which is decided batch by batch
         text = ("\n".join(spoilt) + "\n").encode()

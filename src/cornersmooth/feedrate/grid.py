@@ -96,7 +96,9 @@ def make_grid(
 
     # the cells next to the stops
     front, back = _end_cells(half_speed, run, low, change, begin, end, accel, jerk)
-    front, back = resolution.end * front, resolution.end * back
+    smallest = SMALLEST * speed_limits.edge[-1]
+    least = np.minimum(smallest, (end - begin) / 12.0)  # else a cell far along the path may have no length at all
+    front, back = np.maximum(resolution.end * front, least), np.maximum(resolution.end * back, least)
 
     # knots where the size of the cells is given: where the limit changes, and next to the end cells
     slow = np.sqrt(np.minimum(cap, before))
@@ -111,7 +113,7 @@ def make_grid(
     knot, size, run = knot[order], size[order], run[order]
 
     g = resolution.growth
-    size = np.maximum(size, SMALLEST * speed_limits.edge[-1])
+    size = np.maximum(size, smallest)
     size = g * knot + np.minimum.accumulate(size - g * knot)
     size = -g * knot + np.minimum.accumulate((size + g * knot)[::-1])[::-1]
     left, right = np.flatnonzero(run[1:] == run[:-1]), np.flatnonzero(run[1:] == run[:-1]) + 1

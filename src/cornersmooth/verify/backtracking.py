@@ -21,6 +21,9 @@ _REACH = 3
 #: a stretch whose length is more than so many times the distance of its ends turns
 _STRAIGHT = 1.2
 
+#: part of what counts as nearer by which tip or axis point must be nearer ahead to be taken as going on
+_CLEARLY = 0.25
+
 Found = tuple[Floats, Ints, Ints, Floats]
 
 
@@ -63,19 +66,22 @@ def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Float
     """By how much tip or axis point alone would be nearer at a place before the one that it must not go back behind.
 
     Where the tip turns round while its axis turns, a rounding that has turned already is nearest to the way before the
-    turn, though tip and axis point each are near the way behind it.
+    turn, though tip and axis point each are near the way behind it. And a path that is run backwards takes both back:
+    where one of them goes on, a curve only turns the tool a little less than it has done, within the tolerance.
     """
     own, six = match.six[vertex], match.path.six
     here, there = _on(six, held), _on(six, free)
     high = match.high[vertex]
     ahead = np.minimum(held.astype(np.int64) + 1, high)
-    gain = np.zeros(len(vertex))
-    for column in (slice(0, 3), slice(3, 6)):
+    gains = np.zeros((2, len(vertex)))
+    for gain, column in zip(gains, (slice(0, 3), slice(3, 6)), strict=True):
         off = _distance(own[:, column], here[:, column])
         beyond = nearest_alone(own, six, ahead, ahead, high, match.near, column)[2]
         off = np.where(ahead > held, np.minimum(off, beyond), off)
-        gain = np.maximum(gain, off - _distance(own[:, column], there[:, column]))
-    return gain
+        gain[:] = off - _distance(own[:, column], there[:, column])
+    one_goes_on = gains.min(axis=0) < -_CLEARLY * match.slack
+    found: Floats = np.where(one_goes_on, 0.0, gains.max(axis=0))
+    return found
 
 
 def original_backwards(match: Match, theirs: Reached) -> Found | None:
