@@ -15,6 +15,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.model import SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.nc.curve_blocks import _intervals
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.spline_share import SplineShare
@@ -185,3 +186,12 @@ def test_cycle832_is_asked_for_by_name() -> None:
     lines = text.splitlines()
     assert lines[lines.index("TRAORI") - 1] == "CYCLE832(0.00200,_ORI_FINISH,0.00458)"
     assert lines[lines.index("TRAFOOF", 2) + 1] == "CYCLE832(0,_OFF,1)"
+
+
+def test_a_control_point_may_be_the_only_one_of_its_rows() -> None:
+    """Rows are written in chunks: the last one may hold the last control point of a long curve alone."""
+    points = np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [3.0, 1.0, 6.0]])
+    number = np.arange(1, 5, dtype=np.int8)
+    whole = _intervals(points, number)
+    assert whole[:, 0].tolist() == [1.0, 2.0, 3.0, 0.0]
+    assert _intervals(points[3:], number[3:]).tolist() == whole[3:].tolist()

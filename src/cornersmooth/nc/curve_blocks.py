@@ -198,8 +198,9 @@ def _intervals(spline: Floats, curve: NDArray[np.int8]) -> Floats:
         final = spline[last[np.minimum(np.searchsorted(last, np.arange(len(spline))), len(last) - 1)], 2]
     ahead = []
     for shift in (1, 2):
-        following = np.append(spline[shift:, 0], np.zeros(shift))
-        number = np.append(curve[shift:], np.zeros(shift, np.int8))
+        none = np.zeros(min(shift, len(spline)), np.int8)
+        following = np.append(spline[shift:, 0], none)
+        number = np.append(curve[shift:], none)
         ahead.append(np.where(number == curve + shift, following, final))
     found = spline.copy()
     found[:, 0] = ahead[1] - ahead[0]
