@@ -47,6 +47,7 @@ RUN_BY = {
     "python tests/batch_runs.py": "test_batch_runs_times_a_batch",
     "python -m nc.sweep": "test_sweeps_find_nothing",
     "python -m verify.sweep": "test_sweeps_find_nothing",
+    "python -m verify.word_mutations 2": "tests/verify/test_word_mutations.py",
     "python -m verify.hole_mutations": "test_hole_mutations_are_scored",
     "python tests/nc/linuxcnc_controller.py samples/impeller.cls -e 0.01": (
         "tests/kinematics/test_linuxcnc_controller.py"
