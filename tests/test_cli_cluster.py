@@ -8,6 +8,7 @@ import os
 import re
 import shlex
 import signal
+import socket
 import subprocess
 import time
 from collections.abc import Iterator
@@ -15,8 +16,10 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth.cli.cluster import do
+from cornersmooth import Settings, __version__, choose_form
+from cornersmooth.cli.cluster import _proof_of_sharing, do
 from cornersmooth.cli.job import Job
+from cornersmooth.nc import Frame
 from interruptions import cl_text
 from oracle.command import DONE, SCRIPT, USAGE, command, environment, run, wait_for
 
@@ -101,6 +104,20 @@ def test_the_commands_of_the_page_work(scheduler: Path, folder: Path, tmp_path: 
     assert len((tmp_path / "made.csv").read_text().splitlines()) == FILES + 1
 
 
+def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path) -> None:
+    done = subprocess.Popen(["true"])
+    done.wait()
+    name = f"cluster-{socket.gethostname()}"
+    for process, host in ((done.pid, name), (os.getpid(), name), (done.pid, "cluster-elsewhere")):
+        (tmp_path / f".{host}.{process}-0badcafe.part").touch()
+    target = str(tmp_path / "one.nc")
+    job = Job("one.cls", target, (), {}, Settings(), choose_form(), Frame(), None, force=False, batch=True)
+    with _proof_of_sharing([job]) as proof:
+        assert Path(proof).exists()
+        left = {path.name for path in tmp_path.iterdir()} - {Path(proof).name}
+    assert left == {f".{name}.{os.getpid()}-0badcafe.part", f".cluster-elsewhere.{done.pid}-0badcafe.part"}
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -116,9 +133,6 @@ def test_what_cannot_work_is_refused(folder: Path, tmp_path: Path, words: tuple[
 
 
 def test_workers_that_do_not_fit_say_so(tmp_path: Path) -> None:
-    from cornersmooth import Settings, __version__, choose_form
-    from cornersmooth.nc import Frame
-
     job = Job("a.cls", "out/a.nc", (), {}, Settings(), choose_form(), Frame(), None, force=False, batch=True)
     assert "does not see out; let it stand in a folder that all share" in do(job, "/", "out/none", __version__).message
     found = do(job, "/", "", "0.0")

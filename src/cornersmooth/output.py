@@ -237,6 +237,13 @@ def remove_leftovers(path: str, process: int | None = None) -> None:
             os.unlink(left)
 
 
+def processes_of_leftovers(folder: str, name: str) -> list[int]:
+    """Numbers of the processes whose temporary files of this name are in a folder."""
+    start = f".{name}."
+    found = (left.removeprefix(start).partition("-")[0] for left in os.listdir(folder) if left.startswith(start))
+    return sorted({int(word) for word in found if word.isdigit()})
+
+
 def make_folder(path: str) -> None:
     """Make the folder for outputs.
 

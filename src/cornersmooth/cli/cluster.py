@@ -20,7 +20,7 @@ from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.errors import SettingsError
 from cornersmooth.extras import install_hint
-from cornersmooth.output import make_folder, remove_leftovers, temporary_name
+from cornersmooth.output import make_folder, processes_of_leftovers, remove_leftovers, temporary_name
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -121,10 +121,24 @@ def _proof_of_sharing(jobs: list[Job]) -> Iterator[str]:
     """Yield a file among the outputs that exists as long as the batch runs."""
     folder = os.path.dirname(jobs[0].target)
     make_folder(folder)
-    with temporary_name(folder, "cluster") as path:
+    name = f"cluster-{socket.gethostname()}"
+    for process in processes_of_leftovers(folder, name):
+        if not _alive(process):  # a run of this machine that was killed
+            remove_leftovers(os.path.join(folder, name), process)
+    with temporary_name(folder, name) as path:
         with open(path, "xb"):
             pass
         yield path
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # somebody else's
+        pass
+    return True
 
 
 def _outcome(job: Job, task: Any) -> Outcome:
