@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -119,6 +119,8 @@ class Machine:
         From the tip to the spindle with both rotary axes at zero.
     tool_length : float, mm
         From the spindle nose to the tip; matters for heads without tool centre point control only.
+    tool_lengths : tuple of (int, float), mm
+        The same by number of tool, for those that `tool_length` is not for.
     part_zero : (float, float, float), mm
         Where the zero of the part sits in the coordinates in which the points of the tables are given.
     dynamics : tuple of Dynamics
@@ -136,6 +138,7 @@ class Machine:
     part_zero: Vector = (0.0, 0.0, 0.0)
     dynamics: tuple[Dynamics, ...] = ()
     travel: tuple[Travel, ...] = ()
+    tool_lengths: tuple[tuple[int, float], ...] = ()
 
     def __post_init__(self) -> None:
         where = f"machine {self.name}"
@@ -155,8 +158,9 @@ class Machine:
                 raise SettingsError("CS253", f"{where}: {key} is not a point of space", "give three numbers")
         if not any(self.tool_direction):
             raise SettingsError("CS253", f"{where}: tool_direction is zero", "give a vector along the tool")
-        if not (math.isfinite(self.tool_length) and self.tool_length >= 0):
-            raise SettingsError("CS253", f"{where}: tool_length is {self.tool_length:g}", "give 0 mm or more")
+        for length in (self.tool_length, *dict(self.tool_lengths).values()):
+            if not (math.isfinite(length) and length >= 0):
+                raise SettingsError("CS253", f"{where}: tool_length is {length:g}", "give 0 mm or more")
         if _parallel(first.unit, second.unit):
             raise SettingsError(
                 "CS253", f"{where}: {first.name} and {second.name} are parallel", "give two different directions"
@@ -177,6 +181,15 @@ class Machine:
             if item.name not in (*LINEAR, *self.names):
                 known = ", ".join((*LINEAR, *self.names))
                 raise SettingsError("CS253", f"{where}: dynamics of {item.name}, which it has not", f"use {known}")
+
+    def with_tool(self, number: int | None) -> Machine:
+        """Return the machine with the length of a tool; None for one that is not known."""
+        length = dict(self.tool_lengths).get(-1 if number is None else number, self.tool_length)
+        return self if length == self.tool_length else replace(self, tool_length=length)
+
+    def with_longest_tool(self) -> Machine:
+        """Return the machine with the tool that a turn of the head moves most."""
+        return replace(self, tool_length=max((self.tool_length, *dict(self.tool_lengths).values())))
 
     @cached_property
     def tool(self) -> Floats:

@@ -20,6 +20,7 @@ _SHELF = Shelf(
         "preferred",
         "tool_direction",
         "tool_length",
+        "tool_lengths",
         "part_zero",
         "travel",
         "axis",
@@ -71,10 +72,10 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
     ----------
     text : str or dict
         Keys: ``like`` (a machine that comes with the program; then only what is different), ``name``, ``description``,
-        ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``part_zero`` and two tables ``[[axis]]`` with
-        ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``, ``modulo``, ``clamp``;
-        ``[travel]`` with ``X``, ``Y`` and ``Z``, each ``[lowest, highest]``, any of which may be left out; and for the
-        planning of the time
+        ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``[tool_lengths]``, ``part_zero`` and two tables
+        ``[[axis]]`` with ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``, ``modulo``,
+        ``clamp``; ``[travel]`` with ``X``, ``Y`` and ``Z``, each ``[lowest, highest]``, any of which may be left out;
+        and for the planning of the time
         tables ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min
         or deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which may be left out.
     file : str
@@ -105,6 +106,7 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
             part_zero=_vector(table, "part_zero", (0.0, 0.0, 0.0)),
             dynamics=_dynamics(table, (*LINEAR, first.name, second.name)),
             travel=_travel(table),
+            tool_lengths=_tool_lengths(table),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
@@ -137,6 +139,13 @@ def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
         modulo=modulo,
         clamp=None if clamp is None else (clamp[0], clamp[1]),
     )
+
+
+def _tool_lengths(table: dict[str, Any]) -> tuple[tuple[int, float], ...]:
+    given = table.get("tool_lengths", {})
+    if not isinstance(given, dict) or not all(name.isdecimal() for name in given):
+        raise _SHELF.wrong("tool_lengths is not a table by number of tool", "write [tool_lengths] and 3 = 120.5 below")
+    return tuple((int(name), _number(value, f"tool_lengths.{name}")) for name, value in given.items())
 
 
 def _travel(table: dict[str, Any]) -> tuple[Travel, ...]:

@@ -212,8 +212,7 @@ def write(
         for lines in motion.finish():
             text.write(lines)
         text.write_blocks(motion.end())
-    without_tilt = 0 if motion.upright_writer is None else motion.upright_writer.blocks
-    return Written(text.blocks + motion.blocks + writer.blocks + without_tilt, findings.all())
+    return Written(text.blocks + motion.written, findings.all())
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findings) -> Iterator[Rows]:

@@ -12,6 +12,7 @@ from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Move, Program
 from cornersmooth.nc.control import Control, Extra, FormTable, Mode, Orientation
 from cornersmooth.nc.control_tables import load_control
+from cornersmooth.nc.cycle_blocks import loaded_tool
 from cornersmooth.nc.form import ROTARY_SHARE, Form
 from cornersmooth.settings import Settings
 from cornersmooth.tables import closest
@@ -112,19 +113,31 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
         hint = f"use -f {vectors[0]}" if vectors else "name your machine with --machine"
         _refuse_tilt(form, program, settings, tilt, text, hint)
     if form.orientation == "machine" and form.machine is not None and form.machine.swings_the_tool:
-        loads = [statement for statement in program.statements if statement.word in ("LOADTL", "LOAD", "TURRET")]
-        tools = {tuple(statement.args[:2]) for statement in loads}
-        if len(tools) > 1:
-            what = f"{len(tools)} tools, and {form.machine.name} has one tool_length that goes into every position"
-            hint = "write a file for each tool, or let the control keep the tool tip"
-            line = next(one.line for one in loads if tuple(one.args[:2]) != tuple(loads[0].args[:2]))
-            raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
+        _check_lengths(form.machine, program)
     if form.rotary and form.curves and len(program.arcs):
         turn = np.zeros(len(program))
         pose = program.arcs.pose
         turn[pose] = norm(program.axis[pose] - program.axis[pose - 1])
         text = "the tool turns on an arc, which {} cannot follow within the tolerance"
         _refuse_tilt(form, program, settings, turn, text, f"use -f {next(iter(form.table.forms))}")
+
+
+def _check_lengths(machine: Machine, program: Program) -> None:
+    """Refuse a program with tools whose lengths are not known, where these go into every position."""
+    loads = [statement for statement in program.statements if statement.word in ("LOADTL", "LOAD", "TURRET")]
+    known = dict(machine.tool_lengths)
+    numbers = [(loaded_tool(statement) or (-1, -1))[0] for statement in loads]
+    missing = [one for one, number in zip(loads, numbers, strict=True) if number not in known]
+    if known and missing:
+        what = f"a tool that [tool_lengths] of {machine.name} does not have, and whose length goes into every position"
+        hint = "write its length into the machine file"
+        raise SettingsError("CS219", what, hint, file=program.source.name, line=missing[0].line)
+    tools = {tuple(statement.args[:2]) for statement in loads}
+    if len(tools) > 1 and not known:
+        what = f"{len(tools)} tools, and {machine.name} has one tool_length that goes into every position"
+        hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
+        line = next(one.line for one in loads if tuple(one.args[:2]) != tuple(loads[0].args[:2]))
+        raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
 
 
 def _refuse_tilt(form: Form, program: Program, settings: Settings, tilt: Floats, text: str, hint: str) -> None:

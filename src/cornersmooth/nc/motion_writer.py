@@ -18,15 +18,14 @@ from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.cycle_blocks import Hole, first_of_hole, hole_blocks, hole_feeds, kind_of
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.holes import Cycle, approaches, hole_moves, travel_height, travel_of
+from cornersmooth.nc.motion_warnings import MotionWarnings
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.rewinds import rows_that_swing
 from cornersmooth.nc.run import Run
+from cornersmooth.nc.statement_args import with_starts
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
-
-#: cosine of the angle from Z beyond which a tool is tilted
-_UPRIGHT = 1.0 - 1e-6
 
 #: a pose that no program has
 _NOWHERE = 1 << 62
@@ -67,18 +66,19 @@ class MotionWriter:
     _last: NDArray[np.int64] | None = None  #: what was written last, a tool change or not
     _return_to: int = _NOWHERE  #: first pose behind a tool change, until it is reached
     _next_statement: int = 0
-    _said_tool: bool = False
-    _said_spindle: bool = False
-    _said_turns: bool = False
     _arc_begun: int = -1  #: arc behind a FROM whose start has been gone to
     _ticks: Ints = field(init=False)  #: of the block that is written
     _said: tuple[Statement, ...] = field(init=False)
     _approach: Ints | None = field(init=False)
+    _warnings: MotionWarnings = field(init=False)
     _tilting: BlockWriter = field(init=False)  #: the writer of all other tools
+    _writers: dict[int | None, BlockWriter] = field(default_factory=dict)  #: for tools of different lengths
+    _last_writer: BlockWriter | None = None
 
     def __post_init__(self) -> None:
         self._tilting = self.writer
-        self._said = _with_starts(self.program)
+        self._warnings = MotionWarnings(self.program, self.findings)
+        self._said = with_starts(self.program)
         self.operation.withdraw = self._withdraw
         self._approach = approaches(self.program) if (self.program.kind == Move.HOLE).any() else None
 
@@ -125,7 +125,7 @@ class MotionWriter:
         text = self.statements.blocks(statement)
         if self.statements.changed:  # a tool change leaves the machine elsewhere
             self._position, self._return_to, self.statements.changed = None, statement.pose, False
-            self._said_spindle = False
+            self._warnings.another_tool()
         yield from self._blocks(text)
 
     def _blocks(self, text: Sequence[str]) -> Iterator[bytes]:
@@ -151,13 +151,31 @@ class MotionWriter:
 
     def _stand(self, pose: int) -> None:
         """Take the writer of the tool at hand: without words of its axis where it stays along Z."""
-        if self.upright is None or self.upright_writer is None or self.operation.begun:
+        if self.operation.begun:
             return
-        writer = self.upright_writer if self.upright[pose] else self._tilting
+        standing = self.upright is not None and bool(self.upright[pose])
+        writer = self.upright_writer if standing and self.upright_writer else self._of_tool()
         if writer is self.writer:
             return
         writer.take_over(self.writer)
         self.writer, self.operation.mode, self._position = writer, writer.form.mode, None
+
+    def _of_tool(self) -> BlockWriter:
+        """Writer for a tool that tilts: of its own where its length goes into every position."""
+        machine = self._tilting.form.machine
+        if machine is None or not machine.tool_lengths or self._tilting.form.orientation != "machine":
+            return self._tilting
+        number = self.statements.tool
+        if number not in self._writers:
+            form = replace(self._tilting.form, machine=machine.with_tool(number))
+            self._writers[number] = replace(self._tilting, form=form, blocks=0)
+        return self._writers[number]
+
+    @property
+    def written(self) -> int:
+        """Blocks written so far."""
+        writers = [self._tilting, *self._writers.values(), *([self.upright_writer] if self.upright_writer else [])]
+        return self.blocks + sum(writer.blocks for writer in writers)
 
     def _rotary_blocks(self, ticks: Ints) -> dict[str, tuple[str, ...]]:
         """Blocks of the rotary axes, with where a row has them; a tool that stays along Z has them at zero."""
@@ -247,9 +265,11 @@ class MotionWriter:
         if self._last is None or not len(passed):
             return
         again = self._last[None]
-        if again.shape[1] != self.writer.columns:  # one of both tools stays along Z, so that pose does
+        if self._last_writer is not self.writer:
             pose = passed[:1]
-            other = np.zeros((1, 2)) if self.writer.form.rotary else self.program.axis[pose]
+            other = self.program.axis[pose]
+            if self.writer.form.rotary:  # else one of both tools stays along Z, so that pose does
+                other = self.writer.angles(again) if again.shape[1] == self.writer.columns else np.zeros((1, 2))
             again = self.writer.ticks(self.program.tip[pose], other)
         yield from self._emit(self._run(again, np.array([move])))
 
@@ -285,7 +305,7 @@ class MotionWriter:
 
     def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> str:
         """Cycle of the control that drills holes, as `kind_of` names it; empty for none."""
-        if cycle is None or self.writer is self._tilting or not (self.native or cycle.tap):
+        if cycle is None or self.writer is not self.upright_writer or not (self.native or cycle.tap):
             return ""
         if cycle.tap and not (self.statements.clockwise and self.statements.speed and self.operation.spindle):
             return ""
@@ -293,7 +313,7 @@ class MotionWriter:
 
     def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
         """Why the control's cycle cannot do a tap, in words."""
-        if self.writer is self._tilting:
+        if self.writer is not self.upright_writer:
             return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
         if not kind_of(cycle, self.writer.form, self.program, poses):
             return "the control has no such cycle for it"
@@ -307,6 +327,7 @@ class MotionWriter:
         if kind == "tap":
             text = "a tap is left to the control's cycle: see that it turns the spindle with the feed"
             self.findings.add("CS348", "warning", line, text, len(poses))
+        self._warnings.of_cut(int(poses[0]), turning=bool(self.operation.spindle))
         feeds, modes = hole_feeds(cycle, program, poses)
         travel, clearance = travel_of(cycle, program, poses, approach[poses])
         speed, table = self.statements.speed or 0.0, writer.form.table.cycles
@@ -394,14 +415,15 @@ class MotionWriter:
             yield from self._blocks(self.operation.begin(self._rotary_blocks(first)))
         if self.operation.retracted:
             self.operation.retracted = False
-            self._warn_of_tilt(int(run.move[0]))
+            self._warnings.of_first(int(run.move[0]), self.writer.form, rapid=bool(run.rapid[0]))
             yield from self._blocks(self._approaches(first, bool(run.rapid[0])))
-            if not run.rapid[0]:
-                text = "the first motion of a tool is a feed move: it feeds down from the height of the retract"
-                self.findings.add("CS333", "warning", int(self.program.line[run.move[0]]), text)
-        self._warn_of_standing_still(run)
-        self._warn_of_turns(run)
+        self._warnings.of_tool(int(run.move[0]), self.statements.tool)
+        if not run.rapid.all():
+            self._warnings.of_cut(int(run.move[np.argmin(run.rapid)]), turning=bool(self.operation.spindle))
+        if self.writer.form.rotary:
+            self._warnings.of_turns(run, self.writer.form, self.writer.angles(run.ticks))
         self._position = self._last = run.ticks[-1]
+        self._last_writer = self.writer
         yield self.writer.text(run, dwell)
 
     def _approaches(self, first: Ints, rapid: bool) -> list[str]:
@@ -417,51 +439,3 @@ class MotionWriter:
             return []
         self._position = self.writer.lifted(self._position, self.retract)
         return [self.writer.rapid(self._position)]
-
-    def _warn_of_tilt(self, pose: int) -> None:
-        """Say that the control turns the tool on its own behind a retract: the text cannot turn it before."""
-        if not self.writer.form.rotary and self.program.axis[pose][2] < _UPRIGHT:
-            text = "the first motion of a tool turns it to a tilted axis; see that it is free to, or name the machine"
-            self.findings.add("CS337", "warning", int(self.program.line[pose]), text)
-
-    def _warn_of_turns(self, run: Run) -> None:
-        """Say once that an endless axis gets words that some machines of the control refuse."""
-        form = self.writer.form
-        if self._said_turns or form.mode.motion.endless_words or form.machine is None or not form.rotary:
-            return
-        endless = np.array([axis.limits is None and not axis.modulo for axis in form.machine.axes])
-        angles = self.writer.angles(run.ticks)[:, endless]
-        rows = np.flatnonzero(((angles < 0.0) | (angles >= 360.0)).any(axis=1))
-        if len(rows):
-            self._said_turns = True
-            names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
-            text = (
-                f"words of {names} beyond 0 to 360 deg: a modulo axis takes them only where the builder allows it "
-                "(MD30455 bit 0, else alarm 16830); else write modulo = true for the axis in a machine file"
-            )
-            self.findings.add("CS346", "warning", int(self.program.line[run.move[rows[0]]]), text)
-
-    def _warn_of_standing_still(self, run: Run) -> None:
-        """Say once that a tool moves that was not loaded, and for each tool that it cuts while the spindle stands."""
-        line = self.program.line[run.move]
-        if self.statements.tool is None and not self._said_tool:
-            self._said_tool = True
-            text = "the CL file loads no tool before it moves: the tool in the spindle is taken, with length register 1"
-            self.findings.add("CS334", "warning", int(line[0]), text)
-        cuts = np.flatnonzero(~run.rapid)
-        if len(cuts) and not self._said_spindle and not self.operation.spindle:
-            self._said_spindle = True
-            text = "the spindle is not started before the first cut of a tool"
-            self.findings.add("CS335", "warning", int(line[cuts[0]]), text)
-
-
-def _with_starts(program: Program) -> tuple[Statement, ...]:
-    """Statements of the program, and one for every FROM, which is a pose there, behind what stands before it."""
-    starts = np.flatnonzero(program.kind == Move.FROM).tolist()
-    if not starts:
-        return program.statements
-    said = [
-        Statement(pose, int(program.line[pose]), "FROM", tuple((program.tip[pose] / program.mm_per_unit).tolist()))
-        for pose in starts
-    ]
-    return tuple(sorted((*program.statements, *said), key=lambda statement: (statement.pose, statement.word == "FROM")))

@@ -19,6 +19,7 @@ from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothPro
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import corner_blends, line_limits
+from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves, rotary_angles
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
@@ -75,6 +76,8 @@ def rotary_rows(
     tip, axis, move = _whole(rows)
     if not len(move):
         return
+    tools = tools_of_poses(program) if machine.tool_lengths else None
+    own_machine, machine = machine, machine.with_longest_tool()
     rapid, line, file = rapid_moves(program.kind)[move], program.line[move], program.source.name
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_length)
     path = rotary_angles(machine, tip, axis, tolerance=tolerance, rapid=rapid, line=line, file=file)
@@ -133,7 +136,8 @@ def rotary_rows(
             rate = np.minimum(rate, fastest)
         if rate is not None:
             rate = np.round(rate, INVERSE_TIME_DECIMALS)
-        check_travel(machine, filled.tip[own], filled.angles[own], line[filled.pose[own]], file)
+        for chosen, one in machines_of_rows(own_machine, tools, move[here][filled.pose[own]]):
+            check_travel(one, filled.tip[own][chosen], filled.angles[own][chosen], line[filled.pose[own]][chosen], file)
         count = len(filled.pose[own])
         yield Rows(
             tip=filled.tip[own],

@@ -1,8 +1,10 @@
-"""Arguments of CL statements: their words and numbers."""
+"""Arguments of CL statements: their words and numbers; statements that stand for poses."""
 
 from __future__ import annotations
 
-from cornersmooth.model import Statement
+import numpy as np
+
+from cornersmooth.model import Move, Program, Statement
 
 
 def numbers_of(statement: Statement) -> list[float]:
@@ -34,3 +36,15 @@ def spoken_text(statement: Statement) -> str:
     text = statement.args[0] if statement.args and isinstance(statement.args[0], str) else statement.text
     text = text.strip()
     return text[1:-1] if len(text) > 1 and text[0] == text[-1] == "'" else text
+
+
+def with_starts(program: Program) -> tuple[Statement, ...]:
+    """Statements of the program, and one for every FROM, which is a pose there, behind what stands before it."""
+    starts = np.flatnonzero(program.kind == Move.FROM).tolist()
+    if not starts:
+        return program.statements
+    said = [
+        Statement(pose, int(program.line[pose]), "FROM", tuple((program.tip[pose] / program.mm_per_unit).tolist()))
+        for pose in starts
+    ]
+    return tuple(sorted((*program.statements, *said), key=lambda statement: (statement.pose, statement.word == "FROM")))

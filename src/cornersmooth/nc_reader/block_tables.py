@@ -10,9 +10,11 @@ import io
 import re
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Bools, Floats, Ints
@@ -26,6 +28,9 @@ CHUNK = 1 << 20
 
 #: stands for a number where only the kind of line matters: no sign or digit may stand before or behind it
 _ANY_NUMBER: Final = b"+1.5"
+_LINE_END: Final = np.uint8(ord("\n"))
+#: stands for it in a text that is searched for kinds of lines
+_MARK: Final = b"\x01"
 _BLOCK_NUMBER: Final = re.compile(rb"^(N?)\d+(?= )", re.MULTILINE)
 
 
@@ -147,10 +152,9 @@ class LetteredLines:
     """
 
     def __init__(self, text: bytes, lexer: Lexer) -> None:
-        self._lines = text.split(b"\n")[:-1]
-        self._measure = lexer.measure
-        kinds = lexer.measure.sub(_ANY_NUMBER, _BLOCK_NUMBER.sub(rb"\g<1>0", text)).split(b"\n")[:-1]
-        known = {kind: _LineKind.of(kind, lexer) for kind in set(kinds)}
+        self._numbers = find_numbers(text, lexer)
+        kinds = _BLOCK_NUMBER.sub(rb"\g<1>0", self._numbers.marked()).split(b"\n")[:-1]
+        known = {kind: _LineKind.of(kind.replace(_MARK, _ANY_NUMBER), lexer) for kind in set(kinds)}
         self._kinds = [known[kind] for kind in kinds]
 
     def bulk(self) -> Bools:
@@ -159,15 +163,12 @@ class LetteredLines:
 
     def columns(self, rows: Ints) -> dict[str, Floats] | None:
         """Numbers of lines that stand in a run, NaN where a line has none; None if the run is none."""
-        chosen = rows.tolist()
-        kinds = [self._kinds[row] for row in chosen]
-        found = self._measure.findall(b"\n".join([self._lines[row] for row in chosen]))
+        kinds = [self._kinds[row] for row in rows.tolist()]
         try:
-            values = parse_numbers(b" ".join(found))
+            values = self._numbers.values
         except NumberError:  # too large
             return None
-        count = np.array([kind.count for kind in kinds if kind is not None])
-        begin = np.cumsum(count) - count
+        begin = self._numbers.first[rows]
         order = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
         label = np.array([order[kind] for kind in kinds])
         groups: list[Group] = []
@@ -180,6 +181,83 @@ class LetteredLines:
             ]
             groups.append((own, tuple(kind.columns), numbers))
         return merged(groups, len(rows))
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Where the numbers of a text are that differ from block to block (`Lexer.measure`), m of them.
+
+    Parameters
+    ----------
+    text : (n,) uint8
+        Ends with a line end.
+    start, stop : (m,) int64
+    """
+
+    text: NDArray[np.uint8]
+    start: Ints
+    stop: Ints
+
+    def marked(self) -> bytes:
+        """The text with a mark instead of each number."""
+        marked, kept = self.text.copy(), ~self._inside
+        marked[marked == _MARK[0]] = ord("?")
+        marked[self.start] = _MARK[0]
+        kept[self.start] = True
+        return marked[kept].tobytes()
+
+    @cached_property
+    def values(self) -> Floats:
+        """(m,) The numbers."""
+        written, kept = np.where(self._inside, self.text, ord(" ")), self._inside.copy()
+        kept[self.stop] = True
+        return parse_numbers(written[kept].astype(np.uint8).tobytes())
+
+    @cached_property
+    def first(self) -> Ints:
+        """(l,) Number of the first one of each line, or behind it."""
+        ends = np.flatnonzero(self.text == _LINE_END)
+        return np.searchsorted(self.start, np.concatenate(([0], ends[:-1] + 1)))
+
+    @cached_property
+    def _inside(self) -> Bools:
+        """(n,) whether a byte belongs to a number."""
+        edges = np.zeros(len(self.text) + 1, np.int8)
+        edges[self.start] = 1
+        edges[self.stop] -= 1
+        inside: Bools = np.cumsum(edges[:-1], dtype=np.int8) > 0
+        return inside
+
+
+def find_numbers(text: bytes, lexer: Lexer) -> Numbers:
+    """Numbers of a text as `Lexer.measure` finds them; those of most controls all at once."""
+    raw = np.frombuffer(text, np.uint8)
+    if lexer.measure is Lexer.measure:
+        return Numbers(raw, *_plain_numbers(raw))
+    spans = np.array([match.span() for match in lexer.measure.finditer(text)], np.int64).reshape(-1, 2)
+    return Numbers(raw, spans[:, 0], spans[:, 1])
+
+
+def _plain_numbers(raw: NDArray[np.uint8]) -> tuple[Ints, Ints]:
+    """Starts and stops of `Lexer.measure`: digits with a point, perhaps a sign before; a second point ends them."""
+    point = raw == ord(".")
+    edges = np.flatnonzero(np.diff(point | _digit(raw), prepend=False, append=False))
+    start, stop = edges[::2], edges[1::2]
+    points = np.append(np.flatnonzero(point), [len(raw)] * 2)
+    own = np.searchsorted(points, start)
+    stop = np.minimum(stop, points[own + 1])
+    with_point = (points[own] < stop) & (stop - start > 1)
+    start, stop = start[with_point], stop[with_point]
+    before, farther = (np.where(start >= k, raw[start - k], _LINE_END) for k in (1, 2))
+    signed = (before == ord("+")) | (before == ord("-"))
+    taken = (farther == ord("G")) | (farther == ord(".")) | _digit(farther)
+    free = before != ord("G")
+    return (start - (signed & ~taken))[free], stop[free]
+
+
+def _digit(raw: NDArray[np.uint8]) -> Bools:
+    digits: Bools = raw - np.uint8(ord("0")) <= np.uint8(9)
+    return digits
 
 
 @dataclass(frozen=True, eq=False)

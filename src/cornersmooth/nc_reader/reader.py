@@ -27,6 +27,12 @@ from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
 from cornersmooth.nc_reader.way_back import WayBack
 from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables
 
+#: name in `State.memory` of the tool that has been chosen
+TOOL: Final = "tool"
+
+#: name in `State.memory` of where a tool of another length has left
+LEFT_AT: Final = "left at"
+
 #: share of the tolerance, at the axis point, that a tool without words for its axis may lean
 FIXED_SHARE: Final = 0.1
 
@@ -177,6 +183,21 @@ class Reader:
                 return float(known[-1])
         return self.modal.code
 
+    def _take_tool(self) -> None:
+        """Go on with the length of another tool."""
+        assert self.rotary is not None
+        before, last = self.rotary.machine, [*self.given, *self.ready][-1:]
+        machine = before.with_tool(int(self.memory.get(TOOL, -1)))
+        self.rotary = replace(self.rotary, machine=machine)
+        if last and machine.tool_length != before.tool_length:
+            self.memory[LEFT_AT] = last[0].tip[-1]
+
+    def _arrive_again(self, run: Executed, step: float) -> None:
+        """Put another tool to where the one before has left, if no more than printed digits are between."""
+        left_at = self.memory.pop(LEFT_AT, None)
+        if left_at is not None and np.linalg.norm(run.tip[0] - left_at) <= step:
+            run.tip[0] = left_at
+
     def _know_points(self, run: Executed) -> None:
         """From here on U V W are a point on the axis: what was said before of the axis is no such point."""
         if self.placed:
@@ -194,6 +215,7 @@ class Reader:
         if self.rotary is not None:
             lever = self.lever if self._given_lever is None else self._given_lever
             steps = replace(self.rotary, tip_step=steps[0]).steps(lever)
+            self._arrive_again(run, steps[0])
         self.ready.append(path_elements(run, second_is, steps, rotary=self.rotary is not None))
         self.way_back.look_along(self.ready[-1])
         self.elements += len(run.kind)
@@ -241,6 +263,10 @@ class Reader:
 
     def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
         """Say a word that stands beside the motion; a late one acts after the motion of its block."""
+        if letter == "T":
+            self.memory[TOOL] = value
+        elif (letter, value) == ("M", 6.0) and self.rotary is not None:
+            self._take_tool()
         if letter == "M" and self.rotary is not None and take_clamp(value, self.rotary.machine, self.memory):
             return
         if late:

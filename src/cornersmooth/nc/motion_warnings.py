@@ -1,0 +1,76 @@
+"""What is said of the motion while it is written: first motions, spindles that stand, words that may be refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.model import Floats, Program
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.run import Run
+
+#: cosine of the angle from Z beyond which a tool is tilted
+_UPRIGHT: Final = 1.0 - 1e-6
+
+
+@dataclass
+class MotionWarnings:
+    """Says each of them once, or once for each tool.
+
+    Parameters
+    ----------
+    program : Program
+    findings : Findings
+    """
+
+    program: Program
+    findings: Findings
+    _said_tool: bool = False
+    _said_spindle: bool = False
+    _said_turns: bool = False
+
+    def another_tool(self) -> None:
+        """Begin anew with what is said for each tool."""
+        self._said_spindle = False
+
+    def of_first(self, pose: int, form: Form, *, rapid: bool) -> None:
+        """Say that the control turns the tool on its own behind a retract, or feeds down from there."""
+        line = int(self.program.line[pose])
+        if not form.rotary and self.program.axis[pose][2] < _UPRIGHT:
+            text = "the first motion of a tool turns it to a tilted axis; see that it is free to, or name the machine"
+            self.findings.add("CS337", "warning", line, text)
+        if not rapid:
+            text = "the first motion of a tool is a feed move: it feeds down from the height of the retract"
+            self.findings.add("CS333", "warning", line, text)
+
+    def of_tool(self, pose: int, tool: int | None) -> None:
+        """Say that a tool moves that was not loaded."""
+        if tool is None and not self._said_tool:
+            self._said_tool = True
+            text = "the CL file loads no tool before it moves: the tool in the spindle is taken, with length register 1"
+            self.findings.add("CS334", "warning", int(self.program.line[pose]), text)
+
+    def of_cut(self, pose: int, *, turning: bool) -> None:
+        """Say that a tool cuts while the spindle stands."""
+        if not turning and not self._said_spindle:
+            self._said_spindle = True
+            text = "the spindle is not started before the first cut of a tool"
+            self.findings.add("CS335", "warning", int(self.program.line[pose]), text)
+
+    def of_turns(self, run: Run, form: Form, angles: Floats) -> None:
+        """Say that an endless axis gets words that some machines of the control refuse; `angles` are those of `run`."""
+        if self._said_turns or form.mode.motion.endless_words or form.machine is None:
+            return
+        endless = np.array([axis.limits is None and not axis.modulo for axis in form.machine.axes])
+        rows = np.flatnonzero(((angles[:, endless] < 0.0) | (angles[:, endless] >= 360.0)).any(axis=1))
+        if len(rows):
+            self._said_turns = True
+            names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
+            text = (
+                f"words of {names} beyond 0 to 360 deg: a modulo axis takes them only where the builder allows it "
+                "(MD30455 bit 0, else alarm 16830); else write modulo = true for the axis in a machine file"
+            )
+            self.findings.add("CS346", "warning", int(self.program.line[run.move[rows[0]]]), text)
