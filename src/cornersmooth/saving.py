@@ -12,7 +12,7 @@ from cornersmooth import nc, smoothing
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.feedrate import Limits, direct, plan_text
 from cornersmooth.feedrate.written import written_motion
-from cornersmooth.kinematics import Machine, with_dynamics
+from cornersmooth.kinematics import Machine, endless, with_dynamics
 from cornersmooth.model import Arcs, Floats, Ints, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import read_back
@@ -48,6 +48,8 @@ def estimate_saving(
         None where nothing can be planned: without any feed, or out of reach of the machine.
     """
     machine = with_dynamics(form.machine)
+    if machine is not None and form.rewind:
+        machine = endless(machine)
     feed = feed_times(program, limits)
     before = after = at_feed = 0.0
     planned = 0

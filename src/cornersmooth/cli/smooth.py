@@ -218,6 +218,7 @@ def _form(given: dict[str, Any]) -> Form:
         tcp=not given["no_tcp"],
         extras=given["extras"],
         digits=given["digits"],
+        rewind=given["rewind"] or 0.0,
     )
 
 

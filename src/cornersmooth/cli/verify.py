@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 #: problems shown without -v
 _PROBLEMS_SHOWN = 20
 
+#: rewinds shown
+_REWINDS_SHOWN = 5
+
 
 @click.command(
     "verify",
@@ -246,6 +249,10 @@ def _summary(found: Verification) -> Iterator[str]:
     yield f"{'tangent jump':<18}{_place(found.tangent_jump, 'deg')}"
     if found.curves:
         yield f"{'curvature jump':<18}{_place(found.curvature_jump, '1/mm')}"
+    for out, back in found.rewinds[:_REWINDS_SHOWN]:
+        yield f"{'rewind':<18}the cut is left at NC line {out}, and gone on with at NC line {back}"
+    if len(found.rewinds) > _REWINDS_SHOWN:
+        yield f"{'':<18}{more(len(found.rewinds) - _REWINDS_SHOWN, 'rewind')}"
     for line, block in found.trusted:
         yield f"{'taken on trust':<18}{block}, NC line {line}"
     yield f"{'blocks':<18}{found.blocks}, shortest move {_place(found.shortest, 'mm')}"

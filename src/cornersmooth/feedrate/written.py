@@ -14,7 +14,7 @@ from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.planner import Progress, plan_path
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.feedrate.written_curves import WrittenCurves
-from cornersmooth.kinematics import Machine
+from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Program, Source, Statement
 from cornersmooth.nc_reader.elements import Element, Event, NcProgram
 from cornersmooth.settings import Settings
@@ -262,4 +262,5 @@ def plan_text(
     inside = motion.within[path.move] & ~path.turning & ~np.concatenate(([True], path.turning[:-1]))
     path = replace(path, junction_speed=np.where(np.append(inside, False), np.inf, path.junction_speed))
     path = within_blocks(path, limits, BlockLimits() if blocks is None else blocks, motion.blocks)
-    return plan_path(path, limits, machine=machine, progress=progress)
+    # limits of rotary axes are the text's affair: it may turn them back where the path does not show it
+    return plan_path(path, limits, machine=None if machine is None else endless(machine), progress=progress)

@@ -248,5 +248,11 @@ def with_dynamics(machine: Machine | None) -> Machine | None:
     return machine if machine is not None and machine.dynamics else None
 
 
+def endless(machine: Machine) -> Machine:
+    """Return the machine with rotary axes that turn without end: for plans of texts that turn back by themselves."""
+    first, second = (replace(axis, limits=None) for axis in machine.axes)
+    return replace(machine, axes=(first, second))
+
+
 def _parallel(one: Floats, other: Floats) -> bool:
     return float(np.linalg.norm(np.cross(one, other))) < PARALLEL

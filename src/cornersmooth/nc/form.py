@@ -34,6 +34,8 @@ class Form:
         Functions of the control that were asked for.
     upright : Mode or None
         `FormTable.upright`.
+    rewind : float, mm
+        How far a cut is left along the tool where a rotary axis would pass its limit; 0 where that is an error.
     """
 
     table: Control
@@ -44,6 +46,7 @@ class Form:
     machine: Machine | None = None
     extras: tuple[Extra, ...] = ()
     upright: Mode | None = None
+    rewind: float = 0.0
 
     @property
     def control(self) -> str:

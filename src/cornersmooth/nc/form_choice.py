@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from cornersmooth.settings import Settings
 from cornersmooth.tables import closest
 from cornersmooth.vectors import norm
 
+#: mm along the tool that a cut is left by, at least: less is not clear of it
+LEAST_REWIND: Final = 1.0
+
 
 def choose_form(
     control: str | Path | Control = "fanuc",
@@ -27,6 +31,7 @@ def choose_form(
     tcp: bool = True,
     extras: Iterable[str] = (),
     digits: str = "",
+    rewind: float = 0.0,
 ) -> Form:
     """Return the form of a control by name; the control's default where `form` is None.
 
@@ -42,6 +47,8 @@ def choose_form(
         Names of functions of the control to be switched on.
     digits : str
         As `Control.with_digits` takes it; empty for those of the control's table.
+    rewind : float, mm
+        How far a cut is left along the tool where a rotary axis would pass its limit; 0 where that is an error.
 
     Raises
     ------
@@ -70,7 +77,9 @@ def choose_form(
             asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
             mode = chosen.modes[orientation]
             _check_modulo(table, chosen, mode, machine)
-            return Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright)
+            found = Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright, rewind)
+            _check_rewind(found)
+            return found
     raise _refusal(table, chosen, wanted, machine)
 
 
@@ -85,6 +94,24 @@ def _check_modulo(table: Control, form: FormTable, mode: Mode, machine: Machine 
         raise SettingsError("CS215", text, f"use -f {lines}" if lines else hint)
     if not mode.motion.shortest:
         raise SettingsError("CS215", f"{table.name} has no words by which {axes} goes the shorter way", hint)
+
+
+def _check_rewind(form: Form) -> None:
+    """Refuse to leave cuts where there is nothing above which rotary axes could turn."""
+    if not form.rewind:
+        return
+    here = f"{form.control} form {form.name}"
+    if not form.rewind >= LEAST_REWIND:
+        raise SettingsError("CS202", f"rewind is {form.rewind:g} mm", f"give {LEAST_REWIND:g} mm or more")
+    if not form.rotary:
+        raise SettingsError("CS215", f"{here} has no rotary axes here that could turn back", "leave out --rewind")
+    if form.curves:
+        lines = next((name for name, other in form.table.forms.items() if not other.curve), "")
+        hint = f"use -f {lines}" if lines else "leave out --rewind"
+        raise SettingsError("CS215", f"{here} has curves, which are not left on the way", hint)
+    if not form.table.program.retract:
+        what = f"the table of {form.control} has no retract above which rotary axes could turn back"
+        raise SettingsError("CS215", what, "leave out --rewind")
 
 
 def _extra(table: Control, form: str, name: str) -> Extra:

@@ -20,7 +20,7 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.holes import Cycle, approaches, hole_moves, travel_height, travel_of
 from cornersmooth.nc.motion_warnings import MotionWarnings
 from cornersmooth.nc.operation import Operation
-from cornersmooth.nc.rewinds import rows_that_swing
+from cornersmooth.nc.rewinds import refuse_compensated, retracts_before
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.statement_args import with_starts
 from cornersmooth.nc.statement_writer import StatementWriter
@@ -213,6 +213,7 @@ class MotionWriter:
             bezier=self.writer.bezier(rows.tip[part], rows.other[part], rows.curve[part], spline),
             spline=spline,
             blend=rows.blend[part] if rows.blend is not None else None,
+            left=rows.left[part] if rows.left is not None else None,
         )
         before = len(run)
         run = self._moving(run)
@@ -220,35 +221,41 @@ class MotionWriter:
         yield from self._emit_above(run)
 
     def _emit_above(self, run: Run, dwell: int = 0) -> Iterator[bytes]:
-        """Write a run; where rotary axes swing the tool in a rapid, the tool goes up before."""
+        """Write a run; where rotary axes swing the tool in a rapid, or turn back in a cut, the tool goes up before."""
         first = 0
-        for row in self._rewinds(run).tolist():
+        for row, in_cut in self._turns(run):
             if row > first:
                 yield from self._emit(run.part(first, row), dwell)
-            yield from self._blocks(self.operation.go_home())
-            first = row
+            if in_cut:
+                yield from self._leave_cut(run.part(row, row + 1))
+            else:
+                yield from self._blocks(self.operation.go_home())
+            first = row + in_cut
         yield from self._emit(run.part(first, len(run)) if first else run, dwell)
+
+    def _turns(self, run: Run) -> list[tuple[int, bool]]:
+        """Rows before which the tool goes up so that rotary axes turn there, and whether that is within a cut."""
+        cuts = np.zeros(0, np.int64) if run.left is None else np.flatnonzero(run.left)
+        return sorted([(row, False) for row in self._rewinds(run).tolist()] + [(row, True) for row in cuts.tolist()])
+
+    def _leave_cut(self, back: Run) -> Iterator[bytes]:
+        """Leave a cut along the tool, and come back to the row where it goes on, with other rotary words, at feed."""
+        assert self._position is not None
+        if self.statements.compensated:
+            refuse_compensated(self.program, int(back.move[0]))
+        away = self.writer.form.rewind
+        yield from self._blocks([self.writer.rapid(self.writer.lifted(self._position, away))])
+        yield from self._blocks(self.operation.go_home(along=False))
+        yield from self._emit(back, above=away)
 
     def _rewinds(self, run: Run) -> Ints:
         """Rows before which the tool goes up, so that rotary axes turn back there."""
-        form = self.writer.form
-        if not form.rotary or form.machine is None or not len(run) or not run.rapid.any():
+        if not self.writer.form.rotary or not len(run) or not run.rapid.any():
             return np.zeros(0, np.int64)
         before = run.ticks[:1] if self._position is None else self._position[None]
         angles = self.writer.angles(np.concatenate((before, run.ticks)))
-        rows = rows_that_swing(form.machine, angles, np.concatenate(([False], run.rapid))) - 1
-        if not len(rows):
-            return rows
-        line = int(self.program.line[run.move[rows[0]]])
-        if not self.operation.can_rewind():
-            text = (
-                "rotary axes swing the tilted tool in a rapid, and the control's table has no retract: keep clear there"
-            )
-            self.findings.add("CS340", "warning", line, text, len(rows))
-            return rows[:0]
-        text = "retract before a rapid in which rotary axes swing the tilted tool: they turn at its height"
-        self.findings.add("CS341", "note", line, text, len(rows))
-        return rows
+        lines = self.program.line[run.move]
+        return retracts_before(self.writer.form, angles, run.rapid, lines, self.findings, self.operation.can_rewind())
 
     def _begins_at_stated(self, move: int) -> bool:
         """Whether a move is an arc from a stated position, met for the first time."""
@@ -407,7 +414,8 @@ class MotionWriter:
         kept = new | (run.curve > 0)
         return run if kept.all() else run.only(kept)
 
-    def _emit(self, run: Run, dwell: int = 0) -> Iterator[bytes]:
+    def _emit(self, run: Run, dwell: int = 0, above: float = 0.0) -> Iterator[bytes]:
+        """Write a run; behind a retract the tool comes down along its axis from so many mm above."""
         if not len(run):
             return
         first = run.ticks[0]
@@ -415,8 +423,9 @@ class MotionWriter:
             yield from self._blocks(self.operation.begin(self._rotary_blocks(first)))
         if self.operation.retracted:
             self.operation.retracted = False
-            self._warnings.of_first(int(run.move[0]), self.writer.form, rapid=bool(run.rapid[0]))
-            yield from self._blocks(self._approaches(first, bool(run.rapid[0])))
+            if not above:
+                self._warnings.of_first(int(run.move[0]), self.writer.form, rapid=bool(run.rapid[0]))
+            yield from self._blocks(self._approaches(first, above or self.approach * bool(run.rapid[0])))
         self._warnings.of_tool(int(run.move[0]), self.statements.tool)
         if not run.rapid.all():
             self._warnings.of_cut(int(run.move[np.argmin(run.rapid)]), turning=bool(self.operation.spindle))
@@ -426,11 +435,11 @@ class MotionWriter:
         self._last_writer = self.writer
         yield self.writer.text(run, dwell)
 
-    def _approaches(self, first: Ints, rapid: bool) -> list[str]:
+    def _approaches(self, first: Ints, above: float) -> list[str]:
         """Blocks that bring the tool over its first position, and to where it comes down along its axis."""
-        if not (self.approach and rapid and self.operation.can_rewind()):
+        if not (above and self.operation.can_rewind()):
             return self.writer.approach(first)
-        start = self.writer.lifted(first, self.approach)
+        start = self.writer.lifted(first, above)
         return [*self.writer.approach(start), self.writer.rapid(start)]
 
     def _withdraw(self) -> list[str]:

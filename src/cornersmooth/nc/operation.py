@@ -111,11 +111,17 @@ class Operation:
         self._moved = False
         return [*self._back(), *self._expand(steps)]
 
-    def go_home(self) -> list[str]:
-        """Blocks that bring the tool to the height of the retract with spindle and coolant on."""
+    def go_home(self, *, along: bool = True) -> list[str]:
+        """Blocks that bring the tool to the height of the retract with spindle and coolant on.
+
+        Parameters
+        ----------
+        along : bool
+            Whether it may have to go back along its axis first.
+        """
         self._moved = self.begun = False
         return [
-            *self._back(),
+            *(self._back() if along else ()),
             *self._expand([step for step in self.form.table.program.tool_end if step in _STEPS.keys() - _RUNNING_ON]),
         ]
 

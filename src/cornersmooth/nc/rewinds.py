@@ -6,12 +6,15 @@ by 300 degrees leads a tool that leans by 30 degrees all the way round. The tool
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NoReturn
 
 import numpy as np
 
+from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, tool_axis
-from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints, Program
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
 from cornersmooth.vectors import dot
 
 #: degrees by which the way of the tool axis may be longer than the shortest one
@@ -48,6 +51,42 @@ def rows_that_swing(machine: Machine, angles: Floats, rapid: Bools) -> Ints:
     turn = np.abs(np.diff(angles, axis=0)).max(axis=1) > LONGEST_DETOUR / 2
     rows = np.flatnonzero(rapid[1:] & turn) + 1
     return rows[swinging(machine, angles[rows - 1], angles[rows])] if len(rows) else rows
+
+
+def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findings: Findings, possible: bool) -> Ints:
+    """Rows of a run before which the tool goes up, so that rotary axes turn back there; says so.
+
+    Parameters
+    ----------
+    form : Form
+        With rotary words.
+    angles : (r + 1, 2) float64, degrees
+        Before the run, and of its rows.
+    rapid : (r,) bool
+    line : (r,) int64
+        Of the CL file.
+    findings : Findings
+    possible : bool
+        Whether the control has a retract.
+    """
+    assert form.machine is not None
+    rows = rows_that_swing(form.machine, angles, np.concatenate(([False], rapid))) - 1
+    if not len(rows):
+        return rows
+    if not possible:
+        text = "rotary axes swing the tilted tool in a rapid, and the control's table has no retract: keep clear there"
+        findings.add("CS340", "warning", int(line[rows[0]]), text, len(rows))
+        return rows[:0]
+    text = "retract before a rapid in which rotary axes swing the tilted tool: they turn at its height"
+    findings.add("CS341", "note", int(line[rows[0]]), text, len(rows))
+    return rows
+
+
+def refuse_compensated(program: Program, pose: int) -> NoReturn:
+    """Give up at a rewind within cutter compensation, which would have to be cancelled and begun again."""
+    what = "a rotary axis would have to turn back in a cut with cutter compensation"
+    hint = "let the CAM system put the cutter's radius into the path"
+    raise InputError("CS377", what, hint, file=program.source.name, line=int(program.line[pose]))
 
 
 def _angle(a: Floats, b: Floats) -> Floats:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import corner_blends, line_limits
 from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
-from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves, rotary_angles
+from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves, rewound_angles, rotary_angles
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
@@ -80,7 +81,18 @@ def rotary_rows(
     own_machine, machine = machine, machine.with_longest_tool()
     rapid, line, file = rapid_moves(program.kind)[move], program.line[move], program.source.name
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_length)
-    path = rotary_angles(machine, tip, axis, tolerance=tolerance, rapid=rapid, line=line, file=file)
+    how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": line, "file": file}
+    left = np.zeros(len(move), np.bool_)
+    if form.rewind:
+        path, source, left = rewound_angles(machine, tip, axis, **how)
+        if left.any():
+            tip, axis, move = tip[source], axis[source], move[source]
+            rapid = rapid[source] | left
+            _tell_rewinds(machine, path.angles, left, program.line[move], findings)
+        del source
+    else:
+        path = rotary_angles(machine, tip, axis, **how)
+    del how
     for finding in path.findings:
         findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
     angles = path.angles
@@ -110,24 +122,26 @@ def rotary_rows(
         inserted += len(more)
         unsolved += line[more.unsolved + 1].tolist()
         filled = fill(tip[here], axis[here], angles[here], more)
+        held = left[here] | np.append(left[here][1:], False)  # both rows of a place where a cut is left
         start, at_pose = segments_of_rows(move, here.start, here.stop)
         blend = None
         if long:
             row = filled.pose
             exact = at_pose[row] & ~filled.inserted
             found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move[here][row], start[row], exact)
+            found = replace(found, fixed=found.fixed | (held[row] & ~filled.inserted))
             kept = fewest_lines(found, limits)
             filled = filled.only(kept)
             blend = corner_blends(found, kept, rapid[here][filled.pose], limits, settings, form)
         own = slice(1 if begin else 0, None)
         of_timed, fastest = None if timed is None else timed[here], form.mode.motion.fastest
-        rate = _rates(filled, move[here], of_timed, program, settings, form)
+        rate = _rates(filled, move[here], left[here], of_timed, program, settings, form)
         if rate is not None and fastest:
             if form.orientation == "machine" and (rate > fastest).any():
                 before = len(filled.pose)
-                filled = _merged(smoothed, machine, filled, (move[here], start, at_pose), rate, limits, fastest)
+                filled = _merged(smoothed, machine, filled, (move[here], start, at_pose, held), rate, limits, fastest)
                 merged += before - len(filled.pose)
-                rate = _rates(filled, move[here], of_timed, program, settings, form)
+                rate = _rates(filled, move[here], left[here], of_timed, program, settings, form)
             assert rate is not None
             beyond = np.flatnonzero(rate[own] > fastest)
             if len(beyond) and not slowed:
@@ -147,6 +161,7 @@ def rotary_rows(
             joined=np.zeros(count, np.bool_),
             rate=None if rate is None else rate[own],
             blend=None if blend is None else blend[own],
+            left=(left[here][filled.pose] & ~filled.inserted)[own] if left.any() else None,
         )
     if unsolved:
         text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
@@ -166,7 +181,7 @@ def _merged(
     smoothed: SmoothProgram,
     machine: Machine,
     filled: FilledPath,
-    rows: tuple[Ints, Ints, Bools],
+    rows: tuple[Ints, Ints, Bools, Bools],
     rate: Floats,
     limits: LineLimits,
     fastest: float,
@@ -175,13 +190,15 @@ def _merged(
 
     Parameters
     ----------
-    rows : (n,) int64, (n,) int64, (n,) bool
-        Move of each row of the unfilled path, the pose that its segment starts from, and whether it is at a pose.
+    rows : (n,) int64, (n,) int64, (n,) bool, (n,) bool
+        Move of each row of the unfilled path, the pose that its segment starts from, whether it is at a pose, and
+        whether it stays in any case.
     rate : (m,) float64, 1/min
     """
     own, inserted = filled.pose, filled.inserted
     move, start, at_pose = rows[0][own], rows[1][own], rows[2][own] & ~inserted
     found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move, start, at_pose)
+    fixed = found.fixed | (rows[3][own] & ~inserted)
     quick = rate > fastest
     minutes = np.where(np.isfinite(rate), 1.0 / np.where(rate > 0.0, rate, 1.0), 0.0)
     # a row stays where it ends a part of the time that is long enough
@@ -196,7 +213,19 @@ def _merged(
         axis_point=_MERGED_SHARE * limits.axis_point,
         turn=min(limits.turn, _MERGED_TURN),
     )
-    return filled.only(fewest_lines(replace(found, fixed=found.fixed | ends | ~between, position=position), limits))
+    return filled.only(fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits))
+
+
+def _tell_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, findings: Findings) -> None:
+    """Say where cuts are left, for each axis that turns there."""
+    rows = np.flatnonzero(left)
+    turn = np.abs(angles[rows] - angles[rows - 1])
+    column = int(np.argmax(turn[0]))
+    text = (
+        f"the cut is left along the tool and gone on with where {machine.names[column]} has turned by "
+        f"{turn[0, column]:.4g} deg above the retract: expect a mark on the part"
+    )
+    findings.add("CS376", "warning", int(line[rows[0]]), text, len(rows))
 
 
 def _whole(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:
@@ -238,12 +267,13 @@ def _timed_cuts(angles: Floats, move: Ints, program: Program) -> Bools:
 
 
 def _rates(
-    path: FilledPath, move: Ints, timed: Bools | None, program: Program, settings: Settings, form: Form
+    path: FilledPath, move: Ints, left: Bools, timed: Bools | None, program: Program, settings: Settings, form: Form
 ) -> Floats | None:
     """(m,) moves per minute where blocks are timed by us, NaN elsewhere; None where none is.
 
     `timed` says which rows without inserted ones; else it is every block in which only rotary axes turn, for controls
-    that want it. Where the tip stands still, the axis point runs with the feed.
+    that want it. Where the tip stands still, the axis point runs with the feed. `left` says of rows without inserted
+    ones where the tool comes back into a cut that it has left.
     """
     if timed is None and not form.mode.timed_turns:
         return None
@@ -260,4 +290,8 @@ def _rates(
     rate = np.full(len(own), np.nan)
     rate[chosen] = inverse_time(way[chosen], program.feed[own[chosen]], turn[chosen], _FASTEST_TURN)
     rate[~np.isfinite(rate)] = np.nan
+    back = left[path.pose] & ~path.inserted
+    if back.any():
+        rate[back] = program.feed[own[back]] / form.rewind if timed is not None else np.nan
+        rate[back & ~chosen] = np.nan
     return rate

@@ -37,6 +37,8 @@ class Run:
     spline : (r, 3) float64 or None
     blend : (r,) float64 or None, mm
         As in `Rows`.
+    left : (r,) bool or None
+        As in `Rows`.
     """
 
     ticks: Ints
@@ -51,6 +53,7 @@ class Run:
     bezier: Floats | None = None
     spline: Floats | None = None
     blend: Floats | None = None
+    left: Bools | None = None
 
     def __len__(self) -> int:
         return len(self.ticks)

@@ -19,7 +19,8 @@ Where is what:
 - what a text is: `source` (bytes), `reading_options` (control, machine, digits), `dialects` (grammar), `word_list`
 - bytes to tables: `lexer`, `words`, `block_tables`, `line_patterns`
 - tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `long_curves`, `rotary`;
-  `needed_states` says which words want another state; `way_back` leads back from retracts
+  `needed_states` says which words want another state; `way_back` leads back from retracts,
+  `left_cuts` back into cuts
 - what comes out: `path_elements`, `elements`; `curves` evaluates them; `reading` puts a whole text together
 """
 

@@ -275,6 +275,9 @@ class NcProgram(Elements):
     along_tool : tuple of (int, bool)
         Rapids straight along the tool beside retracts, which posts add: the element, and whether it goes back to the
         retract from the element before or down from it to the element behind.
+    left_cuts : tuple of (int, int, int, int)
+        Cuts that are left along the tool for a retract and gone on with: the elements along the tool, out and above,
+        and NC lines of leaving and of coming back.
     """
 
     events: tuple[Event, ...]
@@ -283,6 +286,7 @@ class NcProgram(Elements):
     blocks: int
     unsaid: frozenset[str | tuple[str, float]] = frozenset()
     along_tool: tuple[tuple[int, bool], ...] = ()
+    left_cuts: tuple[tuple[int, int, int, int], ...] = ()
 
     @property
     def mm_per_unit(self) -> float:

@@ -1,4 +1,4 @@
-"""Motion words that a control takes for something else in another state: those of the axis and of curves (CS506)."""
+"""Motion words that a control takes for something else in another state, or not at all: of the axis and of curves."""
 
 from __future__ import annotations
 
@@ -64,6 +64,30 @@ def modulo_problems(table: Table, machine: Machine, words: str, memory: Mapping[
         problems += [
             Problem(CONTROL_WORDS, 0, int(table.line[np.argmax(wrong)]), text) for wrong, text in found if wrong.any()
         ]
+    return problems
+
+
+def limit_problems(table: Table, run: Executed, machine: Machine, step: float) -> list[Problem]:
+    """Return which rotary words of a run lie beyond the limits of their axes.
+
+    Parameters
+    ----------
+    table : Table
+    run : Executed
+        What becomes of it; of curves, whose control points may lie farther out, the ends.
+    machine : Machine
+    step : float, degrees
+        Last printed digit.
+    """
+    problems = []
+    for column, axis in enumerate(machine.axes):
+        if axis.limits is None:
+            continue
+        values, line = (run.second[:, column], run.line) if len(run.curves) else (table.column(axis.name), table.line)
+        beyond = np.flatnonzero((values < axis.low - step / 2) | (values > axis.high + step / 2))
+        if len(beyond):
+            text = f"{axis.name} goes to {values[beyond[0]]:g} deg, its limits are {axis.low:g} and {axis.high:g}"
+            problems.append(Problem("CS581", 0, int(line[beyond[0]]), text))
     return problems
 
 

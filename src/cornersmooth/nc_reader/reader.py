@@ -14,10 +14,12 @@ from cornersmooth.nc_reader.dialects.base import INCREMENTAL
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Executed, Modal, execute
 from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
+from cornersmooth.nc_reader.left_cuts import LeftCuts
 from cornersmooth.nc_reader.needed_states import (
     AxisWords,
     clamp_problems,
     curve_problem,
+    limit_problems,
     modulo_problems,
     take_clamp,
     unclamped_problems,
@@ -77,6 +79,7 @@ class Reader:
         self.placed = False
         self.blocks = 0
         self.way_back = WayBack(name)
+        self.left_cuts = LeftCuts(self.problems)
         #: the last element that was given out, if any
         self.given: list[Elements] = []
         #: elements up to a rapid along the tool before a retract that nobody asked for
@@ -97,7 +100,7 @@ class Reader:
                 self.rows(item)
             else:
                 self.line(item)
-            if self.placed and self.elements - self.given_out >= GIVEN_OUT:
+            if self.placed and self.elements - self.given_out >= GIVEN_OUT and not self.left_cuts.open:
                 yield self._collected()
         self.flush()
         if self.rotary is not None:
@@ -164,6 +167,7 @@ class Reader:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
                 rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
                 self.problems += modulo_problems(table, rotary.machine, self.dialect.shorter_way, self.memory)
+                self.problems += limit_problems(table, run, rotary.machine, rotary.angle_step)
                 run = replace(run, second=rotary.unwrapped(run.second, before.second))
                 if self.dialect.retracts:
                     self._check_swings(rotary.swung(run, start), run)
@@ -218,6 +222,7 @@ class Reader:
             self._arrive_again(run, steps[0])
         self.ready.append(path_elements(run, second_is, steps, rotary=self.rotary is not None))
         self.way_back.look_along(self.ready[-1])
+        self.left_cuts.come_back(self.ready[-1], self.elements)
         self.elements += len(run.kind)
         self.curves += len(run.curves)
         if not self.placed and (run.kind != Element.RAPID).any():
@@ -265,6 +270,7 @@ class Reader:
         """Say a word that stands beside the motion; a late one acts after the motion of its block."""
         if letter == "T":
             self.memory[TOOL] = value
+            self.left_cuts.forget()
         elif (letter, value) == ("M", 6.0) and self.rotary is not None:
             self._take_tool()
         if letter == "M" and self.rotary is not None and take_clamp(value, self.rotary.machine, self.memory):
@@ -296,6 +302,8 @@ class Reader:
 
     def leave(self, axes: str) -> None:
         """Say that axes go to positions of the machine."""
+        if not self.way_back.has_come(self.ready):
+            self.left_cuts.leave([*self.given, *self.ready[-2:]], self.elements)
         if self.way_back.look_back(self.given, self.ready):  # words behind it belong where it comes from
             self.withdrawn = self.elements
             place = len(self.events)

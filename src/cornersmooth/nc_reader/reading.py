@@ -98,4 +98,5 @@ def _program(reader: Reader, parts: list[Elements]) -> NcProgram:
         blocks=reader.blocks,
         unsaid=reader.dialect.unsaid,
         along_tool=tuple(reader.along_tool),
+        left_cuts=tuple(reader.left_cuts.found),
     )

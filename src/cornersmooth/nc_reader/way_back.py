@@ -52,9 +52,13 @@ class WayBack:
         if not line or len(elements) < 2 or int(elements.line[0]) != line:
             return
         ends = elements.part(0, 2)
-        along = (ends.kind == Element.RAPID).all() and _is_above(ends, 0, 1)
+        along = (ends.kind == Element.RAPID).all() and is_above(ends, 0, 1)
         if along and self.added(ends.tip[0], ends.tip[1], ends.tip_step, ends.tip[1]):
             elements.tip[0], elements.second[0] = ends.tip[1], ends.second[1]
+
+    def has_come(self, ready: list[Elements]) -> bool:
+        """Whether the element before the last is on the other side of a retract."""
+        return bool(ready) and int(ready[-1].line[-1]) == self._came
 
     def look_back(self, given: list[Elements], ready: list[Elements]) -> bool:
         """Let a last rapid that nobody asked for, straight back along the tool before a retract, not move the tool.
@@ -74,12 +78,12 @@ class WayBack:
         parts = [*given, *ready[-2:]]
         if not ready or sum(map(len, parts)) < 2 or ready[-1].kind[-1] != Element.RAPID:
             return False
-        if ready[-1].line[-1] == self._came:  # the element before it is on the other side of a retract
+        if self.has_come(ready):
             return False
         whole = Elements.joined(parts)
         ends = whole.part(len(whole) - 2, len(whole))
         near = ends.tip[0]
-        if not (_is_above(ends, 1, 0) and self.added(near, ends.tip[1], ends.tip_step, near)):
+        if not (is_above(ends, 1, 0) and self.added(near, ends.tip[1], ends.tip_step, near)):
             return False
         ready[-1].tip[-1], ready[-1].second[-1] = ends.tip[0], ends.second[0]
         return True
@@ -126,7 +130,7 @@ class WayBack:
         return replace(run, **rows, arc_element=(np.cumsum(kept) - 1)[run.arc_element])
 
 
-def _is_above(ends: Elements, above: int, below: int) -> bool:
+def is_above(ends: Elements, above: int, below: int) -> bool:
     """Whether a tip is straight back along the tool from another, with the same axis."""
     axis = ends.second if ends.second_is == "vector" else ends.second - ends.tip
     axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)

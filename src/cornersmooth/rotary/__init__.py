@@ -3,6 +3,7 @@
 from cornersmooth.rotary.angle_path import RotaryPath, rapid_moves, rotary_angles
 from cornersmooth.rotary.axis_findings import axis_rates
 from cornersmooth.rotary.insertion import FilledPath, Insertions, fill, insertions
+from cornersmooth.rotary.rewinding import rewound_angles
 
 __all__ = [
     "FilledPath",
@@ -12,5 +13,6 @@ __all__ = [
     "fill",
     "insertions",
     "rapid_moves",
+    "rewound_angles",
     "rotary_angles",
 ]

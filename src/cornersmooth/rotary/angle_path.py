@@ -20,6 +20,7 @@ from cornersmooth.kinematics.poses import (
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.rotary.axis_findings import limit_error, pole_finding, reach_error, rewind_finding, swap_finding
 from cornersmooth.rotary.branch_choice import LIMIT_SLACK, PREFERENCE_COST, NoChoiceError, Stretches, choose
+from cornersmooth.rotary.cut_parts import CutTooFarError, parts_of_cut, too_far
 from cornersmooth.rotary.unwrapping import WideSteps, meet_at_pole, unwrap
 
 #: Poses worked on at a time, so that memory is needed for their angles and little else.
@@ -56,6 +57,8 @@ def rotary_angles(
     *,
     tolerance: float,
     rapid: Bools | None = None,
+    left: Bools | None = None,
+    divide: bool = False,
     line: Ints | None = None,
     file: str | None = None,
 ) -> RotaryPath:
@@ -72,6 +75,10 @@ def rotary_angles(
         Also how far outside the reach of the machine an axis may lie (digits of the file) and be taken as on its edge.
     rapid : (n,) bool
         The move into the pose does not cut, so that solution and turn may change in it; only the first by default.
+    left : (n,) bool
+        The pose repeats the one before, behind which a cut is left: solution and turn may change there, too.
+    divide : bool
+        Whether cuts that leave the limits are to be divided.
     line : (n,) int64
         Source lines for messages.
     file : str, optional
@@ -81,17 +88,22 @@ def rotary_angles(
     ------
     InputError
         The machine cannot reach an axis (CS361), or not within the limits of its rotary axes (CS362).
+    CutTooFarError
+        Instead of CS362 where cuts are to be divided, and can be.
     """
     n = len(axis)
     line = np.zeros(n, np.int64) if line is None else line
     rapid = np.zeros(n, np.bool_) if rapid is None else rapid
+    left = np.zeros(n, np.bool_) if left is None else left
     if n == 0:
         return RotaryPath(np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int8), ())
     poses = _sorted_poses(machine, axis, tolerance, line, file)
-    run: Ints = np.cumsum(rapid, dtype=np.int64)
+    run: Ints = np.cumsum(rapid | left, dtype=np.int64)
     branch, swaps = np.full(n, -1, np.int8), np.zeros(0, np.int64)
     if len(poses.steady):
-        angles, branch[poses.steady], swaps = _steady_angles(machine, axis, poses, run, tolerance, line, file)
+        angles, branch[poses.steady], swaps = _steady_angles(
+            machine, axis, poses, run, tolerance, line, file, divide=divide
+        )
         if len(poses.cone):
             steady, angles = angles, np.full((n, 2), np.nan)
             angles[poses.steady] = steady
@@ -112,8 +124,9 @@ def rotary_angles(
                 pose = int(off[here][np.argmax(over)])
                 both = solutions(machine, axis[pose : pose + 1]).angles[0]
                 raise limit_error(machine, both, machine.limits, None, int(line[pose]), 0, file)
-    findings = pole_finding(machine, tip, axis, angles, rapid, line)
-    findings += rewind_finding(machine, angles, rapid, line) + swap_finding(machine, swaps, line)
+    findings = pole_finding(machine, tip, axis, angles, rapid | left, line)
+    findings += rewind_finding(machine, angles, rapid & ~left, line)
+    findings += swap_finding(machine, swaps[~left[swaps]], line)
     return RotaryPath(angles, deviation, branch, findings)
 
 
@@ -172,7 +185,15 @@ def _sorted_poses(machine: Machine, axis: Floats, tolerance: float, line: Ints, 
 
 
 def _steady_angles(
-    machine: Machine, axis: Floats, poses: _Poses, run: Ints, tolerance: float, line: Ints, file: str | None
+    machine: Machine,
+    axis: Floats,
+    poses: _Poses,
+    run: Ints,
+    tolerance: float,
+    line: Ints,
+    file: str | None,
+    *,
+    divide: bool,
 ) -> tuple[Floats, NDArray[np.int8], Ints]:
     """Angles (s, 2) and branches (s,) of the poses outside the cone, and poses before which a rapid changes branch."""
     steady, unwrapped = poses.steady, poses.angles
@@ -209,6 +230,9 @@ def _steady_angles(
     try:
         branch, turns = choose(stretches, machine.limits)
     except NoChoiceError as stuck:
+        left = _divided(stretches, stuck, begins, unwrapped, way, machine.limits) if divide else None
+        if left is not None:
+            raise CutTooFarError(steady[left]) from None
         raise _stuck_error(machine, stuck, stretch, axis, unwrapped, way, steady, run, line, file) from stuck
     angles = np.empty((len(steady), 2))
     for here in _chunks(len(steady)):
@@ -265,6 +289,33 @@ def _into_limits(angles: Floats, limits: Floats) -> Floats:
     return clipped
 
 
+def _extremes(members: Ints, unwrapped: Floats, way: WideSteps) -> tuple[Floats, Floats]:
+    """Lowest and highest angles on the way into rows that follow one another: twice (m, 2, 2)."""
+    low, high = unwrapped[members], unwrapped[members]
+    own = (way.row >= members[0]) & (way.row <= members[-1])
+    row = way.row[own] - members[0]
+    low[row], high[row] = np.minimum(low[row], way.low[own]), np.maximum(high[row], way.high[own])
+    return low, high
+
+
+def _divided(
+    stretches: Stretches, stuck: NoChoiceError, begins: Ints, unwrapped: Floats, way: WideSteps, limits: Floats
+) -> Ints | None:
+    """Rows behind which cuts are to be left: in the one that is stuck, and in all that can be in no turn."""
+    ends = np.append(begins[1:], len(unwrapped))
+    left = []
+    for number in np.union1d(too_far(stretches, limits), stuck.stretch).tolist():
+        members = np.arange(begins[number], ends[number])
+        low, high = _extremes(members, unwrapped, way)
+        entered = stuck if number == stuck.stretch else None
+        rows = parts_of_cut(unwrapped[members], low, high, limits, entered)
+        if rows is None:
+            return None
+        left.append(members[rows])
+    rows = np.concatenate(left)
+    return rows if len(rows) else None
+
+
 def _stuck_error(
     machine: Machine,
     stuck: NoChoiceError,
@@ -280,10 +331,7 @@ def _stuck_error(
     """Message for the pose that no choice gets beyond."""
     limits = machine.limits
     members = np.flatnonzero(stretch == stuck.stretch)
-    low, high = unwrapped[members], unwrapped[members]
-    own = (way.row >= members[0]) & (way.row <= members[-1])
-    row = way.row[own] - members[0]
-    low[row], high[row] = np.minimum(low[row], way.low[own]), np.maximum(high[row], way.high[own])
+    low, high = _extremes(members, unwrapped, way)
     furthest, words = 0, unwrapped[members[0], 0]
     for branch, *turns in stuck.states:
         least, most = low[:, branch] + 360 * np.array(turns), high[:, branch] + 360 * np.array(turns)

@@ -53,6 +53,8 @@ class Rows:
         last knot.
     blend : (r,) float64 or None, mm
         How far the control may round the corner at each row by itself; None where it is not told for each.
+    left : (r,) bool or None
+        Rows at which the tool comes back into a cut that it has left at the row before; None where there is none.
     """
 
     tip: Floats
@@ -65,6 +67,7 @@ class Rows:
     rate: Floats | None = None
     spline: Floats | None = None
     blend: Floats | None = None
+    left: Bools | None = None
 
 
 @dataclass(frozen=True)

@@ -47,11 +47,11 @@ class OwnRapids:
             That of both which is nearer to the part.
         """
         far = end if np.array_equal(near, start) else start
-        known, gone_to = (
-            bool((np.abs(tips - tip) <= _STEPS * step).all(axis=1).any())
-            for tips, tip in ((self.tip, near), (self.tip[self.rapid], far))
-        )
-        return known and not gone_to
+        return _close(self.tip, near, step) and not self.goes_to(far, step)
+
+    def goes_to(self, tip: Floats, step: float) -> bool:
+        """Whether the CL file goes to a tip in rapid, up to printed digits."""
+        return _close(self.tip[self.rapid], tip, step)
 
     def left_out(self, nc: NcProgram) -> tuple[Elements, list[Event]]:
         """Elements and events of a text that was read before, where rapids that posts add do not move the tool.
@@ -70,5 +70,14 @@ class OwnRapids:
                 tip[element], second[element] = tip[near], second[near]
                 if back:  # words behind it belong where it comes from
                     withdrawn.add(element + 1)
+        for left, above, *_ in nc.left_cuts:
+            if not any(self.goes_to(nc.tip[element], nc.tip_step) for element in (left, above)):
+                tip[[left, above]], second[[left, above]] = nc.tip[left - 1], nc.second[left - 1]
+                withdrawn.discard(left + 1)
         events = [replace(event, element=event.element - (event.element in withdrawn)) for event in nc.events]
         return replace(elements, tip=tip, second=second), events
+
+
+def _close(tips: Floats, tip: Floats, step: float) -> bool:
+    """Whether one of some tips (n, 3) is another, up to printed digits."""
+    return bool((np.abs(tips - tip) <= _STEPS * step).all(axis=1).any())

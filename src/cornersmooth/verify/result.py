@@ -71,6 +71,8 @@ class Verification:
         NC lines, and blocks, whose meaning is taken on trust because the user put them there.
     unverified : str
         What of the text was not looked at; empty where all of it was.
+    rewinds : tuple of (int, int)
+        NC lines where a cut is left along the tool, and where the tool comes back into it.
     """
 
     passed: bool
@@ -96,6 +98,7 @@ class Verification:
     pose_nc_line: Ints = field(repr=False)
     trusted: tuple[tuple[int, str], ...] = ()
     unverified: str = ""
+    rewinds: tuple[tuple[int, int], ...] = ()
 
     @property
     def max_tip_deviation_mm(self) -> float:
@@ -135,6 +138,7 @@ class Verification:
             "curves": self.curves,
             "problem_count": self.problem_count,
             "not_verified": self.unverified,
+            "rewinds": [{"nc_line": out, "back_nc_line": back} for out, back in self.rewinds],
             "trusted": [{"nc_line": line, "text": text} for line, text in self.trusted],
             **{key: _finite(where.value) for key, where in places.items()},
             "where": {key: {"cl_line": where.cl_line, "nc_line": where.nc_line} for key, where in places.items()},

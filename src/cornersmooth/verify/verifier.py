@@ -155,7 +155,8 @@ class Verifier:
         text = _Text(iter([elements.at_most() if self._slower else elements]), events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
         found = measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
-        return replace(found, unverified="the words of the text: they are looked at where it is read, not afterwards")
+        unverified = "the words of the text: they are looked at where it is read, not afterwards"
+        return replace(found, unverified=unverified, rewinds=tuple((out, back) for *_, out, back in nc.left_cuts))
 
     def _of_text(self, task: Task, source: Source) -> Verification:
         options = self._options
@@ -168,7 +169,8 @@ class Verifier:
         lines = read_lines(source, self._name, options.dialect.lexer)
         room = options.tolerance / self._program.mm_per_unit
         check = WordCheck(options.control, options.dialect.lexer, room, self._trusted, self._weights)
-        reader.way_back.added = OwnRapids(task).added
+        own_rapids = OwnRapids(task)
+        reader.way_back.added, reader.left_cuts.asked = own_rapids.added, own_rapids.goes_to
         chunks = reader.chunks(check.watch(lines) if self._words else lines)
         text = _Text((part.at_most() for part in chunks) if self._slower else chunks, reader.events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
@@ -181,7 +183,8 @@ class Verifier:
         unverified = f"what your own table says of {', '.join(sorted(own))}" if own else ""
         if not self._words:
             unverified = "words beside the motion, which a table of your own may define"
-        return replace(found, trusted=tuple(check.trusted), unverified=unverified)
+        rewinds = tuple((out, back) for *_, out, back in reader.left_cuts.found)
+        return replace(found, trusted=tuple(check.trusted), unverified=unverified, rewinds=rewinds)
 
 
 def _taking_what(kind: Callable[_Given, object]) -> Callable[[Callable[..., _Found]], Callable[_Given, _Found]]:

@@ -73,6 +73,12 @@ retract = click.option(
     type=LENGTH,
     help="How far the tool goes back along its axis before it goes up. [default: straight up]",
 )
+rewind = click.option(
+    "--rewind",
+    type=LENGTH,
+    help="Where a rotary axis would pass its limit in a cut, leave the cut by this length along the tool, turn the "
+    "axis back above the retract and go on. [default: an error]",
+)
 skip_taps = click.option("--skip-taps", is_flag=True, help="Only go over holes that are to be tapped, with a warning.")
 cycles = click.option(
     "--cycles",
@@ -128,6 +134,7 @@ def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
             work_offset,
             approach,
             retract,
+            rewind,
             skip_taps,
             cycles,
             header,

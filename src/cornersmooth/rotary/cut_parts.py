@@ -1,0 +1,90 @@
+"""A cut that no choice of angles keeps inside the limits, in parts that can be kept: as few as there can be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.rotary.branch_choice import LIMIT_SLACK, NoChoiceError, Stretches
+
+
+class CutTooFarError(Exception):
+    """Cuts that no choice keeps inside the limits, unless they are left on the way.
+
+    Parameters
+    ----------
+    poses : (k,) int64
+        Poses behind which a cut is to be left, ascending.
+    """
+
+    def __init__(self, poses: Ints) -> None:
+        super().__init__(poses)
+        self.poses = poses
+
+
+def too_far(stretches: Stretches, limits: Floats) -> Ints:
+    """Stretches that are inside the limits on no branch and in no turn: (k,) int64."""
+    least = np.ceil((limits[:, 0] - LIMIT_SLACK - stretches.low) / 360)
+    most = np.floor((limits[:, 1] + LIMIT_SLACK - stretches.high) / 360)
+    fits: Bools = np.logical_and.reduce(least <= most, axis=2)
+    return np.flatnonzero(~np.logical_or.reduce(fits, axis=1))
+
+
+def parts_of_cut(
+    angles: Floats, low: Floats, high: Floats, limits: Floats, stuck: NoChoiceError | None = None
+) -> Ints | None:
+    """Rows of a stretch behind which the cut is left, so that all parts of it are inside the limits.
+
+    Parameters
+    ----------
+    angles : (m, 2, 2) float64, degrees
+        ``[row, branch, axis]``, unwrapped.
+    low, high : (m, 2, 2) float64, degrees
+        Extremes on the way into each row.
+    limits : (2, 2) float64, degrees
+    stuck : NoChoiceError, optional
+        Says in which states the stretch can be entered; any that the limits allow otherwise.
+
+    Returns
+    -------
+    (k,) int64 or None
+        None where a single move, or the way in, leaves the limits.
+    """
+    count, begin = len(angles), 0
+    left: list[int] = []
+    while True:
+        if stuck is not None and not left:
+            stop = max(_first_outside(low, high, limits, state[0], state[1:]) for state in stuck.states.astype(float))
+        else:
+            stop = begin + _farthest(angles[begin:], low[begin:], high[begin:], limits)
+        if stop == count:
+            return np.array(left, np.int64)
+        if stop - 1 < begin or (stop - 1 == begin and left):
+            return None
+        begin = stop - 1
+        left.append(begin)
+
+
+def _first_outside(low: Floats, high: Floats, limits: Floats, branch: float, turns: Floats) -> int:
+    """First row outside of the limits; the number of rows where none is."""
+    own = int(branch)
+    beyond = np.maximum(limits[:, 0] - low[:, own] - 360 * turns, high[:, own] + 360 * turns - limits[:, 1])
+    rows = np.flatnonzero(beyond.max(axis=1) > LIMIT_SLACK)
+    return int(rows[0]) if len(rows) else len(low)
+
+
+def _farthest(angles: Floats, low: Floats, high: Floats, limits: Floats) -> int:
+    """First row outside of the limits for the branch and the turns that reach farthest from the first row on."""
+    reached = []
+    for branch in (0, 1):
+        stops = []
+        for axis in (0, 1):
+            lowest = np.minimum.accumulate(np.append(angles[:1, branch, axis], low[1:, branch, axis]))
+            highest = np.maximum.accumulate(np.append(angles[:1, branch, axis], high[1:, branch, axis]))
+            # within the limits as long as a whole number lies between both
+            least = np.ceil((limits[axis, 0] - LIMIT_SLACK - lowest) / 360)
+            most = np.floor((limits[axis, 1] + LIMIT_SLACK - highest) / 360)
+            outside = np.flatnonzero(least > most)
+            stops.append(int(outside[0]) if len(outside) else len(angles))
+        reached.append(min(stops))
+    return max(reached)
