@@ -12,7 +12,8 @@ import pytest
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, load_machine, machine_names, poses, tool_axis
 from cornersmooth.kinematics.poses import angle_between
-from cornersmooth.rotary import angle_path, axis_findings, fill, insertions, rotary_angles
+from cornersmooth.model import Move
+from cornersmooth.rotary import angle_path, axis_findings, fill, insertions, rapid_moves, rotary_angles, still_poses
 
 TOLERANCE = 0.02  # degrees
 
@@ -172,6 +173,24 @@ def test_upright_cuts_wait_where_they_will_be_needed():
     assert np.ptp(c[:10]) < 1e-9
     assert np.ptp(c[10:]) < 1e-9
     assert c[10] - c[9] == pytest.approx(30)
+
+
+@pytest.mark.parametrize("name", ["table-bc", "head-ac", "nutated-bc"])
+def test_holes_near_the_pole_are_not_left_to_the_tolerance(name: str):
+    """Nothing is cut on the way through: a rapid to another axis, another hole, a cut and the hole behind it."""
+    kind = np.array([Move.RAPID, Move.HOLE, Move.HOLE, Move.RAPID, Move.LINEAR, Move.HOLE, Move.LINEAR], np.uint8)
+    axis = tilted([15.0, 1.6, 0.0, 1.0, 2.0, 1.0, 1.0], [180.0, 3.0, 0.0, 90.0, 90.0, 210.0, 210.0])
+    how = {"tolerance": 5.0, "rapid": rapid_moves(kind), "still": still_poses(kind)}
+    path = rotary_angles(load_machine(name), line_of(7), axis, **how)
+    assert still_poses(kind).tolist() == [True, True, True, False, False, True, False]
+    assert path.deviation[still_poses(kind)].max() == 0
+    assert path.deviation.max() <= 5.0
+    # where digits do not tell the axis from the pole the first angle waits
+    near = tilted([15.0, 4e-5, 15.0], [180.0, 3.0, 170.0])
+    how = {"tolerance": 5.0, "rapid": np.ones(3, np.bool_), "still": np.ones(3, np.bool_), "still_tolerance": 1e-4}
+    path = rotary_angles(load_machine(name), line_of(3), near, **how)
+    assert path.angles[1, 0] == path.angles[0, 0]
+    assert path.deviation.max() <= 1e-4
 
 
 def test_start_looks_ahead_to_the_end_of_the_cut():

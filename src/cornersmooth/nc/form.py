@@ -108,7 +108,7 @@ class Form:
         if self.orientation == "fixed":
             return 2.0 / math.sqrt(3.0) * ROTARY_SHARE * tolerance
         if self.rotary:
-            reserve = axis_length * math.radians(self.rotary_tolerance(tolerance, axis_length) + self._angle_rounding)
+            reserve = axis_length * math.radians(self.rotary_tolerance(tolerance, axis_length) + self.angle_rounding)
             return 2.0 / math.sqrt(3.0) * reserve
         return axis_length * float(10.0**-self.table.digits.vector)
 
@@ -121,6 +121,6 @@ class Form:
         return math.degrees(ROTARY_SHARE * tolerance / axis_length)
 
     @property
-    def _angle_rounding(self) -> float:
+    def angle_rounding(self) -> float:
         """Degrees by which the rounding of both rotary words may turn the axis."""
         return float(10.0**-self.table.digits.angle)

@@ -38,13 +38,14 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
     program, settings, machine = smoothed.program, smoothed.settings, form.machine
     if machine is None:
         raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
-    step, resolution = form.rounding(program.units), 10.0**-form.table.digits.angle
+    step, resolution = form.rounding(program.units), form.angle_rounding
     left = (settings.tolerance - math.sqrt(3.0) / 2.0 * step) / settings.axis_length
     found = rotary_curves(
         smoothed,
         machine,
         tolerance=_STRAIGHT_SHARE * math.degrees(left) - resolution,
         allowance=angle_allowance(smoothed, resolution),
+        angle_resolution=resolution,
         file=program.source.name,
     )
     for finding in found.findings:

@@ -21,7 +21,15 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import corner_blends, line_limits
 from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
-from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves, rewound_angles, rotary_angles
+from cornersmooth.rotary import (
+    FilledPath,
+    fill,
+    insertions,
+    rapid_moves,
+    rewound_angles,
+    rotary_angles,
+    still_poses,
+)
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
@@ -82,6 +90,7 @@ def rotary_rows(
     rapid, line, file = rapid_moves(program.kind)[move], program.line[move], program.source.name
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_length)
     how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": line, "file": file}
+    how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
     left = np.zeros(len(move), np.bool_)
     if form.rewind:
         path, source, left = rewound_angles(machine, tip, axis, **how)

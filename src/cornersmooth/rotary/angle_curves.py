@@ -119,6 +119,7 @@ def rotary_curves(
     *,
     tolerance: float,
     allowance: Floats | None = None,
+    angle_resolution: float = 0.0,
     file: str | None = None,
 ) -> RotaryCurves:
     """Control points of the rotary angles for all smoothed corners, on the knots and weights of their tip curves.
@@ -134,6 +135,8 @@ def rotary_curves(
     allowance : (k,) float64, degrees, optional
         Largest angle between the tool axis and the direction of Q(u) − P(u) for each row of `Corners`, joints included
         (`angle_allowance`); `tolerance` for all by default. Smoothed corners with nothing left become `lines`.
+    angle_resolution : float, degrees
+        Step of the written angles.
     file : str, optional
         For messages.
 
@@ -155,7 +158,7 @@ def rotary_curves(
     if not tolerance > 0:
         raise SettingsError("CS255", f"orientation tolerance is {tolerance:g} deg", "give a positive angle")
     allowed = np.where(allowed < LEAST_ALLOWANCE * tolerance, 0.0, allowed)
-    motion = rotary_motion(smoothed, machine, tolerance, allowed, file)
+    motion = rotary_motion(smoothed, machine, tolerance, allowed, angle_resolution, file)
     work = _Work(smoothed, machine, motion, allowed)
     found, pending = [], np.arange(len(motion.rows))
     for spans, ruled in TRIALS:

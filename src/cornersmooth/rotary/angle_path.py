@@ -59,6 +59,8 @@ def rotary_angles(
     rapid: Bools | None = None,
     left: Bools | None = None,
     divide: bool = False,
+    still: Bools | None = None,
+    still_tolerance: float = 0.0,
     line: Ints | None = None,
     file: str | None = None,
 ) -> RotaryPath:
@@ -79,6 +81,11 @@ def rotary_angles(
         The pose repeats the one before, behind which a cut is left: solution and turn may change there, too.
     divide : bool
         Whether cuts that leave the limits are to be divided.
+    still : (n,) bool
+        Nothing is cut on the way through the pose (`still_poses`), so that it need not deviate near the pole; none by
+        default.
+    still_tolerance : float, degrees
+        By how much the axis may deviate there all the same: what the digits of the words account for.
     line : (n,) int64
         Source lines for messages.
     file : str, optional
@@ -97,7 +104,10 @@ def rotary_angles(
     left = np.zeros(n, np.bool_) if left is None else left
     if n == 0:
         return RotaryPath(np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int8), ())
-    poses = _sorted_poses(machine, axis, tolerance, line, file)
+    cone = np.full(n, tolerance / 2)
+    if still is not None:
+        cone[still] = still_tolerance / 2
+    poses = _sorted_poses(machine, axis, tolerance, cone, line, file)
     run: Ints = np.cumsum(rapid | left, dtype=np.int64)
     branch, swaps = np.full(n, -1, np.int8), np.zeros(0, np.int64)
     if len(poses.steady):
@@ -141,6 +151,13 @@ def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
     return rapid
 
 
+def still_poses(kind: NDArray[np.uint8]) -> Bools:
+    """Poses of a program through which nothing is cut: holes, and rapids with no cut behind them; (n,) bool."""
+    rapid = rapid_moves(kind)
+    still: Bools = rapid & np.append(rapid[1:], True) | (kind == Move.HOLE)
+    return still
+
+
 @dataclass(frozen=True)
 class _Poses:
     """Poses by what their axes are.
@@ -161,10 +178,12 @@ class _Poses:
     beyond: Ints
 
 
-def _sorted_poses(machine: Machine, axis: Floats, tolerance: float, line: Ints, file: str | None) -> _Poses:
-    """Both solutions of all poses outside of the cone.
+def _sorted_poses(
+    machine: Machine, axis: Floats, tolerance: float, cones: Floats, line: Ints, file: str | None
+) -> _Poses:
+    """Both solutions of all poses outside of the cone of the pole, given for each in degrees.
 
-    Half of the tolerance is the cone: two axes inside it are within the tolerance of each other.
+    Half of what an axis may deviate is the cone: two axes inside it are within that of each other.
     """
     n, count = len(axis), 0
     angles, steady = np.empty((n, 2, 2)), np.empty(n, np.int64)
@@ -174,7 +193,7 @@ def _sorted_poses(machine: Machine, axis: Floats, tolerance: float, line: Ints, 
         if (outside := found.beyond > tolerance).any():
             pose = here.start + int(np.argmax(outside))
             raise reach_error(machine, axis[pose], float(found.beyond[pose - here.start]), int(line[pose]), file)
-        inside = found.pole_distance <= tolerance / 2
+        inside = found.pole_distance <= cones[here]
         own = np.flatnonzero(~inside)
         angles[count : count + len(own)] = found.angles[own] if len(own) < len(inside) else found.angles
         steady[count : count + len(own)] = here.start + own

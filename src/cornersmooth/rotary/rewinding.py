@@ -16,7 +16,16 @@ _ROUNDS: Final = 100
 
 
 def rewound_angles(
-    machine: Machine, tip: Floats, axis: Floats, *, tolerance: float, rapid: Bools, line: Ints, file: str | None
+    machine: Machine,
+    tip: Floats,
+    axis: Floats,
+    *,
+    tolerance: float,
+    rapid: Bools,
+    still: Bools,
+    still_tolerance: float,
+    line: Ints,
+    file: str | None,
 ) -> tuple[RotaryPath, Ints, Bools]:
     """Rotary angles of a path in which cuts are left, where nothing else keeps the limits.
 
@@ -46,6 +55,8 @@ def rewound_angles(
                 tolerance=tolerance,
                 rapid=rapid[source],
                 left=left,
+                still=still[source],
+                still_tolerance=still_tolerance,
                 divide=number < _ROUNDS,
                 line=line[source],
                 file=file,

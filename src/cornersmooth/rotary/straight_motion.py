@@ -16,7 +16,7 @@ from cornersmooth.errors import Finding
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, pole_distance, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
-from cornersmooth.rotary.angle_path import rapid_moves, rotary_angles
+from cornersmooth.rotary.angle_path import rapid_moves, rotary_angles, still_poses
 from cornersmooth.rotary.insertion import Insertions, insertions
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.segments import Segments, segments_of
@@ -126,7 +126,12 @@ class RotaryMotion:
 
 
 def rotary_motion(
-    smoothed: SmoothProgram, machine: Machine, tolerance: float, allowance: Floats, file: str | None
+    smoothed: SmoothProgram,
+    machine: Machine,
+    tolerance: float,
+    allowance: Floats,
+    angle_resolution: float,
+    file: str | None,
 ) -> RotaryMotion:
     """Rotary angles of the smoothed motion outside its curves.
 
@@ -136,6 +141,8 @@ def rotary_motion(
         Largest angle between the tool axis and that of the ruled motion on straight motion.
     allowance : (k,) float64, degrees
         The same at the joints of each row of `Corners`, not above `tolerance`; 0 for corners that are to be lines.
+    angle_resolution : float, degrees
+        Step of the written angles.
     file : str or None
         For messages.
 
@@ -148,7 +155,7 @@ def rotary_motion(
     corners = smoothed.corners
     rows = np.flatnonzero(corners.smoothed)
     strictest = max(float(allowance[rows].min(initial=tolerance)), STRICTEST_SHARE * tolerance)
-    followed, pose_angles, findings = _follow(smoothed, machine, segments, rows, strictest, file)
+    followed, pose_angles, findings = _follow(smoothed, machine, segments, rows, strictest, angle_resolution, file)
     allowed = np.full(len(smoothed.program), tolerance)  # on the segment into each pose
     allowed[corners.pose[rows]] = allowance[rows]
     allowed[corners.after[rows]] = np.minimum(allowed[corners.after[rows]], allowance[rows])
@@ -180,7 +187,13 @@ def rotary_motion(
 
 
 def _follow(
-    smoothed: SmoothProgram, machine: Machine, segments: Segments, rows: Ints, tolerance: float, file: str | None
+    smoothed: SmoothProgram,
+    machine: Machine,
+    segments: Segments,
+    rows: Ints,
+    tolerance: float,
+    angle_resolution: float,
+    file: str | None,
 ) -> tuple[Followed, Floats, tuple[Finding, ...]]:
     """Rotary angles along the whole smoothed path, a few samples on every transition."""
     program, corners = smoothed.program, smoothed.corners
@@ -208,7 +221,15 @@ def _follow(
     rapid = rapid_moves(program.kind)[owner]
     rapid[1:] &= owner[1:] != owner[:-1]
     path = rotary_angles(
-        machine, path_tip, path_axis, tolerance=tolerance, rapid=rapid, line=program.line[owner], file=file
+        machine,
+        path_tip,
+        path_axis,
+        tolerance=tolerance,
+        rapid=rapid,
+        still=still_poses(program.kind)[owner],
+        still_tolerance=angle_resolution,
+        line=program.line[owner],
+        file=file,
     )
     branch = path.branch.astype(np.int64)
     followed = Followed(first, count, path.angles, branch)

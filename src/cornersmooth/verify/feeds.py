@@ -5,6 +5,9 @@ Where a rounded pose changes the feed, the change may lie anywhere inside the ro
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
@@ -23,6 +26,9 @@ _CREEPING = (SHORT_STEPS + 2) / 2
 
 #: an element shorter than this may have the feed of any move so near, mm: ten steps of what CL files are written in
 _TINY = 1e-3
+
+#: poses looked at together
+_STRIDE = 64
 
 #: elements that are looked at one by one in a run of wrong ones; none of those behind them is better
 _MOST_SINGLE = 50
@@ -45,15 +51,18 @@ def check_feeds(distances: Distances, found: Findings) -> None:
     feed, mode = program.feed[original.pose], program.feed_mode[original.pose] == FeedMode.PER_REVOLUTION
     said, per_revolution, room = nc.feed[element], nc.per_revolution[element], nc.feed_room[element]
     rapid = nc.kind[element] == Element.RAPID
+
+    def fits(k: int, moves: Ints) -> Bools:
+        """(m,) whether row k carries the feed of moves."""
+        return _same(said[k], per_revolution[k], room[k], feed, mode, moves)
+
     good = _same(said, per_revolution, room, feed, mode, low) | rapid
     other = np.flatnonzero(~good)
     if len(other):
         good[other] = _same(said[other], per_revolution[other], room[other], feed, mode, high[other])
         several = np.flatnonzero(~good & (high > low + 1))
         for k in several.tolist():
-            among = np.arange(low[k], high[k] + 1)
-            own = tuple(np.full(len(among), column[k]) for column in (said, per_revolution, room))
-            good[k] = bool(_same(own[0], own[1], own[2], feed, mode, among).any())
+            good[k] = fits(k, np.arange(low[k], high[k] + 1)).any()
     wrong = np.flatnonzero(~good)
     follows = np.diff(wrong, prepend=-2) == 1
     in_a_row = 0
@@ -61,10 +70,9 @@ def check_feeds(distances: Distances, found: Findings) -> None:
         in_a_row = in_a_row + 1 if joined and not good[k - 1] else 0
         if in_a_row >= _MOST_SINGLE:
             continue
-        among = _alike(match, int(element[k]), int(start[k]), int(end[k]))
-        own = tuple(np.full(len(among), column[k]) for column in (said, per_revolution, room))
-        if _same(own[0], own[1], own[2], feed, mode, among).any():
-            good[k] = True
+        ends = int(start[k]), int(end[k])
+        good[k] = fits(k, _alike(match, int(element[k]), *ends)).any() or _near_enough(match, *ends, partial(fits, k))
+        if good[k]:
             continue
         pair = float(said[k]), float(room[k])
         good[k] = _inside_rounding(match, off, int(start[k]), int(end[k]), int(low[k]), pair, feed)
@@ -89,7 +97,14 @@ def _touched(match: Match, start: Ints, end: Ints) -> tuple[Ints, Ints]:
     return owner[segment + 1], owner[last + 1]
 
 
-def _same(said: Floats, per_revolution: Bools, room: Floats, feed: Floats, mode: Bools, move: Ints) -> Bools:
+def _same(
+    said: Floats | np.float64,
+    per_revolution: Bools | np.bool_,
+    room: Floats | np.float64,
+    feed: Floats,
+    mode: Bools,
+    move: Ints,
+) -> Bools:
     asked = feed[move]
     slack = ARITHMETIC * np.maximum(np.abs(asked), 1.0)
     near = (np.abs(said - asked) <= np.abs(room) + slack) | (asked <= -_CREEPING * room)
@@ -118,6 +133,39 @@ def _alike(match: Match, element: int, start: int, end: int) -> Ints:
             k += step
         found.append(min(max(k, low), high))
     return np.unique(match.original.trail.owner[found[0] + 1 : found[1] + 2])
+
+
+def _near_enough(match: Match, start: int, end: int, fits: Callable[[Ints], Bools]) -> bool:
+    """Whether an element may run along moves that fit, as both of its ends are within the tolerance of such moves.
+
+    Which of the poses within the tolerance a written one stands for nobody can tell. What is so near to a straight move
+    at both ends is as near in between.
+    """
+    owner = match.original.trail.owner
+    ranges = [owner[np.array(_within_tolerance(match, vertex)) + 1] for vertex in (start, end)]
+    moves = np.arange(np.min(ranges), np.max(ranges) + 1)
+    good = fits(moves)
+    run = np.cumsum(np.diff(good, prepend=False))
+    one, other = (set(run[good & (moves >= first) & (moves <= last)].tolist()) for first, last in ranges)
+    return not one.isdisjoint(other)
+
+
+def _within_tolerance(match: Match, vertex: int) -> tuple[int, int]:
+    """First and last segment of the CL path with poses within the tolerance of a written one, and all between."""
+    own, six = match.six[vertex], match.path.six
+    segment, low, high = (int(column[vertex]) for column in (match.segment, match.low, match.high))
+
+    def reach(poses: range) -> int:
+        """Count the first of some poses that are near."""
+        for begin in range(0, len(poses), _STRIDE):
+            away = six[np.array(poses[begin : begin + _STRIDE])] - own
+            square = np.maximum((away[:, :3] ** 2).sum(axis=1), (away[:, 3:] ** 2).sum(axis=1))
+            far = np.flatnonzero(square > (match.tolerance + match.margin) ** 2)
+            if len(far):
+                return begin + int(far[0])
+        return len(poses)
+
+    return segment - reach(range(segment, low, -1)), segment + reach(range(segment + 1, high + 1))
 
 
 def _inside_rounding(

@@ -1,0 +1,41 @@
+"""Programs whose text was right and once refused, or wrong and passed: `right/NAME.cls`, cut down to what matters.
+
+The first line of each is a comment that says for what it is written: control, form, machine or ``-``, ``tcp`` or
+``axes``, settings by name, ``digits=`` and ``planned`` as a `Trial` has them. What follows ``#`` says what made
+verification object.
+"""
+
+from __future__ import annotations
+
+from ast import literal_eval
+from pathlib import Path
+
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.settings import Settings
+from nc.cases import Case
+from verify.random_programs import Trial
+from verify.sweep import has_holes, judged
+
+FILES = sorted((Path(__file__).parent / "right").glob("*.cls"))
+
+
+def load(path: Path) -> Trial:
+    """The trial that a file holds."""
+    cl = path.read_text()
+    control, form, machine, tcp, *said = cl.splitlines()[0].removeprefix("$$").split("#")[0].split()
+    options = dict(word.split("=", 1) for word in said if "=" in word)
+    digits = options.pop("digits", "")
+    settings = Settings(**{name: literal_eval(value) for name, value in options.items()})
+    case = Case(control, form, machine.strip("-"), tcp == "tcp")
+    return Trial(0, case, settings, "", cl, oracle=True, digits=digits, planned="planned" in said)
+
+
+@pytest.mark.parametrize("path", FILES, ids=[path.stem for path in FILES])
+def test_text_passes_and_the_oracle_agrees(path: Path) -> None:
+    one = load(path)
+    program = read(one.cl.encode(), name="trial.cls")
+    oracle = not has_holes(program)
+    found = judged(one.case, program, one.settings, oracle=oracle, digits=one.digits, planned=one.planned)
+    assert found == ("passed", "")
