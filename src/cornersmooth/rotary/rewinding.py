@@ -22,10 +22,10 @@ def rewound_angles(
     *,
     tolerance: float,
     rapid: Bools,
-    still: Bools,
-    still_tolerance: float,
     line: Ints,
     file: str | None,
+    still: Bools | None = None,
+    still_tolerance: float = 0.0,
 ) -> tuple[RotaryPath, Ints, Bools]:
     """Rotary angles of a path in which cuts are left, where nothing else keeps the limits.
 
@@ -55,7 +55,7 @@ def rewound_angles(
                 tolerance=tolerance,
                 rapid=rapid[source],
                 left=left,
-                still=still[source],
+                still=None if still is None else still[source],
                 still_tolerance=still_tolerance,
                 divide=number < _ROUNDS,
                 line=line[source],
