@@ -219,6 +219,7 @@ def _form(given: dict[str, Any]) -> Form:
         extras=given["extras"],
         digits=given["digits"],
         rewind=given["rewind"] or 0.0,
+        planes=given["planes"] == "tilted",
     )
 
 

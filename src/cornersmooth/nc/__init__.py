@@ -20,7 +20,7 @@ from cornersmooth.nc.control_tables import (
     load_control,
     parse_control,
 )
-from cornersmooth.nc.cycle_blocks import upright_form, upright_poses
+from cornersmooth.nc.cycle_blocks import upright_poses
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.form_choice import check_program, choose_form
@@ -28,11 +28,13 @@ from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.motion_writer import MotionWriter
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.own_words import own_words
+from cornersmooth.nc.planes import plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
+from cornersmooth.nc.writers import Writers
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
 
@@ -188,18 +190,16 @@ def write(
     statements = StatementWriter(
         chosen, program, findings, operation, comments=frame.comments, skip_taps=frame.skip_taps
     )
-    circles = plan_circles(program, smoothed.settings, chosen)
+    native = frame.cycles == "native"
+    upright = upright_poses(program, chosen, drills=native, taps=not frame.skip_taps)
+    planes = plan_planes(program, smoothed.settings, chosen, upright, findings)
+    circles = plan_circles(program, smoothed.settings, chosen, planes)
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
     writer = BlockWriter(chosen, program, statements, findings, circles, stretch, values["blend"])
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
-    motion = MotionWriter(program, writer, statements, operation, findings, approach, frame.retract)
-    native = frame.cycles == "native"
-    upright = upright_poses(program, chosen, drills=native, taps=not frame.skip_taps)
-    if upright.any():
-        motion.upright, motion.native = upright, native
-        own = upright_form(chosen)
-        motion.upright_writer = BlockWriter(own, program, statements, findings, circles, own.stretch(1.0))
+    writers = Writers(writer, upright, planes)
+    motion = MotionWriter(program, writers, statements, operation, findings, approach, frame.retract, native)
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
         text.write_blocks(operation.start())

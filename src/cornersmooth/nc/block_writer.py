@@ -22,6 +22,7 @@ from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.curve_blocks import Curves, RowWriter
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.planes import Plane
 from cornersmooth.nc.polynomial_blocks import bezier_points, curves_for
 from cornersmooth.nc.program_frame import BLEND_STEP, blend_word
 from cornersmooth.nc.run import Run
@@ -50,6 +51,8 @@ class BlockWriter:
         `Form.stretch`.
     blend : str
         How far the head lets the control round the corners of lines; empty where nothing else is said.
+    plane : Plane or None
+        Tilted plane in whose coordinates positions are written.
     """
 
     form: Form
@@ -59,6 +62,7 @@ class BlockWriter:
     circles: Circles
     stretch: float = 1.0
     blend: str = ""
+    plane: Plane | None = None
     blocks: int = 0
     _feed: int = -1  # ticks and feed mode of the last F, as one number
     _mode: int = FeedMode.PER_MINUTE
@@ -220,6 +224,8 @@ class BlockWriter:
             decimals = form.table.digits.angle
             other = to_ticks(other, (decimals,) * 2) / 10.0**decimals
             tip = machine_position(form.machine, tip, other)
+        if self.plane is not None:
+            tip = tip @ self.plane.frame
         if form.orientation == "point":
             other = tip + self.stretch * (other - tip)
         if form.rotary and form.machine is not None and form.machine.names != form.other_words:

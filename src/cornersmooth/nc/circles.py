@@ -14,6 +14,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Keep, Program
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.planes import Planes
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.arcs import arc_points, arc_radii, divided
 from cornersmooth.text import to_ticks
@@ -62,29 +63,33 @@ class Circles:
     radius: Ints
 
 
-def plan_circles(program: Program, settings: Settings, form: Form) -> Circles:
+def plan_circles(program: Program, settings: Settings, form: Form, planes: Planes) -> Circles:
     """Choose the arcs that a form can write as circles.
 
     Parameters
     ----------
     settings : Settings
         The circle through the written numbers keeps its tolerance, at the tip and at the axis point.
+    planes : Planes
+        In a tilted plane arcs are those of its own coordinates.
     """
     arcs = program.arcs
-    plane = np.array([2, 1, 0])[np.argmax(np.abs(arcs.normal), axis=1)] if len(arcs) else np.zeros(0, np.int64)
+    frames, tilted = planes.frames(arcs.pose), planes.of[arcs.pose] >= 0
+    normal = _local(arcs.normal, frames)
+    plane = np.array([2, 1, 0])[np.argmax(np.abs(normal), axis=1)] if len(arcs) else np.zeros(0, np.int64)
     third = PLANES[plane, 2]
-    height = np.take_along_axis(arcs.normal, third[:, None], axis=1)[:, 0]
+    height = np.take_along_axis(normal, third[:, None], axis=1)[:, 0]
     radius = arc_radii(program)
     unit = program.mm_per_unit
     decimals = form.tip_decimals(program.units)
     ticks = to_ticks(np.minimum(radius, _LARGEST_RADIUS) / unit, decimals)
     vectors = to_ticks(program.axis, form.table.digits.vector)
     fits = (
-        form.mode.circles
+        np.where(tilted, form.plane is not None and form.plane.circles, form.mode.circles)
         & (np.abs(height) > 1.0 - _UPRIGHT)
         & (radius < _LARGEST_RADIUS)
         & (ticks > 0)
-        & (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1)
+        & (tilted | (vectors[arcs.pose] == vectors[arcs.pose - 1]).all(axis=1))
         # the plane of cutter compensation must not change under it, and it is XY
         & ((plane == 0) | (program.keep[arcs.pose] != Keep.CUTTER_COMPENSATION))
     )
@@ -93,18 +98,19 @@ def plan_circles(program: Program, settings: Settings, form: Form) -> Circles:
         step = float(unit * 10.0**-decimals)
         tolerance = min(settings.tip_tolerance, settings.axis_point_tolerance)
         written: Floats = ticks.astype(np.float64) * step
-        deviation = _deviation(program, blocks, PLANES[plane], height > 0.0, written, step)
+        deviation = _deviation(program, blocks, PLANES[plane], height > 0.0, written, step, frames)
         blocks[deviation > tolerance] = 0
     return Circles(blocks, plane + FIRST_PLANE, height < 0.0, ticks)
 
 
 def _deviation(
-    program: Program, blocks: Ints, planes: Ints, counterclockwise: Bools, radius: Floats, step: float
+    program: Program, blocks: Ints, planes: Ints, counterclockwise: Bools, radius: Floats, step: float, frames: Floats
 ) -> Floats:
     """(k,) mm from the written circles to the arcs at equal shares; infinite for a block that is too short."""
     rows, share = divided(blocks)
     before = share - 1.0 / blocks[rows]
-    start, end = (step * np.rint(arc_points(program, rows, at)[0] / step) for at in (before, share))
+    frames = frames[rows]
+    start, end = (step * np.rint(_local(arc_points(program, rows, at)[0], frames) / step) for at in (before, share))
     first, second, third = planes[rows].T
     own = np.arange(len(rows))
     chord = np.stack([end[own, axis] - start[own, axis] for axis in (first, second, third)], axis=1)
@@ -125,8 +131,14 @@ def _deviation(
         point[own, second] += to_centre[:, 1] + sine * x + cosine * y
         point[own, third] += probe * chord[:, 2]
         arc, _ = arc_points(program, rows, before + probe * (share - before))
-        worst = np.maximum(worst, norm(point - arc))
+        worst = np.maximum(worst, norm(point - _local(arc, frames)))
     worst[~proper] = np.inf
     deviation = np.zeros(len(blocks))
     np.maximum.at(deviation, rows, worst)
     return deviation
+
+
+def _local(vectors: Floats, frames: Floats) -> Floats:
+    """(k, 3) vectors in the coordinates of (k, 3, 3) frames."""
+    local: Floats = np.einsum("ki,kij->kj", vectors, frames)
+    return local

@@ -167,6 +167,12 @@ class Mode:
         Whether arcs may be written as circular blocks, without the words of the orientation.
     timed_turns : bool
         Whether blocks in which only rotary axes turn are written with inverse time: F would be degrees per minute.
+    tool_end : tuple of str or None
+        In place of `ProgramTable.tool_end`.
+    rotations : str
+        Of a tilted plane: the axes of its three rotations, each that of the frame which those before it have made, as
+        in ``zxz``; their degrees stand for ``{first}``, ``{second}`` and ``{third}`` in `on`. Empty where the rotary
+        axes are turned by words (``{rotary_start}``), and the part with them.
     """
 
     words: tuple[str, ...]
@@ -178,6 +184,8 @@ class Mode:
     within_on: Blocks = ()
     within_off: Blocks = ()
     begin: Blocks | None = None
+    tool_end: Blocks | None = None
+    rotations: str = ""
 
 
 @dataclass(frozen=True)
@@ -290,7 +298,8 @@ class FormTable:
     """A form of a control with all its modes.
 
     `upright` is how a tool runs that stays along Z from its change to the next, where its holes are cycles of the
-    control: without tool tip control, under which controls take no such cycles. None where that cannot be.
+    control: without tool tip control, under which controls take no such cycles. `plane` is how a tool with one tilted
+    axis runs in a tilted plane of the control. None where that cannot be.
     """
 
     name: str
@@ -298,6 +307,7 @@ class FormTable:
     curve: CurveStyle
     modes: Mapping[Orientation, Mode]
     upright: Mode | None = None
+    plane: Mode | None = None
 
 
 @dataclass(frozen=True)

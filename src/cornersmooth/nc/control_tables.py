@@ -59,7 +59,7 @@ _SHELF = Shelf(
     wrong_value="CS213",
 )
 
-_FORM_KEYS = ("description", "curve", "upright", *get_args(Orientation))
+_FORM_KEYS = ("description", "curve", "upright", "plane", *get_args(Orientation))
 _MODE_KEYS = (
     "words",
     "on",
@@ -67,6 +67,8 @@ _MODE_KEYS = (
     "within_on",
     "within_off",
     "begin",
+    "tool_end",
+    "rotations",
     "circles",
     "timed_turns",
     *(item.name for item in fields(Motion)),
@@ -104,7 +106,7 @@ _BRACES: dict[str, Table] = {
     "dwell": {"milliseconds": 1, "seconds": "1."},
     "compensation_left": {"register": 1},
     "compensation_right": {"register": 1},
-    "on": {"offset": 1},
+    "on": {"offset": 1, "first": "0.", "second": "0.", "third": "0."},
     "work_offset_block": {"work_offset": "G54"},
     "file_name": {"stem": "PART", "number": "0001"},
     **dict.fromkeys(("start", "begin", "tool_end", "between_tools", "end", "retract"), _PROGRAM_BRACES),
@@ -215,7 +217,7 @@ def _check_tables(table: Table) -> None:
     _check_table(table.get("forms", {}), "forms")
     for name, form in table.get("forms", {}).items():
         _check_table(form, f"forms.{name}")
-        for mode in ("upright", *get_args(Orientation)):
+        for mode in ("upright", "plane", *get_args(Orientation)):
             _check_table(form.get(mode, {}), f"forms.{name}.{mode}")
 
 
@@ -310,7 +312,8 @@ def _form(name: str, entry: Table, motion: Table) -> FormTable:
     if not modes:
         raise _SHELF.wrong(f"{where} says no orientation", f"use one of {', '.join(get_args(Orientation))}")
     upright = _mode(entry["upright"], motion, f"{where}.upright") if "upright" in entry else None
-    return FormTable(name, _text(entry, "description", ""), curve, modes, upright)
+    plane = _mode(entry["plane"], motion, f"{where}.plane") if "plane" in entry else None
+    return FormTable(name, _text(entry, "description", ""), curve, modes, upright, plane)
 
 
 def _lines(table: Table) -> LineStyle:
@@ -337,6 +340,9 @@ def _extras(table: Table) -> dict[str, Extra]:
 def _mode(entry: Table, motion: Table, where: str) -> Mode:
     _SHELF.check_keys(entry, _MODE_KEYS, f"{where}.")
     own = {item.name for item in fields(Motion)}
+    rotations = _text(entry, "rotations", "")
+    if rotations and not re.fullmatch(r"(?!(.)\1)[xyz][xy][xyz]", rotations):
+        raise _SHELF.wrong(f"{where}.rotations is {rotations!r}", "give three axes, as in zxz; the second is not z")
     return Mode(
         words=_blocks(entry.get("words", []), f"{where}.words"),
         on=_blocks(entry.get("on", []), f"{where}.on"),
@@ -344,6 +350,8 @@ def _mode(entry: Table, motion: Table, where: str) -> Mode:
         within_on=_blocks(entry.get("within_on", []), f"{where}.within_on"),
         within_off=_blocks(entry.get("within_off", []), f"{where}.within_off"),
         begin=_blocks(entry["begin"], f"{where}.begin") if "begin" in entry else None,
+        tool_end=_blocks(entry["tool_end"], f"{where}.tool_end") if "tool_end" in entry else None,
+        rotations=rotations,
         motion=_record(Motion, {**motion, **{key: value for key, value in entry.items() if key in own}}, where),
         circles=_flag(entry.get("circles", False), f"{where}.circles"),
         timed_turns=_flag(entry.get("timed_turns", False), f"{where}.timed_turns"),

@@ -57,7 +57,8 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
         return chosen
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
     tilted &= program.kind != Move.FROM
-    starts, tapped = _tools(program)
+    starts = tool_starts(program)
+    tapped = [one.pose for one in program.statements if one.word == "CYCLE" and "TAP" in one.args]
     if not form.rotary and tilted.any():  # without a machine no words bring the rotary axes back
         tilted[int(np.argmax(tilted)) :] = True
     for first, stop in zip(starts, [*starts[1:], len(program)], strict=True):
@@ -82,20 +83,17 @@ def _any_as_cycle(program: Program, form: Form, first: int, stop: int) -> bool:
     return False
 
 
-def _tools(program: Program) -> tuple[list[int], list[int]]:
-    """Poses at which another tool begins, the first among them; and poses at which a tap is asked for."""
+def tool_starts(program: Program) -> list[int]:
+    """Poses at which another tool begins, the first pose among them; ascending."""
     said = {statement.word for statement in program.statements}
     words = TOOL_WORDS if TOOL_WORDS & said else {"TOOLNO"}
-    starts, tapped, tool = [0], [], None
+    starts, tool = [0], None
     for statement in program.statements:
-        if statement.word in words:
-            loaded = loaded_tool(statement)
-            if loaded is not None and loaded != tool:
-                starts.append(statement.pose)
-                tool = loaded
-        elif statement.word == "CYCLE" and "TAP" in statement.args:
-            tapped.append(statement.pose)
-    return sorted({min(pose, len(program)) for pose in starts}), tapped
+        loaded = loaded_tool(statement) if statement.word in words else None
+        if loaded is not None and loaded != tool:
+            starts.append(statement.pose)
+            tool = loaded
+    return sorted({min(pose, len(program)) for pose in starts})
 
 
 def _can_stand_upright(form: Form) -> bool:

@@ -36,6 +36,8 @@ class Form:
         `FormTable.upright`.
     rewind : float, mm
         How far a cut is left along the tool where a rotary axis would pass its limit; 0 where that is an error.
+    plane : Mode or None
+        `FormTable.plane` where tilted planes are asked for.
     """
 
     table: Control
@@ -47,6 +49,7 @@ class Form:
     extras: tuple[Extra, ...] = ()
     upright: Mode | None = None
     rewind: float = 0.0
+    plane: Mode | None = None
 
     @property
     def control(self) -> str:
@@ -110,7 +113,12 @@ class Form:
         if self.rotary:
             reserve = axis_length * math.radians(self.rotary_tolerance(tolerance, axis_length) + self.angle_rounding)
             return 2.0 / math.sqrt(3.0) * reserve
-        return axis_length * float(10.0**-self.table.digits.vector)
+        in_plane = 0.0 if self.plane is None else 2.0 / math.sqrt(3.0) * self.plane_reserve(tolerance, axis_length)
+        return max(axis_length * float(10.0**-self.table.digits.vector), in_plane)
+
+    def plane_reserve(self, tolerance: float, axis_length: float) -> float:
+        """By how much the angles of a tilted plane may be off at the axis point, mm: a step of their last digit."""
+        return min(axis_length * math.radians(self.angle_rounding), ROTARY_SHARE * tolerance)
 
     def stretch(self, axis_length: float) -> float:
         """By how many times farther from the tip than the axis point a second point is written."""

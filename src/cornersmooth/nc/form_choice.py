@@ -32,6 +32,7 @@ def choose_form(
     extras: Iterable[str] = (),
     digits: str = "",
     rewind: float = 0.0,
+    planes: bool = False,
 ) -> Form:
     """Return the form of a control by name; the control's default where `form` is None.
 
@@ -49,6 +50,8 @@ def choose_form(
         As `Control.with_digits` takes it; empty for those of the control's table.
     rewind : float, mm
         How far a cut is left along the tool where a rotary axis would pass its limit; 0 where that is an error.
+    planes : bool
+        Whether a tool that keeps a tilted axis between rapids is to run in a tilted plane of the control.
 
     Raises
     ------
@@ -77,7 +80,8 @@ def choose_form(
             asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
             mode = chosen.modes[orientation]
             _check_modulo(table, chosen, mode, machine)
-            found = Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright, rewind)
+            plane = _plane(table, chosen, machine) if planes else None
+            found = Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright, rewind, plane)
             _check_rewind(found)
             return found
     raise _refusal(table, chosen, wanted, machine)
@@ -112,6 +116,19 @@ def _check_rewind(form: Form) -> None:
     if not form.table.program.retract:
         what = f"the table of {form.control} has no retract above which rotary axes could turn back"
         raise SettingsError("CS215", what, "leave out --rewind")
+
+
+def _plane(table: Control, form: FormTable, machine: Machine | None) -> Mode:
+    """Mode of the tilted planes of a form; refuses a control, form or machine without such."""
+    if form.plane is None:
+        others = [name for name, other in table.forms.items() if other.plane is not None]
+        what = f"{table.name} form {form.name}" if others else table.name
+        hint = f"use -f {others[0]}" if others else "leave out --planes"
+        raise SettingsError("CS232", f"{what} has no tilted planes", hint)
+    if not form.plane.rotations and machine is not None and machine.swings_the_tool:
+        text = f"{table.name} has tilted planes for machines whose tables turn the part only; {machine.name} has a head"
+        raise SettingsError("CS232", text, "leave out --planes")
+    return form.plane
 
 
 def _extra(table: Control, form: str, name: str) -> Extra:

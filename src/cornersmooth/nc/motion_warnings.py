@@ -39,12 +39,21 @@ class MotionWarnings:
     def of_first(self, pose: int, form: Form, *, rapid: bool) -> None:
         """Say that the control turns the tool on its own behind a retract, or feeds down from there."""
         line = int(self.program.line[pose])
-        if not form.rotary and self.program.axis[pose][2] < _UPRIGHT:
+        if form.orientation in ("vector", "point") and self.program.axis[pose][2] < _UPRIGHT:
             text = "the first motion of a tool turns it to a tilted axis; see that it is free to, or name the machine"
             self.findings.add("CS337", "warning", line, text)
         if not rapid:
             text = "the first motion of a tool is a feed move: it feeds down from the height of the retract"
             self.findings.add("CS333", "warning", line, text)
+
+    def behind_plane(self, pose: int, form: Form) -> None:
+        """Say that the rotary axes stand where a tilted plane has left them, and no words bring them back."""
+        if not form.rotary and "{rotary_zero}" in form.table.program.begin:
+            text = (
+                "tool tip control behind a tilted plane: the rotary axes stand where the plane has left them, and the "
+                "part program may turn with them; name the machine, so that they go to zero before"
+            )
+            self.findings.add("CS358", "warning", int(self.program.line[pose]), text)
 
     def of_tool(self, pose: int, tool: int | None) -> None:
         """Say that a tool moves that was not loaded."""

@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.kinematics.poses import continued
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.control import INVERSE_TIME
@@ -24,6 +25,7 @@ from cornersmooth.nc.rewinds import refuse_compensated, retracts_before
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.statement_args import with_starts
 from cornersmooth.nc.statement_writer import StatementWriter
+from cornersmooth.nc.writers import Writers
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import format_number
 
@@ -42,41 +44,37 @@ class MotionWriter:
     statements : StatementWriter
     operation : Operation
     findings : Findings
-    upright : (n,) bool
-        `cycle_blocks.upright_poses`.
-    upright_writer : BlockWriter or None
-        Writes what those say.
+    writers : Writers
+        Of all poses.
     native : bool
         Whether holes are cycles of the control, where they can be.
     """
 
     program: Program
-    writer: BlockWriter
+    writers: Writers
     statements: StatementWriter
     operation: Operation
     findings: Findings
     approach: float = 0.0  #: mm along the tool, behind a retract
     retract: float = 0.0  #: mm along the tool, before a retract
-    upright: Bools | None = None
-    upright_writer: BlockWriter | None = None
     native: bool = False
+    writer: BlockWriter = field(init=False)  #: that of the tool at hand
     blocks: int = 0  #: those that are not `writer`'s
     _repeated: int = 0
     _position: NDArray[np.int64] | None = None
     _last: NDArray[np.int64] | None = None  #: what was written last, a tool change or not
     _return_to: int = _NOWHERE  #: first pose behind a tool change, until it is reached
     _next_statement: int = 0
+    _plane: int = -1  #: tilted plane of the tool at hand
     _arc_begun: int = -1  #: arc behind a FROM whose start has been gone to
     _ticks: Ints = field(init=False)  #: of the block that is written
     _said: tuple[Statement, ...] = field(init=False)
     _approach: Ints | None = field(init=False)
     _warnings: MotionWarnings = field(init=False)
-    _tilting: BlockWriter = field(init=False)  #: the writer of all other tools
-    _writers: dict[int | None, BlockWriter] = field(default_factory=dict)  #: for tools of different lengths
     _last_writer: BlockWriter | None = None
 
     def __post_init__(self) -> None:
-        self._tilting = self.writer
+        self.writer = self.writers.tilting
         self._warnings = MotionWarnings(self.program, self.findings)
         self._said = with_starts(self.program)
         self.operation.withdraw = self._withdraw
@@ -137,59 +135,53 @@ class MotionWriter:
         """Rows between statements, holes apart from the others."""
         if start >= stop:
             return
-        self._stand(int(rows.move[start]))
-        if self._approach is None:
-            yield from self._lines(rows, start, stop)
-            return
-        hole = self.program.kind[rows.move[start:stop]] == Move.HOLE
-        edges = [start, *(start + 1 + np.flatnonzero(hole[1:] != hole[:-1])).tolist(), stop]
-        for first, last in pairwise(edges):
-            if hole[first - start]:
+        poses = rows.move[start:stop]
+        hole, plane = self.program.kind[poses] == Move.HOLE, self.writers.planes.of[poses]
+        edges = np.flatnonzero((hole[1:] != hole[:-1]) | (plane[1:] != plane[:-1]))
+        for first, last in pairwise([start, *(start + 1 + edges).tolist(), stop]):
+            yield from self._stand(int(rows.move[first]))
+            if hole[first - start] and self._approach is not None:
                 yield from self._holes(rows, slice(first, last), self._approach)
             else:
                 yield from self._lines(rows, first, last)
 
-    def _stand(self, pose: int) -> None:
-        """Take the writer of the tool at hand: without words of its axis where it stays along Z."""
-        if self.operation.begun:
+    def _stand(self, pose: int) -> Iterator[bytes]:
+        """Take the writer of a pose; between tilted planes, and beside them, the tool goes up."""
+        if self.operation.begun and self.writers.plane_of(pose) == self._plane:
             return
-        standing = self.upright is not None and bool(self.upright[pose])
-        writer = self.upright_writer if standing and self.upright_writer else self._of_tool()
+        writer = self.writers.of(pose, self.statements.tool)
+        if self._plane >= 0 and writer is self.writers.tilting:
+            self._warnings.behind_plane(pose, writer.form)
+        self._plane = self.writers.plane_of(pose)
+        if self.operation.begun:
+            yield from self._blocks(self.operation.go_home())
         if writer is self.writer:
             return
         writer.take_over(self.writer)
         self.writer, self.operation.mode, self._position = writer, writer.form.mode, None
-
-    def _of_tool(self) -> BlockWriter:
-        """Writer for a tool that tilts: of its own where its length goes into every position."""
-        machine = self._tilting.form.machine
-        if machine is None or not machine.tool_lengths or self._tilting.form.orientation != "machine":
-            return self._tilting
-        number = self.statements.tool
-        if number not in self._writers:
-            form = replace(self._tilting.form, machine=machine.with_tool(number))
-            self._writers[number] = replace(self._tilting, form=form, blocks=0)
-        return self._writers[number]
+        self.operation.plane = writer.plane.words if writer.plane is not None else {}
 
     @property
     def written(self) -> int:
         """Blocks written so far."""
-        writers = [self._tilting, *self._writers.values(), *([self.upright_writer] if self.upright_writer else [])]
-        return self.blocks + sum(writer.blocks for writer in writers)
+        return self.blocks + sum(writer.blocks for writer in self.writers.all())
 
     def _rotary_blocks(self, ticks: Ints) -> dict[str, tuple[str, ...]]:
         """Blocks of the rotary axes, with where a row has them; a tool that stays along Z has them at zero."""
-        return self._tilting.rotary_blocks(ticks)
+        tilting = self.writers.tilting
+        if self.writer.plane is not None and self.writer.plane.angles is not None:
+            ticks = tilting.ticks(np.zeros((1, 3)), self.writer.plane.angles[None])[0]
+        return tilting.rotary_blocks(ticks)
 
     def _lines(self, rows: Rows, start: int, stop: int) -> Iterator[bytes]:
         part = slice(start, stop)
         move, program = rows.move[part], self.program
         ticks = self._ticks[part]
-        if self.writer is not self._tilting:
+        if self.writer is not self.writers.tilting:
             ticks = self.writer.ticks(rows.tip[part], rows.other[part])
         arc = rows.arc[part] if rows.arc is not None else None
         spline = rows.spline[part] if rows.spline is not None else None
-        yield from self._go_back(int(move[0]))
+        yield from self._go_back(int(move[0]), rows.other[part][:1])
         if arc is not None and arc[0] >= 0:  # after a tool change, a hole or a FROM the tool is not at its start
             yield from self._go_to(self.writer.ticks(program.tip[move[:1] - 1], rows.other[part][:1]), move[:1])
         elif self._begins_at_stated(int(move[0])):  # an arc in lines wants its start, too
@@ -197,7 +189,7 @@ class MotionWriter:
             yield from self._go_to(start_of_arc, move[:1])
         self._join(ticks, rows.joined[part])
         feed, mode = program.feed[move], program.feed_mode[move].astype(np.int64)
-        if rows.rate is not None:
+        if rows.rate is not None and self.writer.plane is None:
             rate = rows.rate[part]
             timed = ~np.isnan(rate)
             feed, mode = np.where(timed, rate, feed), np.where(timed, INVERSE_TIME, mode)
@@ -265,7 +257,7 @@ class MotionWriter:
         self._arc_begun = move
         return True
 
-    def _go_back(self, move: int) -> Iterator[bytes]:
+    def _go_back(self, move: int, near: Floats) -> Iterator[bytes]:
         """Go to the pose behind a tool change even if it repeats the last one before, and so is no row."""
         begin, self._return_to = self._return_to, _NOWHERE
         passed = begin + np.flatnonzero(self.program.kind[begin:move] != Move.FROM)
@@ -275,8 +267,13 @@ class MotionWriter:
         if self._last_writer is not self.writer:
             pose = passed[:1]
             other = self.program.axis[pose]
-            if self.writer.form.rotary:  # else one of both tools stays along Z, so that pose does
-                other = self.writer.angles(again) if again.shape[1] == self.writer.columns else np.zeros((1, 2))
+            if self.writer.form.rotary and self.writer.form.machine is not None:
+                if again.shape[1] == self.writer.columns:
+                    other = self.writer.angles(again)
+                elif self._last_writer is None or self._last_writer.plane is None:
+                    other = np.zeros((1, 2))  # the tool before stays along Z, so that pose does
+                else:
+                    other = continued(self.writer.form.machine, other, near, np.array([-1]), 0.0)[0]
             again = self.writer.ticks(self.program.tip[pose], other)
         yield from self._emit(self._run(again, np.array([move])))
 
@@ -287,6 +284,7 @@ class MotionWriter:
     def _holes(self, rows: Rows, part: slice, approach: Ints) -> Iterator[bytes]:
         """Holes of one cycle, of the control or as plain moves; those not understood are only approached."""
         cycle, program, poses = self.statements.cycle, self.program, rows.move[part]
+        self._return_to = _NOWHERE
         line = int(program.line[poses[0]])
         kind = self._cycle_of_control(cycle, poses)
         if cycle is not None and cycle.tap and not kind:
@@ -312,7 +310,7 @@ class MotionWriter:
 
     def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> str:
         """Cycle of the control that drills holes, as `kind_of` names it; empty for none."""
-        if cycle is None or self.writer is not self.upright_writer or not (self.native or cycle.tap):
+        if cycle is None or not self.writers.takes_cycles(self.writer) or not (self.native or cycle.tap):
             return ""
         if cycle.tap and not (self.statements.clockwise and self.statements.speed and self.operation.spindle):
             return ""
@@ -320,7 +318,7 @@ class MotionWriter:
 
     def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
         """Why the control's cycle cannot do a tap, in words."""
-        if self.writer is not self.upright_writer:
+        if not self.writers.takes_cycles(self.writer):
             return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
         if not kind_of(cycle, self.writer.form, self.program, poses):
             return "the control has no such cycle for it"
@@ -342,7 +340,7 @@ class MotionWriter:
         said: tuple[str, ...] = ()
         for k, pose in enumerate(poses.tolist()):
             above = self._run(
-                writer.ticks(program.tip[[pose]] + [0.0, 0.0, travel[k]], program.axis[[pose]]), poses[[k]]
+                writer.ticks(program.tip[[pose]] + travel[k] * program.axis[[pose]], program.axis[[pose]]), poses[[k]]
             )
             level = above.ticks[0, 2]
             if not said or self._position is None or self._position[2] != level:
@@ -350,8 +348,9 @@ class MotionWriter:
                 said = ()
                 yield from self._emit(self._moving(replace(above, rapid=np.ones(1, np.bool_))))
                 yield from self._blocks(writer.feed_mode(int(modes[0])))
+            tip = program.tip[pose]
             hole = Hole(
-                program.tip[pose] / unit,
+                (tip if writer.plane is None else tip @ writer.plane.frame) / unit,
                 travel[k] / unit,
                 clearance[k] / unit,
                 cycle.depth / unit,

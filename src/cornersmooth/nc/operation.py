@@ -48,6 +48,7 @@ class Operation:
     withdraw: Callable[[], list[str]] = list  #: blocks along the tool before a retract, of who knows where it is
     halted: bool = False  #: the CL file has stopped the program since the last motion
     clamps: tuple[tuple[str, str], ...] = ()  #: words that hold rotary axes, and let them turn
+    plane: Mapping[str, str] = field(default_factory=dict)  #: numbers of the tilted plane at hand
     mode: Mode = field(init=False)  #: what tool tip control is for the tool at hand
     _clamped: bool = True  # nobody knows what was before
     _tip_control: bool = False
@@ -80,7 +81,17 @@ class Operation:
         steps = self.form.table.program.begin if own is None else own
         blocks += self._let_turn()
         blocks += self._expand(steps, rotary if self.retracted else _NO_ROTARY)
-        return [*blocks, *(self._hold() if self.mode is self.form.upright else ())]
+        return [*blocks, *(self._hold() if self._stands else ())]
+
+    @property
+    def _stands(self) -> bool:
+        """Whether the rotary axes stand while the tool moves."""
+        return self.mode in (self.form.upright, self.form.plane)
+
+    @property
+    def _tool_end(self) -> Blocks:
+        """Steps behind the last motion of a tool, or of a tilted plane."""
+        return self.form.table.program.tool_end if self.mode.tool_end is None else self.mode.tool_end
 
     def _let_turn(self) -> list[str]:
         """Blocks that let clamped rotary axes turn."""
@@ -103,7 +114,7 @@ class Operation:
             Whether another tool follows.
         """
         self._stopped_line, self.begun = line, False
-        steps = self.form.table.program.tool_end
+        steps = self._tool_end
         if not self._moved:  # a program begins with a tool change, as a rule
             steps = tuple(step for step in steps if step in _STEPS)
         elif another and not self.halted:
@@ -122,7 +133,7 @@ class Operation:
         self._moved = self.begun = False
         return [
             *(self._back() if along else ()),
-            *self._expand([step for step in self.form.table.program.tool_end if step in _STEPS.keys() - _RUNNING_ON]),
+            *self._expand([step for step in self._tool_end if step in _STEPS.keys() - _RUNNING_ON]),
         ]
 
     def _back(self) -> list[str]:
@@ -134,7 +145,12 @@ class Operation:
         return bool(self.form.table.program.retract)
 
     def pause(self) -> list[str]:
-        """Blocks that switch tool tip control off where the tool stands, for words that it does not allow."""
+        """Blocks that switch tool tip control off where the tool stands, for words that it does not allow.
+
+        A tilted plane ends above the part only.
+        """
+        if self._tip_control and self.mode is self.form.plane:
+            return self.go_home()
         return self._expand(("{functions_off}", "{tip_control_off}"))
 
     def end(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
@@ -177,7 +193,7 @@ class Operation:
 
     def _tip_control_on(self) -> list[str]:
         self._tip_control = self._functions = True
-        on = [block.format(offset=self.offset) for block in self.mode.on]
+        on = [block.format(offset=self.offset, **self.plane) for block in self.mode.on]
         return [*self._extras("on", outside=True), *on, *self.mode.within_on, *self._extras("on", outside=False)]
 
     def _functions_off(self) -> list[str]:

@@ -101,8 +101,9 @@ def _blocks(table: Control) -> Iterator[str]:
     for item in fields(table.words):
         yield from _of_field(table, item.name)
     for form in table.forms.values():
-        for mode in (*form.modes.values(), *((form.upright,) if form.upright is not None else ())):
-            for blocks in (mode.on, mode.off, mode.within_on, mode.within_off, mode.begin or ()):
+        for mode in filter(None, (*form.modes.values(), form.upright, form.plane)):
+            own = (mode.begin or (), mode.tool_end or ())
+            for blocks in (mode.on, mode.off, mode.within_on, mode.within_off, *own):
                 yield from blocks
     for extra in table.extras.values():
         yield from (*extra.on, *extra.off)

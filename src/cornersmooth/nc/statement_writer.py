@@ -219,7 +219,9 @@ class StatementWriter:
 
     def _outside_tip_control(self) -> list[str]:
         """Blocks before a new speed, where the control takes none under tool tip control."""
-        return self.operation.pause() if self.words.speed_without_tip_control else []
+        blocks = self.operation.pause() if self.words.speed_without_tip_control else []
+        self.changed |= bool(blocks) and self.operation.retracted
+        return blocks
 
     def coolant(self, statement: Statement) -> list[str] | None:
         """COOLNT/ON, OFF, FLOOD, MIST and what else the control has; a bare COOLNT means ON."""

@@ -202,6 +202,8 @@ class Elements:
         move may be higher than this, as F is the largest that the control takes.
     second_room : (m,) float64
         By how much, as `second`, directions that must be exact may be off beside the printed digits.
+    tip_room : (m,) float64, mm
+        The same for each coordinate of tips: digits of a tilted plane are not along X, Y and Z.
     curves : Curves
     arcs : NcArcs
     second_is : {"vector", "point"}
@@ -219,6 +221,7 @@ class Elements:
     per_revolution: NDArray[np.bool_]
     feed_room: Floats
     second_room: Floats
+    tip_room: Floats
     curves: Curves
     arcs: NcArcs
     second_is: Second
@@ -254,7 +257,7 @@ class Elements:
 
 
 #: fields of `Elements` with a row for each
-_COLUMNS: Final = ("kind", "tip", "second", "line", "feed", "per_revolution", "feed_room", "second_room")
+_COLUMNS: Final = ("kind", "tip", "second", "line", "feed", "per_revolution", "feed_room", "second_room", "tip_room")
 
 
 @dataclass(frozen=True, kw_only=True)

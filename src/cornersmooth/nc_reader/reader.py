@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any, Final, NoReturn
@@ -25,6 +26,7 @@ from cornersmooth.nc_reader.needed_states import (
     unclamped_problems,
 )
 from cornersmooth.nc_reader.path_elements import in_mm, path_elements
+from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane, unclamped
 from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
 from cornersmooth.nc_reader.way_back import WayBack
 from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables
@@ -80,6 +82,9 @@ class Reader:
         self.blocks = 0
         self.way_back = WayBack(name)
         self.left_cuts = LeftCuts(self.problems)
+        #: the tilted plane that is on, and what has been said of it
+        self.plane: TiltedPlane | None = None
+        self._said_of_planes: set[str] = set()
         #: the last element that was given out, if any
         self.given: list[Elements] = []
         #: elements up to a rapid along the tool before a retract that nobody asked for
@@ -155,14 +160,13 @@ class Reader:
                 approach = frozenset(lines.difference(run.line.tolist()))
                 if not len(run.kind):
                     continue
+            if self.plane is not None:
+                self._in_plane(table, run, self.plane, factor, before)
+                continue
             self._check_control(table, before.code, approach)
             if self.modal.points and not before.points:
                 self._know_points(run)
-            self.problems.extend(run.problems)
-            unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
-            unit = 1.0 if before.inverse_time else unit
-            run = in_mm(run, factor, unit, points=self.modal.points)
-            run.feed_room += self.dialect.feed_step / 2 * unit
+            run = self._in_mm(run, factor, before)
             if self.rotary is not None:
                 start = before.but(tip=tuple(factor * value for value in before.tip))
                 rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
@@ -176,6 +180,66 @@ class Reader:
                 self.lever = max(self.lever, float(levers.max(initial=0.0, where=~np.isnan(levers))))
             self._add(run)
         self.waiting = []
+
+    def _in_mm(self, run: Executed, factor: float, before: Modal) -> Executed:
+        """Return a run in millimetres, and note what is wrong with it."""
+        self.problems.extend(run.problems)
+        unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
+        unit = 1.0 if before.inverse_time else unit
+        run = in_mm(run, factor, unit, points=self.modal.points)
+        run.feed_room += self.dialect.feed_step / 2 * unit
+        return run
+
+    def _in_plane(self, table: Table, run: Executed, plane: TiltedPlane, factor: float, before: Modal) -> None:
+        """Take over a run in a tilted plane."""
+        axis_words = self.rotary.names if self.rotary is not None else "IJKUVW"
+        found = plane.problems(table, run, self.tip_control, axis_words)
+        self.problems += [problem for problem in found if problem.text not in self._said_of_planes]
+        self._said_of_planes |= {problem.text for problem in found}
+        self._add(plane.in_part(self._in_mm(run, factor, before)), plane)
+
+    def tilt(self, line: Line, plane: TiltedPlane) -> None:
+        """Switch a tilted plane on."""
+        if self.plane is not None:
+            self.wrong("CS506", line, "a tilted plane within another")
+        if self.tip_control:
+            self.wrong("CS506", line, f"a tilted plane under {self.tip_control}")
+        self._above(line, "a tilted plane where the tool is not retracted")
+        self.plane, self._said_of_planes = plane, set()
+        self.way_back.open = True
+        self.modal = self.modal.but(tip=(math.nan,) * 3)
+        if plane.turned:
+            self._turn(line)
+
+    def turn_to_plane(self, line: Line) -> None:
+        """Turn the rotary axes to the tilted plane that is on."""
+        if self.plane is None or self.plane.turned:
+            self.wrong("CS506", line, "the tool is turned to a tilted plane, and none waits for it")
+            return
+        self._above(line, "the tool is turned to a tilted plane where it is not retracted")
+        self.plane = replace(self.plane, turned=True)
+        self._turn(line)
+
+    def level(self, line: Line) -> None:
+        """Switch the tilted plane off, where one is on."""
+        if self.plane is None:
+            return
+        if self.tip_control:
+            self.wrong("CS506", line, f"the end of a tilted plane under {self.tip_control}")
+        self._above(line, "a tilted plane ends where the tool is not retracted")
+        self.modal, self.plane = self.plane.left(self.modal, rotary=self.rotary is not None), None
+
+    def _above(self, line: Line, text: str) -> None:
+        """Complain where the tool is not above a retract."""
+        if not self.way_back.open:
+            self.wrong(NOT_ABOVE, line, text)
+
+    def _turn(self, line: Line) -> None:
+        """Complain of rotary axes that are held where a plane turns them."""
+        if self.rotary is not None:
+            axes = self.rotary.machine.axes
+            for name in unclamped(self.memory, self.rotary.names, [axis.clamp is not None for axis in axes]):
+                self.wrong("CS538", line, f"{name} turns to a tilted plane while it is clamped")
 
     @property
     def _code(self) -> float:
@@ -209,8 +273,8 @@ class Reader:
         for part in self.ready:
             part.second[:] = np.nan
 
-    def _add(self, run: Executed) -> None:
-        """Take over the elements of a run."""
+    def _add(self, run: Executed, plane: TiltedPlane | None = None) -> None:
+        """Take over the elements of a run, in a tilted plane or in none."""
         if not len(run.kind):
             return
         second_is: Second = "point" if self.modal.points else "vector"
@@ -220,7 +284,10 @@ class Reader:
             lever = self.lever if self._given_lever is None else self._given_lever
             steps = replace(self.rotary, tip_step=steps[0]).steps(lever)
             self._arrive_again(run, steps[0])
-        self.ready.append(path_elements(run, second_is, steps, rotary=self.rotary is not None))
+        elements = path_elements(run, second_is, steps, rotary=self.rotary is not None)
+        if plane is not None:
+            elements.second_room[:], elements.tip_room[:] = plane.room, ASIDE * elements.tip_step
+        self.ready.append(elements)
         self.way_back.look_along(self.ready[-1])
         self.left_cuts.come_back(self.ready[-1], self.elements)
         self.elements += len(run.kind)
@@ -254,7 +321,7 @@ class Reader:
             room = self.rotary.pole_room(found.second)
         elif found.second_is == "vector" and not self.steps.second:  # no word says anything of the tool axis
             room += FIXED_SHARE * self.options.tolerance / self.options.axis_length
-        return replace(found, second_room=room)
+        return replace(found, second_room=np.maximum(room, found.second_room))
 
     @property
     def units(self) -> Units:
@@ -310,7 +377,7 @@ class Reader:
             while place and self.events[place - 1].element == self.elements:
                 place -= 1
             self.events[place:] = [replace(event, element=event.element - 1) for event in self.events[place:]]
-        self.modal = self.way_back.leave(self.modal, axes)
+        self.modal = self.way_back.leave(self.modal, "XYZ" if self.plane is not None else axes)
 
     def _check_swings(self, elements: Ints, run: Executed) -> None:
         """Complain of rapids in which rotary axes lead the tool far round."""

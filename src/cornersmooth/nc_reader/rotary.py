@@ -86,6 +86,14 @@ class Rotary:
         tool = np.broadcast_to(self.machine.tool, (len(angles), 3))
         return _turned(first, angles[:, 0], _turned(second, angles[:, 1], tool))
 
+    def carried(self, vectors: Floats, angles: Floats) -> Floats:
+        """(n, 3) vectors of the machine in a part that tables have turned by (n, 2) degrees."""
+        for index in (1, 0):
+            axis = self.machine.axes[index]
+            if axis.carrier == "table":
+                vectors = _turned(axis, angles[:, index], vectors)
+        return vectors
+
     def tips(self, position: Floats, angles: Floats) -> Floats:
         """(n, 3) tips in the part, mm, for words of the linear axes and degrees.
 

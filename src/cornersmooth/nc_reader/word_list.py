@@ -13,18 +13,19 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
 ``[[word]]``
     ``is``: the word, blanks left out. ``says``: what it means, for the documentation.
 
-    ``state``: what it changes. Where the tool moves, every state must be what it was at the first motion, but for those
-    that ``follows`` the CL file, which others compare. ``head``: one of these words must be said before the first
-    motion. ``off``: what must hold at the end of the program. ``compared``: others compare it with the CL file.
+    ``state``: what it changes; of a ``[[block]]``, too. Where the tool moves, every state must be what it was at the
+    first motion, but for those that ``follows`` the CL file, which others compare. ``head``: one of these words must be
+    said before the first motion. ``off``: what must hold at the end of the program. ``compared``: others compare it
+    with the CL file.
 
     ``needs``: a word that must stand in the same block, of whose state it may say more. ``must``: the same, for a word
     that is nothing without. ``alone``: no other words may stand beside it. ``before``: ``"arc"``. ``after``: a word
     that must have been said since the last time. ``then``, ``behind``: the next block, the block before. ``share``:
     what the number in brackets may be of the tolerance. ``varies``: it may change within the program. ``zero``: the
     rotary axes must have been sent to zero before: where a parameter says so, the part program turns with the angles of
-    that moment. ``never``: the control has no such word. ``tool``: in a text with a ``cycle`` of the control it may
-    differ from tool to tool. ``high``: only behind a retract; a control with such a word wants the tool high at the
-    end, too.
+    that moment. ``turns``: the control turns them, and nobody says where to. ``never``: the control has no such word.
+    ``tool``: in a text with a ``cycle`` of the control, or a tilted plane, it may differ from tool to tool. ``high``:
+    only behind a retract; a control with such a word wants the tool high at the end, too.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.
@@ -69,6 +70,7 @@ class WordRule:
     zero: bool = False
     tool: bool = False
     cycle: bool = False
+    turns: bool = False
 
 
 @dataclass(frozen=True)

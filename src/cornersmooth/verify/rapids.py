@@ -47,7 +47,8 @@ def digit_errors(nc: Elements, element: Ints, tip: Floats, axis: Floats, axis_le
     """
     off = nc.tip[element] - tip
     second = nc.second[element]
-    exact: Bools = np.logical_and.reduce(np.abs(off) <= nc.tip_step / 2 + ARITHMETIC, axis=1)
+    near = np.abs(off) <= (nc.tip_step / 2 + nc.tip_room[element] + ARITHMETIC)[:, None]
+    exact: Bools = np.logical_and.reduce(near, axis=1)
     if nc.second_is == "vector":
         side = second - axis
         room = (nc.second_step / 2 + nc.second_room[element] + ARITHMETIC)[:, None]
@@ -165,7 +166,7 @@ class Rapids:
             exact, _ = digit_errors(nc, ours[-count:], self._tip[rows], self._axis[rows], self.axis_length)
             tail = count if exact.all() else int(np.argmin(exact[::-1]))
         middle = slice(0, len(theirs) - tail), slice(0, len(ours) - tail)
-        codes = _opcodes(self._tip[theirs[middle[0]]], nc.tip[ours[middle[1]]], nc.tip_step)
+        codes = _opcodes(self._tip[theirs[middle[0]]], nc, ours[middle[1]])
         if not final:  # what comes behind the last that fits may fit something farther on
             while len(codes) > 1 and codes[-1][0] != "equal":
                 codes.pop()
@@ -227,9 +228,16 @@ def moving_rapids(nc: Elements, first: int, stop: int) -> Ints:
     return found
 
 
-def _opcodes(theirs: Floats, ours: Floats, step: float) -> list[tuple[str, int, int, int, int]]:
-    if max(len(theirs), len(ours)) > _LONGEST_SEARCH:
-        return [("replace", 0, len(theirs), 0, len(ours))]
+def _opcodes(theirs: Floats, nc: Elements, element: Ints) -> list[tuple[str, int, int, int, int]]:
+    """How the tips of elements differ from a list of tips, in printed digits."""
+    if max(len(theirs), len(element)) > _LONGEST_SEARCH:
+        return [("replace", 0, len(theirs), 0, len(element))]
+    step, ours = nc.tip_step, nc.tip[element]
+    aside = np.flatnonzero(nc.tip_room[element])
+    if len(aside) and len(theirs):  # digits along other axes: the nearest tip, if it is as near as they can be
+        apart = np.linalg.norm(ours[aside, None] - theirs, axis=2)
+        near = apart.min(axis=1) <= np.sqrt(3) / 2 * step + ARITHMETIC
+        ours[aside[near]] = theirs[apart.argmin(axis=1)[near]]
     left = [tuple(row) for row in np.round(theirs / step).astype(np.int64).tolist()]
     right = [tuple(row) for row in np.round(ours / step).astype(np.int64).tolist()]
     return list(difflib.SequenceMatcher(None, left, right, autojunk=False).get_opcodes())

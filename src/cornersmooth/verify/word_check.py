@@ -225,7 +225,7 @@ class WordCheck:
         self._angles |= {word.name: word.value for word in line.words if word.name in _ROTARY}
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
-        still = any(rule.retract and rule.pattern.fullmatch(text_of(words)) for rule in self.list.blocks)
+        still = any(rule.pattern.fullmatch(text_of(words)) for rule in self.list.blocks)
         still |= any(rule.alone and any_of(rule.pattern, words) for rule in self.list.words)
         if not still and any(word.name in _LINEAR for word in line.words):
             self._moved(line.number, self._code)
@@ -366,6 +366,8 @@ class WordCheck:
                 self._unframed(NOT_LISTED, number, f"{word} without the rotary axes at zero before it")
             if rule.high and not self._high:
                 self._unframed(NOT_LISTED, number, f"{word} without a retract before it")
+            if rule.turns:
+                self._angles = {}
             if rule.retract:
                 self._retract, self._high = number, True
             if rule.after is not None or word.startswith("TOOL CALL "):
@@ -386,7 +388,7 @@ class WordCheck:
     def _states(self, number: int, words: list[str], rules: list[WordRule | None]) -> None:
         """Take over what a block changes."""
         if len(rules) != len(words):
-            return
+            words, rules = [text_of(words)], rules[:1]
         for word, rule in zip(words, rules, strict=True):
             if rule is None or not rule.state:
                 continue

@@ -87,6 +87,14 @@ cycles = click.option(
     show_default=True,
     help="Holes as plain moves, or as the control's own cycles where it has such and the tool stays along Z.",
 )
+planes = click.option(
+    "--planes",
+    type=click.Choice(["none", "tilted"]),
+    default="none",
+    show_default=True,
+    help="Whether a tool that keeps a tilted axis between rapids runs in a tilted plane of the control: CYCLE800, "
+    "PLANE SPATIAL, G68.2, G254.",
+)
 header = click.option(
     "--header",
     type=click.Path(),
@@ -137,6 +145,7 @@ def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
             rewind,
             skip_taps,
             cycles,
+            planes,
             header,
             footer,
             block_numbers,

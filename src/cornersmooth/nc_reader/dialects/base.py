@@ -11,6 +11,8 @@ from cornersmooth.nc_reader.words import Columns, Line
 
 if TYPE_CHECKING:
     from cornersmooth.nc_reader.execution import Modal
+    from cornersmooth.nc_reader.planes import TiltedPlane
+    from cornersmooth.nc_reader.rotary import Rotary
 
 
 #: M words that act after the motion of their block: stops, spindle off, coolant off, end
@@ -35,6 +37,8 @@ class State(Protocol):
     """What a dialect may ask of the reader, and tell it."""
 
     modal: Modal
+    #: how rotary words move the tool; None without a machine
+    rotary: Rotary | None
     #: what keeps the tip where it is told, in the words of the dialect; empty for nothing
     tip_control: str
     #: what else a dialect has to remember from line to line
@@ -54,6 +58,15 @@ class State(Protocol):
 
     def leave(self, axes: str) -> None:
         """Say that axes go to positions of the machine: where they are in the part is not known any more."""
+
+    def tilt(self, line: Line, plane: TiltedPlane) -> None:
+        """Switch a tilted plane on."""
+
+    def turn_to_plane(self, line: Line) -> None:
+        """Turn the rotary axes to the tilted plane that is on."""
+
+    def level(self, line: Line) -> None:
+        """Switch the tilted plane off, where one is on."""
 
     def refuse(self, line: Line, what: str, hint: str) -> None:
         """Give up: words that make it impossible to tell where the tool is."""

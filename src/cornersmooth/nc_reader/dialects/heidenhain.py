@@ -11,12 +11,15 @@ from typing import Final
 from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, Dialect, State, values
 from cornersmooth.nc_reader.hole_cycles import DEFINED, HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 from cornersmooth.nc_reader.words import SPL, Columns, Line, Word
 
 _VECTOR: Final = {"TX": "I", "TY": "J", "TZ": "K"}
 _PATHS: Final = ("L", "LN", "SPL")
 
 _TOOL_CALL: Final = re.compile(rf"TOOL CALL(?: (\d+))?(?: [XYZ])?(?: S({NUMBER}))?(?: F{NUMBER})?(?: D.*)?")
+#: turns about the fixed axes X, Y and Z in this order, which are turns about its own Z, Y and X
+_SPATIAL: Final = re.compile(rf"PLANE SPATIAL SPA({NUMBER}) SPB({NUMBER}) SPC({NUMBER}) TURN FMAX")
 _FOLDED: Final = re.compile(rb"[^\n]*~[ \r]*\n(?:[^\n]*~[ \r]*\n)*[^\n]*\n?")
 
 #: blocks that change nothing measured here
@@ -27,7 +30,6 @@ _SILENT = (
     "CYCL DEF 32",
     "CYCL DEF 9.0",
     "CYCL DEF 247",
-    "PLANE RESET",
     "* -",
     "*-",
     "LBL",
@@ -198,6 +200,12 @@ class Heidenhain(Dialect):
             state.event(line, "G", 4.0, f"{1000.0 * float(match[1]):.10g}")
         elif match := re.match(r"CYCL DEF (200|201|207) ", text):
             self._define(int(match[1]), text, line, state)
+        elif match := _SPATIAL.fullmatch(text):
+            angles = match.groups()
+            turns = [(axis, float(angle)) for axis, angle in zip("ZYX", angles[::-1], strict=True)]
+            state.tilt(line, TiltedPlane(rotated_frame(turns), room_of(angles)))
+        elif text == "PLANE RESET STAY":
+            state.level(line)
         elif text == "STOP":
             state.event(line, "M", 0.0, text, late=True)
         elif match := re.fullmatch(r"FUNCTION TCPM F (?:TCP|CONT) AXIS POS PATHCTRL (AXIS|VECTOR)(?: .*)?", text):

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, Dialect, State
 from cornersmooth.nc_reader.hole_cycles import INITIAL_HEIGHT, HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
 from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.nc_reader.words import MOTION_CODES, NURBS, Columns, Line, Word
 
@@ -25,6 +26,12 @@ _COMPENSATION = (40.0, 41.0, 42.0)
 #: hole cycles with what they take besides X Y Z R F, and the codes that stand beside them
 _CYCLES = {73.0: "Q", 81.0: "", 82.0: "P", 83.0: "Q", 84.0: "P", 85.0: "", 89.0: "P"}
 _BACK_TO_START = 98.0
+#: G words of tilted planes, by what switches them on
+_TILTED, _PLANE_LINE = 68.2, re.compile(rb"G68\.2[^\n]*", re.IGNORECASE)
+_PLANE_WORDS: Mapping[str, frozenset[float]] = {
+    "G68.2": frozenset((_TILTED, 53.1, 69.0)),
+    "G254": frozenset((254.0, 255.0)),
+}
 #: names in `State.memory` of the speed of the spindle, and of whether M29 asks it to turn with the feed
 _SPEED, _RIGID = "speed", "rigid"
 _NO_CYCLE = 80.0
@@ -58,6 +65,8 @@ class IsoWords:
         Name of the tool tip control under which hole cycles are taken; None where they are not known.
     rigid : bool
         Whether ``M29 S`` asks for taps that turn the spindle with the feed.
+    planes : {"", "G68.2", "G254"}
+        What switches tilted planes on.
     """
 
     tip_control: Mapping[float, str]
@@ -71,6 +80,7 @@ class IsoWords:
     retracts: bool = True
     cycles_in: str | None = "G43"
     rigid: bool = False
+    planes: str = ""
 
 
 _FANUC = {43.0: "G43", 43.4: "G43.4", 43.5: "G43.5", 49.0: ""}
@@ -81,9 +91,16 @@ _NO_THROUGH: frozenset[str | tuple[str, float]] = frozenset((("coolant", 88.0),)
 _HIGH_SPEED = frozenset((5.0, 5.1, 8.0))
 
 ISO_WORDS: Mapping[str, IsoWords] = {
-    "fanuc": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH, rigid=True),
+    "fanuc": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH, rigid=True, planes="G68.2"),
     # high-speed high-accuracy control II, or III (P20000): program error P29 without it
-    "mitsubishi": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH, curves_need="G5 P10000"),
+    "mitsubishi": IsoWords(
+        _FANUC,
+        _FANUC_CONTROLS,
+        silent=_HIGH_SPEED,
+        unsaid=_NO_THROUGH,
+        curves_need="G5 P10000",
+        planes="G68.2",
+    ),
     "haas": IsoWords(
         {43.0: "G43", 234.0: "G234", 49.0: ""},
         {"angles": ("G234",), "machine": ("", "G43"), "vector": ("G234",)},
@@ -91,6 +108,7 @@ ISO_WORDS: Mapping[str, IsoWords] = {
         others="NOQPE",
         unsaid=frozenset((("coolant", 7.0),)),
         dwell=1000.0,
+        planes="G254",
     ),
     "linuxcnc": IsoWords(
         {43.0: "G43", 43.1: "G43.1", 49.0: ""},
@@ -122,6 +140,10 @@ class Iso(Dialect):
         self.controls, self.unsaid, self.curves_need = self.iso.controls, self.iso.unsaid, self.iso.curves_need
         self.retracts = self.iso.retracts
 
+    def decimals(self, text: bytes) -> tuple[int, int | None]:
+        """As `Dialect.decimals`: the angles of a tilted plane are no vectors."""
+        return super().decimals(_PLANE_LINE.sub(b"", text))
+
     def words(self, line: Line, state: State) -> None:
         """Interpret a line that is no motion block."""
         codes = {word[1] for word in line.words if word[0] == "G"}
@@ -130,6 +152,9 @@ class Iso(Dialect):
             return
         if codes & _CYCLES.keys():
             self._cycle(line, codes, state)
+            return
+        if codes & _PLANE_WORDS.get(self.iso.planes, frozenset()):
+            self._plane(line, codes, state)
             return
         if _NO_CYCLE in codes:
             state.memory.pop(INITIAL_HEIGHT, None)
@@ -199,6 +224,30 @@ class Iso(Dialect):
             cycle = replace(cycle, feed=pitch, pitch=pitch)
         drill(cycle, given["X"], given["Y"], line, state)
         state.change(line, code=math.nan, feed=feed, per_revolution=turning)
+
+    def _plane(self, line: Line, codes: set[float], state: State) -> None:
+        """G68.2, G53.1 and G69, or G254 and G255."""
+        given = {word.name: word for word in line.words if word.name not in "GN"}
+        count = sum(word.name != "N" for word in line.words)
+        if len(codes) > 1 or count != 1 + len(given) or (given and _TILTED not in codes):
+            state.refuse(line, "words beside those of a tilted plane", "give it a block of its own")
+        if codes & {69.0, 255.0}:
+            state.level(line)
+        elif 53.1 in codes:
+            state.turn_to_plane(line)
+        elif _TILTED in codes:
+            if given.keys() != set("XYZIJK") or any(given[name].value for name in "XYZ"):
+                state.refuse(line, "G68.2 in another form", "give X0. Y0. Z0. and the Euler angles I J K")
+            turns = [(axis, given[name].value) for axis, name in zip("ZXZ", "IJK", strict=True)]
+            room = room_of([given[name].text for name in "IJK"])
+            state.tilt(line, TiltedPlane(rotated_frame(turns), room, "G43", turned=False))
+        else:
+            angles = state.modal.second[:2]
+            frame = turned_frame(state.rotary, angles) if state.rotary is not None else None
+            if frame is None or math.isnan(sum(angles)):
+                state.refuse(line, "G254 where the angles of the tables are not known", "name the machine")
+            else:
+                state.tilt(line, TiltedPlane(frame, 0.0, "G43"))
 
     def _to_machine(self, line: Line, codes: set[float], state: State) -> None:
         """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""

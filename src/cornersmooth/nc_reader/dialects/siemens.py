@@ -11,6 +11,7 @@ from typing import Final
 from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, BY_WORD, Dialect, State
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
+from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
 from cornersmooth.nc_reader.words import BSPLINE, POLY, Columns, Line, Word
 
 #: names of words of several letters: vectors are I J K, second points U V W, as in `motion`
@@ -42,6 +43,11 @@ _SPEED: Final = "speed"
 
 #: hole cycles, and how many arguments they may have
 _CYCLES: Final = {"CYCLE81": (4,), "CYCLE82": (6,), "CYCLE83": (12,), "CYCLE84": (12,), "CYCLE85": (8,)}
+
+#: a plane without retract, shifts or more than one data record, whose rotary axes turn to it
+_SWIVEL: Final = re.compile(
+    rf"CYCLE800[ \t]*\((?:0,\"\",0,(?P<mode>\d+),0,0,0,(?P<angles>{NUMBER},{NUMBER},{NUMBER}),0,0,0,-?1)?\)"
+)
 
 #: a BSPLINE says its degree, which is 3
 _DEGREES: Final = ((None, False), (3.0, True))
@@ -85,6 +91,9 @@ class Siemens(Dialect):
             return
         if any(word[0] in _CYCLES for word in line.words):
             self._cycle(line, state)
+            return
+        if any(word[0] == "CYCLE800" for word in line.words):
+            self._plane(line, state)
             return
         motion: dict[str, float] = {}
         for name, value, text, *_ in line.words:
@@ -142,6 +151,23 @@ class Siemens(Dialect):
         modal = state.modal
         drill(known, modal.tip[0], modal.tip[1], line, state)
         state.change(line, code=math.nan, feed=modal.feed, per_revolution=modal.per_revolution)
+
+    def _plane(self, line: Line, state: State) -> None:
+        """CYCLE800: a plane by turns about its own axes, one after another; without arguments none."""
+        words = [word for word in line.words if word.name != "N"]
+        match = _SWIVEL.fullmatch(words[0].text)
+        if len(words) > 1 or match is None:
+            hint = 'write CYCLE800(0,"",0,57,0,0,0,A,B,C,0,0,0,-1), or CYCLE800()'
+            state.refuse(line, f"{words[0].text} is not understood", hint)
+        elif match["mode"] is None:
+            state.level(line)
+        else:
+            mode, angles = int(match["mode"]), match["angles"].split(",")
+            axes = [(mode >> shift) & 3 for shift in (0, 2, 4)]
+            if mode > 0b111111 or 0 in axes or axes[0] == axes[1] or axes[1] == axes[2]:
+                state.refuse(line, f"CYCLE800 in the mode {mode}", "use 57: axis by axis about X, Y, Z")
+            turns = [("XYZ"[axis - 1], float(angle)) for axis, angle in zip(axes, angles, strict=True)]
+            state.tilt(line, TiltedPlane(rotated_frame(turns), room_of(angles)))
 
     def _to_machine(self, line: Line, state: State) -> None:
         """SUPA: a rapid in machine coordinates, without frames."""

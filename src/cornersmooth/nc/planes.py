@@ -1,0 +1,223 @@
+"""Tilted planes of the control (3+2): which poses are written in one, its frame, and the numbers of its words.
+
+The frame is made of the angles as they are written, as the control will make it, and positions are computed in that
+frame: so rounded angles do not move the tip, however far it is from the zero of the part. They only turn the tool, by
+less than a step of their last digit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.kinematics import Machine, machine_position, solutions
+from cornersmooth.model import Bools, Floats, Ints, Keep, Move, Program
+from cornersmooth.nc.cycle_blocks import tool_starts
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+from cornersmooth.settings import Settings
+from cornersmooth.text import format_number
+from cornersmooth.vectors import norm
+
+#: tool axes that differ by less are one, and all of a run are so near to its first
+_SAME: Final = 1e-7
+
+#: moves with which the tool may come to another axis: it goes up before
+_FREE: Final = (Move.RAPID, Move.HOLE)
+
+#: moves that cut nothing
+_IDLE: Final = (Move.RAPID, Move.FROM)
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A tilted plane.
+
+    Parameters
+    ----------
+    frame : (3, 3) float64
+        Columns: X', Y' and Z' of the plane in the part; Z' is the tool axis, the zero is that of the part.
+    words : mapping of str to str
+        Numbers of the three rotations, as they are written: ``first``, ``second``, ``third``.
+    angles : (2,) float64 or None, degrees
+        Rotary words, where these make the plane.
+    """
+
+    frame: Floats
+    words: Mapping[str, str] = field(default_factory=dict)
+    angles: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Planes:
+    """The tilted planes of a program.
+
+    Parameters
+    ----------
+    of : (n,) int64
+        Plane of each pose, -1 for none.
+    planes : tuple of Plane
+    """
+
+    of: Ints
+    planes: tuple[Plane, ...] = ()
+
+    def frames(self, poses: Ints) -> Floats:
+        """(k, 3, 3) frames in which poses are written; the part's own outside of planes."""
+        frames = np.array([*(plane.frame for plane in self.planes), np.eye(3)])
+        return frames[self.of[poses]]
+
+
+def plan_planes(program: Program, settings: Settings, form: Form, upright: Bools, findings: Findings) -> Planes:
+    """Choose the runs of poses that are written in tilted planes.
+
+    A run has one tilted axis, cuts, and lies between rapids or changes of the tool: there it can go up and be turned.
+
+    Parameters
+    ----------
+    program : Program
+    settings : Settings
+    form : Form
+        Where it has no `Form.plane` there are none.
+    upright : (n,) bool
+        Poses of tools that stay along Z, which need no plane.
+    findings : Findings
+        Takes which runs are in planes, and which are not although they could.
+    """
+    of = np.full(len(program), -1, np.int64)
+    if form.plane is None:
+        return Planes(of)
+    planes: dict[tuple[str, ...], int] = {}
+    found: list[Plane] = []
+    for first, stop in _runs(program):
+        if upright[first]:
+            continue
+        line = int(program.line[first])
+        plane, why = _plane(program.axis[first], settings, form)
+        if plane is None:
+            findings.add("CS357", "warning", line, f"no tilted plane: {why}; under tool tip control as other motion")
+            continue
+        name = (*plane.words.values(), *map(str, [] if plane.angles is None else plane.angles.tolist()))
+        number = planes.setdefault(name, len(found))
+        if number == len(found):
+            found.append(plane)
+        of[first:stop] = number
+        findings.add("CS356", "note", line, "run with one axis of the tool written in a tilted plane of the control")
+    return Planes(of, tuple(found))
+
+
+def _runs(program: Program) -> list[tuple[int, int]]:
+    """First poses, and those behind the last, of runs that could be written in a plane."""
+    kind, axis = program.kind, program.axis
+    moving = np.flatnonzero(kind != Move.FROM)
+    if not len(moving):
+        return []
+    turned = np.zeros(len(kind) + 1, np.bool_)
+    turned[moving[1:]] = norm(np.diff(axis[moving], axis=0)) > _SAME
+    starts = np.array([start for start in tool_starts(program) if start < len(kind)], np.int64)
+    turned[[*starts, moving[0], len(kind)]] = True
+    free = np.append(np.isin(kind, _FREE), True)
+    free[[*starts, moving[0]]] = True
+    # where the control offsets the path, it goes on doing so from one run to the next
+    free &= ~np.append(program.keep == Keep.CUTTER_COMPENSATION, False)
+    runs = []
+    for first, stop in pairwise(np.flatnonzero(turned).tolist()):
+        here = moving[(moving >= first) & (moving < stop)]
+        if not (free[first] and free[stop] and (~np.isin(kind[here], _IDLE)).any()):
+            continue
+        near = norm(axis[here] - axis[first]).max() <= _SAME
+        if near and norm(axis[first] - (0.0, 0.0, 1.0)) > _SAME:
+            runs.append((first, stop))
+    return runs
+
+
+def _plane(axis: Floats, settings: Settings, form: Form) -> tuple[Plane | None, str]:
+    """Plane with a tool axis as Z'; else why there is none."""
+    assert form.plane is not None
+    digits = form.table.digits.angle
+    if form.plane.rotations:
+        plus = form.plane.motion.signs
+        said = [format_number(angle, digits, plus=plus) for angle in tilting_angles(form.plane.rotations, axis)]
+        frame = rotations_frame(form.plane.rotations, [float(number) for number in said])
+        plane = Plane(frame, dict(zip(("first", "second", "third"), said, strict=True)))
+    else:
+        assert form.machine is not None
+        angles = _rotary_angles(form.machine, axis)
+        if angles is None:
+            return None, "no angles of the rotary axes within their limits turn the part so"
+        angles = np.round(angles, digits)
+        plane = Plane(turned_part(form.machine, angles), angles=angles)
+    off = settings.axis_length * float(norm(plane.frame[None, :, 2] - axis)[0])
+    if off > form.plane_reserve(settings.tolerance, settings.axis_length):
+        return None, f"its angles of {digits} decimals would turn the tool by more than the tolerance leaves"
+    if norm(plane.frame[None, :, 2] - (0.0, 0.0, 1.0))[0] < _SAME:
+        return None, "in the written angles the tool is not tilted"
+    return plane, ""
+
+
+def tilting_angles(rotations: str, axis: Floats) -> tuple[float, float, float]:
+    """Angles in degrees of three rotations that bring Z to an axis; the last is zero.
+
+    Parameters
+    ----------
+    rotations : str
+        Axes of the rotations in their order, each that of the frame which those before it have made, as in ``"zxz"``.
+    axis : (3,) float64
+        Unit vector.
+    """
+    one, two = (_UNIT[name] for name in rotations[:2])
+    across = np.cross(two, _UNIT["z"])  # where the second rotation leads Z
+    if rotations[0] == "z":
+        second = math.acos(min(max(float(axis[2]), -1.0), 1.0))
+    else:
+        second = math.asin(min(max(float(axis @ one) * float(across @ one), -1.0), 1.0))
+    turned = math.cos(second) * _UNIT["z"] + math.sin(second) * across
+    flat, wanted = (vector - (vector @ one) * one for vector in (turned, axis))
+    first = math.atan2(float(one @ np.cross(flat, wanted)), float(flat @ wanted))
+    return math.degrees(first), math.degrees(second), 0.0
+
+
+def rotations_frame(rotations: str, degrees: list[float]) -> Floats:
+    """(3, 3) frame, columns X' Y' Z', that three rotations make, each about an axis of the frame before it."""
+    frame = np.eye(3)
+    for name, angle in zip(rotations, degrees, strict=True):
+        cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+        unit = _UNIT[name]
+        across = np.cross(unit, np.eye(3)).T  # unit × v
+        frame = frame @ (cosine * np.eye(3) + sine * across + (1.0 - cosine) * np.outer(unit, unit))
+    return frame
+
+
+def turned_part(machine: Machine, angles: Floats) -> Floats:
+    """(3, 3) directions X Y Z of the machine, as columns, in a part that tables have turned by (2,) degrees."""
+    places = np.vstack((np.eye(3), np.zeros((1, 3))))
+    moved = machine_position(machine, places, np.tile(angles, (4, 1)))
+    frame: Floats = moved[:3] - moved[3]
+    return frame
+
+
+def _rotary_angles(machine: Machine, axis: Floats) -> Floats | None:
+    """(2,) degrees within the limits that bring the tool to an axis: as preferred, else as little as possible."""
+    found = solutions(machine, axis[None])
+    if found.beyond[0] > 0.0:
+        return None
+    turns = np.array([[one, other] for one in (-360.0, 0.0, 360.0) for other in (-360.0, 0.0, 360.0)])
+    angles = (found.angles[0][:, None, :] + turns).reshape(-1, 2)
+    low, high = machine.limits.T
+    angles = angles[((angles >= low) & (angles <= high)).all(axis=1)]
+    if not len(angles):
+        return None
+    turned = np.abs(angles).sum(axis=1)
+    if machine.preferred is not None:
+        name, sign = machine.preferred
+        turned = turned + np.where(sign * angles[:, machine.names.index(name)] >= 0.0, 0.0, 1e6)
+    chosen: Floats = angles[int(np.argmin(turned))]
+    return chosen
+
+
+_UNIT: Final = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}

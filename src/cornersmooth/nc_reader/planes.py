@@ -1,0 +1,148 @@
+"""Tilted planes: the frame that a control makes of the words of a plane, and motion in it as motion in the part.
+
+While a plane is on, the modal position is that of the plane; what is executed is brought into the part, with the tool
+along Z' of the plane. A plane is switched on and off above a retract, where the rotary axes may turn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from cornersmooth.model import Floats
+from cornersmooth.nc_reader.dialects.base import CLAMPED
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.execution import Executed, Modal
+from cornersmooth.nc_reader.rotary import Rotary
+from cornersmooth.nc_reader.words import Table
+
+#: problem of a plane that is switched on or off where the tool is not above the part
+NOT_ABOVE: Final = "CS539"
+
+#: by how many steps of the last digit, beside half a step, rounding along X', Y', Z' may move a tip along X, Y or Z
+ASIDE: Final = (math.sqrt(3.0) - 1.0) / 2.0
+
+
+@dataclass(frozen=True)
+class TiltedPlane:
+    """A plane that is on.
+
+    Parameters
+    ----------
+    frame : (3, 3) float64
+        Columns: its axes X', Y', Z' in the part, whose zero it has.
+    room : float, rad
+        By how much its printed angles leave the tool axis open.
+    needs : str
+        Tool tip control that its motion needs; empty for none.
+    turned : bool
+        Whether the rotary axes have been sent to it.
+    """
+
+    frame: Floats
+    room: float = 0.0
+    needs: str = ""
+    turned: bool = True
+
+    @property
+    def tool(self) -> Floats:
+        """(3,) unit vector of the tool."""
+        axis: Floats = self.frame[:, 2]
+        return axis
+
+    def in_part(self, run: Executed) -> Executed:
+        """Return a run in the coordinates of the part."""
+        out = self.frame.T
+        return replace(
+            run,
+            tip=run.tip @ out,
+            second=np.tile(self.tool, (len(run.kind), 1)),
+            arc_centre=run.arc_centre @ out,
+            arc_normal=run.arc_normal @ out,
+        )
+
+    def left(self, modal: Modal, *, rotary: bool) -> Modal:
+        """Return what holds behind the plane: where the rotary axes stand the text has not said."""
+        known = np.array(modal.tip) @ self.frame.T  # nothing where any of it is unknown
+        second = (math.nan,) * 3 if rotary else tuple(self.tool.tolist())
+        return modal.but(tip=tuple(known.tolist()), second=second)
+
+    def problems(self, table: Table, run: Executed, tip_control: str, axis_words: str) -> list[Problem]:
+        """Return what is wrong with a run of motion blocks in it.
+
+        Parameters
+        ----------
+        table : Table
+        run : Executed
+        tip_control : str
+            In force.
+        axis_words : str
+            Addresses of words of the tool axis.
+        """
+        if not len(run.kind):
+            return []
+        line, found = int(run.line[0]), []
+        if not self.turned:
+            found.append("motion in a tilted plane before the tool is turned to it")
+        if tip_control != self.needs:
+            found.append(
+                f"motion in a tilted plane under {tip_control or 'no length of the tool'}, where "
+                f"{self.needs or 'no tool tip control'} must be in force"
+            )
+        straight = ~np.isin(table.column("G"), (2.0, 3.0))
+        if any((~np.isnan(table.column(name)) & straight).any() for name in axis_words):
+            found.append("words of the tool axis in a tilted plane")
+        if len(run.curves):
+            found.append("a curve in a tilted plane")
+        return [Problem("CS506", 0, line, text) for text in found]
+
+
+def rotated_frame(turns: Sequence[tuple[str, float]]) -> Floats:
+    """(3, 3) frame after turns about its own axes, one after another, as columns.
+
+    Parameters
+    ----------
+    turns : sequence of (str, float)
+        Axis, of those that the turns before have made, and degrees.
+    """
+    axes = [np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])]
+    for name, degrees in turns:
+        about = "XYZ".index(name)
+        one, other = (about + 1) % 3, (about + 2) % 3
+        cosine, sine = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+        axes[one], axes[other] = (
+            cosine * axes[one] + sine * axes[other],
+            cosine * axes[other] - sine * axes[one],
+        )
+    return np.stack(axes, axis=1)
+
+
+def turned_frame(rotary: Rotary, angles: Sequence[float]) -> Floats | None:
+    """(3, 3) frame of the machine's directions in a part that its tables have turned; None where a head turns the tool.
+
+    Parameters
+    ----------
+    rotary : Rotary
+    angles : sequence of two float
+        Degrees.
+    """
+    if any(axis.carrier != "table" for axis in rotary.machine.axes):
+        return None
+    degrees = np.tile(np.array(angles[:2]), (3, 1))
+    frame: Floats = rotary.carried(np.eye(3), degrees).T
+    return frame
+
+
+def room_of(numbers: Sequence[str]) -> float:
+    """Radians that a step of the last printed digit of angles is."""
+    return math.radians(10.0 ** -min(len(number.partition(".")[2]) for number in numbers))
+
+
+def unclamped(memory: dict[str, Any], names: Sequence[str], clamps: Sequence[bool]) -> list[str]:
+    """Rotary axes that a plane would turn although they are held."""
+    free = memory.get(CLAMPED, {})
+    return [name for name, clamp in zip(names, clamps, strict=True) if clamp and free.get(name, True)]
