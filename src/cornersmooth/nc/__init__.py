@@ -10,7 +10,7 @@ from typing import Protocol
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.model import Ints, SmoothProgram, Units
 from cornersmooth.nc.block_writer import BlockWriter
-from cornersmooth.nc.circles import Circles, plan_circles
+from cornersmooth.nc.circles import Circles, plan_circles, with_arcs
 from cornersmooth.nc.control import Control
 from cornersmooth.nc.control_tables import (
     control_aliases,
@@ -223,7 +223,7 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findi
     long = smoothed.settings.lines == "long"
     rows = coarse_rows(smoothed, circles.blocks) if long else dense_rows(smoothed, circles.blocks)
     if form.rotary:
-        return rotary_rows(rows, smoothed, form, findings, long=long)
+        return with_arcs(rotary_rows(rows, smoothed, form, findings, long=long), smoothed.program, circles)
     return long_rows(rows, smoothed, form) if long else rows
 
 

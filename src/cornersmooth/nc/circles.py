@@ -8,7 +8,8 @@ stays, and where the circle through the rounded numbers is within the tolerance 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Planes
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.arcs import arc_points, arc_radii, divided
+from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import to_ticks
 from cornersmooth.vectors import norm
 
@@ -101,6 +103,15 @@ def plan_circles(program: Program, settings: Settings, form: Form, planes: Plane
         deviation = _deviation(program, blocks, PLANES[plane], height > 0.0, written, step, frames)
         blocks[deviation > tolerance] = 0
     return Circles(blocks, plane + FIRST_PLANE, height < 0.0, ticks)
+
+
+def with_arcs(rows: Iterator[Rows], program: Program, circles: Circles) -> Iterator[Rows]:
+    """Rows in rotary words with `Rows.arc`: in a tilted plane the axes stand, so that no row of an arc has moved."""
+    own = np.full(len(program), -1, np.int64)
+    own[program.arcs.pose] = np.where(circles.blocks > 0, np.arange(len(circles.blocks)), -1)
+    some = bool((own >= 0).any())
+    for part in rows:
+        yield replace(part, arc=own[part.move]) if some else part
 
 
 def _deviation(
