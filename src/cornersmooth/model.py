@@ -344,7 +344,8 @@ class Corners:
         Distance of the second control point from the corner over that of the first; 2/3 in the paper.
     tip_error, axis_error : (k,) float64, mm
         Largest distance between both motions at a common parameter: at the tip, and at b = tip + H·axis. The paths
-        themselves are at least as near (`smoothing.path_distance`).
+        themselves are at least as near (`smoothing.path_distance`). With an axis tolerance the latter is what the axis
+        turns, at `Settings.axis_scale` from the tip.
     orientation_error : (k,) float64, rad
         Largest angle between the axis on the transition and on the original motion at the common parameter.
     extra : mapping of str to (k,) float64

@@ -35,6 +35,8 @@ class Provenance:
         Those that control points of curves have; None where they may have any.
     planned_feeds : bool
         Whether feeds are those of a plan, at most the programmed ones.
+    axis_tolerance : float or None, degrees
+        What the tool axis may be off, in place of ε at the axis point.
     """
 
     version: str
@@ -49,12 +51,14 @@ class Provenance:
     sha256: str = ""
     weights: tuple[float, ...] | None = (1.0,)
     planned_feeds: bool = False
+    axis_tolerance: float | None = None
 
     def lines(self) -> tuple[str, ...]:
         """Texts of the comments."""
         words = {
             "E": f"{self.tolerance:.9g}",
             "H": f"{self.axis_length:.9g}",
+            **({} if self.axis_tolerance is None else {"AXIS": f"{self.axis_tolerance:.9g}"}),
             "METHOD": self.method,
             "CONTROL": self.control,
             "FORM": self.form,
@@ -103,6 +107,7 @@ def read_provenance(text: bytes) -> Provenance | None:
             sha256=digest[1].lower() if digest else "",
             weights=_weights(words.get("WEIGHTS", "1")),
             planned_feeds=words.get("FEEDS") == "plan",
+            axis_tolerance=float(words["AXIS"]) if "AXIS" in words else None,
         )
     except (KeyError, ValueError):
         return None

@@ -23,7 +23,10 @@ class Settings:
     tolerance : float, mm
         ε: bound on the deviation of the written tip path and axis-point path (design section 4).
     axis_length : float, mm
-        H: distance of the axis point from the tip. Choose the length of the cutting edge.
+        H: distance of the axis point from the tip. Choose the length of the cutting edge. An axis tolerance takes its
+        place: H follows from it then, whatever is given.
+    axis_tolerance : float or None, degrees
+        τ: in place of ε at the axis point, what the tool axis may be off where the tip is within ε.
     method : str
         A name in `cornersmooth.methods.METHODS`.
     shape : {"paper", "auto"}
@@ -66,6 +69,7 @@ class Settings:
 
     tolerance: float = 0.01
     axis_length: float = 10.0
+    axis_tolerance: float | None = None
     method: str = DEFAULT_METHOD
     shape: Shape = "paper"
     allocation: Allocation = "half"
@@ -107,12 +111,52 @@ class Settings:
             for number in value if isinstance(value, tuple) else (value,):
                 if number is not None and not (math.isfinite(number) and low <= number <= high):
                     raise SettingsError("CS202", f"{name} is {number:g}", f"give a value from {low:g} to {high:g}")
+        if self.axis_tolerance is not None:
+            object.__setattr__(self, "axis_length", self._check_axis_tolerance(self.axis_tolerance))
         if self.tip_tolerance <= 0 or self.axis_point_tolerance <= 0:
             raise SettingsError(
                 "CS203",
                 f"tolerance {self.tolerance:g} mm is finer than the written digits can hold",
-                f"use at least {2 * max(self._tip_rounding, self._axis_point_rounding):.2g} mm",
+                self._coarser,
             )
+
+    def _check_axis_tolerance(self, degrees: float) -> float:
+        """H that goes with an axis tolerance, mm."""
+        low, high = BOUNDS["axis_length"]
+        longest = (1.0 + AXIS_POINT_SHARES) * self.tolerance
+        length = longest / chord_of(degrees)
+        if not low <= length <= high:
+            bound, word = (longest / low, "at most") if length < low else (longest / high, "at least")
+            raise SettingsError(
+                "CS208",
+                f"axis_tolerance {degrees:g} deg does not go with a tolerance of {self.tolerance:g} mm",
+                f"use {word} {math.degrees(bound):.2g} deg",
+            )
+        if self.orientation_tolerance is not None:
+            raise SettingsError("CS207", "axis_tolerance says all of the axis", "leave out orientation_tolerance")
+        return length
+
+    @property
+    def _coarser(self) -> str:
+        """What to do where the digits are too coarse for the tolerances."""
+        if self.axis_tolerance is None:
+            return f"use at least {2 * max(self._tip_rounding, self._axis_point_rounding):.2g} mm"
+        axis = math.degrees(self._axis_point_rounding / self.axis_length)
+        return f"use at least {2 * self._tip_rounding:.2g} mm and an axis tolerance of {2 * axis:.2g} deg"
+
+    @property
+    def axis_point_allowed(self) -> float:
+        """What the axis point of the written motion may be off, mm: ε, or several times that with an axis tolerance.
+
+        A tip off by ε or less and an axis point off by `AXIS_POINT_SHARES` ε or less, at one pose of the original, have
+        an axis off by a chord of (1 + `AXIS_POINT_SHARES`) ε / H at most: H is such that this is τ.
+        """
+        return self.tolerance if self.axis_tolerance is None else AXIS_POINT_SHARES * self.tolerance
+
+    @property
+    def axis_scale(self) -> float:
+        """Distance from the tip, mm, at which what the axis may turn shows as ε: H, or ε over the chord of τ."""
+        return self.axis_length if self.axis_tolerance is None else self.tolerance / chord_of(self.axis_tolerance)
 
     @property
     def tip_tolerance(self) -> float:
@@ -121,15 +165,15 @@ class Settings:
 
     @property
     def axis_point_tolerance(self) -> float:
-        """What curves may use at the axis point: ε less the rounding of tip and axis point."""
-        return self.curve_share * (self.tolerance - self._axis_point_rounding)
+        """What curves may use at the axis point: `axis_point_allowed` less the rounding of tip and axis point."""
+        return self.curve_share * (self.axis_point_allowed - self._axis_point_rounding)
 
     @property
     def line_tolerances(self) -> tuple[float, float]:
         """What long lines may use at the tip and at the axis point, mm."""
         return (
             self.line_share * (self.tolerance - self._tip_rounding),
-            self.line_share * (self.tolerance - self._axis_point_rounding),
+            self.line_share * (self.axis_point_allowed - self._axis_point_rounding),
         )
 
     @property
@@ -146,7 +190,17 @@ class Settings:
         excess = METHODS[self.method].excess
         if not excess:
             return self.tolerance
-        return (1.0 + excess) * self.tolerance + self._axis_point_rounding
+        rounding = self._axis_point_rounding if self.axis_tolerance is None else self._tip_rounding
+        return (1.0 + excess) * self.tolerance + rounding
+
+    @property
+    def verified_axis_tolerance(self) -> float | None:
+        """What verification allows the tool axis, degrees; None where the axis point has to keep ε."""
+        excess = METHODS[self.method].excess
+        if self.axis_tolerance is None or not excess:
+            return self.axis_tolerance
+        rounding = (self._tip_rounding + self._axis_point_rounding) / self.axis_length
+        return (1.0 + excess) * self.axis_tolerance + math.degrees(rounding)
 
     @property
     def chord(self) -> float:
@@ -155,7 +209,7 @@ class Settings:
 
     @property
     def interpolation_tolerance(self) -> float:
-        """Distance, at the axis point, that turning the axis inside one written line may add, mm.
+        """Distance, at `axis_scale` from the tip, that turning the axis inside one written line may add, mm.
 
         It needs no share of ε in the choice of L: on straight remainders nothing else deviates, and inside a
         transition it vanishes at the written poses, where the deviation has its maximum.
@@ -169,6 +223,16 @@ class Settings:
     def as_dict(self) -> dict[str, Any]:
         """Plain values in field order, for the report."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
+
+
+#: What the axis point may be off, over ε, where the axis has a tolerance of its own. The larger, the less the way of
+#: the tip takes of what the axis may turn (a tenth of it at most), and the longer is H.
+AXIS_POINT_SHARES = 9.0
+
+
+def chord_of(degrees: float) -> float:
+    """Distance of two unit vectors at an angle."""
+    return 2.0 * math.sin(math.radians(degrees) / 2.0)
 
 
 #: Largest default of the chord tolerance, mm. Where lines meet, the axes jump in speed, and a control slows down for
@@ -193,6 +257,7 @@ TIMED_STRETCHES, TIMED_STRETCHES_VERBOSE = 4, 20
 BOUNDS: dict[str, tuple[float, float]] = {
     "tolerance": (1e-6, 10.0),
     "axis_length": (1e-3, 1e4),
+    "axis_tolerance": (1e-4, 45.0),
     "weights": (0.001, 3.0),
     "ratio": (0.5, 0.9),
     "orientation_tolerance": (1e-6, 90.0),

@@ -108,20 +108,28 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
         "limited by",
         f"the tolerance ({summary['limited_by_tolerance']} of them), segment length ({summary['limited_by_segment']})",
     )
-    say(
-        "error",
-        f"tip {summary['max_tip_error_mm']:.4f} mm, axis point {summary['max_axis_error_mm']:.4f} mm "
-        f"(H {settings['axis_length']:g} mm), tolerance {settings['tolerance']:g} mm",
-    )
+    own_axis = settings["axis_tolerance"] is not None
+    allowed = f"tolerance {settings['tolerance']:g} mm"
+    if own_axis:
+        say("error", f"tip {summary['max_tip_error_mm']:.4f} mm, {allowed}, axis {settings['axis_tolerance']:g}°")
+    else:
+        say(
+            "error",
+            f"tip {summary['max_tip_error_mm']:.4f} mm, axis point {summary['max_axis_error_mm']:.4f} mm "
+            f"(H {settings['axis_length']:g} mm), {allowed}",
+        )
     say("tool axis", f"turned by up to {summary['max_orientation_error_deg']:.4f}° from the original")
     if text := construction_of(settings["method"]).summary_text(summary):
         say(settings["method"], text)
     if "verification" in contents:
         found = contents["verification"]
+        second = f"axis point {found['max_axis_point_deviation_mm'] or 0.0:.4f} mm"
+        if own_axis:
+            second = f"tool axis {found['max_orientation_deviation_deg']:.4f}°"
         say(
             "verified",
             f"{'passed' if found['passed'] else 'FAILED'}: tip {found['max_tip_deviation_mm']:.4f} mm, "
-            f"axis point {found['max_axis_point_deviation_mm']:.4f} mm in the written text",
+            f"{second} in the written text",
         )
     if "not_verified" in contents:
         say("NOT VERIFIED", contents["not_verified"])

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 @outputs.output
 @nc_text.form
 @smoothing.axis_length
+@smoothing.axis_tolerance
 @outputs.directory
 @outputs.glob
 @outputs.skip_existing

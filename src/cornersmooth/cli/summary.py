@@ -24,10 +24,18 @@ def line_of(outcome: Outcome) -> str:
     else:
         told = (
             f"{outcome.status:<8} {name}: {row['smoothed']} of {row['corners']} corners, "
-            f"tip {row['max_tip_error_mm']:.4f} mm, axis point {row['max_axis_error_mm']:.4f} mm, "
+            f"tip {row['max_tip_error_mm']:.4f} mm, {_second(outcome.contents)}, "
             f"{row['blocks']} blocks, {row['seconds']:.1f} s"
         )
     return told + (f", NOT VERIFIED: {outcome.unverified}" if outcome.unverified else "")
+
+
+def _second(contents: Mapping[str, Any]) -> str:
+    """What is told of the axis."""
+    summary = contents["summary"]
+    if contents["settings"]["axis_tolerance"] is not None:
+        return f"tool axis {summary['max_orientation_error_deg']:.4f}°"
+    return f"axis point {summary['max_axis_error_mm']:.4f} mm"
 
 
 def counts_line(counts: Mapping[str, int], unverified: int) -> str:

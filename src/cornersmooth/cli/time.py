@@ -37,6 +37,7 @@ LAWS = tuple(_TITLES)
 @click.argument("source", type=click.Path(), metavar="IN")
 @smoothing.tolerance
 @smoothing.axis_length
+@smoothing.axis_tolerance
 @motion.limit_options
 @motion.limits_machine
 @motion.text
@@ -130,7 +131,7 @@ def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
         if not given["text"]:
             return compared
         how = nc_text.reading_back_of({**given, "machine": given["text_machine"], "no_tcp": False})
-        how |= {"tolerance": settings.tolerance, "axis_length": settings.axis_length}
+        how |= {"tolerance": settings.tolerance, "axis_length": settings.axis_scale}
         nc = read_nc(given["text"], **how)
         blocks = BlockLimits(given["block_time"], given["look_ahead"])
         law = plan_text(nc, limits, name=given["text"], blocks=blocks, settings=settings, machine=machine)
@@ -160,7 +161,9 @@ def _tables(compared: Comparison) -> Iterator[str]:
     settings, saving = compared.settings, compared.saving_percent
     names = [name for name in compared.laws if name not in LAWS[:2]]
     yield times_text(compared.seconds, names, limiting(compared.laws[min(names, key=compared.seconds.__getitem__)]))
-    yield f"tolerance {settings.tolerance:g} mm, axis point at {settings.axis_length:g} mm"
+    own = settings.axis_tolerance
+    second = f"axis point at {settings.axis_length:g} mm" if own is None else f"tool axis {own:g} deg"
+    yield f"tolerance {settings.tolerance:g} mm, {second}"
     yield (f"{'':<24}{'time s':>12}{'saves % of':>15}{'saves % of':>15}{'stops':>10}{'turning s':>12}{'length mm':>14}")
     yield f"{'':<24}{'':>12}{'exact stop':>15}{'velocity jump':>15}"
     for name, law in compared.laws.items():

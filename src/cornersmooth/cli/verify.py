@@ -41,6 +41,7 @@ _REWINDS_SHOWN = 5
 @click.argument("text", type=click.Path(), metavar="NC")
 @smoothing.tolerance
 @smoothing.axis_length
+@smoothing.axis_tolerance
 @nc_text.control
 @nc_text.machine
 @nc_text.no_tcp
@@ -82,8 +83,10 @@ def command(source: str, text: str, **given: Any) -> int:
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     remark, weights = _take_over(given, nc, data)
     own = own_words(nc_text.control_of(given))
-    measures = {"tolerance": given["tolerance"], "axis_length": given["axis_length"]}
-    how = {**measures, **nc_text.reading_back_of(given)}
+    smoothing.check_one_of_axis(given)
+    reader = nc_text.reading_back_of(given)
+    measures = {name: given[name] for name in ("tolerance", "axis_length", "axis_tolerance")}
+    how = {**measures, **reader}
     program = read(data, name=name, **reading.reading_of(given))
     pages = [path for path in given["reports"] if path.lower().endswith(".html")]
     if given["plot"] or given["verbose"] or pages:  # it is looked at more than once
@@ -106,9 +109,13 @@ def command(source: str, text: str, **given: Any) -> int:
     if pages:
         from cornersmooth.nc_reader import read_nc
         from cornersmooth.page import verified_page
+        from cornersmooth.verify.task import length_of
 
+        how_read = {**reader, "tolerance": given["tolerance"], "axis_length": given["axis_length"]}
+        if given["axis_tolerance"] is not None:
+            how_read["axis_length"] = length_of(given["tolerance"], given["axis_tolerance"])
         page = verified_page(
-            program, read_nc(nc, **how), found, source=data, machine=how["machine"], tool=given["tool"]
+            program, read_nc(nc, **how_read), found, source=data, machine=how["machine"], tool=given["tool"]
         ).encode("utf-8")
         for path in pages:
             with open_output(target_of(path)) as output:
@@ -154,6 +161,8 @@ def _take_over(
     if made is None:
         return _recognise(given, head, context), None
     said: dict[str, Any] = {"tolerance": made.tolerance, "axis_length": made.axis_length, "no_tcp": not made.tcp}
+    if context.get_parameter_source("axis_length") != click.core.ParameterSource.COMMANDLINE:
+        said["axis_tolerance"] = made.axis_tolerance
     said |= {"control": made.control} if made.control in control_names() else {}
     said |= {"machine": made.machine or None} if made.machine in ("", *machine_names()) else {}
     typed = click.core.ParameterSource.COMMANDLINE
@@ -238,14 +247,19 @@ def _summary(found: Verification) -> Iterator[str]:
     yield kept_text(found.to_dict())
     failed = f"FAILED: {found.problem_count} problem{'s' * (found.problem_count != 1)}"
     yield f"{'result':<18}{'passed' if found.passed else failed}"
-    yield f"{'tolerance':<18}{found.tolerance:g} mm, axis point at {found.axis_length:g} mm"
+    own_axis = found.axis_tolerance is not None
+    second = f"tool axis {found.axis_tolerance:g} deg" if own_axis else f"axis point at {found.axis_length:g} mm"
+    yield f"{'tolerance':<18}{found.tolerance:g} mm, {second}"
     one, both = found.tolerance, TOGETHER * found.tolerance
     yield f"{'tip':<18}{_place(found.tip, 'mm', one)}"
-    yield f"{'axis point':<18}{_place(found.axis_point, 'mm', one)}"
-    yield f"{'tool axis':<18}{_place(found.orientation, 'deg')}"
-    yield f"{'common pose':<18}tip {_place(found.together_tip, 'mm', both)}"
-    yield f"{'':<18}axis point {_place(found.together_axis_point, 'mm', both)}"
-    yield f"{'':<18}(tip and axis point measured from one pose of the other motion may be {TOGETHER:g} times as far)"
+    if not own_axis:
+        yield f"{'axis point':<18}{_place(found.axis_point, 'mm', one)}"
+    yield f"{'tool axis':<18}{_place(found.orientation, 'deg', found.axis_tolerance)}"
+    if not own_axis:
+        yield f"{'common pose':<18}tip {_place(found.together_tip, 'mm', both)}"
+        yield f"{'':<18}axis point {_place(found.together_axis_point, 'mm', both)}"
+        text = f"(tip and axis point measured from one pose of the other motion may be {TOGETHER:g} times as far)"
+        yield f"{'':<18}{text}"
     yield f"{'tangent jump':<18}{_place(found.tangent_jump, 'deg')}"
     if found.curves:
         yield f"{'curvature jump':<18}{_place(found.curvature_jump, '1/mm')}"

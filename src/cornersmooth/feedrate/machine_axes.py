@@ -189,7 +189,7 @@ def follow(machine: Machine, path: Path) -> MachineAxes:
             "add [dynamics.X] with velocity, acceleration and jerk to its file, and the same for the other axes",
         )
     program, settings = path.program, path.settings
-    tolerance = math.degrees(settings.tolerance / settings.axis_length)
+    tolerance = math.degrees(settings.tolerance / settings.axis_scale)
     cone = tolerance / _CONES
     rapid = rapid_moves(program.kind)
     found = rotary_angles(

@@ -119,7 +119,7 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
     return settings.but(
         lines=lines,
         tip_resolution=form.tip_resolution(units, tolerance),
-        axis_point_resolution=form.axis_point_resolution(units, tolerance, settings.axis_length),
+        axis_point_resolution=form.axis_point_resolution(units, settings),
         round_feed_changes=settings.round_feed_changes and not form.curves,
     )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.nc.control import Control, CurveStyle, Extra, Mode, Orientation
+from cornersmooth.settings import Settings
 
 #: share of ε, at the axis point, that rotary axes may take between and at the written words
 ROTARY_SHARE = 0.1
@@ -100,20 +101,26 @@ class Form:
         step = self.rounding(units)
         return step + 2.0 / math.sqrt(3.0) * TIP_SHARE * tolerance if self.orientation == "machine" else step
 
-    def axis_point_resolution(self, units: Units, tolerance: float, axis_length: float) -> float:
+    def axis_point_resolution(self, units: Units, settings: Settings) -> float:
         """What the orientation is worth at the axis point, as a step in mm.
 
         A second point at the distance H′ moves b = tip + H·dir by at most H/H′ times its own rounding, besides that of
         the tip, which is in `tip_resolution` already. Rotary words have besides what `rotary_tolerance` leaves to them.
         """
+        axis_length = settings.axis_length
         if self.orientation == "point":
             return self.rounding(units) / self.stretch(axis_length)
         if self.orientation == "fixed":
-            return 2.0 / math.sqrt(3.0) * ROTARY_SHARE * tolerance
+            return 2.0 / math.sqrt(3.0) * ROTARY_SHARE * settings.tolerance * (axis_length / settings.axis_scale)
         if self.rotary:
-            reserve = axis_length * math.radians(self.rotary_tolerance(tolerance, axis_length) + self.angle_rounding)
+            between = self.rotary_tolerance(settings.tolerance, settings.axis_scale)
+            reserve = axis_length * math.radians(between + self.angle_rounding)
             return 2.0 / math.sqrt(3.0) * reserve
-        in_plane = 0.0 if self.plane is None else 2.0 / math.sqrt(3.0) * self.plane_reserve(tolerance, axis_length)
+        in_plane = (
+            0.0
+            if self.plane is None
+            else 2.0 / math.sqrt(3.0) * self.plane_reserve(settings.axis_point_allowed, axis_length)
+        )
         return max(axis_length * float(10.0**-self.table.digits.vector), in_plane)
 
     def plane_reserve(self, tolerance: float, axis_length: float) -> float:
@@ -125,7 +132,10 @@ class Form:
         return max(self.table.digits.lever / axis_length, 1.0)
 
     def rotary_tolerance(self, tolerance: float, axis_length: float) -> float:
-        """Degrees by which rotary axes may leave the axis asked for, rounding of the words not counted."""
+        """Degrees by which rotary axes may leave the axis asked for, rounding of the words not counted.
+
+        `axis_length` is the distance from the tip, mm, at which the axis may be off by the tolerance.
+        """
         return math.degrees(ROTARY_SHARE * tolerance / axis_length)
 
     @property

@@ -186,7 +186,7 @@ def _check_lengths(machine: Machine, program: Program) -> None:
 
 def _refuse_tilt(form: Form, program: Program, settings: Settings, tilt: Floats, text: str, hint: str) -> None:
     """Refuse the first pose whose tilt (n,), rad, is worth more than a rounding error at the axis point."""
-    tilted = np.flatnonzero(settings.axis_length * tilt > ROTARY_SHARE * settings.tolerance)
+    tilted = np.flatnonzero(settings.axis_scale * tilt > ROTARY_SHARE * settings.tolerance)
     if len(tilted):
         what = text.format(f"{form.control} form {form.name}")
         raise SettingsError("CS219", what, hint, file=program.source.name, line=int(program.line[tilted[0]]))

@@ -153,7 +153,7 @@ def _plane(axis: Floats, settings: Settings, form: Form) -> tuple[Plane | None, 
         angles = np.round(angles, digits)
         plane = Plane(turned_part(form.machine, angles), angles=angles)
     off = settings.axis_length * float(norm(plane.frame[None, :, 2] - axis)[0])
-    if off > form.plane_reserve(settings.tolerance, settings.axis_length):
+    if off > form.plane_reserve(settings.axis_point_allowed, settings.axis_length):
         return None, f"its angles of {digits} decimals would turn the tool by more than the tolerance leaves"
     if norm(plane.frame[None, :, 2] - (0.0, 0.0, 1.0))[0] < _SAME:
         return None, "in the written angles the tool is not tilted"

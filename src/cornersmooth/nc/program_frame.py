@@ -95,7 +95,7 @@ class Frame:
             raise SettingsError(
                 "CS216", f"{form.control} takes no program name {self.program!r}", f"use one like {table.name}"
             )
-        turn = math.degrees(settings.blend_share * settings.tolerance / settings.axis_length)
+        turn = math.degrees(settings.blend_share * settings.tolerance / settings.axis_scale)
         return {
             "program": self.program or name_of_file(self.stem, table) or table.name,
             "units": form.table.layout.units[program.units],

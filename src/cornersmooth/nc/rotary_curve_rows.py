@@ -39,7 +39,7 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
     if machine is None:
         raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
     step, resolution = form.rounding(program.units), form.angle_rounding
-    left = (settings.tolerance - math.sqrt(3.0) / 2.0 * step) / settings.axis_length
+    left = (settings.tolerance - math.sqrt(3.0) / 2.0 * step) / settings.axis_scale
     found = rotary_curves(
         smoothed,
         machine,

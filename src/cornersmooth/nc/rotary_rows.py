@@ -88,7 +88,7 @@ def rotary_rows(
     tools = tools_of_poses(program) if machine.tool_lengths else None
     own_machine, machine = machine, machine.with_longest_tool()
     rapid, line, file = rapid_moves(program.kind)[move], program.line[move], program.source.name
-    tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_length)
+    tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
     how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": line, "file": file}
     how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
     left = np.zeros(len(move), np.bool_)
@@ -288,7 +288,7 @@ def _rates(
         return None
     own = move[path.pose]
     step = np.diff(path.tip, axis=0, prepend=path.tip[:1])
-    swing = step + settings.axis_length * np.diff(path.axis, axis=0, prepend=path.axis[:1])
+    swing = step + settings.axis_scale * np.diff(path.axis, axis=0, prepend=path.axis[:1])
     length = norm(step)
     still = length < form.rounding(program.units)
     turn = np.abs(np.diff(path.angles, axis=0, prepend=path.angles[:1])).max(axis=1)

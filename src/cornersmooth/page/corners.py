@@ -119,7 +119,8 @@ def measured_corners(program: Program, found: Verification) -> CornerList:
     for first, last in program.chains.tolist():
         inner[first + 1 : last] = True
     pose = np.flatnonzero(inner)
-    turn, axis_turn = (_turns(points, pose) for points in (program.tip, program.tip + found.axis_length * program.axis))
+    height = found.axis_length if found.axis_tolerance is None else 0.0
+    turn, axis_turn = (_turns(points, pose) for points in (program.tip, program.tip + height * program.axis))
     off = np.fmax(found.pose_tip[pose], found.pose_axis_point[pose])
     out = off > found.tolerance
     straight = (np.maximum(turn, axis_turn) < _STRAIGHT) & ~out

@@ -125,7 +125,13 @@ def original_path(program: Program) -> OriginalPath:
 
 
 def written_path(
-    program: Program, nc: NcProgram, original: OriginalPath, *, tolerance: float, axis_length: float
+    program: Program,
+    nc: NcProgram,
+    original: OriginalPath,
+    *,
+    tolerance: float,
+    axis_length: float,
+    axis_tolerance: float | None = None,
 ) -> WrittenPath:
     """Points of a text that was read, each with its place on the original and its deviation."""
     bent = np.isin(nc.kind, (Element.ARC, Element.CURVE))
@@ -140,7 +146,9 @@ def written_path(
     element = np.repeat(np.arange(len(nc)), pieces)
     share = (np.arange(len(element)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1) / pieces[element]
     tip, axis = written_at(nc, element, share)
-    along = deviation_along(program, nc, tolerance=tolerance, axis_length=axis_length, samples=samples)
+    along = deviation_along(
+        program, nc, tolerance=tolerance, axis_length=axis_length, axis_tolerance=axis_tolerance, samples=samples
+    )
     row = np.full(len(nc) * samples, -1, np.int64)
     own = np.flatnonzero(along.element >= 0)
     row[along.element[own] * samples + np.round(along.fraction[own] * samples).astype(np.int64) - 1] = own
@@ -158,7 +166,8 @@ def written_path(
     tip_off[there], axis_off[there], angle_off[there] = along.tip[rows], along.axis_point[rows], along.angle[rows]
     straight = np.flatnonzero(there & (program.kind[pose] == Move.LINEAR))
     place = along.share[at[straight]]
-    for off, height in ((tip_off, 0.0), (axis_off, axis_length)):
+    second = () if axis_tolerance is not None else ((axis_off, axis_length),)
+    for off, height in ((tip_off, 0.0), *second):
         near = _distance(program, tip[straight] + height * axis[straight], pose[straight], place, height)
         off[straight] = np.minimum(off[straight], near)
     end = (share == 1.0) | bent[element]

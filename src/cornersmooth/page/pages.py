@@ -125,7 +125,7 @@ def verified_page(
     surface: SurfaceMap | None = None,
 ) -> str:
     """Page of a text that somebody wrote, measured against its CL file; with a map of the surface if there is one."""
-    settings = Settings(tolerance=found.tolerance, axis_length=found.axis_length)
+    settings = Settings(tolerance=found.tolerance, **_second_of(found))
     limits = Limits() if limits is None else limits
     subject = Subject(
         program=program,
@@ -140,7 +140,7 @@ def verified_page(
     facts = [
         *_input_facts(program, source),
         ("tolerance ε", f"{found.tolerance:g} mm"),
-        ("axis length H", f"{found.axis_length:g} mm"),
+        _second_fact(found.axis_length, found.axis_tolerance),
         *_measured_facts(found),
         *_limit_facts(limits, machine),
     ]
@@ -166,15 +166,15 @@ def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None =
     stream = io.BytesIO()
     write(smoothed, stream, form=form)
     settings = smoothed.settings
-    tolerance, height = settings.verified_tolerance, settings.axis_length
-    nc = read_nc(stream.getvalue(), tolerance=tolerance, axis_length=height)
+    tolerance, own = settings.verified_tolerance, settings.verified_axis_tolerance
+    nc = read_nc(stream.getvalue(), tolerance=tolerance, axis_length=settings.axis_scale)
     method = settings.method
     laws = {"direct": compared.laws["direct_velocity_jump"], "local": compared.laws[method]}
     subject = Subject(
         program=program,
         nc=nc,
         settings=settings,
-        verification=verify(program, nc, tolerance=tolerance, axis_length=height),
+        verification=verify(program, nc, tolerance=tolerance, axis_length=settings.axis_length, axis_tolerance=own),
         smoothed=smoothed,
         laws=laws,
         limits=compared.limits,
@@ -225,16 +225,33 @@ def _input_facts(program: Program, source: bytes) -> list[tuple[str, str]]:
 def _settings_facts(settings: Settings) -> list[tuple[str, str]]:
     return [
         ("tolerance ε", f"{settings.tolerance:g} mm"),
-        ("axis length H", f"{settings.axis_length:g} mm"),
+        _second_fact(settings.axis_length, settings.axis_tolerance),
         ("method", f"{settings.method}, shape {settings.shape}, allocation {settings.allocation}"),
         ("reversals", f"sharp above {settings.reversal_angle:g}°"),
     ]
 
 
+def _second_of(found: Verification) -> dict[str, Any]:
+    """What the axis had to keep, as `Settings` take it."""
+    own = found.axis_tolerance
+    return {"axis_length": found.axis_length} if own is None else {"axis_tolerance": own}
+
+
+def _second_fact(axis_length: float, axis_tolerance: float | None) -> tuple[str, str]:
+    """What is kept besides the tip."""
+    if axis_tolerance is None:
+        return "axis length H", f"{axis_length:g} mm"
+    return "axis tolerance", f"{axis_tolerance:g}°, drawn in mm so that it is ε"
+
+
 def _measured_facts(found: Verification) -> list[tuple[str, str]]:
     return [
         ("tip, largest", f"{found.tip.value:.6g} mm at CL line {found.tip.cl_line}"),
-        ("axis point, largest", f"{found.axis_point.value:.6g} mm at CL line {found.axis_point.cl_line}"),
+        *(
+            [("axis point, largest", f"{found.axis_point.value:.6g} mm at CL line {found.axis_point.cl_line}")]
+            if found.axis_tolerance is None
+            else []
+        ),
         ("tool axis, largest", f"{found.orientation.value:.4g}° at CL line {found.orientation.cl_line}"),
         ("blocks", f"{found.blocks:,}"),
     ]

@@ -107,7 +107,12 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
     program, settings = subject.program, subject.settings
     original = original_path(program)
     written = written_path(
-        program, subject.nc, original, tolerance=settings.tolerance, axis_length=settings.axis_length
+        program,
+        subject.nc,
+        original,
+        tolerance=settings.tolerance,
+        axis_length=settings.axis_length,
+        axis_tolerance=settings.axis_tolerance,
     )
     planned = plan_all(
         program,

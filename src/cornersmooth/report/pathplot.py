@@ -41,9 +41,9 @@ def draw_path(
         CS262: matplotlib is not installed.
     """
     figure = new_figure(8.0, 9.0)
-    height = smoothed.settings.axis_length
+    height, own = smoothed.settings.axis_length, smoothed.settings.verified_axis_tolerance
     original = original_path(program)
-    written = written_path(program, nc, original, tolerance=tolerance, axis_length=height)
+    written = written_path(program, nc, original, tolerance=tolerance, axis_length=height, axis_tolerance=own)
     off = np.fmax(written.tip_off, written.axis_off)
     keep = thinned(written.tip, off, off > tolerance, _POINTS)
     above, below = figure.subfigures(2, 1, height_ratios=(2.0, 1.0))

@@ -97,7 +97,8 @@ def verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> str:
 def kept_text(found: Mapping[str, Any]) -> str:
     """Say whether the promise is kept, from what verification found (`Verification.to_dict`)."""
     if found["passed"]:
-        return f"OK: within {found['tolerance_mm']:g} mm everywhere"
+        axis = found.get("axis_tolerance_deg")
+        return f"OK: within {found['tolerance_mm']:g} mm{'' if axis is None else f' and {axis:g} deg'} everywhere"
     count, problems = found["problem_count"], found["problems"]
     text = f"BROKEN: {count:,} {'problem' if count == 1 else 'problems'}"
     if problems:

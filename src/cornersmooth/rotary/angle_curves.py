@@ -106,7 +106,7 @@ def angle_allowance(smoothed: SmoothProgram, angle_resolution: float) -> Floats:
         Step of the written angles, half of which is taken off for each of the two.
     """
     settings = smoothed.settings
-    height = settings.axis_length
+    height = settings.axis_scale
     left = settings.tolerance - math.sqrt(3) / 2 * settings.tip_resolution - smoothed.corners.axis_error
     left -= height * math.radians(angle_resolution)
     allowance: Floats = np.degrees(2 * np.arcsin(np.clip(left / (2 * height), 0.0, 1.0)))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from cornersmooth.model import Program, SmoothProgram
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.axis_steps import axis_step_findings, refuse_flips
@@ -45,4 +47,7 @@ def smooth(
     settings = Settings() if settings is None else settings
     refuse_flips(program)
     smoothed = construction_of(settings.method).smooth(program, settings, progress, processes)
+    if settings.axis_tolerance is not None:
+        turned = settings.axis_scale * 2.0 * np.sin(smoothed.corners.orientation_error / 2.0)
+        smoothed = replace(smoothed, corners=replace(smoothed.corners, axis_error=turned))
     return replace(smoothed, findings=(*smoothed.findings, *axis_step_findings(program, settings)))

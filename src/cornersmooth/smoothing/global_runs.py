@@ -52,7 +52,7 @@ class GlobalRuns(Proportional):
         if not len(count):
             return SmoothProgram(program, corners, settings, findings)
         point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
-        tolerances = settings.tip_tolerance, settings.axis_point_tolerance - TURNING * settings.tolerance
+        tolerances = settings.tip_tolerance, settings.axis_point_tolerance - TURNING * _turning(settings)
         lines = Polylines.through(point, count, STEP * min(tolerances))
         curves, found = solve_groups(lines, tolerances, settings.axis_length, progress, processes=processes)
         runs = _kept(curves, pose)
@@ -60,6 +60,11 @@ class GlobalRuns(Proportional):
             first = int(pose[lines.first[:-1][~curves.kept][0]])
             findings = (*findings, _one_by_one(program, first, curves, count))
         return SmoothProgram(program, _with_runs(corners, runs, curves, found), settings, findings, runs)
+
+
+def _turning(settings: Settings) -> float:
+    """What the tolerance at `Settings.axis_scale` is worth at the axis point, mm."""
+    return settings.tolerance * (settings.axis_length / settings.axis_scale)
 
 
 def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[Ints, Ints, Ints]:

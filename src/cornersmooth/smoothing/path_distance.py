@@ -109,6 +109,7 @@ def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple
     tip, axis_point = corners.tip_error[rows].copy(), corners.axis_error[rows].copy()
     if not METHODS[smoothed.settings.method].one_parameter:
         return tip, axis_point
+    own_axis = smoothed.settings.axis_tolerance is not None  # then it has no path of its own
     for begin in range(0, len(rows), _BATCH):
         chosen = begin + np.flatnonzero(corners.smoothed[rows[begin : begin + _BATCH]])
         if not len(chosen):
@@ -116,7 +117,8 @@ def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple
         transitions = _Transitions.of(smoothed, rows[chosen])
         lines = lines_of(smoothed, rows[chosen]) if dense else None
         tip[chosen] = _passing(transitions, lines, tip[chosen], whole=False)
-        axis_point[chosen] = _passing(transitions, lines, axis_point[chosen], whole=True)
+        if not own_axis:
+            axis_point[chosen] = _passing(transitions, lines, axis_point[chosen], whole=True)
     return tip, axis_point
 
 

@@ -111,11 +111,11 @@ def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints
 def turn_limit(settings: Settings, half_turn: Floats, tolerance: float) -> Floats:
     """Largest change of axis in one line inside a segment whose axis turns by twice `half_turn`, rad.
 
-    Two things set it, each given half of `tolerance` (mm) at distance H: controls turn vectors
+    Two things set it, each given half of `tolerance` (mm) at `Settings.axis_scale`: controls turn vectors
     linearly or on the great circle, which differ by up to θ³/54; and the ruled motion turns fastest in the middle of
     its segment, so that equal shares of a line's parameter and of the original's differ by up to θ²·tan(half_turn)/4.
     """
-    share = tolerance / 2.0 / settings.axis_length
+    share = tolerance / 2.0 / settings.axis_scale
     limit = np.full_like(half_turn, math.cbrt(54.0 * share))
     tangent = np.tan(np.minimum(half_turn, math.radians(FLIP_ANGLE / 2.0)))
     steep = tangent > 0.0
@@ -129,7 +129,7 @@ def turn_limit(settings: Settings, half_turn: Floats, tolerance: float) -> Float
 
 def _divide(settings: Settings, segments: Segments, poses: Ints, chord: Floats) -> None:
     """Set `lines`: lines per straight remainder, from the change of axis along it, given as its chord."""
-    share = settings.interpolation_tolerance / settings.axis_length
+    share = settings.interpolation_tolerance / settings.axis_scale
     turning = chord**3 / 54.0 + chord**2 / 4.0 * np.tan(np.minimum(chord, 2.0) / 2.0) > share
     if settings.axis_step is not None:
         turning |= 2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)) > math.radians(settings.axis_step)

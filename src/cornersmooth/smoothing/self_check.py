@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -24,9 +24,17 @@ _STEPS: Final = 3
 _LEAST: Final = 1e-30
 
 
+class Common(NamedTuple):
+    """Distances (g, m) from one pose of the original, mm: of tip, of axis point, and of that with the tips together."""
+
+    tip: Floats
+    axis_point: Floats
+    turned: Floats
+
+
 def distances(
     program: Program, axis_length: float, poses: Ints, tip: Floats, axis: Floats
-) -> tuple[Floats, Floats, Floats, Floats]:
+) -> tuple[Floats, Floats, Common, Floats]:
     """How far sampled poses are from the original motion through some poses of a program.
 
     Parameters
@@ -40,9 +48,10 @@ def distances(
 
     Returns
     -------
-    tip, axis_point, together : (g, m) float64, mm
-        From the path of the tip, from the path of the axis point, and the larger of both from the pose that is nearest
-        in six dimensions.
+    tip, axis_point : (g, m) float64, mm
+        From the path of the tip, and from the path of the axis point.
+    common : Common
+        From the pose that is nearest in six dimensions.
     backwards : (g,) float64, mm
         By how much that pose goes back at most from one sample to the next.
     """
@@ -55,16 +64,17 @@ def distances(
     size = np.stack([np.sqrt(square(leg.tip_end - leg.tip_start) + square(leg.swing)) for leg in legs])
     start = np.cumsum(size, axis=0) - size
 
-    def nearest(*chosen: int) -> tuple[Floats, Floats, Floats]:
-        """Distances of tip and axis point from the pose at which those `chosen` are nearest together; its length."""
+    def nearest(*chosen: int) -> tuple[Common, Floats]:
+        """Distances from the pose at which those `chosen` are nearest together, and its length."""
         found = [leg.nearest(own, chosen) for leg in legs]
         which = np.stack([row[0] for row in found]).argmin(axis=0)[None]
-        share, *away = (np.take_along_axis(np.stack([row[k] for row in found]), which, axis=0)[0] for k in (1, 2, 3))
+        share, *away = (np.take_along_axis(np.stack([row[k] for row in found]), which, axis=0)[0] for k in (1, 2, 3, 4))
         row = np.arange(len(poses))[:, None]
-        return away[0], away[1], start[which[0], row] + share * size[which[0], row]
+        return Common(*away), start[which[0], row] + share * size[which[0], row]
 
-    *both, length = nearest(0, 1)
-    return nearest(0)[0], nearest(1)[1], np.maximum(*both), -np.diff(length, axis=1).min(axis=1, initial=0.0)
+    common, length = nearest(0, 1)
+    back = -np.diff(length, axis=1).min(axis=1, initial=0.0)
+    return nearest(0)[0].tip, nearest(1)[0].axis_point, common, back
 
 
 def passing(point: Floats, path: Floats) -> Floats:
@@ -101,13 +111,13 @@ class _Leg:
         lever, turning = self.axis_length * ruled / size, self.axis_length * across / size
         return (tip, tip + lever), (np.broadcast_to(way, tip.shape), way + turning)
 
-    def nearest(self, own: tuple[Floats, Floats], chosen: tuple[int, ...]) -> tuple[Floats, Floats, Floats, Floats]:
+    def nearest(self, own: tuple[Floats, Floats], chosen: tuple[int, ...]) -> tuple[Floats, ...]:
         """Where those of tip and axis point (g, m, 3) that are `chosen` are nearest together.
 
         Returns
         -------
-        square, share, tip, axis_point : (g, m) float64
-            Sum of the chosen squares of distances, where on the segment, and both distances, mm.
+        square, share, tip, axis_point, turned : (g, m) float64
+            Sum of the chosen squares of distances, where on the segment, and the distances, mm.
         """
         grid = np.linspace(0.0, 1.0, _PARTS + 1)
         points, _ = self.at(np.broadcast_to(grid, (len(self.tip_start), len(grid))))
@@ -122,7 +132,8 @@ class _Leg:
                 steep = sum(dot(slope[k], slope[k]) for k in chosen)
                 share = np.clip(share + towards / np.maximum(steep, _LEAST), 0.0, 1.0)
         here, _ = self.at(found)
-        return best, found, norm(own[0] - here[0]), norm(own[1] - here[1])
+        off, top = own[0] - here[0], own[1] - here[1]
+        return best, found, norm(off), norm(top), norm(top - off)
 
 
 def _squares(

@@ -48,7 +48,8 @@ def place_zhang2016(legs: Legs, weights: Floats, ratio: Floats, settings: Settin
     sine_tip = _half_turn_sine(legs.tip_in, legs.tip_out, *tip_lengths)
     sine_axis = _half_turn_sine(axis_in, axis_out, *axis_lengths)
     factor = 2.0 * nurbs.deviation_factor(weights, ratio)  # 2·w1/(3(w1+w2)) at the paper's ratio
-    by_tolerance = divide(settings.tolerance, factor * np.maximum(sine_tip, sine_axis))
+    more = settings.axis_point_allowed / settings.tolerance
+    by_tolerance = divide(settings.tolerance, factor * np.maximum(sine_tip, sine_axis / more))
     tip_room, axis_room = np.minimum(*tip_lengths) / 2.0, np.minimum(*axis_lengths) / 2.0
     tip_length, axis_length = np.minimum(tip_room, by_tolerance), np.minimum(axis_room, by_tolerance)
 
@@ -226,15 +227,20 @@ def _beyond(smoothed: SmoothProgram, rows: Ints, tip: Floats, lever: Floats) -> 
     poses = np.stack((corners.before[rows], corners.pose[rows], corners.after[rows]), axis=1)
     allowed, height, axis = (
         (1.0 + METHODS[settings.method].excess) * settings.tolerance,
-        settings.axis_length,
+        settings.axis_scale,
         unit(lever),
     )
-    alone_tip, alone_axis, together, backwards = distances(program, height, poses, tip, axis)
+    alone_tip, alone_axis, common, backwards = distances(program, height, poses, tip, axis)
     corner, direction = program.tip[poses[:, 1]], program.axis[poses[:, 1]]
-    worst = np.maximum(alone_tip, alone_axis).max(axis=1)
-    worst = np.maximum(worst, passing(corner, tip))
-    worst = np.maximum(worst, passing(corner + height * direction, tip + height * axis))
-    beyond: Bools = (worst > allowed) | (together.max(axis=1) > _TOGETHER * allowed)
+    if settings.axis_tolerance is None:
+        worst = np.maximum(alone_tip, alone_axis).max(axis=1)
+        worst = np.maximum(worst, passing(corner + height * direction, tip + height * axis))
+        worst = np.maximum(worst, np.maximum(common.tip, common.axis_point).max(axis=1) / _TOGETHER)
+    else:  # both at one pose
+        worst = np.maximum(common.tip, common.turned).max(axis=1)
+        at_corner = norm(tip - corner[:, None]), height * norm(axis - direction[:, None])
+        worst = np.maximum(worst, np.maximum(*at_corner).min(axis=1))
+    beyond: Bools = np.maximum(worst, passing(corner, tip)) > allowed
     return beyond | (backwards > 2.0 * max(settings.tip_resolution, settings.axis_point_resolution, _LEAST_BACK))
 
 

@@ -14,7 +14,7 @@ from cornersmooth.nc_reader.reading import read_nc
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.distances import from_original, owner_fraction
 from cornersmooth.verify.match import Match, match
-from cornersmooth.verify.nearest import gap_between, nearest_segments
+from cornersmooth.verify.nearest import nearest_segments
 from cornersmooth.verify.polyline import written_at
 from cornersmooth.verify.task import Task
 
@@ -37,6 +37,7 @@ class Distribution:
     way : (k,) float64, mm
         Length of the original path, rapids included, up to the original pose.
     tip, axis_point : (k,) float64, mm
+        Axis points as in `Task`: with an axis tolerance, what the axis is off, where that shows as the tolerance.
     angle : (k,) float64, degrees
     share : (k,) float64
         Where on the original move, 1 at its end.
@@ -70,6 +71,7 @@ def deviation_along(
     *,
     tolerance: float,
     axis_length: float = 10.0,
+    axis_tolerance: float | None = None,
     samples: int = 8,
     control: str = "fanuc",
     machine: Machine | None = None,
@@ -79,7 +81,7 @@ def deviation_along(
 
     Parameters
     ----------
-    program, nc, tolerance, axis_length, control, machine, tcp
+    program, nc, tolerance, axis_length, axis_tolerance, control, machine, tcp
         As in `verify`.
     samples : int
         Poses per element.
@@ -90,9 +92,10 @@ def deviation_along(
         At the poses of the original that come nearest to tip and axis point together.
     """
     text = nc
+    task = Task.of(program, tolerance, axis_length, axis_tolerance)
     if not isinstance(text, NcProgram):
-        text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
-    task = Task.of(program, tolerance, axis_length)
+        length = task.axis_length
+        text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=length)
     parts = [np.zeros((0, _COLUMNS))]
     for batch in Batches(task).of([text]):
         matched = match(task, batch)
@@ -130,11 +133,11 @@ def _of_elements(match: Match, offset: int, samples: int) -> Floats:
     vertex = np.repeat(end[feeding], samples)
     limits = match.low[vertex], match.high[vertex]
     middle = np.clip(place.astype(np.int64), *limits)
-    six = np.hstack((tip, tip + match.axis_length * axis))
+    six = match.task.six(tip, axis)
     segment, at = nearest_segments(six, match.path.six, middle, _REACH, *limits)
     original, length = match.original, match.path.length
     owner, fraction = owner_fraction(original.trail.owner, original.trail.fraction, segment, at)
-    gap = gap_between(tip, axis, *original.at(owner, fraction), match.axis_length)
+    gap = match.task.gap(tip, axis, *original.at(owner, fraction))
     way = length[segment] + at * (length[segment + 1] - length[segment])
     pose = original.pose[owner]
     places = (fraction, share, pose, element + offset, original.program.line[pose], match.nc.line[element])

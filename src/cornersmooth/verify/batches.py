@@ -296,7 +296,7 @@ class _Part:
         """(k, 6) tips and axis points at the ends of elements of what is held."""
         tip = self.held.tip[part]
         axis = directions(self.held, tip, self.held.second[part])
-        return np.hstack((tip, tip + self.task.axis_length * axis))
+        return self.task.six(tip, axis)
 
     def _flush(self) -> Iterator[Batch]:
         """Give out what waits."""

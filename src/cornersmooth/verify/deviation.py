@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.common_place import axis_off_of_original, axis_off_of_written
 from cornersmooth.verify.distances import (
     Distances,
     Reached,
@@ -14,8 +15,9 @@ from cornersmooth.verify.distances import (
     own_gaps_of_original,
     own_gaps_of_written,
 )
-from cornersmooth.verify.findings import Findings, Poses
+from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses
 from cornersmooth.verify.hull_bounds import hull_gaps
+from cornersmooth.verify.match import Match
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 from cornersmooth.verify.wide_search import passed_nearby
 
@@ -27,7 +29,7 @@ TOGETHER: Final = 2.0
 
 
 def check_written(distances: Distances, found: Findings) -> None:
-    """Written vertices must be near the original: CS521, CS522, CS525."""
+    """Written vertices must be near the original: CS521, CS522, CS525, CS527."""
     match, written = distances.match, distances.written
     cl_line = _cl_lines_near(distances, written.place)
     nc_line = match.nc.line[match.written.trail.owner[written.vertex]]
@@ -35,7 +37,7 @@ def check_written(distances: Distances, found: Findings) -> None:
 
 
 def check_original(distances: Distances, found: Findings) -> None:
-    """The written motion must come near the vertices of the original: CS521, CS522, CS525."""
+    """The written motion must come near the vertices of the original: CS521, CS522, CS525, CS527."""
     match, theirs = distances.match, distances.original
     original = match.original
     pose = original.pose[original.trail.owner[theirs.vertex]]
@@ -65,11 +67,15 @@ def _take(
     result.orientation.update(gap.angle, cl_line, nc_line)
     together = TOGETHER * match.tolerance + match.margin
     own_gaps = own_gaps_of_written if mine else own_gaps_of_original
+    own_axis = match.task.own_axis
+    axis_off = axis_off_of_written if mine else axis_off_of_original
     known = np.zeros(len(gap.tip), np.bool_)
     tip, axis = gap.tip.copy(), gap.axis_point.copy()
 
     def look(rows: Ints) -> None:
         tip[rows], axis[rows] = own_gaps(match, reached, rows)
+        if own_axis:
+            axis[rows] = axis_off(match, reached, rows)
         known[rows] = True
 
     over = np.flatnonzero(gap.larger > limit)
@@ -90,7 +96,7 @@ def _take(
         worst.update(values[rows], cl_line[rows], nc_line[rows])
     over = over[known[over]]
     apart = over[(gap.larger[over] > together) & (np.maximum(tip, axis)[over] <= limit)]
-    if len(apart):
+    if len(apart) and not own_axis:
         amount = gap.larger[apart] if mine else common_gaps_of_original(match, reached, apart)
         still = amount > together  # a step from a knot is not exact where the axis turns much before the next
         apart, amount = apart[still], amount[still]
@@ -99,11 +105,20 @@ def _take(
     for code, values in ((521, tip), (522, axis)):
         broken = over[values[over] > limit]
         if len(broken):
-            found.violations.add(code, place[broken], cl_line[broken], nc_line[broken], values[broken])
+            _broken(match, found, code, place[broken], cl_line[broken], nc_line[broken], values[broken])
+
+
+def _broken(
+    match: Match, found: Findings, code: int, place: Floats, cl_line: Ints, nc_line: Ints, amount: Floats
+) -> None:
+    """Take down where tip or axis are beyond what they may."""
+    if code == 522 and match.task.own_axis:
+        code, amount = AXIS_OFF, match.task.degrees(amount)
+    found.violations.add(code, place, cl_line, nc_line, amount)
 
 
 def check_curves(distances: Distances, found: Findings) -> None:
-    """Curves must be near the original between their knots too: CS521, CS522."""
+    """Curves must be near the original between their knots too: CS521, CS522, CS527."""
     match = distances.match
     limit = match.tolerance + ARITHMETIC
     gaps = hull_gaps(match, limit)
@@ -116,7 +131,7 @@ def check_curves(distances: Distances, found: Findings) -> None:
         worst.update(values, cl_line, nc_line)
         broken = np.flatnonzero(values > limit)
         if len(broken):
-            found.violations.add(code, place[broken], cl_line[broken], nc_line[broken], values[broken])
+            _broken(match, found, code, place[broken], cl_line[broken], nc_line[broken], values[broken])
 
 
 def check_exact_poses(distances: Distances, found: Findings) -> None:

@@ -16,7 +16,7 @@ from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import Gap, Metric, climb, gap_between, nearest_segments
+from cornersmooth.verify.nearest import Gap, Metric, climb, nearest_segments
 from cornersmooth.verify.polyline import directions, written_at
 from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.wide_search import look_farther, nearest_alone
@@ -105,7 +105,7 @@ def from_written(match: Match) -> Reached:
     if len(over):
         own = rows[over]
         segment[loose[over]], at[loose[over]] = nearest_segments(
-            match.six[own], match.path.six, segment[loose[over]], _REACH, match.low[own], match.high[own]
+            match.six[own], match.path.six, segment[loose[over]], REACH, match.low[own], match.high[own]
         )
         wider = _gap_to_original(match, own, segment[loose[over]], at[loose[over]])
         better.tip[over], better.axis_point[over], better.angle[over] = wider.tip, wider.axis_point, wider.angle
@@ -117,7 +117,7 @@ def _gap_to_original(match: Match, vertex: Ints, segment: Ints, at: Floats) -> G
     original, trail = match.original, match.written.trail
     tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, segment, at))
     own = trail.tip.take(vertex, axis=0), trail.axis.take(vertex, axis=0)
-    return gap_between(*own, tip, axis, match.axis_length)
+    return match.task.gap(*own, tip, axis)
 
 
 def from_original(match: Match) -> Reached:
@@ -134,7 +134,7 @@ def from_original(match: Match) -> Reached:
     bent = np.flatnonzero(~match.written.straight[owner - match.written.first])
     if len(bent):
         tip[bent], axis[bent], at[bent] = _on_bent(match, point.take(bent, axis=0), segment[bent], at[bent])
-    gap = gap_between(tip, axis, point[:, :3], trail.axis.take(vertex, axis=0), match.axis_length)
+    gap = match.task.gap(tip, axis, point[:, :3], trail.axis.take(vertex, axis=0))
     return Reached(vertex, gap, segment + at)
 
 
@@ -229,11 +229,12 @@ def _newton_from_knot(
     target = point.copy()
     vectors = match.nc.second_is == "vector"
     if vectors:  # of length one
-        value, slope, bend = (_with_axis_point(part, match.axis_length) for part in (value, slope, bend))
+        value, slope, bend = (match.task.six(part[:, :3], part[:, 3:]) for part in (value, slope, bend))
     else:
         share = (match.axis_length / np.linalg.norm(value[:, 3:] - value[:, :3], axis=1))[:, None]
+        share /= match.axis_length
         value, slope, bend = (
-            np.hstack((part[:, :3], part[:, :3] + share * (part[:, 3:] - part[:, :3]))) for part in (value, slope, bend)
+            match.task.six(part[:, :3], share * (part[:, 3:] - part[:, :3])) for part in (value, slope, bend)
         )
     rest = target - value
     size = np.einsum("ij,ij->i", slope, slope) - np.einsum("ij,ij->i", rest, bend)
@@ -241,14 +242,9 @@ def _newton_from_knot(
     good = np.abs(step) <= _SHORT_STEP * (group.spans[-1] - group.spans[0])
     step = np.clip(np.where(good, step, 0.0), group.spans[0] - u, group.spans[-1] - u)[:, None]
     found = value + step * slope + step * step / 2 * bend
-    if vectors:
-        found[:, 3:] -= found[:, :3]
+    if vectors != match.task.own_axis:
+        found[:, 3:] += -found[:, :3] if vectors else found[:, :3]
     return found, good
-
-
-def _with_axis_point(six: Floats, axis_length: float) -> Floats:
-    """Tip and axis point (k, 6) of tip and tool vector."""
-    return np.hstack((six[:, :3], six[:, :3] + axis_length * six[:, 3:]))
 
 
 def search_elements(
@@ -269,7 +265,7 @@ def search_elements(
     tip, axis : (k, 3) float64
     distance : (k,) float64
     """
-    nc, length = match.nc, match.axis_length
+    nc, six_of = match.nc, match.task.six
     rows, width = elements.shape
     here = np.arange(rows)
 
@@ -278,7 +274,7 @@ def search_elements(
         which = np.minimum(place.astype(np.int64), width - 1)
         element = np.take_along_axis(elements, which, axis=1)
         tip, axis = written_at(nc, element.ravel(), (place - which).ravel())
-        six = np.hstack((tip, tip + length * axis)).reshape(*place.shape, 6)
+        six = six_of(tip, axis).reshape(*place.shape, 6)
         off = six[..., column] - point[:, None, column]
         return (
             tip.reshape(*place.shape, 3),
@@ -292,7 +288,7 @@ def search_elements(
     # nearer, so chords are what is compared; between elements that do not follow one another there is none
     which = np.minimum(grid.astype(np.int64), width - 1)
     tip, axis, near = look(np.broadcast_to(grid, (rows, len(grid))))
-    share, off = _on_chords(np.concatenate((tip, tip + length * axis), axis=2)[..., column], point[:, column])
+    share, off = _on_chords(six_of(tip, axis)[..., column], point[:, column])
     follows = (np.diff(elements[:, which], axis=1) == 1) | (np.diff(which) == 0)
     share, off = np.where(follows, share, 0.0), np.where(follows, off, near[:, :-1])
     chord = np.argmin(off, axis=1)
@@ -306,7 +302,7 @@ def search_elements(
     split = np.where(np.abs(joint - at) < step, joint, at)
     ends = np.clip(np.stack((at - step, split, at + step), axis=1), 0.0, width)
     tip, axis, _ = look(ends)
-    six = np.concatenate((tip, tip + length * axis), axis=2)[..., column]
+    six = six_of(tip, axis)[..., column]
     way = np.diff(six, axis=1)
     size = np.einsum("kmi,kmi->km", way, way)
     share = np.einsum("kmi,kmi->km", point[:, None, column] - six[:, :-1], way)
@@ -330,20 +326,20 @@ def _on_chords(points: Floats, target: Floats) -> tuple[Floats, Floats]:
 def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
     """Distance of chosen written vertices from the original tip path, and from its axis-point path, each on its own."""
     vertex = reached.vertex[rows]
-    trail, original, length = match.written.trail, match.original, match.axis_length
+    trail, original = match.written.trail, match.original
     result = []
     for metric in ("tip", "axis point"):
         segment, at = nearest_segments(
             match.six[vertex],
             match.path.six,
             match.segment[vertex],
-            _REACH,
+            REACH,
             match.low[vertex],
             match.high[vertex],
             metric,
         )
         tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, segment, at))
-        gap = gap_between(trail.tip[vertex], trail.axis[vertex], tip, axis, length)
+        gap = match.task.gap(trail.tip[vertex], trail.axis[vertex], tip, axis)
         result.append(
             np.minimum(
                 *(
@@ -365,25 +361,25 @@ def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Flo
 
 
 #: segments looked at on either side for the distance of tip or axis point alone
-_REACH = 4
+REACH = 4
 
 
 def common_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> Floats:
     """Distance of chosen original vertices from the nearest written pose: the larger one of tip and axis point."""
     segment = np.minimum(reached.place[rows].astype(np.int64), len(match.six) - 2)
     vertex = reached.vertex[rows]
-    tip, axis, _ = search_elements(match, _elements_around(match, segment), match.path.six[vertex])
+    tip, axis, _ = search_elements(match, elements_around(match, segment), match.path.six[vertex])
     trail = match.original.trail
-    gap = gap_between(tip, axis, trail.tip[vertex], trail.axis[vertex], match.axis_length)
+    gap = match.task.gap(tip, axis, trail.tip[vertex], trail.axis[vertex])
     return np.minimum(gap.larger, reached.gap.larger[rows])
 
 
-def _elements_around(match: Match, segment: Ints) -> Ints:
+def elements_around(match: Match, segment: Ints) -> Ints:
     """(k, e) element of each segment of the written trail, and those beside it."""
     nc, written = match.nc, match.written
     first, last = written.first + 1, written.first + len(written.trail.last) - 1
     owner = written.trail.owner[segment + 1]
-    elements = np.clip(owner[:, None] + np.arange(-_REACH, _REACH + 1), first, last)
+    elements = np.clip(owner[:, None] + np.arange(-REACH, REACH + 1), first, last)
     return np.where(nc.kind[elements] == Element.RAPID, owner[:, None], elements)
 
 
@@ -401,15 +397,15 @@ def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Fl
         ("axis point", slice(3, 6), reached.gap.axis_point[rows]),
     )
     for metric, column, known in ways:
-        near, at = nearest_segments(point, match.six, segment, _REACH * match.parts, low, high, metric)
+        near, at = nearest_segments(point, match.six, segment, REACH * match.parts, low, high, metric)
         climb(point, match.six, segment, low, high, near, at, metric)
-        elements = _elements_around(match, near)
+        elements = elements_around(match, near)
         values = np.minimum(search_elements(match, elements, point, column=column)[2], known)
         far = np.flatnonzero(values > match.tolerance + ARITHMETIC)
         own = point[far], match.six, segment[far], low[far], high[far]
         there, _, distance = nearest_alone(*own, match.near, column)
         known_near = np.isfinite(distance)
-        far, elements = far[known_near], _elements_around(match, there[known_near])
+        far, elements = far[known_near], elements_around(match, there[known_near])
         values[far] = np.minimum(values[far], search_elements(match, elements, point[far], column=column)[2])
         result.append(values)
     return result[0], result[1]

@@ -13,12 +13,16 @@ from cornersmooth.nc_reader.elements import Problem
 #: neighbouring violations no farther apart on the original than this many segments are one problem
 _SAME_PROBLEM: Final = 3.0
 
-#: what a violation of each code is said to be; its amount in mm
+#: code of an axis that is beyond its own tolerance
+AXIS_OFF: Final = 527
+
+#: what a violation of each code is said to be; its amount in mm, that of `AXIS_OFF` in degrees
 _TEXT = {
     521: "the tip leaves its path by {:.6f} mm",
     522: "the axis point leaves its path by {:.6f} mm",
     523: "the path is not run in order: {:.6f} mm backwards",
     525: "tip and axis point are {:.6f} mm from any common pose",
+    AXIS_OFF: "the tool axis is off by {:.6f} deg where the tip is nearest within its tolerance",
     524: "a pose that must be passed exactly is missed by {:.6f} mm",
 }
 

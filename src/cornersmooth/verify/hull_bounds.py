@@ -10,8 +10,9 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import CurveGroup
+from cornersmooth.verify.common_place import axis_off_at
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import gap_between, nearest_segments
+from cornersmooth.verify.nearest import nearest_segments
 from cornersmooth.verify.polyline import directions, unit, written_at
 
 #: samples between two knots where the hull alone does not settle it
@@ -61,10 +62,16 @@ def _searched(match: Match, element: Ints, middle: Ints, reach: int) -> tuple[Fl
     grid = np.linspace(0.0, 1.0, 2 * _SAMPLES + 1)
     owner = np.repeat(element, len(grid))
     tip, axis = written_at(match.nc, owner, np.tile(grid, len(element)))
-    six = np.hstack((tip, tip + match.axis_length * axis))
+    six = match.task.six(tip, axis)
     vertex = match.written.trail.last[owner - match.written.first]
     result = []
+    if match.task.own_axis:
+        middle_of = np.repeat(middle, len(grid))
+        off = axis_off_at(match, tip, axis, middle_of, reach, match.low[vertex], match.high[vertex])
     for metric in ("tip", "axis point"):
+        if metric == "axis point" and match.task.own_axis:
+            result.append(off.reshape(len(element), len(grid)))
+            continue
         segment, at = nearest_segments(
             six,
             match.path.six,
@@ -77,7 +84,7 @@ def _searched(match: Match, element: Ints, middle: Ints, reach: int) -> tuple[Fl
         theirs = match.original.trail
         their_tip = theirs.tip[segment] + at[:, None] * (theirs.tip[segment + 1] - theirs.tip[segment])
         their_axis = unit(theirs.axis[segment] + at[:, None] * (theirs.axis[segment + 1] - theirs.axis[segment]))
-        gap = gap_between(tip, axis, their_tip, their_axis, match.axis_length)
+        gap = match.task.gap(tip, axis, their_tip, their_axis)
         result.append((gap.tip if metric == "tip" else gap.axis_point).reshape(len(element), len(grid)))
     return result[0].max(axis=1), result[1].max(axis=1)
 
@@ -102,7 +109,7 @@ def _suspects(match: Match, group: CurveGroup, limit: float) -> Ints:
         for point in range(1, inner.shape[1] - 1):
             tip = inner[:, point, :3]
             axis = directions(match.nc, tip, inner[:, point, 3:])
-            six = np.hstack((tip, tip + match.axis_length * axis))
+            six = match.task.six(tip, axis)
             off = np.minimum(_off(match, six, before), _off(match, six, after))
             doubtful |= (off > limit) & (off > ends * (1 + _HULL_SLACK))
     return element[doubtful]
@@ -115,7 +122,7 @@ def _plain_corners(match: Match, group: CurveGroup, end: Ints) -> Bools:
     the leg.
     """
     nc, points = match.nc, group.points
-    if nc.second_is != "point":
+    if nc.second_is != "point" or match.task.own_axis:
         return np.zeros(len(points), np.bool_)
     # second points at any distance from the tip, all of a curve as many times as far as the axis points
     lever = points[..., 3:] - points[..., :3]

@@ -148,7 +148,7 @@ def match(task: Task, batch: Batch) -> Match:
     """Find the place of every vertex of a batch."""
     nc = batch.elements
     written = written_motion(nc, batch.first, batch.last, task.tolerance, task.axis_length)
-    six = written.trail.six(task.axis_length)
+    six = task.six(written.trail.tip, written.trail.axis)
     last_vertex = written.trail.last
     rows = batch.stretches.copy()
     rows["first"], rows["last"] = (last_vertex[rows[name] - batch.first] for name in ("first", "last"))

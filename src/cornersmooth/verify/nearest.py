@@ -47,10 +47,12 @@ class Gap:
         return np.maximum(self.tip, self.axis_point)
 
 
-def gap_between(tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats, axis_length: float) -> Gap:
-    """Distances between poses taken pairwise."""
+def gap_between(
+    tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats, axis_length: float, *, own_axis: bool = False
+) -> Gap:
+    """Distances between poses taken pairwise; axis points as in `Task`."""
     off, turned = tip - other_tip, axis - other_axis
-    apart = off + axis_length * turned
+    apart = axis_length * turned if own_axis else off + axis_length * turned
     chord = np.sqrt(np.einsum("ij,ij->i", turned, turned))
     return Gap(
         np.sqrt(np.einsum("ij,ij->i", off, off)),

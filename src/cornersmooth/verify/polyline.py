@@ -48,10 +48,6 @@ class Trail:
     def __len__(self) -> int:
         return len(self.tip)
 
-    def six(self, axis_length: float) -> Floats:
-        """(v, 6) tip and axis point side by side, mm."""
-        return np.hstack((self.tip, self.tip + axis_length * self.axis))
-
 
 @dataclass(frozen=True)
 class Polyline:

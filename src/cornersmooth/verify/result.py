@@ -9,7 +9,8 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.verify.findings import Findings, Poses, Worst
+from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Worst
+from cornersmooth.verify.task import Task
 
 #: problems of one code that are kept
 MOST_PROBLEMS = 1000
@@ -40,12 +41,16 @@ class Verification:
     passed : bool
         Whether nothing is wrong: no problem of any kind.
     tolerance, axis_length : float, mm
+        ε and H; NaN for H where the tool axis has a tolerance of its own.
+    axis_tolerance : float or None, degrees
+        What the tool axis may be off where the tip is within ε; None where the axis point has to keep ε.
     tip, axis_point : Where, mm
         Largest distance between the tip paths, and between the axis-point paths, both ways, in order along the path.
+        With an axis tolerance, which axis points are not part of, all that is said of them is NaN.
     together_tip, together_axis_point : Where, mm
         The same where tip and axis point are compared with one common pose.
     orientation : Where, degrees
-        Largest angle between the tool axes at that pose.
+        Largest angle between the tool axes at that pose; with an axis tolerance, at the place where that is kept best.
     problems : tuple of Problem
         Sorted by NC line; at most `MOST_PROBLEMS` of each code.
     problem_count : int
@@ -63,7 +68,8 @@ class Verification:
     curvature_jump : Where, 1/mm
         Largest change of curvature at an end of a curve or an arc.
     pose_tip, pose_axis_point : (n,) float64, mm
-        Distance of every original pose from the written motion, NaN where the tool does not pass at feed.
+        Distance of every original pose from the written motion, NaN where the tool does not pass at feed. With an axis
+        tolerance the latter is what the axis is off, so that its tolerance shows as ε.
     pose_angle : (n,) float64, degrees
     pose_nc_line : (n,) int64
         NC line that passes nearest.
@@ -78,6 +84,7 @@ class Verification:
     passed: bool
     tolerance: float
     axis_length: float
+    axis_tolerance: float | None
     tip: Where
     axis_point: Where
     together_tip: Where
@@ -131,7 +138,8 @@ class Verification:
             "schema": "cornersmooth-verification/1",
             "passed": self.passed,
             "tolerance_mm": self.tolerance,
-            "axis_length_mm": self.axis_length,
+            "axis_length_mm": _finite(self.axis_length),
+            "axis_tolerance_deg": self.axis_tolerance,
             "poses": self.poses,
             "blocks": self.blocks,
             "elements": self.elements,
@@ -148,7 +156,7 @@ class Verification:
                     "cl_line": problem.cl_line,
                     "nc_line": problem.nc_line,
                     "text": problem.text,
-                    "amount_mm": _finite(problem.amount),
+                    "amount_deg" if problem.code == f"CS{AXIS_OFF}" else "amount_mm": _finite(problem.amount),
                 }
                 for problem in self.problems
             ],
@@ -161,8 +169,8 @@ class Verification:
         passed: Poses,
         problems: list[Problem],
         *,
-        tolerance: float,
-        axis_length: float,
+        task: Task,
+        axis_tolerance: float | None,
         poses: int,
         blocks: int,
         elements: int,
@@ -176,17 +184,21 @@ class Verification:
             count[problem.code] = count.get(problem.code, 0) + 1
             if count[problem.code] <= MOST_PROBLEMS:
                 kept.append(problem)
-        continuity, largest = found.continuity, found.largest
+        continuity, largest, own = found.continuity, found.largest, task.own_axis
+        orientation = _where(largest.orientation, float(np.degrees(largest.orientation.value)))
+        if own:
+            orientation = _where(largest.axis_point, float(task.degrees(largest.axis_point.value)))
         tangent = float(np.degrees(np.arccos(np.clip(-continuity.tangent.value, -1.0, 1.0))))
         return cls(
             passed=not problems,
-            tolerance=tolerance,
-            axis_length=axis_length,
+            tolerance=task.tolerance,
+            axis_length=np.nan if own else task.axis_length,
+            axis_tolerance=axis_tolerance,
             tip=_where(largest.tip),
-            axis_point=_where(largest.axis_point),
+            axis_point=_where(largest.axis_point, np.nan if own else None),
             together_tip=_where(largest.together_tip),
-            together_axis_point=_where(largest.together_axis_point),
-            orientation=_where(largest.orientation, float(np.degrees(largest.orientation.value))),
+            together_axis_point=_where(largest.together_axis_point, np.nan if own else None),
+            orientation=orientation,
             problems=tuple(kept),
             problem_count=len(problems),
             blocks=blocks,

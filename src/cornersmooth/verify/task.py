@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.model import Bools, Keep, Program
+from cornersmooth.model import Bools, Floats, Keep, Program
 from cornersmooth.nc_reader.elements import Elements
+from cornersmooth.verify.nearest import Gap, gap_between
 from cornersmooth.verify.polyline import Original, Polyline, original_motion
 
 #: last printed digits by which the next segment must be nearer to be taken
@@ -26,7 +28,10 @@ class Task:
     exact : (m,) bool
         Whether the end of every move must be passed exactly: all but the inner poses of chains.
     tolerance, axis_length : float, mm
-        ε and H.
+        ε and H; H is the distance at which the axis tolerance shows as ε, where there is one.
+    own_axis : bool
+        Whether the tool axis has a tolerance of its own. The *axis point* then is H times the axis wherever the tip
+        is: it is off by ε where the axis is off by its tolerance.
     """
 
     original: Original
@@ -34,20 +39,47 @@ class Task:
     exact: Bools
     tolerance: float
     axis_length: float
+    own_axis: bool = False
 
     @classmethod
-    def of(cls, program: Program, tolerance: float, axis_length: float) -> Task:
-        """Make it."""
+    def of(cls, program: Program, tolerance: float, axis_length: float, axis_tolerance: float | None = None) -> Task:
+        """Make it; `axis_tolerance` in degrees takes the place of `axis_length`."""
+        own_axis = axis_tolerance is not None
+        if axis_tolerance is not None:
+            axis_length = length_of(tolerance, axis_tolerance)
         original = original_motion(program, tolerance, axis_length)
-        path = Polyline.of(original.trail.six(axis_length))
+        path = Polyline.of(side_by_side(original.trail.tip, original.trail.axis, axis_length, own_axis))
         # tips are held once only
         original = replace(original, trail=replace(original.trail, tip=path.six[:, :3]))
-        return cls(original, path, _exact_poses(original), tolerance, axis_length)
+        return cls(original, path, _exact_poses(original), tolerance, axis_length, own_axis)
+
+    def six(self, tip: Floats, axis: Floats) -> Floats:
+        """(..., 6) tips and axis points side by side, mm."""
+        return side_by_side(tip, axis, self.axis_length, self.own_axis)
+
+    def gap(self, tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats) -> Gap:
+        """Distances between poses taken pairwise."""
+        return gap_between(tip, axis, other_tip, other_axis, self.axis_length, own_axis=self.own_axis)
+
+    def degrees(self, off: Floats | float) -> Floats:
+        """What axis points that are `off` by so many mm make of the axis, where that has a tolerance of its own."""
+        return np.degrees(2.0 * np.arcsin(np.minimum(np.asarray(off) / (2.0 * self.axis_length), 1.0)))
 
     def margin(self, nc: Elements) -> float:
         """Distance that printed digits may account for, mm."""
         axis_step = nc.second_step * (self.axis_length if nc.second_is == "vector" else 1.0)
         return MARGIN_STEPS * max(nc.tip_step, axis_step)
+
+
+def length_of(tolerance: float, axis_tolerance: float) -> float:
+    """Distance from the tip, mm, at which an axis that is off by its tolerance (degrees) is off by the tolerance."""
+    return tolerance / (2.0 * math.sin(math.radians(axis_tolerance) / 2.0))
+
+
+def side_by_side(tip: Floats, axis: Floats, axis_length: float, own_axis: bool) -> Floats:
+    """(..., 6) tips and axis points, mm."""
+    axis_point = axis_length * axis if own_axis else tip + axis_length * axis
+    return np.concatenate((tip, axis_point), axis=-1)
 
 
 def _exact_poses(original: Original) -> Bools:

@@ -32,7 +32,7 @@ from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.statements import TAP, Token, asked, said
-from cornersmooth.verify.task import Task
+from cornersmooth.verify.task import Task, length_of
 from cornersmooth.verify.token_comparison import KINDS, compare
 from cornersmooth.verify.wide_search import way_apart
 from cornersmooth.verify.word_check import WordCheck
@@ -68,6 +68,8 @@ class Verifier:
         ε: what is allowed at tip and axis point.
     axis_length : float, mm
         H: distance of the axis point from the tip.
+    axis_tolerance : float, degrees, optional
+        What the tool axis may be off where the tip is within ε: takes the place of the axis point and H.
     control, machine, tcp
         As in `read_nc`.
     words : bool
@@ -98,6 +100,7 @@ class Verifier:
         *,
         tolerance: float,
         axis_length: float = 10.0,
+        axis_tolerance: float | None = None,
         control: str = "fanuc",
         machine: Machine | None = None,
         tcp: bool = True,
@@ -107,7 +110,11 @@ class Verifier:
         slower: bool = False,
         processes: int = 1,
     ) -> None:
-        _check_bounds(tolerance, axis_length)
+        self._axis_tolerance = axis_tolerance
+        if axis_tolerance is not None:
+            _check_bounds(axis_tolerance=axis_tolerance)
+            axis_length = length_of(tolerance, axis_tolerance)
+        _check_bounds(tolerance=tolerance, axis_length=axis_length)
         self._program, self._words = program, words
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
         self._trusted, self._weights, self._slower = tuple(trusted), weights, slower
@@ -147,13 +154,15 @@ class Verifier:
 
     def _work(self) -> Verification:
         """Read and measure the text as far as it goes."""
-        task = Task.of(self._program, self._options.tolerance, self._options.axis_length)
+        options = self._options
+        task = Task.of(self._program, options.tolerance, options.axis_length, self._axis_tolerance)
         return self._of_text(task, self._text) if isinstance(self._text, Source) else self._of_read(task, self._text)
 
     def _of_read(self, task: Task, nc: NcProgram) -> Verification:
         elements, events = OwnRapids(task).left_out(nc)
         text = _Text(iter([elements.at_most() if self._slower else elements]), events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
+        measured.axis_tolerance = self._axis_tolerance
         found = measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
         unverified = "the words of the text: they are looked at where it is read, not afterwards"
         return replace(found, unverified=unverified, rewinds=tuple((out, back) for *_, out, back in nc.left_cuts))
@@ -176,7 +185,7 @@ class Verifier:
         measured = _measure(task, text, words=self._words, processes=self._processes)
         problems = [*reader.problems, *check.problems]
         own = KINDS & set(self._trusted)
-        measured.own = own
+        measured.own, measured.axis_tolerance = own, self._axis_tolerance
         found = measured.verification(
             problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
@@ -243,6 +252,7 @@ class _Measured:
     margin : float, mm
     own : frozenset of str
         Kinds of statements that the user says in words of his own.
+    axis_tolerance : float or None, degrees
     """
 
     task: Task
@@ -255,6 +265,7 @@ class _Measured:
     words: bool
     margin: float = 0.0
     own: frozenset[str] = frozenset()
+    axis_tolerance: float | None = None
 
     def verification(
         self,
@@ -282,8 +293,8 @@ class _Measured:
             self.findings,
             self.poses,
             problems,
-            tolerance=self.task.tolerance,
-            axis_length=self.task.axis_length,
+            task=self.task,
+            axis_tolerance=self.axis_tolerance,
             poses=len(program),
             blocks=blocks,
             elements=self.batches.elements,
@@ -377,8 +388,8 @@ def _noted(text: _Text, found: _Measured) -> Iterable[Elements]:
         yield nc
 
 
-def _check_bounds(tolerance: float, axis_length: float) -> None:
-    for name, value in (("tolerance", tolerance), ("axis_length", axis_length)):
+def _check_bounds(**values: float) -> None:
+    for name, value in values.items():
         low, high = BOUNDS[name]
         if not low <= value <= high:
             raise SettingsError("CS202", f"{name} is {value:g}", f"give a value from {low:g} to {high:g}")

@@ -23,6 +23,13 @@ axis_length = click.option(
     show_default=True,
     help="Distance from the tool tip to the second point that keeps the tolerance: the length of the cutting edge.",
 )
+axis_tolerance = click.option(
+    "--axis-tolerance",
+    type=float,
+    metavar="DEG",
+    help="Largest deviation of the tool axis where the tip is within -e, in place of -e at the axis point (-H): for"
+    " ball-end mills, whose centre is all that counts.",
+)
 method = click.option(
     "--method",
     type=click.Choice(list(METHODS)),
@@ -82,6 +89,7 @@ axis_step = click.option(
 _SETTINGS = {
     "tolerance": tolerance,
     "axis_length": axis_length,
+    "axis_tolerance": axis_tolerance,
     "method": method,
     "shape": shape,
     "allocation": allocation,
@@ -98,4 +106,15 @@ def settings_of(given: dict[str, Any]) -> Settings:
     """How to smooth, as given; options that a command does not have keep their defaults."""
     from cornersmooth.settings import Settings
 
+    check_one_of_axis(given)
+
     return Settings(**{name: given[name] for name in _SETTINGS if name in given})
+
+
+def check_one_of_axis(given: dict[str, Any]) -> None:
+    """Refuse a length and a tolerance of the axis in one command: the one takes the place of the other."""
+    context, typed = click.get_current_context(silent=True), click.core.ParameterSource.COMMANDLINE
+    if context is None or given.get("axis_tolerance") is None:
+        return
+    if context.get_parameter_source("axis_length") == context.get_parameter_source("axis_tolerance") == typed:
+        raise click.UsageError("--axis-tolerance takes the place of -H/--axis-length: give one of them")

@@ -1,0 +1,109 @@
+"""How far tip and tool axis are off at one place, where the axis has a tolerance of its own.
+
+What is promised then is a place of the other motion at which the tip is within ε and the axis within its tolerance.
+Both together are nearest somewhere else than either alone, so the place is looked for at which the larger of the two
+is smallest, each measured in its tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.distances import REACH, Reached, elements_around, owner_fraction
+from cornersmooth.verify.match import Match
+from cornersmooth.verify.nearest import nearest_segments
+from cornersmooth.verify.polyline import written_at
+
+#: places looked at on every move or element, and rounds of halving around the best of them
+_PLACES: Final = np.linspace(0.0, 1.0, 17)
+_ROUNDS: Final = 32
+
+#: section of an interval in which the larger part is kept
+_GOLDEN: Final = (np.sqrt(5.0) - 1.0) / 2.0
+
+#: tip and axis (k, 3) at fractions (k,) of owners (k,)
+Motion = Callable[[Ints, Floats], tuple[Floats, Floats]]
+
+
+def axis_off_of_written(match: Match, reached: Reached, rows: Ints) -> Floats:
+    """What is off at the best place of the original for some written vertices, mm: see `_least`."""
+    trail, original = match.written.trail, match.original
+    vertex = reached.vertex[rows]
+    theirs = original.trail.owner[match.segment[vertex] + 1]
+    first, last = (original.trail.owner[bound[vertex] + 1] for bound in (match.low, match.high))
+    owners = np.clip(theirs[:, None] + np.arange(-REACH, REACH + 1), first[:, None], last[:, None])
+    known = reached.gap.tip[rows], reached.gap.axis_point[rows]
+    return _least(match, original.at, owners, (trail.tip[vertex], trail.axis[vertex]), known)
+
+
+def axis_off_of_original(match: Match, reached: Reached, rows: Ints) -> Floats:
+    """What is off at the best place of the written motion for some original vertices, mm: see `_least`."""
+    segment = np.minimum(reached.place[rows].astype(np.int64), len(match.six) - 2)
+    vertex, trail = reached.vertex[rows], match.original.trail
+
+    def motion(element: Ints, fraction: Floats) -> tuple[Floats, Floats]:
+        return written_at(match.nc, element, fraction)
+
+    known = reached.gap.tip[rows], reached.gap.axis_point[rows]
+    pose = trail.tip[vertex], trail.axis[vertex]
+    return _least(match, motion, elements_around(match, segment), pose, known)
+
+
+def axis_off_at(match: Match, tip: Floats, axis: Floats, middle: Ints, reach: int, low: Ints, high: Ints) -> Floats:
+    """What is off at the best place of the original for any written poses (k, 3), from path segments (k,) on, mm."""
+    original, trail = match.original, match.original.trail
+    middle, at = nearest_segments(match.task.six(tip, axis), match.path.six, middle, reach, low, high)
+    gap = match.task.gap(tip, axis, *original.at(*owner_fraction(trail.owner, trail.fraction, middle, at)))
+    theirs, first, last = (original.trail.owner[segment + 1] for segment in (middle, low, high))
+    owners = np.clip(theirs[:, None] + np.arange(-REACH, REACH + 1), first[:, None], last[:, None])
+    return _least(match, original.at, owners, (tip, axis), (gap.tip, gap.axis_point))
+
+
+def _least(
+    match: Match, motion: Motion, owners: Ints, pose: tuple[Floats, Floats], known: tuple[Floats, Floats]
+) -> Floats:
+    """(k,) mm: what the axis is off at the best of all places, or the tip where that is more and beyond ε.
+
+    Parameters
+    ----------
+    owners : (k, e) int64
+        Moves or elements that are looked at for each pose.
+    pose : two (k, 3) float64
+        Tips and axes.
+    known : two (k,) float64, mm
+        What tip and axis are off at a place that is known.
+    """
+    found = np.array(known[1])
+    beyond = np.flatnonzero(np.maximum(*known) > match.tolerance)
+    if not len(beyond):
+        return found
+    owners, tip, axis = owners[beyond], pose[0][beyond], pose[1][beyond]
+
+    def off(owner: Ints, at: Floats) -> tuple[Floats, Floats]:
+        """Of tip and axis (k, m), at fractions `at` of owners (k, m)."""
+        there = motion(owner.ravel(), at.ravel())
+        wide = np.repeat(np.arange(len(tip)), owner.shape[1])
+        gap = match.task.gap(tip[wide], axis[wide], *there)
+        return gap.tip.reshape(owner.shape), gap.axis_point.reshape(owner.shape)
+
+    shape = (len(tip), owners.shape[1] * len(_PLACES))
+    first = np.maximum(*off(np.repeat(owners, len(_PLACES), axis=1), np.tile(_PLACES, owners.shape).reshape(shape)))
+    # on each for itself: they may be of very different length
+    best = first.reshape(*owners.shape, len(_PLACES)).argmin(axis=2)
+    low = _PLACES[np.maximum(best - 1, 0)]
+    high = _PLACES[np.minimum(best + 1, len(_PLACES) - 1)]
+    for _ in range(_ROUNDS):
+        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        falls = np.maximum(*off(owners, right)) < np.maximum(*off(owners, left))
+        low, high = np.where(falls, left, low), np.where(falls, high, right)
+    both = off(np.hstack((owners, owners, owners)), np.hstack((low, (low + high) / 2.0, high)))
+    larger = np.maximum(*both)
+    row, which = np.arange(len(tip)), larger.argmin(axis=1)
+    least, turned = larger[row, which], both[1][row, which]
+    least = np.minimum(least, np.maximum(*known)[beyond])
+    found[beyond] = np.where(least > match.tolerance, least, turned)
+    return found
