@@ -129,8 +129,11 @@ def test_axis_along_the_tool_is_refused():
 
 
 def test_number_of_axes_is_checked():
-    with pytest.raises(SettingsError, match=r"1 rotary axes are described; write \[\[axis\]\] exactly twice"):
-        parse_machine('[[axis]]\nname = "A"\ncarrier = "table"\ndirection = [1, 0, 0]\n')
+    axis = '[[axis]]\nname = "A"\ncarrier = "table"\ndirection = [1, 0, 0]\n'
+    with pytest.raises(SettingsError, match=r"3 rotary axes are described; write \[\[axis\]\] twice at most"):
+        parse_machine(3 * axis)
+    assert parse_machine(axis).names == ("A",)
+    assert parse_machine("axis = []").names == ()
 
 
 def test_unknown_names_and_files(tmp_path: Path):
@@ -181,11 +184,13 @@ def test_what_is_wrong_in_dynamics_is_said(old: str, new: str, message: str):
 SAMPLES = sorted((Path(__file__).parents[2] / "samples" / "machines").glob("*.toml"))
 
 
-def test_four_samples_are_there():
+def test_the_samples_are_there():
     kinds = {path.stem: load_machine(path).kind for path in SAMPLES}
     assert kinds == {
         "fork-head": "head-head",
+        "four-axis-a": "table",
         "nutated-head-table": "table-head",
+        "three-axis": "",
         "trunnion-ac": "table-table",
         "trunnion-bc": "table-table",
     }

@@ -21,6 +21,7 @@ from cornersmooth.feedrate import taylor
 from cornersmooth.feedrate.motion import taylor_along
 from cornersmooth.feedrate.path import NO_TURN, Kind, Path
 from cornersmooth.kinematics import Machine, solutions
+from cornersmooth.kinematics.machine import PARALLEL
 from cornersmooth.kinematics.poses import angle_between, continued
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.rotary import rapid_moves, rotary_angles
@@ -35,7 +36,7 @@ _CONES = 2.0
 
 @dataclass(frozen=True)
 class MachineAxes:
-    """The motion of a machine's axes along a path: X, Y, Z in mm, then the two rotary axes in degrees.
+    """The motion of a machine's axes along a path: X, Y, Z in mm, then the rotary axes in degrees.
 
     Parameters
     ----------
@@ -95,10 +96,13 @@ class MachineAxes:
         # in a rapid all axes run evenly, back by whole turns too
         turning[1:, rapid] = 0.0
         turning[1, rapid] = np.radians(whole[rapid])
-        return np.concatenate((_linear_series(self.machine, tip, turning), np.degrees(turning)), axis=-1)
+        rotary = np.degrees(turning[..., : len(self.machine.names)])
+        return np.concatenate((_linear_series(self.machine, tip, turning), rotary), axis=-1)
 
     def _angle_series(self, axis: Floats, value: Floats) -> Floats:
         """Taylor series (4, m, 2) of the rotary angles, rad."""
+        if len(self.machine.names) < 2:
+            return self._series_of_one(axis, value)
         first, second = self.machine.axes
         about = first.unit
         gone = taylor.derivative(axis)
@@ -122,6 +126,19 @@ class MachineAxes:
         order = np.arange(1, taylor.ORDERS)[:, None]
         found[1:, :, 0] = first.sign * rate / order
         found[1:, :, 1] = second.sign * other / order
+        return found
+
+    def _series_of_one(self, axis: Floats, value: Floats) -> Floats:
+        """Return the same with one rotary axis or none: ω = k′·(a×k) / |a×k|²."""
+        found = np.zeros((taylor.ORDERS, len(value), 2))
+        found[0] = value
+        first = self.machine.axes[0]
+        lever = np.cross(first.unit, axis)
+        size = taylor.dot(lever[:-1], lever[:-1])
+        if not self.machine.names or (size[0] <= PARALLEL**2).any():
+            return found
+        rate = taylor.divide(taylor.dot(taylor.derivative(axis), lever[:-1]), size)
+        found[1:, :, 0] = first.sign * rate / np.arange(1, taylor.ORDERS)[:, None]
         return found
 
     def jump_speeds(self, accel_time: float) -> Floats:

@@ -1,4 +1,4 @@
-"""A machine with two rotary axes: where they sit, which way they count, how far they go."""
+"""A machine with up to two rotary axes: where they sit, which way they count, how far they go."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -31,8 +31,8 @@ class RotaryAxis:
         The address of its word in the NC text.
     direction : (float, float, float)
         Along the axis, any length but zero.
-    carrier : {"table", "head"}
-        Whether it carries the part or the tool.
+    carrier : {"table", "head", "none"}
+        Whether it carries the part or the tool; none where it only stands for one that the machine has not.
     point : (float, float, float), mm
         A point on the axis: in machine coordinates for a table, from the spindle nose for a head.
     positive : {"tool", "table"}
@@ -48,7 +48,7 @@ class RotaryAxis:
 
     name: str
     direction: Vector
-    carrier: Literal["table", "head"]
+    carrier: Literal["table", "head", "none"]
     point: Vector = (0.0, 0.0, 0.0)
     positive: Literal["tool", "table"] = "tool"
     limits: tuple[float, float] | None = None
@@ -57,6 +57,8 @@ class RotaryAxis:
 
     def __post_init__(self) -> None:
         where = f"rotary axis {self.name}"
+        if self.carrier == "none":
+            return
         if self.name not in ("A", "B", "C"):
             raise SettingsError("CS253", f"rotary axis name {self.name!r} is not an address", "use A, B or C")
         if self.carrier not in ("table", "head"):
@@ -101,16 +103,21 @@ class RotaryAxis:
         return math.inf if self.limits is None else self.limits[1]
 
 
+#: stands for a rotary axis that a machine has not
+_NO_AXIS: Final = RotaryAxis("", (0.0, 0.0, 1.0), "none")
+
+
 @dataclass(frozen=True)
 class Machine:
-    """Two rotary axes between the part and the tool; three linear axes along X, Y and Z.
+    """Up to two rotary axes between the part and the tool; three linear axes along X, Y and Z.
 
     Parameters
     ----------
     name : str
-    axes : (RotaryAxis, RotaryAxis)
+    axes : tuple of RotaryAxis
         In the order in which they are met on the way from the part to the tool: for two tables the one that carries
-        the part first, for two heads the one that carries the tool last.
+        the part first, for two heads the one that carries the tool last. Those that a machine has not are made up to
+        two by axes whose carrier is none, which never turn: angles are pairs on every machine.
     description : str
         One line for lists.
     preferred : (str, float) or None
@@ -130,7 +137,7 @@ class Machine:
     """
 
     name: str
-    axes: tuple[RotaryAxis, RotaryAxis]
+    axes: tuple[RotaryAxis, ...]
     description: str = ""
     preferred: tuple[str, float] | None = None
     tool_direction: Vector = (0.0, 0.0, 1.0)
@@ -142,17 +149,8 @@ class Machine:
 
     def __post_init__(self) -> None:
         where = f"machine {self.name}"
-        if len(self.axes) != 2:
-            raise SettingsError("CS253", f"{where} has {len(self.axes)} rotary axes", "describe exactly two")
-        first, second = self.axes
-        if first.name == second.name:
-            raise SettingsError("CS253", f"{where}: both rotary axes are called {first.name}", "give two names")
-        if first.carrier == "head" and second.carrier == "table":
-            raise SettingsError(
-                "CS253",
-                f"{where}: the head axis {first.name} stands before the table axis {second.name}",
-                "list the axes from the part to the tool",
-            )
+        if len(self.axes) > 2:
+            raise SettingsError("CS253", f"{where} has {len(self.axes)} rotary axes", "describe two at most")
         for key in ("tool_direction", "part_zero"):
             if len(getattr(self, key)) != 3 or not all(map(math.isfinite, getattr(self, key))):
                 raise SettingsError("CS253", f"{where}: {key} is not a point of space", "give three numbers")
@@ -161,6 +159,34 @@ class Machine:
         for length in (self.tool_length, *dict(self.tool_lengths).values()):
             if not (math.isfinite(length) and length >= 0):
                 raise SettingsError("CS253", f"{where}: tool_length is {length:g}", "give 0 mm or more")
+        object.__setattr__(self, "axes", (*self.axes, _NO_AXIS, _NO_AXIS)[:2])
+        if len(self.names) == 2:
+            self._check_pair(where, *self.axes)
+        if not self.names and not _parallel(self.tool, np.array((0.0, 0.0, 1.0))):
+            hint = "leave out tool_direction: the tool is along Z"
+            raise SettingsError("CS253", f"{where}: no rotary axis, and a tool_direction that is not Z", hint)
+        signed = [name + sign for name in self.names for sign in "+-"]
+        if self.preferred is not None and (self.preferred[0] not in self.names or self.preferred[1] not in (-1.0, 1.0)):
+            raise SettingsError(
+                "CS253",
+                f"{where}: preferred names {self.preferred[0]!r}",
+                f"use {', '.join(signed[:-1])} or {signed[-1]}" if signed else "leave it out",
+            )
+        for item in self.dynamics:
+            if item.name not in (*LINEAR, *self.names):
+                known = ", ".join((*LINEAR, *self.names))
+                raise SettingsError("CS253", f"{where}: dynamics of {item.name}, which it has not", f"use {known}")
+
+    def _check_pair(self, where: str, first: RotaryAxis, second: RotaryAxis) -> None:
+        """Refuse two axes that do not make a machine."""
+        if first.name == second.name:
+            raise SettingsError("CS253", f"{where}: both rotary axes are called {first.name}", "give two names")
+        if first.carrier == "head" and second.carrier == "table":
+            raise SettingsError(
+                "CS253",
+                f"{where}: the head axis {first.name} stands before the table axis {second.name}",
+                "list the axes from the part to the tool",
+            )
         if _parallel(first.unit, second.unit):
             raise SettingsError(
                 "CS253", f"{where}: {first.name} and {second.name} are parallel", "give two different directions"
@@ -171,16 +197,6 @@ class Machine:
                 f"{where}: {second.name} turns the tool about itself",
                 "check the directions and their order, from the part to the tool",
             )
-        if self.preferred is not None and (self.preferred[0] not in self.names or self.preferred[1] not in (-1.0, 1.0)):
-            raise SettingsError(
-                "CS253",
-                f"{where}: preferred names {self.preferred[0]!r}",
-                f"use {first.name}+, {first.name}-, {second.name}+ or {second.name}-",
-            )
-        for item in self.dynamics:
-            if item.name not in (*LINEAR, *self.names):
-                known = ", ".join((*LINEAR, *self.names))
-                raise SettingsError("CS253", f"{where}: dynamics of {item.name}, which it has not", f"use {known}")
 
     def with_tool(self, number: int | None) -> Machine:
         """Return the machine with the length of a tool; None for one that is not known."""
@@ -197,9 +213,9 @@ class Machine:
         return unit_vector(np.array(self.tool_direction))
 
     @property
-    def names(self) -> tuple[str, str]:
-        """Addresses of the two rotary words, from the part to the tool."""
-        return self.axes[0].name, self.axes[1].name
+    def names(self) -> tuple[str, ...]:
+        """Addresses of the rotary words, from the part to the tool: as many as there are axes."""
+        return tuple(axis.name for axis in self.axes if axis.carrier != "none")
 
     @property
     def limits(self) -> Floats:
@@ -213,23 +229,29 @@ class Machine:
 
     @property
     def kind(self) -> str:
-        """``"table-table"``, ``"table-head"`` or ``"head-head"``."""
-        return "-".join(axis.carrier for axis in self.axes)
+        """``"table-table"``, ``"table-head"``, ``"head-head"``, ``"table"``, ``"head"`` or ``""``."""
+        return "-".join(axis.carrier for axis in self.axes if axis.carrier != "none")
 
     @property
     def swings_the_tool(self) -> bool:
         """Whether a rotary axis in the head moves the tip by the length of the tool."""
         return any(axis.carrier == "head" for axis in self.axes)
 
+    @property
+    def _places(self) -> tuple[str, ...]:
+        return (", nearest to the part", ", nearest to the tool") if len(self.names) == 2 else ("",) * len(self.names)
+
     def describe(self) -> str:
         """Text of a few lines for people."""
         lines = [f"{self.name}: {self.description}" if self.description else self.name]
-        for axis, place in zip(self.axes, ("nearest to the part", "nearest to the tool"), strict=True):
+        if not self.names:
+            lines.append("  no rotary axis: the tool is along Z")
+        for axis, place in zip(self.axes[: len(self.names)], self._places, strict=True):
             direction = ", ".join(f"{number:.6g}" for number in axis.unit)
             point = ", ".join(f"{number:g}" for number in axis.point)
             span = "without end" if axis.limits is None else f"from {axis.low:g} to {axis.high:g} deg"
             lines.append(
-                f"  {axis.name} in the {axis.carrier}, {place}: about ({direction}) through ({point}) mm, {span}, "
+                f"  {axis.name} in the {axis.carrier}{place}: about ({direction}) through ({point}) mm, {span}, "
                 f"positive turns the {axis.positive}"
             )
         if self.preferred is not None:
@@ -250,8 +272,7 @@ def with_dynamics(machine: Machine | None) -> Machine | None:
 
 def endless(machine: Machine) -> Machine:
     """Return the machine with rotary axes that turn without end: for plans of texts that turn back by themselves."""
-    first, second = (replace(axis, limits=None) for axis in machine.axes)
-    return replace(machine, axes=(first, second))
+    return replace(machine, axes=tuple(replace(axis, limits=None) for axis in machine.axes))
 
 
 def _parallel(one: Floats, other: Floats) -> bool:

@@ -72,12 +72,12 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
     ----------
     text : str or dict
         Keys: ``like`` (a machine that comes with the program; then only what is different), ``name``, ``description``,
-        ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``[tool_lengths]``, ``part_zero`` and two tables
-        ``[[axis]]`` with ``name``, ``direction``, ``carrier``, ``point``, ``positive``, ``limits``, ``modulo``,
-        ``clamp``; ``[travel]`` with ``X``, ``Y`` and ``Z``, each ``[lowest, highest]``, any of which may be left out;
-        and for the planning of the time
-        tables ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min
-        or deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which may be left out.
+        ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``[tool_lengths]``, ``part_zero`` and up to two
+        tables ``[[axis]]`` (``axis = []`` for none) with ``name``, ``direction``, ``carrier``, ``point``, ``positive``,
+        ``limits``, ``modulo``, ``clamp``; ``[travel]`` with ``X``, ``Y`` and ``Z``, each ``[lowest, highest]``, any of
+        which may be left out; and for the planning of the time tables ``[dynamics.X]`` (Y, Z and the rotary axes alike)
+        with ``velocity`` (mm/min or deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which
+        may be left out.
     file : str
         For messages.
     name : str
@@ -92,19 +92,21 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
         table, _ = _SHELF.parse(text)
         entries = table.get("axis", [])
         if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-            raise _SHELF.wrong("axis is not a list of tables", "write [[axis]] twice")
-        if len(entries) != 2:
-            raise _SHELF.wrong(f"{len(entries)} rotary axes are described", "write [[axis]] exactly twice")
-        first, second = (_axis(entry, number) for number, entry in enumerate(entries, start=1))
+            raise _SHELF.wrong("axis is not a list of tables", "write [[axis]] for each")
+        if len(entries) > 2:
+            raise _SHELF.wrong(f"{len(entries)} rotary axes are described", "write [[axis]] twice at most")
+        if "axis" not in table:
+            raise _SHELF.wrong("no rotary axis is described", "write [[axis]], or axis = [] for a machine without")
+        axes = tuple(_axis(entry, number) for number, entry in enumerate(entries, start=1))
         return Machine(
             name=_text(table, "name", name),
-            axes=(first, second),
+            axes=axes,
             description=_text(table, "description", ""),
             preferred=_preferred(table),
             tool_direction=_vector(table, "tool_direction", (0.0, 0.0, 1.0)),
             tool_length=_number(table.get("tool_length", 0.0), "tool_length"),
             part_zero=_vector(table, "part_zero", (0.0, 0.0, 0.0)),
-            dynamics=_dynamics(table, (*LINEAR, first.name, second.name)),
+            dynamics=_dynamics(table, (*LINEAR, *(axis.name for axis in axes))),
             travel=_travel(table),
             tool_lengths=_tool_lengths(table),
         )
@@ -129,6 +131,8 @@ def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
     clamp = entry.get("clamp")
     if clamp is not None and (not isinstance(clamp, list) or [type(word) for word in clamp] != [str, str]):
         raise _SHELF.wrong(f"{where}clamp is {clamp!r}", 'give two M words, as in ["M10", "M11"]')
+    if entry["carrier"] == "none":  # which stands for axes that are not there
+        raise _SHELF.wrong(f"{where}carrier is 'none'", "use table or head")
     return RotaryAxis(
         name=_text(entry, "name", ""),
         direction=_vector(entry, "direction", (0.0, 0.0, 0.0), where),

@@ -33,7 +33,7 @@ def parse_pose(machine: Machine, text: str) -> dict[str, float]:
     """
     names = sorted(machine.names)
     known = (*names, *LINEAR)
-    example = ",".join(f"{name}{angle}" for name, angle in zip(names, (30, 45), strict=False))
+    example = ",".join([*(f"{name}{angle}" for name, angle in zip(names, (30, 45), strict=False)), "X10,Y0,Z5"])
     parts = [part for part in re.split(r"[,;\s]+", text.strip()) if part]
     if parts and all(_NUMBER.fullmatch(part) for part in parts) and len(parts) == len(names):
         return {**dict.fromkeys(known, 0.0), **dict(zip(names, map(float, parts), strict=True))}
@@ -45,7 +45,7 @@ def parse_pose(machine: Machine, text: str) -> dict[str, float]:
         if word is None or name not in known or name in given:
             why = f"{name} twice" if name in given else part
             what = f"{text!r} is no pose of {machine.name}: {why}"
-            raise SettingsError("CS375", what, f"write angles and, if you like, the tip, as in {example},X10,Y0,Z5")
+            raise SettingsError("CS375", what, f"write angles and, if you like, the tip, as in {example}")
         given.add(name)
         pose[name] = float(word[2])
     if not given:
@@ -62,12 +62,12 @@ def describe_pose(machine: Machine, pose: Mapping[str, float]) -> str:
     pose : mapping of str to float
         Degrees of the rotary words, mm of the tip in part coordinates: all of them, as `parse_pose` gives them.
     """
-    angles = np.array([[pose[name] for name in machine.names]])
+    angles = np.array([[*(pose[name] for name in machine.names), 0.0, 0.0][:2]])
     tip = np.array([[pose[name] for name in LINEAR]])
     axis = tool_axis(machine, angles)
     words, nose = machine_position(machine, tip, angles)[0], nose_position(machine, tip, angles)[0]
     lines = [
-        f"{machine.name} at {_rotary(machine, angles[0])} deg",
+        f"{machine.name} at {_rotary(machine, angles[0])} deg" if machine.names else machine.name,
         f"  tool vector       {_words('IJK', axis[0], 7)}",
         f"  tip on the part   {_words(LINEAR, tip[0])} mm",
         f"  machine position  {_words(LINEAR, words)} mm, from the zero of the part, tool length taken off",
@@ -76,7 +76,7 @@ def describe_pose(machine: Machine, pose: Mapping[str, float]) -> str:
     found = solutions(machine, axis)
     if found.singular[0]:
         lines.append(f"  at the pole: {machine.names[0]} does not turn the tool axis")
-    else:
+    elif len(machine.names) == 2:
         other = [pair for pair in found.angles[0] if np.abs(_turned(pair - angles[0])).max() > _SAME]
         told = " or ".join(_rotary(machine, pair) for pair in other[:1])
         lines += [f"  same tool vector  {told} deg"] * bool(told)
@@ -93,7 +93,7 @@ def describe_pose(machine: Machine, pose: Mapping[str, float]) -> str:
 
 def _rotary(machine: Machine, angles: np.ndarray) -> str:
     """Rotary words in alphabetical order."""
-    named = sorted(zip(machine.names, angles.tolist(), strict=True))
+    named = sorted(zip(machine.names, angles.tolist(), strict=False))
     return _words([name for name, _ in named], np.array([angle for _, angle in named]))
 
 

@@ -1,4 +1,4 @@
-"""Tool axis from rotary angles, and both pairs of rotary angles from a tool axis, for any two rotary axes.
+"""Tool axis from rotary angles, and both pairs of rotary angles from a tool axis, for any two rotary axes or fewer.
 
 The axis in part coordinates is k = R₁(q₁) R₂(q₂) k₀ with the rotary axes a₁, a₂ in the order from the part to the tool.
 With u = R₂ k₀ = R₁⁻¹ k the unit vectors a₁, a₂, u form a spherical triangle whose sides are known: σ between a₁ and a₂,
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.machine import PARALLEL, Machine
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.vectors import dot, norm
 
@@ -79,6 +79,8 @@ def solutions(machine: Machine, axis: Floats) -> Solutions:
     -----
     `tool_axis` of either solution gives the axis back to 1e-15, near the pole too.
     """
+    if len(machine.names) < 2:
+        return _with_one_axis(machine, axis)
     frame = _Frame.of(machine)
     n = len(axis)
     angles, distance, beyond = np.empty((n, 2, 2)), np.empty(n), np.empty(n)
@@ -90,8 +92,26 @@ def solutions(machine: Machine, axis: Floats) -> Solutions:
     return Solutions(angles, distance, beyond)
 
 
+def _with_one_axis(machine: Machine, axis: Floats) -> Solutions:
+    """Angles that come nearest to tool axes with one rotary axis or none: both solutions are the same.
+
+    The axis k₀ goes round a₁ on a cone; the nearest k on it has the azimuth of the axis asked for.
+    """
+    angles = np.zeros((len(axis), 2, 2))
+    about, tool = machine.axes[0].unit, machine.tool
+    across = tool - (tool @ about) * about
+    if machine.names and np.linalg.norm(across) > PARALLEL:
+        other = np.cross(about, across)
+        azimuth = np.arctan2(axis @ other, axis @ across)  # both are as long as each other
+        angles[:, :, 0] = wrap(machine.axes[0].sign * np.degrees(azimuth))[:, None]
+    beyond = angle_between(tool_axis(machine, angles[:, 0]), axis)
+    return Solutions(angles, np.full(len(axis), np.inf), beyond)
+
+
 def pole_distance(machine: Machine, axis: Floats) -> Floats:
     """Angle between tool axes and the nearest pole, as in `Solutions`: (n, 3) -> (n,) degrees."""
+    if len(machine.names) < 2:
+        return np.full(len(axis), np.inf)
     frame = _Frame.of(machine)
     x, y, z = (axis @ frame.first).T
     return frame.pole_distance(np.arctan2(np.hypot(x, y), z))
@@ -185,6 +205,8 @@ def passes_pole(machine: Machine, start: Floats, end: Floats, cone: float) -> Bo
         False where the nearest point is one of the ends.
     """
     passes = np.zeros(len(start), np.bool_)
+    if len(machine.names) < 2:
+        return passes
     step = end - start
     step = norm(step) + np.radians(cone) + ROUNDING
     for pole in _Frame.of(machine).poles(machine):

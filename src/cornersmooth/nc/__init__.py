@@ -7,8 +7,11 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.model import Ints, SmoothProgram, Units
+from cornersmooth.kinematics import Machine, check_travel
+from cornersmooth.model import Ints, Move, Program, SmoothProgram, Units
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.circles import Circles, plan_circles, with_arcs
 from cornersmooth.nc.control import Control
@@ -216,6 +219,8 @@ def write(
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findings) -> Iterator[Rows]:
+    if form.machine is not None and not form.rotary:
+        _check_travel(form.machine, smoothed.program)
     if form.curves and form.rotary:
         return rotary_curve_rows(smoothed, form, findings)
     if form.curves:
@@ -225,6 +230,13 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findi
     if form.rotary:
         return with_arcs(rotary_rows(rows, smoothed, form, findings, long=long), smoothed.program, circles)
     return long_rows(rows, smoothed, form) if long else rows
+
+
+def _check_travel(machine: Machine, program: Program) -> None:
+    """Refuse poses beyond the travel of a machine without rotary axes: between them it goes no farther."""
+    poses = np.flatnonzero(program.kind != Move.FROM)
+    angles = np.zeros((len(poses), 2))
+    check_travel(machine, program.tip[poses], angles, program.line[poses], program.source.name)
 
 
 def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:

@@ -47,7 +47,7 @@ def _direction(form: Form, values: Floats) -> Floats:
         up = values[3:] - values[:3]
     elif form.rotary and form.machine is not None:
         order = [3 + form.other_words.index(name) for name in form.machine.names]
-        angles = values[None, order]
+        angles = np.array([[*values[order], 0.0][:2]])
         up = tool_axis(form.machine, angles)[0]
         if form.orientation == "machine":
             ends = [machine_position(form.machine, tip[None], angles)[0] for tip in (up, np.zeros(3))]

@@ -134,7 +134,8 @@ class BlockWriter:
         machine = self.form.machine
         assert machine is not None
         order = [3 + self.form.other_words.index(name) for name in machine.names]
-        found: Floats = ticks[:, order] / 10.0**self.form.table.digits.angle
+        found = np.zeros((len(ticks), 2))
+        found[:, : len(order)] = ticks[:, order] / 10.0**self.form.table.digits.angle
         return found
 
     def approach(self, ticks: Ints) -> list[str]:

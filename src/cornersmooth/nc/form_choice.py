@@ -71,6 +71,14 @@ def choose_form(
     if machine is None and not tcp and "machine" in chosen.modes:
         raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
     wanted: tuple[Orientation, ...] = ("vector", "point", "fixed")
+    if machine is not None and len(machine.names) < 2 and planes:
+        what = f"{machine.name} has no two rotary axes, which a tilted plane asks for"
+        raise SettingsError("CS232", what, "leave out --planes")
+    if machine is not None and not machine.names:
+        asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
+        found = _without_rotary_axes(table, chosen, machine, asked, rewind)
+        _check_rewind(found)
+        return found
     if not tcp:
         wanted = ("machine",)
     elif machine is not None:
@@ -80,11 +88,34 @@ def choose_form(
             asked = tuple(_extra(table, name, extra) for extra in dict.fromkeys(extras))
             mode = chosen.modes[orientation]
             _check_modulo(table, chosen, mode, machine)
+            _check_curves(table, chosen, machine)
             plane = _plane(table, chosen, machine) if planes else None
             found = Form(table, name, chosen.curve, orientation, mode, machine, asked, chosen.upright, rewind, plane)
             _check_rewind(found)
             return found
     raise _refusal(table, chosen, wanted, machine)
+
+
+def _without_rotary_axes(
+    table: Control, form: FormTable, machine: Machine, extras: tuple[Extra, ...], rewind: float
+) -> Form:
+    """Return the form for a machine without rotary axes: blocks without words of the tool axis, along Z."""
+    mode = form.modes.get("fixed", None if form.curve else form.upright)
+    if mode is None:
+        here = f"{table.name} form {form.name}"
+        lines = next((name for name, other in table.forms.items() if not other.curve and other.upright), "")
+        hint = f"use -f {lines}" if lines else "leave out --machine"
+        raise SettingsError("CS215", f"{here} has no blocks without words of the tool axis", hint)
+    return Form(table, form.name, form.curve, "fixed", mode, machine, extras, form.upright, rewind)
+
+
+def _check_curves(table: Control, form: FormTable, machine: Machine | None) -> None:
+    """Refuse curves in rotary words of a machine with one rotary axis."""
+    if machine is None or not form.curve or len(machine.names) > 1:
+        return
+    lines = next((name for name, other in table.forms.items() if not other.curve), "")
+    what = f"{table.name} form {form.name} has no curves for a machine with one rotary axis"
+    raise SettingsError("CS215", what, f"use -f {lines}" if lines else "leave out --machine")
 
 
 def _check_modulo(table: Control, form: FormTable, mode: Mode, machine: Machine | None) -> None:
@@ -155,6 +186,9 @@ def check_program(form: Form, program: Program, settings: Settings) -> None:
         text = "the tool is not parallel to Z, and {} has no words for its axis"
         vectors = [name for name, other in form.table.forms.items() if "vector" in other.modes]
         hint = f"use -f {vectors[0]}" if vectors else "name your machine with --machine"
+        if form.machine is not None:
+            text = f"the tool is not parallel to Z, and {form.machine.name} has no rotary axis"
+            hint = "turn the part for an operation of its own, or use a machine that reaches it"
         _refuse_tilt(form, program, settings, tilt, text, hint)
     if form.orientation == "machine" and form.machine is not None and form.machine.swings_the_tool:
         _check_lengths(form.machine, program)

@@ -73,7 +73,9 @@ class MotionWarnings:
         """Say that an endless axis gets words that some machines of the control refuse; `angles` are those of `run`."""
         if self._said_turns or form.mode.motion.endless_words or form.machine is None:
             return
-        endless = np.array([axis.limits is None and not axis.modulo for axis in form.machine.axes])
+        axes = form.machine.axes[: len(form.machine.names)]
+        endless = np.array([axis.limits is None and not axis.modulo for axis in axes])
+        angles = angles[:, : len(axes)]
         rows = np.flatnonzero(((angles[:, endless] < 0.0) | (angles[:, endless] >= 360.0)).any(axis=1))
         if len(rows):
             self._said_turns = True

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.kinematics import Machine, inverse_time, machine_position
+from cornersmooth.kinematics import Machine, inverse_time, machine_position, solutions
 from cornersmooth.kinematics.travel import check_travel
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import corner_blends, line_limits
@@ -30,6 +30,7 @@ from cornersmooth.rotary import (
     rotary_angles,
     still_poses,
 )
+from cornersmooth.rotary.axis_findings import reach_error
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
@@ -85,6 +86,7 @@ def rotary_rows(
     tip, axis, move = _whole(rows)
     if not len(move):
         return
+    _check_reach(machine, program, form.rotary_tolerance(settings.tolerance, settings.axis_length))
     tools = tools_of_poses(program) if machine.tool_lengths else None
     own_machine, machine = machine, machine.with_longest_tool()
     rapid, line, file = rapid_moves(program.kind)[move], program.line[move], program.source.name
@@ -223,6 +225,18 @@ def _merged(
         turn=min(limits.turn, _MERGED_TURN),
     )
     return filled.only(fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits))
+
+
+def _check_reach(machine: Machine, program: Program, tolerance: float) -> None:
+    """Refuse the first pose that an axis is missing for; `rotary_angles` would name a place on the way there."""
+    if len(machine.names) > 1:
+        return
+    beyond = np.where(program.kind == Move.FROM, 0.0, solutions(machine, program.axis).beyond)
+    poses = np.flatnonzero(beyond > tolerance)
+    if len(poses):
+        pose = int(poses[0])
+        line, file = int(program.line[pose]), program.source.name
+        raise reach_error(machine, program.axis[pose], float(beyond[pose]), line, file)
 
 
 def _tell_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, findings: Findings) -> None:

@@ -64,8 +64,11 @@ class ReadingOptions:
         SettingsError
             CS204 for an unknown control, CS215 for positions of a machine that is not named.
         """
+        without = machine is not None and not machine.names
+        if without:
+            machine = None
         dialect = dialect_of(control, "".join(machine.names) if machine is not None else "")
-        if machine is None and not tcp:
+        if machine is None and not tcp and not without:
             raise SettingsError("CS215", "machine positions need a machine", "name it with --machine")
         return cls(control, dialect, machine, tcp, tolerance, axis_length)
 

@@ -127,7 +127,7 @@ class Rotary:
             if axis.carrier == "table":
                 away = position + self.machine.part_zero - axis.point
                 total += np.linalg.norm(away, axis=1) + self.machine.tool_length
-            else:
+            elif axis.carrier == "head":
                 total += float(np.linalg.norm(self.machine.tool_length * self.machine.tool + axis.point))
         return total
 
@@ -136,6 +136,8 @@ class Rotary:
 
         There the first axis hardly moves the tool, and turns ahead of time.
         """
+        if len(self.machine.names) < 2:
+            return np.zeros(len(vector))
         allowed = self.tolerance / self.axis_length
         sine = np.linalg.norm(np.cross(vector, self.machine.axes[0].unit), axis=1)
         return np.where(sine <= _POLE * allowed, allowed, 0.0)

@@ -136,7 +136,8 @@ def rotary_angles(
                 raise limit_error(machine, both, machine.limits, None, int(line[pose]), 0, file)
     findings = pole_finding(machine, tip, axis, angles, rapid | left, line)
     findings += rewind_finding(machine, angles, rapid & ~left, line)
-    findings += swap_finding(machine, swaps[~left[swaps]], line)
+    if len(machine.names) == 2:
+        findings += swap_finding(machine, swaps[~left[swaps]], line)
     return RotaryPath(angles, deviation, branch, findings)
 
 

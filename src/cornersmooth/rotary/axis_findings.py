@@ -81,6 +81,8 @@ def pole_finding(
     machine: Machine, tip: Floats, axis: Floats, angles: Floats, rapid: Bools, line: Ints
 ) -> tuple[Finding, ...]:
     """Cuts near the pole, where the first rotary axis turns fast: where, how close, how fast."""
+    if len(machine.names) < 2:
+        return ()
     found = []
     for begin in range(0, len(axis) - 1, CHUNK):
         here = slice(begin, begin + CHUNK + 1)
