@@ -152,8 +152,8 @@ class MotionWriter:
         writer = self.writers.of(pose, self.statements.tool)
         if self._plane >= 0 and writer is self.writers.tilting:
             self._warnings.behind_plane(pose, writer.form)
-        self._plane = self.writers.plane_of(pose)
-        if self.operation.begun:
+        beside, self._plane = self._plane != self.writers.plane_of(pose), self.writers.plane_of(pose)
+        if self.operation.begun or (beside and not self.operation.retracted):
             yield from self._blocks(self.operation.go_home())
         if writer is self.writer:
             return
@@ -337,20 +337,19 @@ class MotionWriter:
         travel, clearance = travel_of(cycle, program, poses, approach[poses])
         speed, table = self.statements.speed or 0.0, writer.form.table.cycles
         once = first_of_hole(getattr(table, kind))
+        frame = np.eye(3) if writer.plane is None else writer.plane.frame
         said: tuple[str, ...] = ()
         for k, pose in enumerate(poses.tolist()):
-            above = self._run(
-                writer.ticks(program.tip[[pose]] + travel[k] * program.axis[[pose]], program.axis[[pose]]), poses[[k]]
-            )
+            tip = program.tip[pose]
+            above = self._run(writer.ticks((tip + travel[k] * frame[:, 2])[None], program.axis[[pose]]), poses[[k]])
             level = above.ticks[0, 2]
             if not said or self._position is None or self._position[2] != level:
                 yield from self._blocks(table.off if said else ())
                 said = ()
                 yield from self._emit(self._moving(replace(above, rapid=np.ones(1, np.bool_))))
                 yield from self._blocks(writer.feed_mode(int(modes[0])))
-            tip = program.tip[pose]
             hole = Hole(
-                (tip if writer.plane is None else tip @ writer.plane.frame) / unit,
+                tip @ frame / unit,
                 travel[k] / unit,
                 clearance[k] / unit,
                 cycle.depth / unit,

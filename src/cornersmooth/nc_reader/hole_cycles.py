@@ -24,6 +24,9 @@ DEFINED: Final = "cycle"
 #: share of a peck that the tool stays above the last depth when it comes back
 _ABOVE: Final = 0.05
 
+#: by how much the sum of two printed heights may be off, in units of the text
+_ROUNDING: Final = 1e-9
+
 #: more pecks in one hole are not carried out
 _MOST_PECKS: Final = 10_000
 
@@ -75,7 +78,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> Non
     InputError
         CS503 where the height at which it begins is not known, or its heights make no hole.
     """
-    if not cycle.bottom <= cycle.clearance <= cycle.travel:
+    if not cycle.bottom <= cycle.clearance <= cycle.travel + _ROUNDING:
         state.refuse(line, "a cycle whose heights are not one below another", "give them in their order")
     if cycle.step and (cycle.clearance - cycle.bottom) / cycle.step > _MOST_PECKS:
         state.refuse(line, "a cycle of more pecks than anybody wants", "give a larger step")

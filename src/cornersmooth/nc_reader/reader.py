@@ -321,7 +321,7 @@ class Reader:
             room = self.rotary.pole_room(found.second)
         elif found.second_is == "vector" and not self.steps.second:  # no word says anything of the tool axis
             room += FIXED_SHARE * self.options.tolerance / self.options.axis_length
-        return replace(found, second_room=np.maximum(room, found.second_room))
+        return replace(found, second_room=np.where(found.tip_room > 0.0, found.second_room, room))
 
     @property
     def units(self) -> Units:

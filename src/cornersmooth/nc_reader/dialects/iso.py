@@ -244,10 +244,10 @@ class Iso(Dialect):
         else:
             angles = state.modal.second[:2]
             frame = turned_frame(state.rotary, angles) if state.rotary is not None else None
-            if frame is None or math.isnan(sum(angles)):
+            if frame is None or state.rotary is None or math.isnan(sum(angles)):
                 state.refuse(line, "G254 where the angles of the tables are not known", "name the machine")
             else:
-                state.tilt(line, TiltedPlane(frame, 0.0, "G43"))
+                state.tilt(line, TiltedPlane(frame, math.radians(state.rotary.angle_step), "G43"))
 
     def _to_machine(self, line: Line, codes: set[float], state: State) -> None:
         """G91 G28 Z0. and the like: to the reference position without a detour; G53: in machine coordinates."""

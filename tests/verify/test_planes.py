@@ -1,0 +1,13 @@
+"""Random 3+2 programs in tilted planes of the control: no false alarm."""
+
+from __future__ import annotations
+
+import pytest
+
+from oracle.share import how_many
+from verify.plane_programs import judged, trial
+
+
+@pytest.mark.parametrize("seed", range(how_many(12, 200)))
+def test_random_programs_in_planes_are_right(seed: int) -> None:
+    assert judged(trial(seed))[0] == ""
