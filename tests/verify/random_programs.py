@@ -30,9 +30,10 @@ ACTING = ("COOLNT/ON", "COOLNT/OFF", "COOLNT/MIST", "OPSTOP", "STOP", "SPINDL/90
 
 @dataclass(frozen=True)
 class Trial:
-    """A program and what is done with it; `oracle` where the independent reader can judge its motion.
+    """A program and what is done with it.
 
-    `digits` as `Control.with_digits` takes them, empty for the control's own; `planned`: feeds are those of a plan.
+    `digits` as `Control.with_digits` takes them, empty for the control's own; `planned`: feeds are those of a plan;
+    `native`: holes are the control's own cycles.
     """
 
     seed: int
@@ -40,10 +41,10 @@ class Trial:
     settings: Settings
     units: str
     cl: str
-    oracle: bool
     parts: tuple[str, ...] = ()
     digits: str = ""
     planned: bool = False
+    native: bool = False
 
     def __str__(self) -> str:
         s = self.settings
@@ -51,6 +52,8 @@ class Trial:
         said += [f"{s.lines} lines"] if s.lines else []
         said += [f"digits {self.digits}"] if self.digits else []
         said += ["planned feeds"] if self.planned else []
+        said += ["native cycles"] if self.native else []
+        said += [f"axis tolerance {s.axis_tolerance:g}"] if s.axis_tolerance is not None else []
         if s.method == "proportional":
             said += [s.shape, s.allocation, *(["weights {:g},{:g}".format(*s.weights)] if s.weights != (1, 1) else [])]
         return f"seed {self.seed}: " + " ".join(said) + " [" + " ".join(self.parts) + "]"
@@ -240,13 +243,12 @@ def trial(seed: int, *, flips: bool = True, only: str = "") -> Trial:
     text = _Text(rng, 25.4 if units == "inch" else 1.0, one_tool)
     text.say("PARTNO TRIAL", "UNITS/INCHES" if units == "inch" else "UNITS/MM")
     _tool(text)
-    kinds, oracle = [*CHAINS, "flip"] if flips and not fixed else [*CHAINS], True
+    kinds = [*CHAINS, "flip"] if flips and not fixed else [*CHAINS]
     parts = []
     for _ in range(int(rng.integers(1, 5))):
         kind = str(rng.choice([*kinds, "arcs", "holes", "holes"]))
         parts.append(kind)
         if kind == "holes":
-            oracle = False
             _holes(text, fixed, case)
         elif kind == "arcs":
             _arcs(text)
@@ -261,7 +263,21 @@ def trial(seed: int, *, flips: bool = True, only: str = "") -> Trial:
     if int(digits or 0) > form.table.digits.most:
         digits = ""
     planned = bool(own.random() < 0.25)
-    return Trial(seed, case, settings, units, cl, oracle, tuple(parts), digits, planned)
+    more = np.random.default_rng((seed, 3))
+    native = "holes" in parts and bool(more.random() < 0.4)
+    if form.long_lines and not settings.lines and more.random() < 0.25:
+        settings = settings.but(lines="long")
+    if settings.orientation_tolerance is None and more.random() < 0.1:
+        settings = _with_axis_tolerance(settings, float(np.round(10.0 ** more.uniform(-2, 0.7), 3)))
+    return Trial(seed, case, settings, units, cl, tuple(parts), digits, planned, native)
+
+
+def _with_axis_tolerance(settings: Settings, degrees: float) -> Settings:
+    """Settings with a tolerance of the tool axis, where the rest of them goes with one."""
+    try:
+        return settings.but(axis_tolerance=degrees)
+    except SettingsError:
+        return settings
 
 
 def _settings(rng: np.random.Generator, seed: int, form: Form) -> Settings:

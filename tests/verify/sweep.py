@@ -2,8 +2,9 @@
 
 ``python -m verify.sweep [--seeds FIRST LAST] [--only CASE] [--method NAME] [--programmed] [--eps MM]... [FILE]...``
 prints a line for every text that is refused although the oracle finds it right, for every text that passes although it
-does not, and for every failure; exit code 1 for any. Programs with holes have no oracle: what is written for them must
-pass.
+does not, and for every failure; exit code 1 for any. At the end it says how often each came, and how often what was
+drawn. The oracle measures tip and axis point of plain motion: what is written for programs with holes, with a tolerance
+of the tool axis, and in curves of whole runs must pass.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ import warnings
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from cornersmooth.cl import read
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.feedrate import Limits
 from cornersmooth.model import Move, Program
-from cornersmooth.nc import Form, fit_settings, write
+from cornersmooth.nc import Form, Frame, fit_settings, write
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
@@ -43,14 +43,17 @@ HAIR = 2e-3
 LENGTHS = (10.0, 50.0)
 
 
-def texts(program: Program, form: Form, settings: Settings, *, planned: bool = False) -> tuple[bytes, Settings]:
+def texts(
+    program: Program, form: Form, settings: Settings, *, planned: bool = False, native: bool = False
+) -> tuple[bytes, Settings]:
     """NC text of a program, and the settings with the digits of the control in them."""
+    frame = Frame(cycles="native" if native else "moves")
     fitted = fit_settings(settings, form, program.units)
     stream = io.BytesIO()
     if planned:
-        postprocess(program, stream, settings, form=form, plan_feeds=Limits(), verify=False)
+        postprocess(program, stream, settings, form=form, frame=frame, plan_feeds=Limits(), verify=False)
     else:
-        write(smooth(program, fitted), stream, form=form)
+        write(smooth(program, fitted), stream, form=form, frame=frame)
     return stream.getvalue(), fitted
 
 
@@ -67,15 +70,14 @@ def keeps(case: Case, program: Program, text: bytes, settings: Settings, allowed
     )
 
 
-def judged(
-    case: Case, program: Program, settings: Settings, *, oracle: bool, digits: str = "", planned: bool = False
-) -> tuple[str, str]:
-    """Outcome of one text: a word, and what is to be said of it."""
+def judged(one: Trial, program: Program, *, oracle: bool = True) -> tuple[str, str]:
+    """Outcome of one text: a word, and what is to be said of it; without `oracle` it must pass."""
+    case, settings, digits = one.case, one.settings, one.digits
     form = case.choose(endless=True)
     if digits:
         form = replace(form, table=form.table.with_digits(digits))
     try:
-        text, fitted = texts(program, form, settings, planned=planned)
+        text, fitted = texts(program, form, settings, planned=one.planned, native=one.native)
     except CornersmoothError as refusal:
         return f"refused {refusal.code}", str(refusal)
     try:
@@ -84,15 +86,17 @@ def judged(
             text,
             tolerance=fitted.verified_tolerance,
             axis_length=settings.axis_length,
+            axis_tolerance=fitted.verified_axis_tolerance,
             control=case.control,
             machine=form.machine,
             tcp=case.tcp,
-            slower=planned,
+            slower=one.planned,
         )
         problems = [f"{problem.nc_line}: {problem.code} {problem.text}" for problem in found.problems]
     except CornersmoothError as refusal:
         problems = [str(refusal)]
     allowed = fitted.verified_tolerance / fitted.tolerance
+    oracle = oracle and not has_holes(program) and settings.axis_tolerance is None
     oracle = oracle and not (settings.method == "global" and form.curves)  # it reads curves of one corner only
     if problems:
         wrong = oracle and not keeps(case, program, text, settings, allowed - HAIR, digits)
@@ -109,6 +113,20 @@ def with_method(one: Trial, method: str) -> Trial:
     s, own = one.settings, Settings()
     plain = s.but(shape=own.shape, allocation=own.allocation, weights=own.weights, orientation_tolerance=None)
     return replace(one, settings=plain.but(method=method))
+
+
+def drawn(one: Trial) -> list[str]:
+    """What of a trial is counted."""
+    s = one.settings
+    said = [
+        f"method {s.method}",
+        *([f"{s.lines} lines"] if s.lines else []),
+        *(f"part {part}" for part in set(one.parts)),
+    ]
+    said += [f"digits {one.digits}"] if one.digits else []
+    said += ["planned feeds"] if one.planned else []
+    said += ["native cycles"] if one.native and "holes" in one.parts else []
+    return said + (["axis tolerance"] if s.axis_tolerance is not None else [])
 
 
 def has_holes(program: Program) -> bool:
@@ -128,12 +146,12 @@ def main() -> int:
     given = parser.parse_args()
     warnings.simplefilter("error")
     count: Counter[str] = Counter()
+    of: Counter[str] = Counter()
     begin = time.process_time()
 
-    def take(name: str, case: Case, data: bytes, settings: Settings, *, oracle: bool = True, **how: Any) -> None:
+    def take(name: str, one: Trial, data: bytes, *, oracle: bool = True) -> None:
         try:
-            program = read(data, name="trial.cls")
-            outcome, said = judged(case, program, settings, oracle=oracle and not has_holes(program), **how)
+            outcome, said = judged(one, read(data, name="trial.cls"), oracle=oracle)
         except Exception as failure:
             where = traceback.extract_tb(failure.__traceback__)[-1]
             outcome, said = "FAILED", f"{type(failure).__name__}: {failure} ({where.filename}:{where.lineno})"
@@ -150,9 +168,8 @@ def main() -> int:
             one = replace(one, planned=False)
         if given.method:
             one = with_method(one, given.method)
-        take(
-            str(one), one.case, one.cl.encode(), one.settings, oracle=one.oracle, digits=one.digits, planned=one.planned
-        )
+        of.update(drawn(one))
+        take(str(one), one, one.cl.encode())
     cases = [case for case in CHOSEN if given.only in str(case)]
     for number, path in enumerate(given.files):
         data = path.read_bytes()
@@ -164,9 +181,21 @@ def main() -> int:
         for eps in given.eps or (0.001, 0.04, 0.15):
             settings = Settings(tolerance=eps, axis_length=LENGTHS[number % len(LENGTHS)])
             for case in cases:
-                take(f"{path.name} {case} eps {eps:g}", case, data, settings, oracle=False)
-    print(dict(sorted(count.items())), f"{time.process_time() - begin:.0f} s")
+                take(f"{path.name} {case} eps {eps:g}", Trial(0, case, settings, "", ""), data, oracle=False)
+    if of:
+        print("drawn:", ", ".join(f"{what} {number}" for what, number in sorted(of.items())))
+    print(f"{sum(count.values())} texts: {_told(count)}; {time.process_time() - begin:.0f} s")
     return 1 if any(name.isupper() for name in count) else 0
+
+
+def _told(count: Counter[str]) -> str:
+    """How many texts came to what, and why those were refused that were."""
+    refused = {name: number for name, number in sorted(count.items()) if name.startswith("refused")}
+    why = ", ".join(f"{name.removeprefix('refused ')} {number}" for name, number in refused.items())
+    said = [f"passed {count['passed']}", f"refused by design {sum(refused.values())}" + (f" ({why})" if why else "")]
+    said += [f"rightly found {count['rightly found']}", f"false alarms {count['FALSE ALARM']}"]
+    said += [f"broken promises {count['BROKEN PROMISE']}", f"passed beyond the tolerance {count['MISSED']}"]
+    return ", ".join([*said, f"failures {count['FAILED']}"])
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.kinematics import tip_position, tool_axis
+from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
@@ -30,8 +31,13 @@ _LARGEST_STEP = 0.08
 
 
 def coarse_rows(smoothed: SmoothProgram, circles: Ints | None = None) -> Iterator[Rows]:
-    """Dense rows without those that only the chord tolerance asks for."""
-    settings = smoothed.settings.but(chord_tolerance=_COARSE)
+    """Dense rows without those that only the chord tolerance asks for.
+
+    Chords from the joints of a transition to its middle keep ε where one parameter drives both curves; else all stay.
+    """
+    settings = smoothed.settings
+    if METHODS[settings.method].one_parameter:
+        settings = settings.but(chord_tolerance=_COARSE)
     return dense_rows(replace(smoothed, settings=settings), circles)
 
 

@@ -12,7 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.distances import Distances, Reached
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import COLUMNS, Metric, nearest_segments
+from cornersmooth.verify.nearest import nearest_segments
 from cornersmooth.verify.wide_search import nearest_alone
 
 #: segments looked at on either side
@@ -23,6 +23,9 @@ _STRAIGHT = 1.2
 
 #: part of what counts as nearer by which tip or axis point must be nearer ahead to be taken as going on
 _CLEARLY = 0.25
+
+#: vertices of a batch that are followed one by one, and how far before a doubtful place one is sure, in `near`
+_MOST_VERTICES, _SURE = 4096, 2.0
 
 Found = tuple[Floats, Ints, Ints, Floats]
 
@@ -38,6 +41,8 @@ def check_backtracking(distances: Distances, found: Findings) -> None:
 def written_backwards(match: Match, written: Reached) -> Found | None:
     """Written vertices that would fit clearly better before the one in front of them.
 
+    Blocks in rotary words may bend: how far the tool has come the ends of blocks tell, not what lies between them.
+
     Returns
     -------
     place, cl_line, nc_line, amount
@@ -49,17 +54,95 @@ def written_backwards(match: Match, written: Reached) -> Found | None:
     own, six, length = match.six[vertex], match.path.six, match.path.length
     segment, at = nearest_segments(own, six, match.segment[vertex], _REACH, match.low[vertex], match.high[vertex])
     free, held = segment + at, match.place[vertex]
+    ends = match.on
+    if match.nc.rotary:
+        ends = match.on & _ends_blocks(match)
+        held = _held_by_ends(match, ends, vertex, free, held)
+        rows = np.flatnonzero(ends[vertex] & (free < held))
+        vertex, own, free, held = vertex[rows], own[rows], free[rows], held[rows]
+        if not len(vertex):
+            return None
     gain = _distance(own, _on(six, held)) - _distance(own, _on(six, free))
     wrong = (gain > match.slack) & (free < held)
     wrong &= _way(length, free, held) <= _STRAIGHT * _distance(_on(six, held), _on(six, free)) + match.slack
     rows = np.flatnonzero(wrong)
     wrong[rows] = _gain_alone(match, vertex[rows], held[rows], free[rows]) > match.slack
+    rows = np.flatnonzero(wrong)
+    if len(rows):
+        wrong[rows] = ~_on_other_lines(match, ends, vertex[rows], held[rows])
     if not wrong.any():
         return None
     original = match.original
     move = original.trail.owner[match.segment[vertex[wrong]] + 1]
     nc_line = match.nc.line[match.written.trail.owner[vertex[wrong]]]
     return held[wrong], original.program.line[original.pose[move]], nc_line, gain[wrong]
+
+
+def _ends_blocks(match: Match) -> Bools:
+    """(v,) whether a vertex is more than a point of the straight motion of the axes in one block."""
+    nc, owner = match.nc, match.written.trail.owner
+    following = np.minimum(owner + 1, len(nc.line) - 1)
+    goes_on = (nc.line[following] == nc.line[owner]) & (following > owner)
+    ends: Bools = ~(goes_on & match.written.straight[owner - match.written.first])
+    return ends
+
+
+def _held_by_ends(match: Match, ends: Bools, vertex: Ints, free: Floats, held: Floats) -> Floats:
+    """Places (k,) that vertices must not go back behind, where only the ends of blocks have reached any."""
+    place = np.where(ends, match.place, -np.inf)
+    place[vertex] = np.where(ends[vertex], free, -np.inf)
+    reached = np.append(-np.inf, np.maximum.accumulate(place)[:-1])[vertex]
+    behind: Floats = np.minimum(held, np.maximum(reached, free))
+    return behind
+
+
+def _on_other_lines(match: Match, ends: Bools, vertex: Ints, held: Floats) -> Bools:
+    """(k,) whether vertices follow in order all the same, if some before them belong to other lines of the CL path.
+
+    Beside a turn several lines are near, and the nearest is not always the one that is run along. So each may be where
+    it is nearest on any line within the tolerance, from the last place without doubt on.
+    """
+    found = np.zeros(len(vertex), np.bool_)
+    path, on = match.path, np.flatnonzero(ends)
+    segment = np.minimum(held.astype(np.int64), len(path.length) - 2)
+    last = np.searchsorted(on, vertex)
+    sure = path.length[segment] - _SURE * match.near
+    first = np.searchsorted(path.length_at(match.segment[on], match.fraction[on]), sure) - 1
+    first = np.maximum(first, np.searchsorted(match.stretch[on], match.stretch[vertex]))
+    groups = np.split(np.arange(len(vertex)), np.flatnonzero(first[1:] > last[:-1]) + 1)
+    left = _MOST_VERTICES
+    for rows in groups:
+        walk = on[first[rows[0]] : last[rows[-1]] + 1]
+        left -= len(walk)
+        if left < 0:
+            break
+        reached = float(path.length_at(match.segment[walk[:1]], match.fraction[walk[:1]])[0])
+        for here in walk[1:].tolist():
+            reached = max(reached, _first_place(match, here, int(segment[rows[-1]]) + _REACH, reached))
+            if np.isinf(reached):
+                break
+            found[rows[vertex[rows] == here]] = True
+    return found
+
+
+def _first_place(match: Match, vertex: int, last: int, reached: float) -> float:
+    """Path length of the first place, not clearly before `reached`, where a vertex is nearest to a line; else inf."""
+    path, own = match.path, match.six[vertex]
+    low = max(int(np.searchsorted(path.length, reached - match.slack, side="right")) - 2, int(match.low[vertex]))
+    high = max(min(last, int(match.high[vertex])), low)
+    start = path.six[low : high + 1]
+    way = path.six[low + 1 : high + 2] - start
+    size = np.einsum("ij,ij->i", way, way)
+    share = np.einsum("ij,ij->i", own - start, way)
+    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+    # not the end of a line that leads on to a nearer place
+    leads_on = (share >= 1.0) & (np.append(share[1:], 1.0) > 0.0) | (share <= 0.0) & (np.append(0.0, share[:-1]) < 1.0)
+    square = (own - start - share[:, None] * way) ** 2
+    near = np.maximum(square[:, :3].sum(axis=1), square[:, 3:].sum(axis=1)) <= (match.tolerance + match.margin) ** 2
+    begin = path.length[low : high + 1]
+    place = begin + share * (path.length[low + 1 : high + 2] - begin)
+    good = place[near & ~leads_on & (place >= reached - match.slack)]
+    return float(good.min(initial=np.inf))
 
 
 def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Floats:
@@ -74,11 +157,9 @@ def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Float
     high = match.high[vertex]
     ahead = np.minimum(held.astype(np.int64) + 1, high)
     gains = np.zeros((2, len(vertex)))
-    ways: tuple[Metric, ...] = ("tip", "axis point")
-    for gain, metric in zip(gains, ways, strict=True):
-        column = COLUMNS[metric]
+    for gain, column in zip(gains, (slice(0, 3), slice(3, 6)), strict=True):
         off = _distance(own[:, column], here[:, column])
-        beyond = nearest_alone(own, six, ahead, ahead, high, match.near, metric)[2]
+        beyond = nearest_alone(own, six, ahead, ahead, high, match.near, column)[2]
         off = np.where(ahead > held, np.minimum(off, beyond), off)
         gain[:] = off - _distance(own[:, column], there[:, column])
     one_goes_on = gains.min(axis=0) < -_CLEARLY * match.slack
