@@ -129,7 +129,7 @@ def reading_back(form: Form) -> dict[str, Any]:
     known = form.table.dialect in CONTROLS
     return {
         "control": form.table.dialect if known else "",
-        "machine": form.machine if form.rotary else None,
+        "machine": form.machine,
         "tcp": form.orientation != "machine",
         "trusted": nc.own_words(form.table) if known else (),
     }

@@ -128,6 +128,9 @@ class Machine:
         From the spindle nose to the tip; matters for heads without tool centre point control only.
     tool_lengths : tuple of (int, float), mm
         The same by number of tool, for those that `tool_length` is not for.
+    home, tool_change : tuple of (str, float)
+        Axes and where they go in machine coordinates, mm or degrees, for retracts and the end of a program, and for a
+        change of tool; the control's own words where nothing is said.
     part_zero : (float, float, float), mm
         Where the zero of the part sits in the coordinates in which the points of the tables are given.
     dynamics : tuple of Dynamics
@@ -146,6 +149,8 @@ class Machine:
     dynamics: tuple[Dynamics, ...] = ()
     travel: tuple[Travel, ...] = ()
     tool_lengths: tuple[tuple[int, float], ...] = ()
+    home: tuple[tuple[str, float], ...] = ()
+    tool_change: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         where = f"machine {self.name}"
@@ -172,6 +177,8 @@ class Machine:
                 f"{where}: preferred names {self.preferred[0]!r}",
                 f"use {', '.join(signed[:-1])} or {signed[-1]}" if signed else "leave it out",
             )
+        for key in ("home", "tool_change"):
+            self._check_position(f"{where}: {key}", getattr(self, key))
         for item in self.dynamics:
             if item.name not in (*LINEAR, *self.names):
                 known = ", ".join((*LINEAR, *self.names))
@@ -197,6 +204,17 @@ class Machine:
                 f"{where}: {second.name} turns the tool about itself",
                 "check the directions and their order, from the part to the tool",
             )
+
+    def _check_position(self, where: str, position: tuple[tuple[str, float], ...]) -> None:
+        """Refuse a position that the axes cannot go to."""
+        spans = {axis.name: (axis.low, axis.high) for axis in self.axes} | {
+            item.name: (item.low, item.high) for item in self.travel
+        }
+        for name, value in position:
+            low, high = spans.get(name, (-math.inf, math.inf))
+            if not math.isfinite(value) or not low <= value <= high:
+                hint = "give positions of the machine's axes that they can go to"
+                raise SettingsError("CS253", f"{where}: {name} is {value:g}", hint)
 
     def with_tool(self, number: int | None) -> Machine:
         """Return the machine with the length of a tool; None for one that is not known."""
@@ -261,6 +279,9 @@ class Machine:
         if any(self.part_zero):
             lines.append(f"  zero of the part at ({', '.join(f'{number:g}' for number in self.part_zero)}) mm")
         lines += [f"  {item.name} from {item.low:g} to {item.high:g} mm" for item in self.travel]
+        for key, position in (("home", self.home), ("tool change", self.tool_change)):
+            told = " ".join(f"{name}{value:g}" for name, value in position)
+            lines += [f"  {key} at {told} of the machine"] * bool(position)
         lines += [f"  {item.describe()}" for item in self.dynamics]
         return "\n".join(lines)
 

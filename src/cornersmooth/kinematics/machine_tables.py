@@ -23,6 +23,8 @@ _SHELF = Shelf(
         "tool_lengths",
         "part_zero",
         "travel",
+        "home",
+        "tool_change",
         "axis",
         "dynamics",
     ),
@@ -75,9 +77,9 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
         ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``[tool_lengths]``, ``part_zero`` and up to two
         tables ``[[axis]]`` (``axis = []`` for none) with ``name``, ``direction``, ``carrier``, ``point``, ``positive``,
         ``limits``, ``modulo``, ``clamp``; ``[travel]`` with ``X``, ``Y`` and ``Z``, each ``[lowest, highest]``, any of
-        which may be left out; and for the planning of the time tables ``[dynamics.X]`` (Y, Z and the rotary axes alike)
-        with ``velocity`` (mm/min or deg/min), ``acceleration`` and ``jerk`` (mm or deg per s² and s³), each of which
-        may be left out.
+        which may be left out; ``[home]`` and ``[tool_change]`` with any axes; and for the planning of the time tables
+        ``[dynamics.X]`` (Y, Z and the rotary axes alike) with ``velocity`` (mm/min or deg/min), ``acceleration`` and
+        ``jerk`` (mm or deg per s² and s³), each of which may be left out.
     file : str
         For messages.
     name : str
@@ -109,6 +111,8 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
             dynamics=_dynamics(table, (*LINEAR, *(axis.name for axis in axes))),
             travel=_travel(table),
             tool_lengths=_tool_lengths(table),
+            home=_position(table, "home", (*LINEAR, *sorted(axis.name for axis in axes))),
+            tool_change=_position(table, "tool_change", (*LINEAR, *sorted(axis.name for axis in axes))),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
@@ -150,6 +154,15 @@ def _tool_lengths(table: dict[str, Any]) -> tuple[tuple[int, float], ...]:
     if not isinstance(given, dict) or not all(name.isdecimal() for name in given):
         raise _SHELF.wrong("tool_lengths is not a table by number of tool", "write [tool_lengths] and 3 = 120.5 below")
     return tuple((int(name), _number(value, f"tool_lengths.{name}")) for name, value in given.items())
+
+
+def _position(table: dict[str, Any], key: str, names: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
+    """Position of any axes, in the order of their names."""
+    given = table.get(key, {})
+    if not isinstance(given, dict):
+        raise _SHELF.wrong(f"{key} is not a table", f"write [{key}] and X = ... below, for the axes that go there")
+    _SHELF.check_keys(given, names, f"{key}.")
+    return tuple((name, _number(given[name], f"{key}.{name}")) for name in names if name in given)
 
 
 def _travel(table: dict[str, Any]) -> tuple[Travel, ...]:

@@ -189,7 +189,7 @@ def write(
     check_program(chosen, program, smoothed.settings)
     frame = frame or Frame()
     values = frame.values(chosen, program, smoothed.settings)
-    operation = Operation(chosen, values, frame.texts(chosen, values), findings)
+    operation = Operation(chosen, values, frame.texts(chosen, values), findings, units=program.units)
     statements = StatementWriter(
         chosen, program, findings, operation, comments=frame.comments, skip_taps=frame.skip_taps
     )

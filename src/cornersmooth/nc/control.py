@@ -212,6 +212,8 @@ class ProgramTable:
         With ``{work_offset}``.
     retract : tuple of str
         Blocks that bring the tool to a height that clears everything; none where the control is told nothing.
+    position : str
+        Block with ``{position}``, words of a position of the machine; empty where the control has no such.
     start : tuple of str
         Before everything else.
     begin : tuple of str
@@ -231,6 +233,7 @@ class ProgramTable:
     work_offset_pattern: str = ""
     work_offset_block: Blocks = ()
     retract: Blocks = ()
+    position: str = ""
     start: Blocks = ("{header}",)
     begin: Blocks = ("{tip_control_on}",)
     tool_end: Blocks = ("{tip_control_off}",)

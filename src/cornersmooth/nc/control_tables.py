@@ -109,6 +109,7 @@ _BRACES: dict[str, Table] = {
     "on": {"offset": 1, "first": "0.", "second": "0.", "third": "0."},
     "work_offset_block": {"work_offset": "G54"},
     "file_name": {"stem": "PART", "number": "0001"},
+    "position": {"position": "Z0."},
     **dict.fromkeys(("start", "begin", "tool_end", "between_tools", "end", "retract"), _PROGRAM_BRACES),
     "block_number": {"number": 10},
     "rounding": {"blend": "0.001"},

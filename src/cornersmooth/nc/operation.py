@@ -9,9 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from cornersmooth.kinematics.dynamics import LINEAR
+from cornersmooth.model import MM_PER_UNIT, Units
 from cornersmooth.nc.control import Blocks, Mode
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.text import format_number
 
 #: blocks of the steps `rotary_zero` and `rotary_start`; nothing without rotary axes
 RotaryBlocks = Mapping[str, Blocks]
@@ -48,6 +51,7 @@ class Operation:
     withdraw: Callable[[], list[str]] = list  #: blocks along the tool before a retract, of who knows where it is
     halted: bool = False  #: the CL file has stopped the program since the last motion
     clamps: tuple[tuple[str, str], ...] = ()  #: words that hold rotary axes, and let them turn
+    units: Units = "mm"  #: of the text
     plane: Mapping[str, str] = field(default_factory=dict)  #: numbers of the tilted plane at hand
     mode: Mode = field(init=False)  #: what tool tip control is for the tool at hand
     _clamped: bool = True  # nobody knows what was before
@@ -156,12 +160,15 @@ class Operation:
     def end(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks behind everything else."""
         steps, blocks = self.form.table.program.end, self.end_tool()
+        home = self._home_position()
         zero = rotary["rotary_zero"]
-        if zero and "{rotary_zero}" in steps:
+        if any(name not in LINEAR for name in self._own_position("home")):  # they stand there, and are held
+            zero = ()
+        elif zero and "{rotary_zero}" in steps:
             zero = (*self._let_turn(), *zero, *self._hold())
         elif not self._clamped:
             blocks += self._hold()
-        return [*blocks, *self._expand(steps, {**rotary, "rotary_zero": zero})]
+        return [*blocks, *home, *self._expand(steps, {**rotary, "rotary_zero": zero})]
 
     def turn(self, blocks: Blocks) -> None:
         """Take note of the blocks that turn the spindle, or of none where it stops."""
@@ -186,8 +193,44 @@ class Operation:
                 blocks.append(step.format(**self.values))
         return blocks
 
+    def change_position(self) -> list[str]:
+        """Blocks that bring the axes to where tools are changed, behind a retract."""
+        position = self._own_position("tool_change")
+        high = {"Z": position.pop("Z")} if "Z" in position else {}
+        return [*self._to_position(position), *self._to_position(high)]
+
+    def _home_position(self) -> list[str]:
+        """Blocks that bring the other axes home, behind the last retract."""
+        return self._to_position({name: value for name, value in self._own_position("home").items() if name != "Z"})
+
+    def _own_position(self, key: str) -> dict[str, float]:
+        """Position that the machine's file has, where the control has words for it."""
+        machine = self.form.machine
+        return dict(getattr(machine, key)) if machine is not None and self.form.table.program.position else {}
+
+    def _to_position(self, position: Mapping[str, float]) -> list[str]:
+        """Block that sends axes to a position of the machine; rotary ones are let turn, and held again."""
+        if not position:
+            return []
+        table, motion = self.form.table, self.form.mode.motion
+        words = []
+        for name, value in position.items():
+            linear = name in LINEAR
+            decimals = table.digits.mm if linear and self.units == "mm" else table.digits.inch
+            unit = MM_PER_UNIT[self.units] if linear else 1.0
+            text = format_number(value / unit, decimals if linear else table.digits.angle, trim=True)
+            text = text if motion.feed_point else text.rstrip(".")
+            words.append(f"{name}{'+' if motion.signs and not text.startswith('-') else ''}{text}")
+        block = table.program.position.format(position=" ".join(words))
+        turning = any(name not in LINEAR for name in position)
+        return [*(self._let_turn() if turning else ()), block, *(self._hold() if turning else ())]
+
     def _retract(self) -> list[str]:
-        blocks = [] if self.retracted else [block.format(**self.values) for block in self.form.table.program.retract]
+        home = self._own_position("home")
+        blocks = [block.format(**self.values) for block in self.form.table.program.retract]
+        if "Z" in home:
+            blocks = self._to_position({"Z": home["Z"]})
+        blocks = [] if self.retracted else blocks
         self.retracted = bool(self.form.table.program.retract)
         return blocks
 

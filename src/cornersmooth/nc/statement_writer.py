@@ -139,6 +139,7 @@ class StatementWriter:
             return self.comment(statement.text)
         blocks = self.operation.end_tool(statement.line, another=number != self.tool)
         if number != self.tool:
+            blocks += self.operation.change_position()
             blocks += [block.format(tool=number) for block in self.words.tool_change]
         self.changed = True
         self.tool, self.operation.offset = number, offset

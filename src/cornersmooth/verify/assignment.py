@@ -36,7 +36,8 @@ def doubtful_windows(doubtful: Bools, stretch: Ints, around: int, most: int) -> 
     number = np.searchsorted(edges, rows, side="right") - 1
     first = np.maximum(rows - around, edges[number])
     last = np.minimum(rows + around, ends[number])
-    new = np.append(True, (first[1:] > last[:-1]) | (np.diff(number) != 0))
+    # no window ends beside what is in doubt; they may overlap
+    new = np.append(True, (np.diff(rows) > around) | (np.diff(number) != 0))
     starts = np.flatnonzero(new)
     stops = np.append(starts[1:], len(rows)) - 1
     return list(zip(first[starts].tolist(), last[stops].tolist(), strict=True))[:most]

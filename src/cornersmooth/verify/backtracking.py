@@ -12,7 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.distances import Distances, Reached
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import nearest_segments
+from cornersmooth.verify.nearest import COLUMNS, Metric, nearest_segments
 from cornersmooth.verify.wide_search import nearest_alone
 
 #: segments looked at on either side
@@ -157,9 +157,11 @@ def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Float
     high = match.high[vertex]
     ahead = np.minimum(held.astype(np.int64) + 1, high)
     gains = np.zeros((2, len(vertex)))
-    for gain, column in zip(gains, (slice(0, 3), slice(3, 6)), strict=True):
+    ways: tuple[Metric, ...] = ("tip", "axis point")
+    for gain, metric in zip(gains, ways, strict=True):
+        column = COLUMNS[metric]
         off = _distance(own[:, column], here[:, column])
-        beyond = nearest_alone(own, six, ahead, ahead, high, match.near, column)[2]
+        beyond = nearest_alone(own, six, ahead, ahead, high, match.near, metric)[2]
         off = np.where(ahead > held, np.minimum(off, beyond), off)
         gain[:] = off - _distance(own[:, column], there[:, column])
     one_goes_on = gains.min(axis=0) < -_CLEARLY * match.slack

@@ -21,8 +21,9 @@ from cornersmooth.verify.match import Match
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 from cornersmooth.verify.wide_search import passed_nearby
 
-#: rows of a batch for which tip and axis point are looked at each on its own: at a time, and at most
-_OWN_ROWS, _MOST_OWN_ROWS = 16, 2048
+#: rows of a batch for which tip and axis point are looked at each on its own: at a time, those that are farther than
+#: the tolerance from a common pose at a time, and at most
+_OWN_ROWS, _SOME_OWN_ROWS, _MOST_OWN_ROWS = 16, 512, 2048
 
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 TOGETHER: Final = 2.0
@@ -79,8 +80,12 @@ def _take(
         known[rows] = True
 
     over = np.flatnonzero(gap.larger > limit)
-    if len(over):
-        look(over[np.argsort(-gap.larger[over])[:_MOST_OWN_ROWS]])
+    order = over[np.argsort(-gap.larger[over])[:_MOST_OWN_ROWS]]
+    for begin in range(0, len(order), _SOME_OWN_ROWS):
+        rows = order[begin : begin + _SOME_OWN_ROWS]
+        look(rows)
+        if 2 * np.count_nonzero(np.maximum(tip[rows], axis[rows]) > limit) > _SOME_OWN_ROWS:
+            break  # the text is off everywhere
     for values, worst in ((tip, result.tip), (axis, result.axis_point)):
         looked = 0
         while looked < _MOST_OWN_ROWS:

@@ -350,11 +350,12 @@ def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Flo
             )
         )
     tip, axis = result
-    for values, column in ((tip, slice(0, 3)), (axis, slice(3, 6))):
+    ways: tuple[tuple[Floats, Metric], ...] = ((tip, "tip"), (axis, "axis point"))
+    for values, metric in ways:
         far = np.flatnonzero(values > match.tolerance + ARITHMETIC)
         own = vertex[far]
         near = nearest_alone(
-            match.six[own], match.path.six, match.segment[own], match.low[own], match.high[own], match.near, column
+            match.six[own], match.path.six, match.segment[own], match.low[own], match.high[own], match.near, metric
         )
         values[far] = np.minimum(values[far], near[2])
     return tip, axis
@@ -372,6 +373,12 @@ def common_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> Float
     trail = match.original.trail
     gap = match.task.gap(tip, axis, trail.tip[vertex], trail.axis[vertex])
     return np.minimum(gap.larger, reached.gap.larger[rows])
+
+
+def _distance(point: Floats, other: Floats) -> Floats:
+    away = point - other
+    distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
+    return distance
 
 
 def elements_around(match: Match, segment: Ints) -> Ints:
@@ -400,10 +407,14 @@ def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Fl
         near, at = nearest_segments(point, match.six, segment, REACH * match.parts, low, high, metric)
         climb(point, match.six, segment, low, high, near, at, metric)
         elements = elements_around(match, near)
-        values = np.minimum(search_elements(match, elements, point, column=column)[2], known)
+        values = np.minimum(known, _distance(_on(match.six, near, at)[:, column], point[:, column]))
+        bent = np.flatnonzero(~match.written.straight[elements - match.written.first].all(axis=1))
+        if metric == "axis point":  # which runs a little off its chords where the tool turns
+            bent = np.arange(len(rows))
+        values[bent] = np.minimum(search_elements(match, elements[bent], point[bent], column=column)[2], known[bent])
         far = np.flatnonzero(values > match.tolerance + ARITHMETIC)
         own = point[far], match.six, segment[far], low[far], high[far]
-        there, _, distance = nearest_alone(*own, match.near, column)
+        there, _, distance = nearest_alone(*own, match.near, metric)
         known_near = np.isfinite(distance)
         far, elements = far[known_near], elements_around(match, there[known_near])
         values[far] = np.minimum(values[far], search_elements(match, elements, point[far], column=column)[2])

@@ -21,8 +21,8 @@ _SAMPLES = 32
 #: segments of the original that are looked at beyond both ends of a curve
 _BESIDE = 3
 
-#: curves searched in one batch at most
-_MOST_CURVES = 20000
+#: curves searched in one batch at most, and those of them that leave the tolerance at knots already
+_MOST_CURVES, _MOST_KNOWN = 20000, 256
 
 #: part of the largest deviation of a curve's ends by which its hull may exceed it unsearched
 _HULL_SLACK = 1e-3
@@ -40,7 +40,13 @@ def hull_gaps(match: Match, limit: float) -> tuple[Floats, Ints, Floats, Floats]
         None where there is no such curve.
     """
     suspects = [_suspects(match, group, limit) for group in match.written.curves]
-    element = np.concatenate([np.zeros(0, np.int64), *suspects])[:_MOST_CURVES]
+    if not suspects:
+        return None
+    element, reached, at_knots = (np.concatenate(columns) for columns in zip(*suspects, strict=True))
+    # curves that leave the tolerance at their knots already are said to: of those only the farthest are looked at
+    known = np.flatnonzero(at_knots > limit)
+    known = known[np.argsort(-reached[known], kind="stable")[:_MOST_KNOWN]]
+    element = element[np.sort(np.append(np.flatnonzero(at_knots <= limit), known))][:_MOST_CURVES]
     if not len(element):
         return None
     trail, first = match.written.trail, match.written.first
@@ -89,8 +95,17 @@ def _searched(match: Match, element: Ints, middle: Ints, reach: int) -> tuple[Fl
     return result[0].max(axis=1), result[1].max(axis=1)
 
 
-def _suspects(match: Match, group: CurveGroup, limit: float) -> Ints:
-    """Elements of curves with a control point between knots farther than the tolerance and than the knots."""
+def _suspects(match: Match, group: CurveGroup, limit: float) -> tuple[Ints, Floats, Floats]:
+    """Curves with a control point between knots farther than the tolerance and than the knots.
+
+    Returns
+    -------
+    element : (k,) int64
+    reached : (k,) float64, mm
+        Distance of their farthest control point.
+    at_knots : (k,) float64, mm
+        Distance of their farthest knot.
+    """
     trail, first = match.written.trail, match.written.first
     element = match.nc.curves.element[group.index]
     end = trail.last[element - first]
@@ -98,10 +113,11 @@ def _suspects(match: Match, group: CurveGroup, limit: float) -> Ints:
     if len(group.spans) == 3 and group.points.shape[1] == 5:
         keep &= ~_plain_corners(match, group, end)
     if not keep.any():
-        return element[:0]
+        return element[:0], np.zeros(0), np.zeros(0)
     group, element, end = group.only(keep), element[keep], end[keep]
     spans = len(group.spans) - 1
     doubtful = np.zeros(len(element), np.bool_)
+    reached, at_knots = np.zeros(len(element)), np.zeros(len(element))
     for k in range(spans):
         inner, _ = group.bezier(k)
         before, after = end - (spans - k), end - (spans - k) + 1
@@ -112,7 +128,9 @@ def _suspects(match: Match, group: CurveGroup, limit: float) -> Ints:
             six = match.task.six(tip, axis)
             off = np.minimum(_off(match, six, before), _off(match, six, after))
             doubtful |= (off > limit) & (off > ends * (1 + _HULL_SLACK))
-    return element[doubtful]
+            np.maximum(reached, off, out=reached)
+        np.maximum(at_knots, ends, out=at_knots)
+    return element[doubtful], reached[doubtful], at_knots[doubtful]
 
 
 def _plain_corners(match: Match, group: CurveGroup, end: Ints) -> Bools:

@@ -26,13 +26,19 @@ from cornersmooth.verify.task import Task
 #: rounding is shorter than its corner by no more than twice its deviation
 _SHORTCUT = 2.0
 
+#: vertices that are tried where one of few is off the path
+_TRIED = 3
+
+#: segments between neighbours of a vertex that is off, on either side of their middle
+_BETWEEN = 3
+
 #: one of so many places that are lost where a stretch is gone through evenly is enough to have it guided
 _LOST = 8
 
 #: to and fro below this part of the tolerance is settled by itself, and pairs and windows that are looked at for it
 _SMALL, _SMALL_PAIRS, _SMALL_WINDOWS = 0.1, 4096, 64
 
-#: windows that are assigned anew, one after another, without any gain: the text itself is off then
+#: windows that are assigned anew, one after another, without much gain: the text itself is off then
 _MOST_FUTILE = 8
 
 #: slack of arithmetic on lengths, mm
@@ -223,54 +229,68 @@ class _Search:
         self.segment[rows["first"]], self.fraction[rows["first"]] = rows["start"], rows["fraction"]
         self.nearest[vertex] = True
         self.distance[vertex] = np.sqrt(square)
-        # never back: stretches follow one another on the path, so all of them are put in order at once
-        found = path.length_at(self.segment[self.vertex], self.fraction[self.vertex])
+        self._put_in_order(length)
+
+    def _put_in_order(self, length: Floats) -> None:
+        """Let no place be behind one before it, and say which vertices are behind or far along the path.
+
+        Stretches follow one another on the path, so all of them are put in order at once. Vertices that are near the
+        path lead. Where one that is off seems to be says little: its place is put between those of its neighbours.
+        """
+        path, rows, every = self.path, self.rows, self.vertex
+        found = path.length_at(self.segment[every], self.fraction[every])
         found = np.clip(found, self.begin[self.owner], None)
+        begins = every == rows["first"][self.owner]
+        sure = begins | (self.distance[every] <= self.far)
         order = np.arange(len(found))
-        ahead = found > np.maximum.accumulate(np.append(-np.inf, found))[:-1]
-        begins = self.vertex == rows["first"][self.owner]
-        leader = np.maximum.accumulate(np.where(ahead | begins, order, 0))
+        off = np.flatnonzero(~sure)
+        if len(off):
+            leader = _leaders(np.where(sure, found, -np.inf), begins)
+            following = np.minimum.accumulate(np.where(sure, order, len(order))[::-1])[::-1][off]
+            bounded = following < len(order)
+            off, following = off[bounded], leader[following[bounded]]
+            beyond = found[off] > found[following]
+            off, following = off[beyond], following[beyond]
+            found[off] = found[following]
+            self._hold(every[off], every[following])
+        leader = _leaders(found, begins)
         held = np.flatnonzero(leader != order)
-        behind, leaders = self.vertex[held], self.vertex[leader[held]]
         gone_back = found[leader[held]] - found[held]
         some = gone_back > _ARITHMETIC
-        behind, leaders, gone_back = behind[some], leaders[some], gone_back[some]
-        self.segment[behind], self.fraction[behind] = self.segment[leaders], self.fraction[leaders]
-        away = self.six[behind] - path.point_at(self.segment[behind], self.fraction[behind])
-        self.distance[behind] = np.sqrt(np.einsum("ij,ij->i", away, away))
-        self.nearest[behind] = False
-        self.backward[behind] = gone_back > self.margin
-        self.gone_back[behind] = gone_back
+        held, gone_back = held[some], gone_back[some]
+        self._hold(every[held], every[leader[held]])
+        self.backward[every[held]] = gone_back > self.margin
+        self.gone_back[every[held]] = gone_back
         place = found[leader]
-        step = np.diff(place, prepend=0.0)[inner] - np.diff(length, prepend=0.0)[vertex]
-        self.apart[vertex] = np.abs(step) > _SHORTCUT * self.far
-        tail = np.searchsorted(self.vertex, rows["last"])
+        # where the text goes aside and comes back it is longer: then it counts how far it has come
+        known = np.flatnonzero(sure)
+        step, way = np.diff(place[known]), np.diff(length[every[known]])
+        aside = np.flatnonzero(np.diff(known) > 1)
+        came = self.six[every[known[aside + 1]]] - self.six[every[known[aside]]]
+        way[aside] = np.sqrt(np.einsum("ij,ij->i", came, came))
+        self.apart[every[known[1:]]] = (np.abs(step - way) > _SHORTCUT * self.far) & ~begins[known[1:]]
+        tail = np.searchsorted(every, rows["last"])
         self.apart[rows["last"]] |= np.abs(place[tail] - self.end) > _SHORTCUT * self.far
+
+    def _hold(self, vertex: Ints, leader: Ints) -> None:
+        """Put vertices where others are."""
+        self.segment[vertex], self.fraction[vertex] = self.segment[leader], self.fraction[leader]
+        away = self.six[vertex] - self.path.point_at(self.segment[vertex], self.fraction[vertex])
+        self.distance[vertex] = np.sqrt(np.einsum("ij,ij->i", away, away))
+        self.nearest[vertex] = False
 
     def _about(self, length: Floats) -> Floats:
         """(k,) path length where about each of `self.vertex` is, from path lengths and the places of few."""
-        rows, path, owner = self.rows, self.path, self.owner
+        rows = self.rows
         first, last = rows["first"], rows["last"]
-        way, size = length[last] - length[first], last - first
-        scale = np.divide(self.end - self.begin, way, out=np.zeros(len(way)), where=way > 0)
-        about: Floats = self.begin[owner] + (length[self.vertex] - length[first][owner]) * scale[owner]
-        few = np.arange(STRIDE - 1, len(owner), STRIDE)
-        few = few[(size <= LONG)[owner[few]]]
-        chosen = self.vertex[few]
-        segment, fraction, square = nearest_from(
-            self.six.take(chosen, axis=0), path, about[few], self.low[chosen], self.high[chosen]
-        )
-        off = path.length_at(segment, fraction) - about[few]
-        sure = square <= self.far**2
-        sure[1:] &= (np.abs(np.diff(off)) <= 2 * STRIDE * self.far) | (np.diff(owner[few]) != 0)
-        lost = np.bincount(owner[few[~sure]], minlength=len(rows))
-        guided = (size > LONG) | (lost > np.bincount(owner[few], minlength=len(rows)) / _LOST)
-        few, off = few[sure], off[sure]
-        edges = np.flatnonzero(np.diff(owner, prepend=-1, append=len(rows)))
-        ends = np.append(edges[:-1], edges[1:] - 1)
-        known = np.append(few, ends)
-        order = np.argsort(known, kind="stable")
-        about += np.interp(np.arange(len(owner)), known[order], np.append(off, np.zeros(len(ends)))[order])
+        size = last - first
+        about, lost = self._evenly(length)
+        if (lost & (size <= LONG)).any():  # a text that is off in many places is longer than its path
+            other, still = self._evenly(_length_without_detours(self.six, self.far))
+            about = np.where((lost & ~still)[self.owner], other, about)
+            lost &= still
+        path, guided = self.path, lost | (size > LONG)
+        edges = np.flatnonzero(np.diff(self.owner, prepend=-1, append=len(rows)))
         for k in np.flatnonzero(guided).tolist():
             part = slice(int(first[k]), int(last[k]) + 1)
             limits = int(rows["start"][k]), int(rows["stop"][k]) - 1
@@ -280,6 +300,42 @@ class _Search:
             own = slice(int(edges[k]), int(edges[k + 1]))
             about[own] = length[part] + np.interp(np.arange(len(length[part])), known, off)
         return about
+
+    def _evenly(self, length: Floats) -> tuple[Floats, Bools]:
+        """As `_about`, gone through evenly from end to end; and in which stretches (s,) this has lost the way."""
+        rows, owner = self.rows, self.owner
+        first, last = rows["first"], rows["last"]
+        way, size = length[last] - length[first], last - first
+        scale = np.divide(self.end - self.begin, way, out=np.zeros(len(way)), where=way > 0)
+        about: Floats = self.begin[owner] + (length[self.vertex] - length[first][owner]) * scale[owner]
+        few = np.arange(STRIDE - 1, len(owner), STRIDE)
+        few = few[(size <= LONG)[owner[few]]]
+        off, sure = self._off_from(about, few)
+        for _ in range(1, _TRIED):  # a vertex that is off itself tells nothing: others are near it
+            lost = np.flatnonzero(~sure)
+            lost = lost[owner[few[lost] - 1] == owner[few[lost]]]
+            if not len(lost):
+                break
+            few[lost] -= 1
+            off[lost], sure[lost] = self._off_from(about, few[lost])
+        sure[1:] &= (np.abs(np.diff(off)) <= 2 * STRIDE * self.far) | (np.diff(owner[few]) != 0)
+        lost = np.bincount(owner[few[~sure]], minlength=len(rows))
+        often = lost > np.bincount(owner[few], minlength=len(rows)) / _LOST
+        few, off = few[sure], off[sure]
+        edges = np.flatnonzero(np.diff(owner, prepend=-1, append=len(rows)))
+        ends = np.append(edges[:-1], edges[1:] - 1)
+        known = np.append(few, ends)
+        order = np.argsort(known, kind="stable")
+        about += np.interp(np.arange(len(owner)), known[order], np.append(off, np.zeros(len(ends)))[order])
+        return about, often
+
+    def _off_from(self, about: Floats, few: Ints) -> tuple[Floats, Bools]:
+        """(k,) how much farther along the path than `about` some of `self.vertex` are, and whether they are near it."""
+        chosen, path = self.vertex[few], self.path
+        segment, fraction, square = nearest_from(
+            self.six.take(chosen, axis=0), path, about[few], self.low[chosen], self.high[chosen]
+        )
+        return path.length_at(segment, fraction) - about[few], square <= self.far**2
 
     def look_again(self) -> None:
         """Assign anew, and with more care, what is too far away or in the wrong order."""
@@ -297,6 +353,7 @@ class _Search:
             )
             rows = rows[square > limit**2]
             doubtful[rows] = ~self._near_alone(rows, limit)
+            doubtful[self._off_anywhere(doubtful, apart, limit)] = False
             apart = np.zeros_like(apart)  # looked at once
             windows = doubtful_windows(doubtful, self.number, around, most_windows + 1)
             if around > ROUNDS[0][0] and len(windows) > most_windows:
@@ -305,7 +362,7 @@ class _Search:
                 part = slice(first, last + 1)
                 before = self._doubts(part)
                 self._assign(first, last, most_pairs, doubtful, wide=around > ROUNDS[0][0])
-                futile = 0 if self._doubts(part) < before else futile + bool(before)
+                futile = 0 if 2 * self._doubts(part) < before else futile + bool(before)
                 if futile > _MOST_FUTILE:
                     return  # nor here
 
@@ -340,6 +397,40 @@ class _Search:
         for metric in _ALONE:
             near &= nearest_places(six, self.path.six, middle, 1, low, high, metric)[2] <= limit**2
         return near
+
+    def _off_anywhere(self, doubtful: Bools, apart: Bools, limit: float) -> Ints:
+        """Doubtful vertices that are off the path wherever they are put between neighbours that are without doubt.
+
+        There is no mishap of the search then: the text itself is off, be it in ever so many places.
+        """
+        rows = np.flatnonzero(doubtful)
+        if not len(rows):
+            return rows
+        number = self.number[rows]
+        begins = np.append(True, (np.diff(rows) > 1) | (np.diff(number) != 0))
+        first = np.flatnonzero(begins)
+        run = np.cumsum(begins) - 1
+        last = np.append(first[1:], len(rows)) - 1
+        before, behind = rows[first] - 1, np.minimum(rows[last] + 1, len(doubtful) - 1)
+        # both neighbours are in the same stretch, and near
+        known = (before >= 0) & (self.number[before] == number[first]) & (self.number[behind] == number[last])
+        known &= ~doubtful[before] & ~doubtful[behind]
+        low, high = self.segment[before], self.segment[behind]
+        known &= (low <= high) & (high - low <= 2 * _BETWEEN)
+        settled = known[run] & ~apart[rows]
+        low, high, own = low[run[settled]], high[run[settled]], rows[settled]
+        far = self.distance[own] > self.far
+        off = np.zeros(len(own), np.bool_)
+        for metric, at, room in (("both", far, self.far), *((metric, ~far, limit) for metric in _ALONE)):
+            six, around = self.six[own[at]], (low[at] + high[at]) // 2
+            square = nearest_places(six, self.path.six, around, _BETWEEN, low[at], high[at], metric)[2]
+            off[at] |= square > room**2
+        settled[settled] = off
+        # all of a run, or none of it
+        whole = np.ones(len(first), np.bool_)
+        whole[run[~settled]] = False
+        found: Ints = rows[whole[run]]
+        return found
 
     def _doubts(self, part: slice) -> int:
         """How many vertices are too far away or in the wrong order."""
@@ -389,3 +480,24 @@ class _Search:
         while end < len(new) and new[end - 1] > old[end]:
             end += 1
         return begin, end
+
+
+def _leaders(found: Floats, begins: Bools) -> Ints:
+    """(k,) the vertex that is farthest along up to each, from where a stretch begins."""
+    order = np.arange(len(found))
+    ahead = found > np.maximum.accumulate(np.append(-np.inf, found))[:-1]
+    leader: Ints = np.maximum.accumulate(np.where(ahead | begins, order, 0))
+    return leader
+
+
+def _length_without_detours(six: Floats, far: float) -> Floats:
+    """(v,) path length up to every vertex as if those that lie aside of their neighbours were between them."""
+    step = np.diff(six, axis=0)
+    way = np.sqrt(np.einsum("ij,ij->i", step, step))
+    past = six[2:] - six[:-2]
+    direct = np.sqrt(np.einsum("ij,ij->i", past, past))
+    detour = way[:-1] + way[1:] - direct
+    around = np.pad(detour, 1, constant_values=-np.inf)
+    aside = np.flatnonzero((detour > 2 * far) & (detour > around[:-2]) & (detour >= around[2:]))
+    way[aside] = way[aside + 1] = direct[aside] / 2
+    return np.append(0.0, np.cumsum(way))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from cornersmooth.verify.polyline import Polyline
 
 #: which distance is made smallest: tip and axis point together, or one of them
 Metric = Literal["both", "tip", "axis point"]
+
+#: columns of a row of both that count for each
+COLUMNS: Final[dict[Metric, slice]] = {"both": slice(0, 6), "tip": slice(0, 3), "axis point": slice(3, 6)}
 
 #: segments that the nearest place may be away from where it is looked for
 _MOST_STEPS = 200
@@ -100,7 +103,7 @@ def nearest_places(
     square : (k,) float64, mm²
         Of the distance.
     """
-    columns = {"both": slice(0, 6), "tip": slice(0, 3), "axis point": slice(3, 6)}[metric]
+    columns = COLUMNS[metric]
     segment, fraction, square = np.empty(len(point), np.int64), np.empty(len(point)), np.empty(len(point))
     for begin in range(0, len(point), _BLOCK):
         part = slice(begin, begin + _BLOCK)

@@ -284,7 +284,8 @@ def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float
 def _before_a_tool(speaking: Sequence[tuple[Event, float, float]], k: int) -> bool:
     """Whether the next word is that of a tool, with no motion between; and there has been one before."""
     event = speaking[k][0]
-    following = speaking[k + 1][0] if k + 1 < len(speaking) else None
+    behind = (other for other, _, _ in speaking[k + 1 :] if (other.letter, other.value) != ("G", 40.0))  # R0 of M91
+    following = next(behind, None)
     changes = following is not None and following.letter == "T" and following.element == event.element
     return changes and any(before.letter == "T" for before, _, _ in speaking[:k])
 

@@ -29,6 +29,7 @@ from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.checks import Examined, examine
 from cornersmooth.verify.findings import Findings, Largest, Poses
 from cornersmooth.verify.half_turns import half_turns
+from cornersmooth.verify.machine_positions import MachinePositions
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.statements import TAP, Token, asked, said
@@ -118,6 +119,7 @@ class Verifier:
         self._program, self._words = program, words
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
         self._trusted, self._weights, self._slower = tuple(trusted), weights, slower
+        self._machine = machine
         self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._text = nc if isinstance(nc, NcProgram) else Source(readable_twice(nc))
         self._name = None if isinstance(nc, NcProgram | bytes) else str(nc)
@@ -177,7 +179,9 @@ class Verifier:
         reader = Reader(self._name, options, steps, lever)
         lines = read_lines(source, self._name, options.dialect.lexer)
         room = options.tolerance / self._program.mm_per_unit
-        check = WordCheck(options.control, options.dialect.lexer, room, self._trusted, self._weights)
+        machine = self._machine if options.dialect.retracts else None
+        positions = MachinePositions(machine, self._program.mm_per_unit)
+        check = WordCheck(options.control, options.dialect.lexer, room, self._trusted, self._weights, positions)
         own_rapids = OwnRapids(task)
         reader.way_back.added, reader.left_cuts.asked = own_rapids.added, own_rapids.goes_to
         chunks = reader.chunks(check.watch(lines) if self._words else lines)

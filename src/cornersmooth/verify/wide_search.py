@@ -10,11 +10,15 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.match import Match
+from cornersmooth.verify.nearest import COLUMNS, Metric, nearest_places
 from cornersmooth.verify.polyline import Polyline
-from cornersmooth.verify.rapids import digit_errors
+from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 
 #: original vertices of a batch that are looked at once more, and written segments looked at for each
 _MOST_ROWS, _MOST_SEGMENTS = 2048, 1 << 14
+
+#: segments that are looked at in one go; and on either side of a place at first
+_AT_ONCE, _FEW = 1 << 16, 8
 
 
 def look_farther(match: Match, vertex: Ints, low: Ints, high: Ints, segment: Ints, at: Floats) -> None:
@@ -38,28 +42,41 @@ def look_farther(match: Match, vertex: Ints, low: Ints, high: Ints, segment: Int
     rows = np.flatnonzero(np.maximum(square[:, :3].sum(axis=1), square[:, 3:].sum(axis=1)) > match.tolerance**2)
     if not len(rows):
         return
-    around = _Around(match)
-    for k in rows[:_MOST_ROWS].tolist():
-        first, last = around.vertices(int(vertex[k]))
-        first = max(first, int(low[k]), int(segment[k]) - _MOST_SEGMENTS // 2)
-        last = min(last, int(high[k]) + 1, int(segment[k]) + _MOST_SEGMENTS // 2)
-        if last <= first:
-            continue
-        begin = six[first:last]
-        way = six[first + 1 : last + 1] - begin
-        rest = path.six[vertex[k]] - begin
+    rows = rows[:_MOST_ROWS]
+    first, last = _Around(match).vertices(vertex[rows])
+    first = np.maximum.reduce((first, low[rows], segment[rows] - _MOST_SEGMENTS // 2))
+    last = np.minimum.reduce((last, high[rows] + 1, segment[rows] + _MOST_SEGMENTS // 2))
+    some = last > first
+    rows, first, last = rows[some], first[some], last[some]
+    if not len(rows):
+        return
+    for part in _even_parts(last - first):
+        own, count = rows[part], (last - first)[part]
+        begins = np.cumsum(count) - count
+        among = np.arange(count.sum()) + np.repeat(first[part] - begins, count)
+        begin = six.take(among, axis=0)
+        way = six.take(among + 1, axis=0) - begin
+        rest = np.repeat(path.six[vertex[own]], count, axis=0) - begin
         size = np.einsum("ij,ij->i", way, way)
         share = np.einsum("ij,ij->i", rest, way)
         share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
         rest -= share[:, None] * way
         off = np.einsum("ij,ij->i", rest, rest)
-        best = int(np.argmin(off))
-        if off[best] < square[k].sum():
-            segment[k], at[k] = first + best, share[best]
+        least = np.minimum.reduceat(off, begins)
+        best = np.flatnonzero(off == np.repeat(least, count))
+        best = best[np.searchsorted(best, begins)]  # the first of each
+        nearer = np.flatnonzero(least < square[own].sum(axis=1))
+        segment[own[nearer]], at[own[nearer]] = among[best[nearer]], share[best[nearer]]
+
+
+def _even_parts(count: Ints) -> list[slice]:
+    """Rows that are taken at a time, so that no more than about `_AT_ONCE` segments are looked at."""
+    edges = np.flatnonzero(np.diff(np.cumsum(count) // _AT_ONCE, prepend=-1))
+    return [slice(a, b) for a, b in zip(edges.tolist(), [*edges[1:].tolist(), len(count)], strict=True)]
 
 
 def nearest_alone(
-    point: Floats, six: Floats, segment: Ints, low: Ints, high: Ints, radius: float, column: slice
+    point: Floats, six: Floats, segment: Ints, low: Ints, high: Ints, radius: float, metric: Metric
 ) -> tuple[Ints, Floats, Floats]:
     """Nearest place for tip or axis point alone, as far as the path stays near on either side of a known place.
 
@@ -76,7 +93,7 @@ def nearest_alone(
     low, high : (k,) int64
         First and last segment allowed.
     radius : float, mm
-    column : slice
+    metric : Metric
         Which of tip and axis point counts.
 
     Returns
@@ -86,27 +103,63 @@ def nearest_alone(
     distance : (k,) float64, mm
         inf where the known segment itself is not that near, and beyond the first `_MOST_ROWS` rows.
     """
+    column = COLUMNS[metric]
     found, fraction, distance = segment.copy(), np.zeros(len(point)), np.full(len(point), np.inf)
-    for k in range(min(len(point), _MOST_ROWS)):
-        first = max(int(low[k]), int(segment[k]) - _MOST_SEGMENTS // 2)
-        last = min(int(high[k]) + 1, int(segment[k]) + _MOST_SEGMENTS // 2)
-        vertex = six[first : last + 1, column]
-        rest = point[k, column] - vertex
-        outside = np.einsum("ij,ij->i", rest, rest) > radius**2
-        here = int(segment[k]) - first
-        before, behind = np.flatnonzero(outside[: here + 1]), np.flatnonzero(outside[here + 1 :])
-        begin = max(int(before[-1]) if len(before) else 0, 0)
-        end = here + 1 + int(behind[0]) if len(behind) else len(vertex) - 1
-        way, rest = np.diff(vertex[begin : end + 1], axis=0), rest[begin:end]
-        size = np.einsum("ij,ij->i", way, way)
-        share = np.einsum("ij,ij->i", rest, way)
-        share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
-        rest = rest - share[:, None] * way
-        off = np.sqrt(np.einsum("ij,ij->i", rest, rest))
-        if here < end and off[here - begin] <= radius:  # else the known place is not on what is allowed
-            best = int(np.argmin(off))
-            found[k], fraction[k], distance[k] = first + begin + best, share[best], off[best]
+    rows = np.flatnonzero((low <= segment) & (segment <= high))[:_MOST_ROWS]
+    square = nearest_places(point[rows], six, segment[rows], 0, segment[rows], segment[rows], metric)[2]
+    rows = rows[square <= (radius + ARITHMETIC) ** 2]
+    for reach in (_FEW, _MOST_SEGMENTS // 2):
+        step = max(_AT_ONCE // (2 * reach), 1)
+        left = []
+        for begin in range(0, len(rows), step):
+            own = rows[begin : begin + step]
+            middle, limits = segment[own], (low[own], high[own])
+            whole, near, *place = _connected(point[own, column], six[:, column], middle, limits, radius, reach)
+            whole |= reach > _FEW
+            left.append(own[~whole])
+            own = own[whole & near]
+            found[own], fraction[own], distance[own] = (values[whole & near] for values in place)
+        rows = np.concatenate(left) if left else rows[:0]
     return found, fraction, distance
+
+
+def _connected(
+    point: Floats, vertices: Floats, middle: Ints, limits: tuple[Ints, Ints], radius: float, reach: int
+) -> tuple[Bools, Bools, Ints, Floats, Floats]:
+    """Nearest places (k,) on what is connected with segments and near, `reach` segments on either side at most.
+
+    Returns
+    -------
+    whole : (k,) bool
+        Whether the path is left on either side within the reach, or ends there.
+    near : (k,) bool
+        Whether the segment itself is near.
+    segment, fraction, distance : (k,)
+    """
+    low, high = limits
+    offset = np.arange(
+        -min(reach, int((middle - low).max(initial=0))), min(reach, int((high - middle).max(initial=0))) + 2
+    )
+    index = middle[:, None] + offset
+    vertex = vertices.take(np.clip(index, 0, len(vertices) - 1), axis=0)
+    rest = point[:, None] - vertex
+    outside = np.einsum("kmi,kmi->km", rest, rest) > radius**2
+    # segments count from the last vertex outside in front of the known one to the first behind it
+    behind, columns = offset > 0, np.arange(len(offset))
+    begin = np.where((outside | (index <= low[:, None])) & ~behind, columns, -1).max(axis=1)
+    end = np.where((outside | (index > high[:, None])) & behind, columns, len(offset)).min(axis=1)
+    whole = (begin >= 0) & (end < len(offset))
+    way = np.diff(vertex, axis=1)
+    size = np.einsum("kmi,kmi->km", way, way)
+    share = np.einsum("kmi,kmi->km", rest[:, :-1], way)
+    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+    rest = rest[:, :-1] - share[..., None] * way
+    off = np.sqrt(np.einsum("kmi,kmi->km", rest, rest))
+    near = off[:, int(np.flatnonzero(offset == 0)[0])] <= radius
+    off[(columns[:-1] < begin[:, None]) | (columns[:-1] >= end[:, None])] = np.inf
+    best = np.argmin(off, axis=1)
+    here = np.arange(len(point))
+    return whole, near, middle + offset[best], share[here, best], off[here, best]
 
 
 def passed_nearby(match: Match, vertex: Ints, tip: Floats, axis: Floats) -> Bools:
@@ -124,9 +177,8 @@ def passed_nearby(match: Match, vertex: Ints, tip: Floats, axis: Floats) -> Bool
     found = np.zeros(len(vertex), np.bool_)
     if not len(vertex):
         return found
-    around = _Around(match)
-    for k in range(min(len(vertex), _MOST_ROWS)):
-        first, last = around.vertices(int(vertex[k]))
+    firsts, lasts = _Around(match).vertices(vertex[:_MOST_ROWS])
+    for k, (first, last) in enumerate(zip(firsts.tolist(), lasts.tolist(), strict=True)):
         element = np.unique(match.written.trail.owner[first : min(last, first + _MOST_SEGMENTS) + 1])
         same, _ = digit_errors(match.nc, element, tip[k], axis[k], match.axis_length)
         found[k] = same.any()
@@ -141,12 +193,12 @@ class _Around:
         self.on = np.flatnonzero(match.on)
         self.place = np.maximum.accumulate(match.path.length_at(match.segment[self.on], match.fraction[self.on]))
 
-    def vertices(self, vertex: int) -> tuple[int, int]:
-        """First and last written vertex that may have to do with an original one."""
+    def vertices(self, vertex: Ints) -> tuple[Ints, Ints]:
+        """(k,) first and last written vertex that may have to do with original ones."""
         middle = self.length[vertex]
-        first = max(int(np.searchsorted(self.place, middle - self.near)) - 1, 0)
-        last = min(int(np.searchsorted(self.place, middle + self.near, side="right")), len(self.on) - 1)
-        return int(self.on[first]), int(self.on[last])
+        first = np.maximum(np.searchsorted(self.place, middle - self.near) - 1, 0)
+        last = np.minimum(np.searchsorted(self.place, middle + self.near, side="right"), len(self.on) - 1)
+        return self.on[first], self.on[last]
 
 
 def way_apart(path: Polyline, here: float, there: float) -> float:

@@ -15,6 +15,7 @@ from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.word_list import WordList, WordRule, word_list
 from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.verify.block_texts import any_numbers, any_of, numbers_in, said, shown, text_of
+from cornersmooth.verify.machine_positions import MachinePositions
 
 #: code of words that are not on the list or not in their place, and of what is not established
 NOT_LISTED: Final = "CS571"
@@ -57,6 +58,8 @@ class WordCheck:
         that the text leaves to him, and `FRAME` where the blocks around the motion are his.
     weights : iterable of float, optional
         Those that control points of curves have; None where they may have any.
+    positions : MachinePositions, optional
+        Those of the machine's file.
     """
 
     def __init__(
@@ -66,8 +69,11 @@ class WordCheck:
         tolerance: float,
         trusted: Iterable[str] = (),
         weights: Iterable[float] | None = None,
+        positions: MachinePositions | None = None,
     ) -> None:
         self.list: WordList = word_list(control)
+        self._positions = MachinePositions(None, 1.0) if positions is None else positions
+        self._known_blocks = (*self.list.blocks, *self._positions.rules)
         self.lexer, self.tolerance = lexer, tolerance
         self.problems: list[Problem] = []
         #: blocks taken on trust: line and text
@@ -142,6 +148,7 @@ class WordCheck:
         known = np.flatnonzero(~np.isnan(codes))
         self._check_weights(table, codes)
         linear = ~np.all([np.isnan(table.column(name)) for name in sorted(_LINEAR)], axis=0)
+        self._positions.leave(table.columns.keys())
         if (self._changed or self._high or self._retract or self._arc) and linear.any():
             row = int(np.argmax(linear))
             given = known[known <= row]
@@ -184,6 +191,7 @@ class WordCheck:
         if line.skipped:
             self._wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
         self._judge(line, words, text)
+        self.problems += self._positions.take(line, text)
         self._blocks += 1
         self._note(line, words)
         return line
@@ -225,7 +233,7 @@ class WordCheck:
         self._angles |= {word.name: word.value for word in line.words if word.name in _ROTARY}
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
-        still = any(rule.pattern.fullmatch(text_of(words)) for rule in self.list.blocks)
+        still = any(rule.pattern.fullmatch(text_of(words)) for rule in self._known_blocks)
         still |= any(rule.alone and any_of(rule.pattern, words) for rule in self.list.words)
         if not still and any(word.name in _LINEAR for word in line.words):
             self._moved(line.number, self._code)
@@ -291,7 +299,7 @@ class WordCheck:
         return known
 
     def _found(self, words: list[str], text: str) -> list[WordRule | None]:
-        whole = next((rule for rule in self.list.blocks if rule.pattern.fullmatch(text)), None)
+        whole = next((rule for rule in self._known_blocks if rule.pattern.fullmatch(text)), None)
         if whole is not None:
             return [whole]
         rules: list[WordRule | None] = []

@@ -1,0 +1,102 @@
+"""Positions of the machine in a text: those of its file, where tools are changed and where the program ends."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Set
+from typing import TYPE_CHECKING, Final
+
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.word_list import WordRule
+from cornersmooth.nc_reader.words import Line
+
+if TYPE_CHECKING:
+    from cornersmooth.kinematics.machine import Machine
+
+#: code of positions of the machine that its file does not have, or that are missing
+POSITIONS: Final = "CS583"
+
+_AXES: Final = r"( [XYZABC][-+]?\d*\.?\d*)+"
+
+#: blocks of positions of the machine, by words that stand before and behind the axes
+_BLOCKS: Final = (f"G53 G0{_AXES}", f"SUPA G0{_AXES} D0", rf"L{_AXES} R0 F ?MAX M91")
+
+#: digits by which a position may be off
+_ROOM: Final = 5e-4
+
+
+class MachinePositions:
+    """Follows the machine's axes through blocks that name positions of the machine.
+
+    Parameters
+    ----------
+    machine : Machine or None
+        Without positions, or without a machine, nothing is asked for.
+    mm_per_unit : float
+        Of the text.
+    """
+
+    def __init__(self, machine: Machine | None, mm_per_unit: float) -> None:
+        home = {} if machine is None else dict(machine.home)
+        change = {} if machine is None else dict(machine.tool_change)
+        self._home, self._change = (
+            {axis: self._said(axis, value, mm_per_unit) for axis, value in known.items()} for known in (home, change)
+        )
+        self._at: dict[str, float] = {}
+        #: rules for blocks that the control's own list need not have
+        self.rules: tuple[WordRule, ...] = ()
+        if home or change:
+            says = "position of the machine, as its file has it"
+            self.rules = tuple(
+                WordRule(re.compile(pattern), says, retract=retract)
+                for block in _BLOCKS
+                for retract, pattern in ((True, f"(?=.* Z[-+.\\d]){block}"), (False, block))
+            )
+
+    @staticmethod
+    def _said(axis: str, value: float, mm_per_unit: float) -> float:
+        return value / mm_per_unit if axis in "XYZ" else value
+
+    def take(self, line: Line, text: str) -> list[Problem]:
+        """Return what is wrong with a block that moves no tool at the part."""
+        if not self.rules:
+            return []
+        if any(rule.pattern.fullmatch(text) for rule in self.rules):
+            return self._goes(line)
+        names = {word.name for word in line.words}
+        if any((word.name, word.value) == ("M", 6.0) for word in line.words) or re.match(r"TOOL CALL \d", text):
+            return self._is_there(line.number, self._change, "the tool is changed")
+        if re.fullmatch(r"M2|M30", text):
+            return self._is_there(line.number, self._home, "the program ends")
+        self.leave(names)
+        return []
+
+    def leave(self, names: Set[str]) -> None:
+        """Take note of axes that move otherwise: words of the tip may move all of them."""
+        gone = names & set("ABC") | (set(self._at) if names & set("XYZ") else set())
+        self._at = {axis: value for axis, value in self._at.items() if axis not in gone}
+
+    def _goes(self, line: Line) -> list[Problem]:
+        """Take note of a position."""
+        problems = []
+        for word in line.words:
+            if word.name not in "XYZABC":
+                continue
+            known = [own[word.name] for own in (self._home, self._change) if word.name in own]
+            if known and min(abs(word.value - value) for value in known) > _ROOM:
+                wanted = " or ".join(f"{word.name}{value:g}" for value in known)
+                text = f"{word.name} goes to {word.value:g} of the machine, whose file says {wanted}"
+                problems.append(Problem(POSITIONS, 0, line.number, text))
+            self._at[word.name] = word.value
+        return problems
+
+    def _is_there(self, number: int, wanted: dict[str, float], what: str) -> list[Problem]:
+        """Return which axes are elsewhere."""
+        off = [f"{axis}{value:g}" for axis, value in wanted.items() if self._off(axis, value)]
+        if not off:
+            return []
+        text = f"{what} away from {' '.join(off)} of the machine, which its file asks for"
+        return [Problem(POSITIONS, 0, number, text)]
+
+    def _off(self, axis: str, value: float) -> bool:
+        return axis not in self._at or abs(self._at[axis] - value) > _ROOM
