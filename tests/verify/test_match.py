@@ -121,7 +121,7 @@ def test_cut_leaves_no_doubt():
 @pytest.mark.parametrize(("off", "kept"), [(0.01, True), (0.0101, False)], ids=["kept", "not kept"])
 def test_all_of_the_tolerance_is_no_doubt_where_tip_and_axis_point_are_near_other_places(off, kept, monkeypatch):
     """Tip and axis point lie 0.003 mm apart along the path: nearest to both, the tip is farther off than by itself."""
-    from cornersmooth.verify import match
+    from cornersmooth.verify import search
 
     program = Program.from_poses([[0, 0, 0], [10, 0, 0], [20, 0, 0]], [[0, 0, 1.0]] * 3, feed=100.0)
     tip = np.array([[5, off, 0], [10, 0, 0], [20, 0, 0]])
@@ -129,7 +129,7 @@ def test_all_of_the_tolerance_is_no_doubt_where_tip_and_axis_point_are_near_othe
     lines = [*HEAD, "G43.5 H1", rapid(program.tip[0], program.axis[0], 10.0, "g1", decimals=6)]
     lines += ["G1 " + place_g1(*pose, 6) + " F100." * (k == 0) for k, pose in enumerate(zip(tip, axis, strict=True))]
     assigned = []
-    monkeypatch.setattr(match, "assign", lambda six, *_: assigned.append(six))
+    monkeypatch.setattr(search, "assign", lambda six, *_: assigned.append(six))
     found = verify(program, encode([*lines, *TAIL]), tolerance=0.01)
     assert found.together_tip.value > off + 5e-5
     assert found.passed == kept
@@ -140,7 +140,7 @@ def test_all_of_the_tolerance_is_no_doubt_where_tip_and_axis_point_are_near_othe
 @pytest.mark.parametrize("off", [0.015, 0.05, 0.5])
 def test_what_is_off_in_many_places_is_told_without_assigning_it_anew(off, monkeypatch):
     """Else each of many wrong places would cost as much as a mishap of the search, of which there are few."""
-    from cornersmooth.verify import match
+    from cornersmooth.verify import search
 
     x = np.linspace(0.0, 60.0, 301)
     tip = np.stack((x, np.sin(x / 4), np.zeros_like(x)), axis=1)
@@ -152,7 +152,7 @@ def test_what_is_off_in_many_places_is_told_without_assigning_it_anew(off, monke
     poses = zip(tip[1:], program.axis[1:], strict=True)
     lines += ["G1 " + place_g1(*pose, 6) + " F100." * (k == 0) for k, pose in enumerate(poses)]
     assigned = []
-    monkeypatch.setattr(match, "assign", lambda six, *_: assigned.append(six))
+    monkeypatch.setattr(search, "assign", lambda six, *_: assigned.append(six))
     found = verify(program, encode([*lines, *TAIL]), tolerance=0.01)
     named = {problem.nc_line for problem in found.problems if problem.code == "CS521"}
     assert named == set((len(HEAD) + 2 + wrong).tolist())

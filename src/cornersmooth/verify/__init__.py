@@ -25,7 +25,7 @@ Where is what:
 
 - what is measured against: `task`, `polyline`
 - elements to batches: `batches`, with `rapids`, `drilling` (`cycles`), and `guide` for long stretches
-- where everything is: `match`, with `nearest` and `assignment`
+- where everything is: `match`, found by `search` with `nearest` and `assignment`
 - checks (`checks` lists them): `deviation`, `backtracking`, `feeds`, `continuity`; they share `distances`, with
   `wide_search`, `hull_bounds`; what they find is in `findings`
 - words: `statements` (beside the motion), `word_check` against `nc_reader.word_list`
