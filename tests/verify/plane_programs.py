@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc import Form, Frame, choose_form
+from cornersmooth.nc import Form, Frame, choose_form, load_control
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from nc.cases import without_limits
@@ -171,7 +171,8 @@ def trial(seed: int) -> PlaneTrial:
     text.say("SPINDL/OFF", "FINI")
     tolerance, length = float(np.round(10.0 ** rng.uniform(-2.5, -0.5), 5)), float(rng.choice([5.0, 10.0, 50.0, 120.0]))
     settings = Settings(tolerance=tolerance, axis_length=length)
-    digits = str(rng.choice(["", "", "", "4"]))
+    most = load_control(control).digits.most
+    digits = str(rng.choice(["", "", *map(str, range(3, most + 1))]))
     form = choose_form(control, "g1", machine=machine, tcp=tcp, digits=digits, planes=True)
     if form.long_lines and rng.random() < 0.3:
         settings = settings.but(lines="long")

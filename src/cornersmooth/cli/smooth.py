@@ -240,6 +240,7 @@ def _frame(given: dict[str, Any]) -> Frame:
         comments=not given["no_comments"],
         skip_taps=given["skip_taps"],
         cycles=given["cycles"],
+        modal=given["modal"],
         approach=given["approach"] or 0.0,
         retract=given["retract"] or 0.0,
         work_offset="" if given["work_offset"] == "none" else given["work_offset"],

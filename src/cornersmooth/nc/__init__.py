@@ -199,7 +199,7 @@ def write(
     circles = plan_circles(program, smoothed.settings, chosen, planes)
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
-    writer = BlockWriter(chosen, program, statements, findings, circles, stretch, values["blend"])
+    writer = BlockWriter(chosen, program, statements, findings, circles, stretch, values["blend"], modal=frame.modal)
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
     writers = Writers(writer, upright, planes)
     motion = MotionWriter(program, writers, statements, operation, findings, approach, frame.retract, native)

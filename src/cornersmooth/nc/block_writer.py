@@ -53,6 +53,8 @@ class BlockWriter:
         How far the head lets the control round the corners of lines; empty where nothing else is said.
     plane : Plane or None
         Tilted plane in whose coordinates positions are written.
+    modal : bool
+        Whether words that repeat are left out, where the control keeps them.
     """
 
     form: Form
@@ -63,6 +65,7 @@ class BlockWriter:
     stretch: float = 1.0
     blend: str = ""
     plane: Plane | None = None
+    modal: bool = False
     blocks: int = 0
     _feed: int = -1  # ticks and feed mode of the last F, as one number
     _mode: int = FeedMode.PER_MINUTE
@@ -70,6 +73,7 @@ class BlockWriter:
     _arc_format: RowFormat = field(init=False)
     _curves: Curves = field(init=False)
     _blank: str = field(init=False)
+    _leaves_out: bool = field(init=False)
     _share: SplineShare | None = field(init=False)
     _modulo: list[int] = field(init=False)  #: columns of modulo axes
     _closing: bytes = field(init=False)
@@ -78,11 +82,14 @@ class BlockWriter:
     def __post_init__(self) -> None:
         motion = self.form.mode.motion
         self._blank = " " if motion.spaces else ""
+        self._leaves_out = self.modal and bool(motion.modal) and not self.form.curves
         words = (*motion.coordinates, *self.form.other_words)
         decimals = self.form.decimals(self.program.units)
         modulo = self.form.machine.modulo if self.form.machine is not None and self.form.rotary else ()
         self._modulo = [k for k, word in enumerate(words) if k > 2 and word in modulo]
         spaced, self._closing = self._spelt(range(len(words)))
+        if self._leaves_out:  # what is left out takes the blank before it with it
+            spaced = (self._blank.encode() + spaced[0], *spaced[1:])
         self._format = self._row_format(spaced, decimals)
         radius = f"{self._blank}{motion.radius}".encode()
         self._arc_format = self._row_format((*spaced[:3], radius), decimals[:3] + decimals[:1])
@@ -243,6 +250,7 @@ class BlockWriter:
         if self._share is not None:
             self._share.take(run)
         prefix, prefix_id, extra = self._prefixes(run)
+        left_out = self._left_out(run, prefix, prefix_id) if self._leaves_out else None
         suffix, suffix_id = self._suffixes(run, dwell)
         self.blocks += len(run) + extra
         apart: list[tuple[Bools, RowWriter, Ints]] = []  # rows with words of their own
@@ -253,14 +261,18 @@ class BlockWriter:
             apart.append((curved, self._curves.format, self._curves.numbers(run, curved)))
         if not apart:
             suffix = [self._closing + end for end in suffix]
-            return self._format.rows(self._said(run.ticks), prefix, prefix_id, suffix, suffix_id)[0]
+            return self._format.rows(self._said(run.ticks), prefix, prefix_id, suffix, suffix_id, left_out)[0]
         which = np.zeros(len(run), np.int64)
         for number, (rows, _, _) in enumerate(apart, start=1):
             which[rows] = number
         plain = which == 0
+        out = None if left_out is None else left_out[plain]
         texts = [
-            layout.rows(numbers, prefix, prefix_id[rows], suffix, suffix_id[rows])
-            for rows, layout, numbers in ((plain, self._format, run.ticks[plain]), *apart)
+            self._format.rows(run.ticks[plain], prefix, prefix_id[plain], suffix, suffix_id[plain], out),
+            *(
+                layout.rows(numbers, prefix, prefix_id[rows], suffix, suffix_id[rows])
+                for rows, layout, numbers in apart
+            ),
         ]
         return _interleave(which, texts)
 
@@ -301,6 +313,31 @@ class BlockWriter:
                 table.append(text)
             chosen[row] = entry
         return table, chosen, extra + self._say_blends(run, table, chosen)
+
+    def _left_out(self, run: Run, table: list[bytes], chosen: Ints) -> Bools:
+        """(r, c) words that repeat from the row before, nothing else between; drops the code where it does, too."""
+        keeps, plain = self.form.mode.motion.modal, chosen <= 1
+        free = plain.copy()
+        free[:1] = False
+        free[1:] &= run.arc[:-1] < 0 if run.arc is not None else True
+        free[1:] &= ~run.dwell[:-1] if run.dwell is not None else True
+        same = np.zeros(run.ticks.shape, np.bool_)
+        same[1:] = run.ticks[1:] == run.ticks[:-1]
+        if self.form.orientation == "vector":
+            same[:, 3:] = np.logical_and.reduce(same[:, 3:], axis=1, keepdims=True)
+        if "tip" not in keeps:
+            same[:, :3] = False
+        if "axis" not in keeps or self._modulo:
+            same[:, 3:] = False
+        free &= ~np.logical_and.reduce(same, axis=1)
+        same &= free[:, None]
+        if "code" in keeps:
+            free[1:] &= run.rapid[1:] == run.rapid[:-1]
+            chosen[free] = len(table)
+            table.append(b"")
+        blank = self._blank.encode()
+        table[:] = [start.removesuffix(blank) for start in table]
+        return same
 
     @property
     def _usual_blend(self) -> int:

@@ -99,6 +99,9 @@ class Motion:
         no words for that.
     inch_feed : int
         What one inch per minute is written as: 10 where F counts tenths.
+    modal : tuple of str
+        What may be left out where it repeats, as the control keeps it: ``code`` (G0, G1), ``tip`` (each of X Y Z) and
+        ``axis`` (the tool vector as a whole, each rotary word).
     fastest : float, 1/min
         Largest F of inverse time (G93) that the control takes; 0 for none. Such an F has three decimals.
     """
@@ -120,6 +123,7 @@ class Motion:
     endless_words: bool = True
     shortest: tuple[str, ...] = ()
     inch_feed: int = 1
+    modal: tuple[str, ...] = ()
     fastest: float = 9999.999
 
 

@@ -215,7 +215,7 @@ def hole_blocks(hole: Hole, cycle: Cycle, kind: str, form: Form, speed: float, p
         "feed": hole.feed,
         "milliseconds": cycle.dwell,
         "seconds": format_number(cycle.dwell / 1000.0, 3, trim=True),
-        "pitch": format_number(pitch, decimals),
+        "pitch": format_number(pitch, max(decimals, form.table.digits.most)),
         "speed": format_number(speed, form.table.digits.speed, trim=True).rstrip("."),
     }
     return tuple(block.format(**values) for block in getattr(form.table.cycles, kind))

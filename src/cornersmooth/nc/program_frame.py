@@ -65,6 +65,8 @@ class Frame:
     cycles : {"moves", "native"}
         How holes are written: as plain moves, or as the control's own cycles where it has such and the tool stays along
         Z. Taps are its own cycles anyway.
+    modal : bool
+        Whether words that repeat are left out where the control keeps them.
     stem : str
         Name of the CL file without its ending, for the program where `program` is None; empty for none.
     """
@@ -81,6 +83,7 @@ class Frame:
     cycles: str = "moves"
     approach: float = 0.0
     retract: float = 0.0
+    modal: bool = False
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
         """What stands for braces in the blocks around the motion and in those of extras.

@@ -92,12 +92,15 @@ class Layout:
     template : (width,) uint8
         A row with its constant characters; zero bytes where others are written. The width is a multiple of `WORD`.
     cells : tuple of Cell
+    spans : tuple of (int, int)
+        First column of each word with its number, and the one behind it.
     tail : int
         First column of what stands behind the numbers; what stands before them begins in column 0.
     """
 
     template: Bytes
     cells: tuple[Cell, ...]
+    spans: tuple[tuple[int, int], ...]
     tail: int
 
 
@@ -124,9 +127,9 @@ def lay_out(
         row.extend(characters)
         return len(row) - len(characters)
 
-    cells = []
+    cells, spans = [], []
     for word, places, before_point, some_negative in zip(words, decimals, digits, negative, strict=True):
-        add(word)
+        start = add(word)
         sign = add(b"\0") if plus or some_negative else None
         whole = [Group(add(bytes(n)), n, whole_table(n)) for n in _groups(before_point, leading=(1, 2, GROUP))]
         part: list[Group] = []
@@ -138,9 +141,10 @@ def lay_out(
         if not part and trim:
             add(b".")
         cells.append(Cell(sign, tuple(whole[::-1]), tuple(part[::-1]), plus, trim, leading_zero))
+        spans.append((start, len(row)))
     behind = add(bytes(tail))
     add(bytes(-len(row) % WORD if row else WORD))
-    return Layout(np.frombuffer(bytes(row), np.uint8), tuple(cells), behind)
+    return Layout(np.frombuffer(bytes(row), np.uint8), tuple(cells), tuple(spans), behind)
 
 
 def _groups(digits: int, leading: tuple[int, ...]) -> list[int]:

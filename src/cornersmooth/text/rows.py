@@ -76,6 +76,7 @@ class RowFormat:
         prefix_id: ArrayLike,
         suffix: Sequence[bytes],
         suffix_id: ArrayLike,
+        left_out: Bools | None = None,
     ) -> tuple[bytes, Ints]:
         """Write rows: prefix, words with their numbers, suffix.
 
@@ -87,6 +88,8 @@ class RowFormat:
             Texts to choose from, of any length; a suffix carries the line end.
         prefix_id, suffix_id : (m,) or () int
             Which of them each row has.
+        left_out : (m, c) bool, optional
+            Words that a row has not. Where its prefix is empty, too, the row begins without a blank.
 
         Returns
         -------
@@ -111,7 +114,13 @@ class RowFormat:
             return b"", np.zeros(1, np.int64)
         heads = Choices(prefix, prefix_id, m, align_right=True)
         tails = Choices(suffix, suffix_id, m, align_right=False)
-        blocks = list(_write_blocks(ticks, self._lay_out(ticks, heads.width, tails.width), heads, tails))
+        layout, drop = self._lay_out(ticks, heads.width, tails.width), None
+        if left_out is not None:
+            empty = np.array([not text for text in prefix])[np.broadcast_to(prefix_id, m)]
+            blank = np.array([word[:1] == b" " for word in self.words])
+            first = np.argmin(left_out, axis=1)
+            drop = _Drop(left_out, np.where(empty & blank[first], first, -1))
+        blocks = list(_write_blocks(ticks, layout, heads, tails, drop))
         offsets = np.zeros(m + 1, np.int64)
         np.cumsum(np.concatenate([lengths for _, lengths in blocks]), out=offsets[1:])
         return b"".join([text for text, _ in blocks]), offsets
@@ -138,6 +147,20 @@ class RowFormat:
         return layout
 
 
+@dataclass(frozen=True)
+class _Drop:
+    """What rows have not: (m, c) words, and the blank of a word (m,), -1 for none."""
+
+    words: Bools
+    blank: Ints
+
+    def clear(self, start: int, stop: int, block: Bytes, layout: Layout) -> None:
+        """Take it out of rows `start` to `stop`, which are laid out."""
+        for column, (first, last) in enumerate(layout.spans):
+            block[self.words[start:stop, column], first:last] = 0
+            block[self.blank[start:stop] == column, first] = 0
+
+
 def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
     """Smallest or largest of each column; many rows side by side take a tenth of the time of one below the other."""
     m, columns = ticks.shape
@@ -149,16 +172,22 @@ def _by_column(extreme: np.ufunc, ticks: Ints) -> list[int]:
     return found
 
 
-def _write_blocks(ticks: Ints, layout: Layout, heads: Choices, tails: Choices) -> Iterator[tuple[bytes, Ints]]:
+def _write_blocks(
+    ticks: Ints, layout: Layout, heads: Choices, tails: Choices, drop: _Drop | None
+) -> Iterator[tuple[bytes, Ints]]:
     """Write rows a block at a time; give the text of each block and the sizes of its rows."""
     m, width = len(ticks), len(layout.template)
     matrix = np.repeat(layout.template[None, :], min(BLOCK, m), axis=0)
     for start in range(0, m, BLOCK):
         stop = min(start + BLOCK, m)
         block = matrix[: stop - start]
+        if drop is not None and start:
+            block[:] = layout.template
         heads.write(start, stop, block, 0)
         for column, cell in enumerate(layout.cells):
             cell.write(ticks[start:stop, column], block)
+        if drop is not None:
+            drop.clear(start, stop, block, layout)
         tails.write(start, stop, block, layout.tail)
         used = block != 0
         # compress takes the same time for every pattern; a Boolean index is slower for many short runs

@@ -216,8 +216,10 @@ class _Search:
         height = away @ self.axis[move]
         beside = np.linalg.norm(away - height[:, None] * self.axis[move], axis=1)
         turned = np.linalg.norm(directions(nc, nc.tip[own], nc.second[own]) - self.axis[move], axis=1)
-        tilted = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)  # by the printed angles of a plane
-        on = (beside <= self.room + tilted * np.abs(height)) & (turned * self.axis_length <= 2 * self.room)
+        # what the printed angles of a tilted plane leave open
+        lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
+        on = beside <= self.room + lean * np.abs(height)
+        on &= turned * self.axis_length <= 2 * self.room + lean * self.axis_length
         return np.where(on, height, np.nan)
 
     def stands(self, move: int, hole: int, element: int) -> bool:

@@ -119,6 +119,9 @@ digits = click.option(
     "[default: what the control takes; fanuc IS-C]",
 )
 block_numbers = click.option("--block-numbers", is_flag=True, help="Number the blocks.")
+modal = click.option(
+    "--modal", is_flag=True, help="Leave out words that repeat from block to block, where the control keeps them."
+)
 no_comments = click.option("--no-comments", is_flag=True, help="Leave out what the CL file says in words.")
 no_verify = click.option(
     "--no-verify", is_flag=True, help="Do not read the written text back and measure it before it takes its place."
@@ -149,6 +152,7 @@ def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
             header,
             footer,
             block_numbers,
+            modal,
             no_comments,
         ),
     )
