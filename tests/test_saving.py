@@ -107,3 +107,18 @@ def test_times_at_programmed_feed():
     program = Program.from_poses(tip, [[0, 0, 1]] * 4, kind=kinds, feed=[np.nan, np.nan, 600.0, 1200.0])
     assert feed_times(program, Limits(rapid=6000.0)) == pytest.approx([0.0, 0.1, 3.0, 2.0])
     assert feed_times(program, Limits(feed=300.0, rapid=6000.0)) == pytest.approx([0.0, 0.1, 6.0, 8.0])
+
+
+def test_holes_count_on_neither_side(program):
+    """A hole that takes half a minute to drill makes no text slower than its CL file."""
+    form = choose_form()
+    settings = fitted(form)
+    last = program.tip[-1] + np.array([[5.0, 0.0, 30.0], [5.0, 0.0, 0.0]])
+    holes = np.vstack((last, last[1:] + [9.0, 0.0, 0.0]))
+    tip, axis = np.vstack((program.tip, holes)), np.vstack((program.axis, [[0.0, 0.0, 1.0]] * 3))
+    kind = np.append(program.kind, [Move.RAPID, Move.HOLE, Move.HOLE])
+    words = (Statement(602, 9, "CYCLE", ("DRILL", "DEPTH", 50.0, "MMPM", 100.0, "CLEAR", 2.0)),)
+    drilled = Program.from_poses(tip, axis, kind=kind, feed=1500.0, statements=(*program.statements, *words))
+    plain = estimate_saving(program, settings, form, Limits(), poses=700, stretches=1)
+    found = estimate_saving(drilled, settings, form, Limits(), poses=700, stretches=1)
+    assert found.direct - found.written == pytest.approx(plain.direct - plain.written, abs=0.1)

@@ -98,3 +98,17 @@ def test_what_is_no_pair_of_m_words_is_refused() -> None:
     for given in ('"M10"', '["M10"]', '["M10", "G1"]', '["M10", 11]'):
         with pytest.raises(SettingsError, match="clamp is"):
             parse_machine(f'like = "table-bc"\n[[axis]]\nname = "C"\nclamp = {given}\n')
+
+
+def test_auxfun_of_a_clamp_is_left_to_the_file_of_the_machine() -> None:
+    cl = CL.replace("FEDRAT/MMPM,300", "AUXFUN/11\nAUXFUN/71\nFEDRAT/MMPM,300").replace("FINI", "AUXFUN/10\nFINI")
+    form, frame = choose_form("haas", machine=MACHINE), Frame(skip_taps=False)
+    lines, plain = lines_of(form, cl, frame=frame), lines_of(form, CL, frame=frame)
+    assert {"(AUXFUN/11)", "M71", "(AUXFUN/10)"} <= set(lines)
+    assert [lines.count(word) for word in ("M10", "M11")] == [plain.count(word) for word in ("M10", "M11")]
+    how = {"tolerance": 0.05, "axis_length": 10.0, "control": "haas", "machine": MACHINE}
+    program = read(cl.encode())
+    assert verify(program, ("\n".join(lines) + "\n").encode(), **how).problems == ()
+    without = [line for line in lines if line != "M71"]
+    found = verify(program, ("\n".join(without) + "\n").encode(), **how)
+    assert [problem.text for problem in found.problems] == ["M71 is missing"]

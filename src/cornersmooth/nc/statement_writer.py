@@ -371,6 +371,10 @@ class StatementWriter:
         if number is None or words_of(statement) or number in (2, 6, 30, 98, 99):
             return None
         blocks = (f"M{number}",)
+        if any(blocks[0] in pair for pair in self.operation.clamps):
+            text = f"AUXFUN/{number} clamps a rotary axis or lets it turn: left out, the machine's file says where"
+            self.findings.add("CS359", "warning", statement.line, text)
+            return self.comment(statement.text)
         if number in (3, 4, 5):
             self.operation.turn(() if number == 5 else blocks)
         elif number in (7, 8, 9):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cornersmooth.feedrate import Comparison, Limits
 from cornersmooth.kinematics import Machine, with_dynamics
-from cornersmooth.model import Program
+from cornersmooth.model import Move, Program
 from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.page.document import document
@@ -90,7 +90,7 @@ def page_and_saving(
     notes = [f"{finding.severity}, line {finding.line}: {finding.text}" for finding in result.findings[:_MOST_NOTES]]
 
     meta, pack = scene(subject, Story(result.program.source.name, "", kept, facts, notes))
-    saving = _saving(meta["totals"])
+    saving = _saving(meta["totals"], result.program)
     if saving is None and kept:
         saving = estimate_saving(
             result.program, settings, form, limits, poses=TIMED_POSES_VERBOSE, stretches=TIMED_STRETCHES_VERBOSE
@@ -151,7 +151,7 @@ def verified_page(
     notes = [f"CL line {item.cl_line}, NC line {item.nc_line}: {item.text}" for item in found.problems[:_MOST_NOTES]]
 
     def sentence(seconds: Mapping[str, float]) -> str:
-        saving = _saving(seconds) if surface is None else None
+        saving = _saving(seconds, program) if surface is None else None
         return text if saving is None else f"{text}; {saving_text(saving)}"
 
     return _page(subject, Story(program.source.name, "", found.passed, facts, notes), sentence)
@@ -206,8 +206,11 @@ def surface_text(surface: SurfaceMap) -> str:
     return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}"
 
 
-def _saving(seconds: Mapping[str, float]) -> Saving | None:
-    return Saving(seconds["direct"], seconds["written"]) if {"direct", "written"} <= set(seconds) else None
+def _saving(seconds: Mapping[str, float], program: Program) -> Saving | None:
+    """Both times, where they are of the same: the text drills its holes, which the CL file only names."""
+    if not {"direct", "written"} <= set(seconds) or (program.kind == Move.HOLE).any():
+        return None
+    return Saving(seconds["direct"], seconds["written"])
 
 
 def _page(subject: Subject, story: Story, sentence: Any) -> str:

@@ -120,6 +120,8 @@ class Verifier:
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
         self._trusted, self._weights, self._slower = tuple(trusted), weights, slower
         self._machine = machine
+        said = () if machine is None else (word for axis in machine.axes for word in axis.clamp or ())
+        self._clamps = frozenset(float(word[1:]) for word in said)
         self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
         self._text = nc if isinstance(nc, NcProgram) else Source(readable_twice(nc))
         self._name = None if isinstance(nc, NcProgram | bytes) else str(nc)
@@ -189,7 +191,7 @@ class Verifier:
         measured = _measure(task, text, words=self._words, processes=self._processes)
         problems = [*reader.problems, *check.problems]
         own = KINDS & set(self._trusted)
-        measured.own, measured.axis_tolerance = own, self._axis_tolerance
+        measured.own, measured.axis_tolerance, measured.clamps = own, self._axis_tolerance, self._clamps
         found = measured.verification(
             problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
@@ -256,6 +258,8 @@ class _Measured:
     margin : float, mm
     own : frozenset of str
         Kinds of statements that the user says in words of his own.
+    clamps : frozenset of float
+        M words that clamp a rotary axis or let it turn.
     axis_tolerance : float or None, degrees
     """
 
@@ -269,6 +273,7 @@ class _Measured:
     words: bool
     margin: float = 0.0
     own: frozenset[str] = frozenset()
+    clamps: frozenset[float] = frozenset()
     axis_tolerance: float | None = None
 
     def verification(
@@ -325,6 +330,8 @@ class _Measured:
             Token("tap", TAP, length_at(move), int(program.line[original.pose[move]])) for move in self.batches.taps
         ]
         theirs = asked(program, np.where(move >= 0, there, _BEFORE).tolist(), end, dwells)
+        # clamps of rotary axes stand where the machine wants them, not where AUXFUN has them
+        theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in self.clamps]
         known = self.lengths | self.batches.stops.lengths()
         known |= {element: length_at(move) for element, move in self.batches.holes.items()}
         first = self.batches.stops.first
