@@ -8,9 +8,14 @@ Reasons stand below, and where there is nothing more to be said in the lists of 
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+
+import numpy as np
 
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError
@@ -100,6 +105,62 @@ No text of this page but that of linuxcnc has run on a control.
 """
 
 
+_REWINDS = """## An axis turns back within a cut
+
+`--rewind 25`, where C of the machine goes from -280 to 280 degrees and the cut, 1.7 turns round a cone, farther: from
+the last block before the pause to the first behind it.
+"""
+
+#: control, machine, tool tip control: where cuts are left
+_REWIND_RUNS = (
+    ("fanuc", "table-ac", True),
+    ("fanuc", "table-ac", False),
+    ("mitsubishi", "table-ac", True),
+    ("haas", "table-bc", True),
+    ("siemens", "table-ac", True),
+    ("heidenhain", "table-ac", True),
+    ("linuxcnc", "xyzac-trt", True),
+)
+
+#: why the blocks of the tool stand there, in order
+_PAUSE = (
+    "the cut is left here",
+    "out along the tool axis in rapid, 25 mm",
+    "over the place, high up: both rotary axes have turned",
+    "down to 25 mm above the place, along the tool axis",
+    "back into the cut along the tool axis, at its feed",
+)
+
+
+def cone() -> bytes:
+    """CL text of 1.7 turns with a tool that leans outwards by 30 degrees."""
+    turn = np.radians(np.arange(0.0, 621.0, 20.0))
+    sine, cosine = math.sin(math.radians(30.0)), math.cos(math.radians(30.0))
+    rows = [
+        f"GOTO/{40 * math.cos(a):.4f},{40 * math.sin(a):.4f},{-a:.4f},"
+        f"{sine * math.cos(a):.7f},{sine * math.sin(a):.7f},{cosine:.7f}"
+        for a in turn.tolist()
+    ]
+    head = ["UNITS/MM", "LOADTL/3", "SPINDL/8000,RPM,CLW", "RAPID", f"GOTO/60,0,60,{sine},0,{cosine:.7f}"]
+    return "\n".join([*head, "FEDRAT/500,MMPM", *rows, "RAPID", "GOTO/0,0,90,0,0,1", "FINI", ""]).encode()
+
+
+def rewind_rows(control: str, name: str, *, tcp: bool) -> Iterator[str]:
+    """Rows of the table of a pause in a cut."""
+    machine = load_machine(name)
+    axes = tuple(replace(axis, limits=(-280.0, 280.0)) if axis.name == "C" else axis for axis in machine.axes)
+    form = choose_form(control, machine=replace(machine, axes=axes), tcp=tcp, rewind=25.0)
+    stream = io.BytesIO()
+    write(smooth(read(cone()), fit_settings(Settings(), form, "mm")), stream, form=form)
+    lines = stream.getvalue().decode("ascii").splitlines()
+    motion = [bool(re.search(r"\bX[-+\d].*Y[-+\d]", line)) for line in lines]
+    feeds = [k for k, line in enumerate(lines) if motion[k] and not re.search(r"\bG0\b|FMAX", line)]
+    out = next(before for before, behind in pairwise(feeds) if behind - before > 3)
+    told = iter(_PAUSE)
+    for k in range(out, feeds[feeds.index(out) + 1] + 1):
+        yield f"| `{lines[k]}` | {next(told) if motion[k] else reason(lines[k], form)} |"
+
+
 def text_of(control: str, machine: str, *, tcp: bool) -> tuple[Form, list[str]]:
     """Lines of the text of the sample."""
     form = choose_form(control, machine=load_machine(machine) if machine else None, tcp=tcp)
@@ -178,6 +239,10 @@ def page() -> str:
         parts.append(f"## {control}{', ' + machine if machine else ''}{'' if tcp else ', without tip control'}\n")
         parts.append(f"Options: `{options}`.\n")
         parts.append("\n".join(["| line | reason |", "|---|---|", *rows(form, lines)]) + "\n")
+    parts.append(_REWINDS)
+    for control, machine, tcp in _REWIND_RUNS:
+        parts.append(f"### {control}, {machine}{'' if tcp else ', without tip control'}\n")
+        parts.append("\n".join(["| line | reason |", "|---|---|", *rewind_rows(control, machine, tcp=tcp)]) + "\n")
     return "\n".join(parts)
 
 
