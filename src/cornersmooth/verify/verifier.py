@@ -19,6 +19,7 @@ from cornersmooth.model import Ints, Program, Units
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
+from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
@@ -29,7 +30,6 @@ from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.checks import Examined, examine
 from cornersmooth.verify.findings import Findings, Largest, Poses
 from cornersmooth.verify.half_turns import half_turns
-from cornersmooth.verify.machine_positions import MachinePositions
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.statements import TAP, Token, asked, said
