@@ -131,6 +131,17 @@ def test_a_pose_that_the_machine_does_not_reach_is_named() -> None:
     assert (error.value.code, error.value.line) == ("CS361", 8)
 
 
+def test_a_method_that_turns_the_tool_elsewhere_is_refused() -> None:
+    """Where tip and axis point are rounded each by itself, the tool leans out of the plane in which A turns it."""
+    turn = np.radians(np.arange(0.0, 90.0, 9.0))
+    lines = [f"GOTO/{12 * (k % 3)},{k},0,0,{-np.sin(a):.7f},{np.cos(a):.7f}" for k, a in enumerate(turn.tolist())]
+    program, form, stream = program_of(lines), choose_form("fanuc", machine=FOUR["table A"]), io.BytesIO()
+    fitted = fit_settings(Settings(tolerance=EPS, method="zhang2016"), form, "mm")
+    with pytest.raises(InputError, match=r"turns the tool out of what A of machine reaches.*--method proportional"):
+        write(smooth(program, fitted), stream, form=form)
+    assert verify(program, text_of(program, form), tolerance=EPS, machine=FOUR["table A"]).problems == ()
+
+
 def test_one_axis_turns_back_within_a_cut() -> None:
     machine = four_axis("A", "table", (1, 0, 0), axis={"limits": [-200.0, 200.0]})
     program = program_of(rows("X", 60))

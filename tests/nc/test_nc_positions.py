@@ -143,6 +143,17 @@ def test_rotary_axes_stand_at_zero_where_home_says_nothing_of_them() -> None:
     assert codes(program, lines, "fanuc", machine) == set()
 
 
+def test_a_height_of_tool_changes_alone_leaves_the_retract_to_the_control() -> None:
+    machine = machine_of({}, {"Z": -25.0})
+    program, lines = text_of("haas", machine)
+    assert [line for line in lines if "G53" in line] == [
+        *("G53 G0 Z0.", "G53 G0 Z-25."),
+        *("G53 G0 Z0.", "G53 G0 Z-25."),
+        "G53 G0 Z0.",
+    ]
+    assert codes(program, lines, "haas", machine) == set()
+
+
 def test_a_control_without_such_words_is_told_nothing() -> None:
     machine = machine_of()
     program, lines = text_of("generic", machine)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.errors import SettingsError
+from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import Machine, inverse_time, machine_position, solutions
 from cornersmooth.kinematics.travel import check_travel
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
@@ -86,11 +86,11 @@ def rotary_rows(
     tip, axis, move = _whole(rows)
     if not len(move):
         return
-    _check_reach(machine, program, form.rotary_tolerance(settings.tolerance, settings.axis_length))
     tools = tools_of_poses(program) if machine.tool_lengths else None
     own_machine, machine = machine, machine.with_longest_tool()
     rapid, line, file = rapid_moves(program.kind)[move], program.line[move], program.source.name
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
+    _check_reach(machine, program, axis, move, tolerance)
     how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": line, "file": file}
     how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
     left = np.zeros(len(move), np.bool_)
@@ -227,16 +227,23 @@ def _merged(
     return filled.only(fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits))
 
 
-def _check_reach(machine: Machine, program: Program, tolerance: float) -> None:
-    """Refuse the first pose that an axis is missing for; `rotary_angles` would name a place on the way there."""
+def _check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, tolerance: float) -> None:
+    """Refuse the first pose that an axis is missing for, or a method that turns the tool to where one is."""
     if len(machine.names) > 1:
         return
+    file = program.source.name
     beyond = np.where(program.kind == Move.FROM, 0.0, solutions(machine, program.axis).beyond)
     poses = np.flatnonzero(beyond > tolerance)
     if len(poses):
         pose = int(poses[0])
-        line, file = int(program.line[pose]), program.source.name
-        raise reach_error(machine, program.axis[pose], float(beyond[pose]), line, file)
+        raise reach_error(machine, program.axis[pose], float(beyond[pose]), int(program.line[pose]), file)
+    rows = np.flatnonzero(solutions(machine, axis).beyond > tolerance)
+    if len(rows):
+        what = (
+            f"the method turns the tool out of what {machine.names[0]} of {machine.name} reaches, within the tolerance"
+        )
+        hint = "use --method proportional, which does not"
+        raise InputError("CS361", what, hint, file=file, line=int(program.line[move[rows[0]]]))
 
 
 def _tell_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, findings: Findings) -> None:

@@ -57,12 +57,20 @@ class MachinePositions:
     def _said(axis: str, value: float, mm_per_unit: float) -> float:
         return value / mm_per_unit if axis in "XYZ" else value
 
-    def take(self, line: Line, text: str) -> list[Problem]:
-        """Return what is wrong with a block that moves no tool at the part."""
+    def take(self, line: Line, text: str, *, retract: bool) -> list[Problem]:
+        """Return what is wrong with a block that moves no tool at the part.
+
+        Parameters
+        ----------
+        line : Line
+        text : str
+        retract : bool
+            Whether it is a retract on the control's own list, which holds where the file says nothing of home.
+        """
         if not self.rules:
             return []
         if any(rule.pattern.fullmatch(text) for rule in self.rules):
-            return self._goes(line)
+            return self._goes(line, free="Z" if retract and "Z" not in self._home else "")
         names = {word.name for word in line.words}
         if any((word.name, word.value) == ("M", 6.0) for word in line.words) or re.match(r"TOOL CALL \d", text):
             return self._is_there(line.number, self._change, "the tool is changed")
@@ -76,14 +84,14 @@ class MachinePositions:
         gone = names & set("ABC") | (set(self._at) if names & set("XYZ") else set())
         self._at = {axis: value for axis, value in self._at.items() if axis not in gone}
 
-    def _goes(self, line: Line) -> list[Problem]:
-        """Take note of a position."""
+    def _goes(self, line: Line, free: str) -> list[Problem]:
+        """Take note of a position; an axis that is free may be anywhere."""
         problems = []
         for word in line.words:
             if word.name not in "XYZABC":
                 continue
             known = [own[word.name] for own in (self._home, self._change) if word.name in own]
-            if known and min(abs(word.value - value) for value in known) > _ROOM:
+            if known and word.name != free and min(abs(word.value - value) for value in known) > _ROOM:
                 wanted = " or ".join(f"{word.name}{value:g}" for value in known)
                 text = f"{word.name} goes to {word.value:g} of the machine, whose file says {wanted}"
                 problems.append(Problem(POSITIONS, 0, line.number, text))

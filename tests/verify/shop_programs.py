@@ -1,0 +1,193 @@
+"""Random programs for machines with limited rotary axes, with one or none, with home and tool-change positions.
+
+    cd tests; python -m verify.shop_programs 0 300
+
+Cuts go round farther than an axis turns and are left on the way (`--rewind`), tools have holes and changes between.
+Every text must pass verification, or be refused for a reason; words of rotary axes must be within their limits.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import sys
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.cl import read
+from cornersmooth.errors import CornersmoothError, SettingsError
+from cornersmooth.kinematics import Machine, parse_machine
+from cornersmooth.nc import Form, Frame, choose_form, fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from cornersmooth.verify import verify
+
+CONTROLS = ("fanuc", "mitsubishi", "haas", "siemens", "heidenhain", "linuxcnc")
+
+#: what comes of texts
+OUTCOMES = ("passed", "refused", "FALSE ALARM", "BEYOND LIMITS")
+
+
+@dataclass(frozen=True)
+class ShopTrial:
+    """A program and what it is written for."""
+
+    seed: int
+    machine: Machine
+    control: str
+    tcp: bool
+    rewind: float
+    settings: Settings
+    cl: str
+    native: bool
+
+    def __str__(self) -> str:
+        s, kind = self.settings, self.machine.kind or "three axes"
+        return (
+            f"seed {self.seed}: {self.control} {kind}{'' if self.tcp else ' no tcp'} rewind {self.rewind:g} "
+            f"eps {s.tolerance:g} H {s.axis_length:g} {s.method} {s.lines}"
+        )
+
+    def form(self) -> Form:
+        """Form that the text is written in."""
+        return choose_form(self.control, machine=self.machine, tcp=self.tcp, rewind=self.rewind)
+
+
+def _machine(rng: np.random.Generator, axes: int, limit: float) -> Machine:
+    """Machine with so many rotary axes; the first of them turns by `limit` degrees either way."""
+    first, second = ("A", [1, 0, 0]), ("C", [0, 0, 1])
+    carrier = str(rng.choice(["table", "head"]))
+
+    def axis(name: str, direction: list[int], carrier: str, **more: object) -> dict[str, object]:
+        point = np.round(rng.uniform(-80, 80, 3), 3).tolist()
+        return {"name": name, "direction": direction, "carrier": carrier, "point": point, **more}
+
+    limits = {"limits": [-limit, limit]} if limit else {}
+    table: dict[str, object] = {"tool_length": float(rng.integers(0, 200)), "axis": []}
+    if axes == 1:
+        table["axis"] = [axis(*first, carrier, **limits)]
+    elif axes == 2:
+        table["axis"] = [axis(*second, "table", **limits), axis(*first, carrier)]
+    for key in ("home", "tool_change"):
+        if rng.random() < 0.4:
+            names = ["X", "Y", "Z", *(["A"] if axes else [])]
+            table[key] = {name: float(np.round(rng.uniform(-90, 90), 2)) for name in names if rng.random() < 0.6}
+    return parse_machine(table)
+
+
+def _poses(rng: np.random.Generator, axes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Poses of a cut that such a machine reaches: round farther than a turn, or a random walk."""
+    count = int(rng.integers(4, 60))
+    turn = np.cumsum(rng.uniform(-3, 25, count) if rng.random() < 0.6 else rng.uniform(-20, 20, count))
+    lean = np.zeros(count) + rng.uniform(10, 60) if axes == 2 else turn
+    around = np.radians(turn if axes == 2 else np.full(count, -90.0))
+    sine, cosine = np.sin(np.radians(lean)), np.cos(np.radians(lean))
+    axis = np.stack((sine * np.cos(around), sine * np.sin(around), cosine), axis=1)
+    if axes == 0:
+        axis = np.tile([0.0, 0.0, 1.0], (count, 1))
+    tip = np.cumsum(rng.normal(size=(count, 3)) * rng.choice([0.1, 2.0, 8.0]), axis=0) + 10 * axis
+    return np.round(tip, 4), axis
+
+
+def _program(rng: np.random.Generator, axes: int, *, tools: bool) -> str:
+    lines = ["UNITS/MM"]
+    for number in range(int(rng.integers(1, 4))):
+        if tools or not number:
+            lines += [f"LOADTL/{number + 1}", f"SPINDL/{int(rng.integers(500, 9000))},RPM,CLW"]
+        for _ in range(int(rng.integers(1, 3))):
+            tip, axis = _poses(rng, axes)
+            rows = [
+                ",".join([*(f"{v:.4f}" for v in p), *(f"{v:.7f}" for v in k)]) for p, k in zip(tip, axis, strict=True)
+            ]
+            above = tip[0] + 60 * axis[0]
+            start = ",".join([*(f"{v:.4f}" for v in above), *(f"{v:.7f}" for v in axis[0])])
+            lines += ["RAPID", f"GOTO/{start}", f"FEDRAT/{int(rng.integers(50, 3000))},MMPM"]
+            for row in rows:
+                lines.append(f"GOTO/{row}")
+                if rng.random() < 0.03:
+                    lines.append(str(rng.choice(["COOLNT/ON", "DELAY/0.5", "PPRINT/MARK", "OPSTOP"])))
+            back = tip[-1] + 70 * axis[-1]
+            lines += ["RAPID", "GOTO/" + ",".join([*(f"{v:.4f}" for v in back), *(f"{v:.7f}" for v in axis[-1])])]
+        if rng.random() < 0.4:
+            lines += ["RAPID", "GOTO/0,0,60,0,0,1", "CYCLE/DRILL,FEDTO,9,MMPM,200,RAPTO,3,RTRCTO,25"]
+            lines += [f"GOTO/{x:.3f},{y:.3f},0,0,0,1" for x, y in rng.uniform(-40, 40, (3, 2)).tolist()]
+            lines += ["CYCLE/OFF", "RAPID", "GOTO/0,0,80,0,0,1"]
+    return "\n".join([*lines, "SPINDL/OFF", "FINI", ""])
+
+
+def shop_trial(seed: int) -> ShopTrial:
+    """Program of a seed; the same each time."""
+    rng = np.random.default_rng((seed, 7))
+    axes = int(rng.choice([0, 1, 1, 2, 2]))
+    limit = float(rng.choice([0.0, 190.0, 200.0, 365.0])) if axes else 0.0
+    machine = _machine(rng, axes, limit)
+    control = str(rng.choice(CONTROLS))
+    tcp = control == "heidenhain" or bool(rng.random() < 0.6)
+    settings = Settings(
+        tolerance=float(np.round(10.0 ** rng.uniform(-2.5, -0.5), 5)),
+        axis_length=float(np.round(10.0 ** rng.uniform(0.3, 1.8), 2)),
+        method=str(rng.choice(["proportional", "proportional", "zhang2016", "global"])),
+    )
+    if tcp and axes and rng.random() < 0.4:
+        settings = settings.but(lines=str(rng.choice(["long", "dense"])))
+    tools = tcp or not machine.swings_the_tool
+    rewind = float(rng.choice([5.0, 40.0])) if axes and rng.random() < 0.8 else 0.0
+    return ShopTrial(
+        seed, machine, control, tcp, rewind, settings, _program(rng, axes, tools=tools), bool(rng.random() < 0.4)
+    )
+
+
+def outcome(one: ShopTrial) -> tuple[str, str, int]:
+    """Outcome of a trial, what is to be said of it, and how many cuts are left."""
+    program, stream = read(one.cl.encode()), io.BytesIO()
+    try:
+        form = one.form()
+        fitted = fit_settings(one.settings, form, "mm")
+        write(smooth(program, fitted), stream, form=form, frame=Frame(cycles="native" if one.native else "moves"))
+    except (CornersmoothError, SettingsError) as refusal:
+        return "refused", str(refusal), 0
+    text = stream.getvalue()
+    try:
+        found = verify(
+            program,
+            text,
+            tolerance=fitted.verified_tolerance,
+            axis_length=one.settings.axis_length,
+            control=one.control,
+            machine=one.machine,
+            tcp=one.tcp,
+        )
+    except CornersmoothError as refusal:
+        return "FALSE ALARM", str(refusal), 0
+    if found.problems:
+        return "FALSE ALARM", " | ".join(f"{one.nc_line}: {one.code} {one.text}" for one in found.problems[:3]), 0
+    for axis in one.machine.axes:
+        words = (
+            [float(value) for value in re.findall(rf" {axis.name}([-+]?\d+\.\d*)", text.decode())] if axis.name else []
+        )
+        if axis.limits is not None and words and not axis.low <= min(words) <= max(words) <= axis.high:
+            return "BEYOND LIMITS", f"{axis.name} from {min(words)} to {max(words)}", 0
+    return "passed", "", len(found.rewinds)
+
+
+def main() -> int:
+    """Judge the programs of a range of seeds."""
+    first, last = (int(word) for word in sys.argv[1:3])
+    count: Counter[str] = Counter()
+    rewinds = 0
+    for seed in range(first, last):
+        one = shop_trial(seed)
+        word, why, left = outcome(one)
+        count[word] += 1
+        count[f"{len(one.machine.names)} rotary axes"] += 1
+        rewinds += left
+        if word != "passed":
+            print(word, one, why, flush=True)
+    print(", ".join(f"{number} {word}" for word, number in sorted(count.items())), f"{rewinds} cuts left")
+    return int(bool(count["FALSE ALARM"] + count["BEYOND LIMITS"]))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
