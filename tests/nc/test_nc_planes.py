@@ -17,8 +17,10 @@ from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Move
-from cornersmooth.nc import Form, Frame, choose_form, fit_settings, write
+from cornersmooth.nc import Form, Frame, choose_form, fit_settings, parse_control, write
 from cornersmooth.nc.planes import rotations_frame, tilting_angles
+from cornersmooth.nc_reader import read_nc
+from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
@@ -391,8 +393,9 @@ CHANGED: dict[str, list[tuple[str, str]]] = {
         ("57,0,0,0,", "57,5,0,0,"),
         (",0,0,0,-1", ",0,0,9,-1"),
         (",-1\\)", ",0)"),
-        (",-1\\)", ",1)"),
-        ("CYCLE800\\(0,", "CYCLE800(1,"),
+        (r"CYCLE800\(0,", "CYCLE800(3,"),
+        (r",0,57", ",1,57"),
+        (r",0,57", ",10,57"),
         (r"^CYCLE800\(\)$", 'CYCLE800(0,"0")'),
     ],
     "heidenhain": [
@@ -461,3 +464,60 @@ def test_mutants_of_planes_are_found(case: Case) -> None:
     assert len(every) > 20
     chosen = share(every, 4, CASES.index(case))
     assert [kind for kind, lines in chosen if not problems(case, lines)] == []
+
+
+def _planes_of(lines: list[str], old: str, new: Callable[[np.ndarray, np.ndarray], str], case: Case) -> list[str]:
+    """The text with another zero of each plane: what `new` says for its frame and zero, and positions from there."""
+    on, off, frame = words_of(case)
+    zero, turned, found = np.array([5.0, -7.0, 11.0]), None, []
+    for line in lines:
+        if match := re.fullmatch(on, line):
+            turned = frame(*map(float, match.groups()))
+            line = re.sub(old, new(turned.as_matrix(), zero), line)
+        elif re.fullmatch(off, line):
+            turned = None
+        elif turned is not None and (move := re.match(r"G[01] X(\S+) Y(\S+)( Z(\S+))?", line)):
+            x, y, z = np.array([move[1], move[2], move[4] or 0], float) - turned.inv().apply(zero)
+            line = line.replace(move[0], f"{move[0][:2]} X{x:.9f} Y{y:.9f}" + (f" Z{z:.9f}" if move[4] else ""))
+        found.append(line)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("case", "old", "new"),
+    [
+        (CASES[0], r"X0\. Y0\. Z0\.", lambda frame, zero: "X{} Y{} Z{}".format(*zero)),
+        (CASES[1], "57,0,0,0", lambda frame, zero: "57,{},{},{}".format(*zero)),
+        (CASES[1], "0,0,0,-1", lambda frame, zero: "{:.12f},{:.12f},{:.12f},-1".format(*(zero @ frame))),
+        (CASES[1], r'0,"",0', lambda frame, zero: '1,"TC_1",100000'),
+    ],
+    ids=["G68.2", "before the turns", "behind the turns", "names and display"],
+)
+def test_planes_of_other_posts_are_read(case: Case, old: str, new: Callable[[np.ndarray, np.ndarray], str]) -> None:
+    lines, _ = text_of(case, cycles="moves")
+    other = lines
+    if "TC" in new(np.eye(3), np.zeros(3)):
+        other = [line.replace('0,"",0', new(np.eye(3), np.zeros(3))) for line in lines]
+    else:
+        other = _planes_of(lines, old, new, case)
+    assert other != lines
+    one, two = (read_nc("\n".join(each).encode(), control=case.control) for each in (lines, other))
+    np.testing.assert_allclose(one.tip, two.tip, atol=1e-6)
+    np.testing.assert_allclose(one.second, two.second, atol=1e-12)
+    assert two.problems == ()
+    if not re.search("TC_1", "".join(other)):  # which data record, and what the display shows, is the user's own affair
+        assert any("CS571" in text for text in problems(case, other))
+
+
+def test_a_table_of_your_own_may_name_the_data_record() -> None:
+    own = """like = "siemens"
+name = "mine"
+[forms.g1.plane]
+on = ['CYCLE800(1,"TC1",100000,57,0,0,0,{first},{second},{third},0,0,0,1)']
+"""
+    form, stream = choose_form(parse_control(own), "g1", planes=True), io.BytesIO()
+    result = postprocess(CL.encode(), stream, Settings(tolerance=EPS), form=form, processes=1)
+    assert b'CYCLE800(1,"TC1",100000,57,' in stream.getvalue()
+    assert result.verification is not None
+    assert result.verification.problems == ()
+    assert result.unverified == ""

@@ -460,7 +460,7 @@ class Control:
             return replace(self, digits=known[choice.lower()])
         number = int(choice) if choice.isdecimal() and len(choice) < 3 else 0
         if not 1 <= number <= self.digits.most:
-            names = "".join(f"{name}, " for name in self.systems)
-            hint = f"use {names}or a number of decimals up to {self.digits.most}"
+            names = ", ".join(self.systems)
+            hint = f"use {f'{names}, or ' if names else ''}a number of decimals up to {self.digits.most}"
             raise SettingsError("CS228", f"{self.name} cannot be written with the digits {choice!r}", hint)
         return replace(self, digits=replace(self.digits, mm=number, inch=number + 1))

@@ -34,19 +34,22 @@ class TiltedPlane:
     Parameters
     ----------
     frame : (3, 3) float64
-        Columns: its axes X', Y', Z' in the part, whose zero it has.
+        Columns: its axes X', Y', Z' in the part.
     room : float, rad
         By how much its printed angles leave the tool axis open.
     needs : str
         Tool tip control that its motion needs; empty for none.
     turned : bool
         Whether the rotary axes have been sent to it.
+    origin : (float, float, float)
+        Its zero in the part, in units of the text.
     """
 
     frame: Floats
     room: float = 0.0
     needs: str = ""
     turned: bool = True
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def tool(self) -> Floats:
@@ -54,20 +57,20 @@ class TiltedPlane:
         axis: Floats = self.frame[:, 2]
         return axis
 
-    def in_part(self, run: Executed) -> Executed:
-        """Return a run in the coordinates of the part."""
-        out = self.frame.T
+    def in_part(self, run: Executed, factor: float) -> Executed:
+        """Return a run in the coordinates of the part, both in mm; `factor` mm are a unit of the text."""
+        out, origin = self.frame.T, factor * np.array(self.origin)
         return replace(
             run,
-            tip=run.tip @ out,
+            tip=run.tip @ out + origin,
             second=np.tile(self.tool, (len(run.kind), 1)),
-            arc_centre=run.arc_centre @ out,
+            arc_centre=run.arc_centre @ out + origin,
             arc_normal=run.arc_normal @ out,
         )
 
     def left(self, modal: Modal, *, rotary: bool) -> Modal:
         """Return what holds behind the plane: where the rotary axes stand the text has not said."""
-        known = np.array(modal.tip) @ self.frame.T  # nothing where any of it is unknown
+        known = np.array(modal.tip) @ self.frame.T + self.origin  # nothing where any of it is unknown
         second = (math.nan,) * 3 if rotary else tuple(self.tool.tolist())
         return modal.but(tip=tuple(known.tolist()), second=second)
 

@@ -196,7 +196,7 @@ class Reader:
         found = plane.problems(table, run, self.tip_control, axis_words)
         self.problems += [problem for problem in found if problem.text not in self._said_of_planes]
         self._said_of_planes |= {problem.text for problem in found}
-        self._add(plane.in_part(self._in_mm(run, factor, before)), plane)
+        self._add(plane.in_part(self._in_mm(run, factor, before), factor), plane)
 
     def tilt(self, line: Line, plane: TiltedPlane) -> None:
         """Switch a tilted plane on."""

@@ -236,11 +236,12 @@ class Iso(Dialect):
         elif 53.1 in codes:
             state.turn_to_plane(line)
         elif _TILTED in codes:
-            if given.keys() != set("XYZIJK") or any(given[name].value for name in "XYZ"):
-                state.refuse(line, "G68.2 in another form", "give X0. Y0. Z0. and the Euler angles I J K")
+            if given.keys() != set("XYZIJK"):
+                state.refuse(line, "G68.2 in another form", "give its zero X Y Z and the Euler angles I J K")
             turns = [(axis, given[name].value) for axis, name in zip("ZXZ", "IJK", strict=True)]
             room = room_of([given[name].text for name in "IJK"])
-            state.tilt(line, TiltedPlane(rotated_frame(turns), room, "G43", turned=False))
+            origin = given["X"].value, given["Y"].value, given["Z"].value
+            state.tilt(line, TiltedPlane(rotated_frame(turns), room, "G43", turned=False, origin=origin))
         else:
             angles = state.modal.second[:2]
             frame = turned_frame(state.rotary, angles) if state.rotary is not None else None

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, BY_WORD, Dialect, State
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
@@ -44,9 +46,11 @@ _SPEED: Final = "speed"
 #: hole cycles, and how many arguments they may have
 _CYCLES: Final = {"CYCLE81": (4,), "CYCLE82": (6,), "CYCLE83": (12,), "CYCLE84": (12,), "CYCLE85": (8,)}
 
-#: a plane without retract, shifts or more than one data record, whose rotary axes turn to it
+#: a new plane (_ST ends in 00, or is 0) with its shifts before and behind the turns, to which the rotary axes turn
+_THREE: Final = rf"{NUMBER},{NUMBER},{NUMBER}"
 _SWIVEL: Final = re.compile(
-    rf"CYCLE800[ \t]*\((?:0,\"\",0,(?P<mode>\d+),0,0,0,(?P<angles>{NUMBER},{NUMBER},{NUMBER}),0,0,0,-?1)?\)"
+    rf"CYCLE800[ \t]*\((?:[0124],\"(?!0\")\w*\",(?:\d*00|0),(?P<mode>\d+),(?P<before>{_THREE}),(?P<angles>{_THREE}),"
+    rf"(?P<behind>{_THREE}),[-+]?1(?:,[^()]*)?)?\)"
 )
 
 #: a BSPLINE says its degree, which is 3
@@ -167,7 +171,10 @@ class Siemens(Dialect):
             if mode > 0b111111 or 0 in axes or axes[0] == axes[1] or axes[1] == axes[2]:
                 state.refuse(line, f"CYCLE800 in the mode {mode}", "use 57: axis by axis about X, Y, Z")
             turns = [("XYZ"[axis - 1], float(angle)) for axis, angle in zip(axes, angles, strict=True)]
-            state.tilt(line, TiltedPlane(rotated_frame(turns), room_of(angles)))
+            frame = rotated_frame(turns)
+            before, behind = (list(map(float, match[name].split(","))) for name in ("before", "behind"))
+            x, y, z = (np.array(before) + frame @ behind).tolist()
+            state.tilt(line, TiltedPlane(frame, room_of(angles), origin=(x, y, z)))
 
     def _to_machine(self, line: Line, state: State) -> None:
         """SUPA: a rapid in machine coordinates, without frames."""
