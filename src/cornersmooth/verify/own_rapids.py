@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints, Move
+from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram
 from cornersmooth.verify.task import Task
 
@@ -26,15 +26,17 @@ class OwnRapids:
     task: Task
     tip: Floats = field(init=False)
     rapid: Ints = field(init=False)
+    moving: Ints = field(init=False)
 
     def __post_init__(self) -> None:
         program, pose = self.task.original.program, self.task.original.pose
         rapid = np.flatnonzero(program.kind[pose] == Move.RAPID)
         object.__setattr__(self, "tip", program.tip[pose])
         object.__setattr__(self, "rapid", rapid)
+        object.__setattr__(self, "moving", np.flatnonzero(program.kind[pose] != Move.HOLE))
 
     def added(self, start: Floats, end: Floats, step: float, near: Floats) -> bool:
-        """Whether the CL file goes nowhere to the far end of a rapid, but has a pose at the end nearer to the part.
+        """Whether the CL file has a pose at the end of a rapid nearer to the part, and does not ask for the rapid.
 
         Out of holes the tool comes without a pose at its bottom, and over them it goes without one above.
 
@@ -46,12 +48,18 @@ class OwnRapids:
         near : (3,) float64, mm
             That of both which is nearer to the part.
         """
-        far = end if np.array_equal(near, start) else start
-        return _close(self.tip, near, step) and not self.goes_to(far, step)
+        leaves = np.array_equal(near, start)
+        at_near, at_far = (_close(self.tip, tip, step) for tip in (near, end if leaves else start))
+        at_far[np.setdiff1d(np.arange(len(at_far)), self.rapid)] = False
+        asked = False
+        for poses in (slice(None), self.moving):  # at holes that are left out nothing moves
+            one, other = (at_near[poses], at_far[poses]) if leaves else (at_far[poses], at_near[poses])
+            asked |= bool((one[:-1] & other[1:]).any())
+        return bool(at_near.any()) and not asked
 
     def goes_to(self, tip: Floats, step: float) -> bool:
         """Whether the CL file goes to a tip in rapid, up to printed digits."""
-        return _close(self.tip[self.rapid], tip, step)
+        return bool(_close(self.tip[self.rapid], tip, step).any())
 
     def left_out(self, nc: NcProgram) -> tuple[Elements, list[Event]]:
         """Elements and events of a text that was read before, where rapids that posts add do not move the tool.
@@ -78,6 +86,7 @@ class OwnRapids:
         return replace(elements, tip=tip, second=second), events
 
 
-def _close(tips: Floats, tip: Floats, step: float) -> bool:
-    """Whether one of some tips (n, 3) is another, up to printed digits."""
-    return bool((np.abs(tips - tip) <= _STEPS * step).all(axis=1).any())
+def _close(tips: Floats, tip: Floats, step: float) -> Bools:
+    """(n,) which of some tips (n, 3) are another, up to printed digits."""
+    close: Bools = np.logical_and.reduce(np.abs(tips - tip) <= _STEPS * step, axis=1)
+    return close

@@ -19,6 +19,9 @@ from cornersmooth.nc_reader.elements import Element, Elements
 #: how far, relative to the tolerance, a trail may stay off the motion it stands for
 CHORD_SHARE = 0.1
 
+#: the same for arcs of the CL file: chords of the text may end at the same points, and show no error there
+ARC_SHARE = 0.025
+
 #: square of the cosine of half a turn below which a move is divided no more: the axis comes near to turning over
 _STEEPEST = 1e-6
 
@@ -179,7 +182,7 @@ def original_motion(program: Program, tolerance: float, axis_length: float) -> O
         normal = program.arcs.normal[row]
         radius = np.linalg.norm(start - np.einsum("ij,ij->i", start, normal)[:, None] * normal, axis=1)
         sweep = program.arcs.sweep[row]
-        cuts[curved] = np.maximum(cuts[curved], arc_cuts(radius, sweep, tolerance))
+        cuts[curved] = np.maximum(cuts[curved], arc_cuts(radius, sweep, ARC_SHARE * tolerance))
     bare = Original(program, pose, Trail(tip, axis, np.arange(len(pose)), np.ones(len(pose)), np.arange(len(pose))))
     if not len(pose) or cuts.max() == 1:
         return bare
@@ -205,9 +208,9 @@ def turn_cuts(axis: Floats, tolerance: float, axis_length: float) -> Ints:
     return cuts
 
 
-def arc_cuts(radius: Floats, sweep: Floats, tolerance: float) -> Ints:
-    """(k,) number of chords of every arc."""
-    largest = np.sqrt(8 * CHORD_SHARE * tolerance / np.maximum(radius, tolerance))
+def arc_cuts(radius: Floats, sweep: Floats, error: float) -> Ints:
+    """(k,) number of chords of every arc, so that they stay within an error, mm."""
+    largest = np.sqrt(8 * error / np.maximum(radius, error))
     return np.maximum(np.ceil(sweep / np.minimum(largest, 1.0)), 1).astype(np.int64)
 
 
@@ -261,7 +264,7 @@ def written_motion(nc: Elements, first: int, last: int, tolerance: float, axis_l
     arc_at = nc.arcs.element[a0:a1] - first
     if len(arc_at):
         radius = np.linalg.norm(tip[arc_at - 1] - nc.arcs.centre[a0:a1], axis=1)
-        cuts[arc_at] = np.maximum(cuts[arc_at], arc_cuts(radius, nc.arcs.sweep[a0:a1], tolerance))
+        cuts[arc_at] = np.maximum(cuts[arc_at], arc_cuts(radius, nc.arcs.sweep[a0:a1], CHORD_SHARE * tolerance))
     curve_groups = tuple(groups(nc.curves, np.arange(c0, c1)))
     for group in curve_groups:
         cuts[nc.curves.element[group.index] - first] = max(len(group.spans) - 1, 1)

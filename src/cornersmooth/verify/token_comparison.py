@@ -101,7 +101,11 @@ def compare(
         return sum(token.value == _ENDED[kind] for token in _effective(tokens, kind))
 
     for kind in _ENDED:
-        if ended(found, kind) > ended(asked_for, kind) and not any(tidies(token, kind) for token in asked_for):
+        mine = found
+        if kind in _STOPPED:  # what a tool change stops says nothing of the end
+            mine, theirs = (_effective(tokens, kind) for tokens in (found, asked_for))
+            mine = _without_habits(mine, theirs, _ENDED[kind], room, apart)
+        if ended(mine, kind) > ended(asked_for, kind) and not any(tidies(token, kind) for token in asked_for):
             found = [token for token in found if not tidies(token, kind)]
     for kind, (name, code) in _NAMES.items():
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
