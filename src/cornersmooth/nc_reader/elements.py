@@ -199,7 +199,7 @@ class Elements:
         mm/min or mm/rev by which the feed is not known: digits of F, and of times and ways where it is timed.
         Negative where the feed is that of the axis point, if the tip stands still, but where the tip may as well creep
         by what the digits do not show: its feed is then anything up to a few times that room. NaN where the feed of the
-        move may be higher than this, as F is the largest that the control takes.
+        move may be higher than this, as F is the largest that the control takes, and -inf where it may be any.
     second_room : (m,) float64
         By how much, as `second`, directions that must be exact may be off beside the printed digits.
     tip_room : (m,) float64, mm
@@ -239,10 +239,13 @@ class Elements:
         return replace(self, **own, curves=self.curves.part(first, stop), arcs=self.arcs.part(first, stop))
 
     def at_most(self) -> Self:
-        """Return the same elements with feeds below which those of the moves may not be (`feed_room` NaN)."""
+        """Return the same elements with feeds below which those of the moves may not be (`feed_room` NaN).
+
+        Where the tip may creep its feed may be any lower one (-inf).
+        """
         least = np.maximum(self.feed - np.abs(self.feed_room), np.finfo(np.float64).tiny)
         feed = np.where(self.feed > 0.0, least, self.feed)
-        return replace(self, feed=feed, feed_room=np.full(len(self), np.nan))
+        return replace(self, feed=feed, feed_room=np.where(self.feed_room < 0.0, -np.inf, np.nan))
 
     @classmethod
     def joined(cls, parts: Sequence[Elements]) -> Elements:
