@@ -85,7 +85,8 @@ cycles = click.option(
     type=click.Choice(["moves", "native"]),
     default="moves",
     show_default=True,
-    help="Holes as plain moves, or as the control's own cycles where it has such and the tool stays along Z.",
+    help="Holes as plain moves, or as the control's own cycles where it has such and the tool stays along Z (or in a "
+    "tilted plane).",
 )
 planes = click.option(
     "--planes",
