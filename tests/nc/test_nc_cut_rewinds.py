@@ -10,16 +10,20 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cornersmooth import postprocess
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.kinematics import Machine, load_machine
+from cornersmooth.feedrate import Limits
+from cornersmooth.kinematics import Dynamics, Machine, load_machine
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.rotary import rewound_angles
+from cornersmooth.saving import estimate_saving
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from oracle.share import share
+from page.making import page_of
 
 EPS, AWAY = 0.05, 25.0
 WORD = re.compile(r"([A-Z])(?:=\S*?\()?([-+]?\d+\.?\d*)")
@@ -205,6 +209,18 @@ def test_a_cl_file_may_ask_for_all_of_it_itself() -> None:
     assert checked.rewinds == ()
     nc = verify(program, read_nc(stream.getvalue(), machine=how["machine"]), **how)
     assert nc.problems == ()
+
+
+def test_reports_and_pages_name_the_places() -> None:
+    """Plans of the original leave out limits that it does not keep."""
+    machine = replace(short("table-ac"), dynamics=(Dynamics("C", 9000.0, 500.0, 1e5),))
+    form, text = choose_form("fanuc", machine=machine, rewind=AWAY), io.BytesIO()
+    result = postprocess(program_text(), text, Settings(tolerance=EPS), form=form)
+    found = result.report()["verification"]["rewinds"]
+    assert [place["back_nc_line"] > place["nc_line"] for place in found] == [True]
+    saving = estimate_saving(result.program, result.smoothed.settings, form, Limits(), poses=10_000, stretches=1)
+    assert saving is not None
+    assert "expect a mark on the part" in page_of(result)
 
 
 def test_without_being_asked_it_is_an_error() -> None:

@@ -130,7 +130,7 @@ def shop_trial(seed: int) -> ShopTrial:
         axis_length=float(np.round(10.0 ** rng.uniform(0.3, 1.8), 2)),
         method=str(rng.choice(["proportional", "proportional", "zhang2016", "global"])),
     )
-    if tcp and axes and rng.random() < 0.4:
+    if tcp and axes and rng.random() < 0.4 and settings.method != "zhang2016":
         settings = settings.but(lines=str(rng.choice(["long", "dense"])))
     tools = tcp or not machine.swings_the_tool
     rewind = float(rng.choice([5.0, 40.0])) if axes and rng.random() < 0.8 else 0.0

@@ -22,6 +22,9 @@ LEAST_LIFT: Final = 1.0
 #: printed digits by which the place where a cut goes on may be off that where it was left
 _STEPS: Final = 2.0
 
+#: differences of sums, mm
+_ARITHMETIC: Final = 1e-9
+
 
 @dataclass(frozen=True)
 class _Left:
@@ -119,6 +122,9 @@ class LeftCuts:
                 return
             for own, at in ((left.part, len(left.part) - 1), (above, row)):
                 own.tip[at], own.second[at] = left.tip, left.second
+            for values, place in ((part.tip, left.tip), (part.second, left.second)):
+                if np.abs(values[stop] - place).max() < _ARITHMETIC:
+                    values[stop] = place
         self.found.append((left.element, element, left.line, int(part.line[stop])))
 
     @staticmethod

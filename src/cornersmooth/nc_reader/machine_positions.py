@@ -67,8 +67,6 @@ class MachinePositions:
         retract : bool
             Whether it is a retract on the control's own list, which holds where the file says nothing of home.
         """
-        if not self.rules:
-            return []
         if any(rule.pattern.fullmatch(text) for rule in self.rules):
             return self._goes(line, free="Z" if retract and "Z" not in self._home else "")
         names = {word.name for word in line.words}

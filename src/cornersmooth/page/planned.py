@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.errors import SettingsError
+from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, TimeLaw, direct, plan, plan_text
 from cornersmooth.feedrate.written import written_motion
-from cornersmooth.kinematics import Machine, with_dynamics
+from cornersmooth.kinematics import Machine, endless, with_dynamics
 from cornersmooth.model import Floats, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.motions import OriginalPath, WrittenPath
+from cornersmooth.rotary import rapid_moves, rotary_angles
 from cornersmooth.settings import Settings
 
 #: moves up to which a motion is planned: some 10 s of work
@@ -74,6 +75,7 @@ def plan_all(
             if moves > MOST_MOVES:
                 left_out.append(f"The {name} path has {moves:,} moves; its speed is planned up to {MOST_MOVES:,}.")
             elif name == "direct":
+                machine = _that_follows(machine, program, settings)
                 laws[name] = direct(program, limits, "velocity_jump", settings=settings, machine=machine)
             elif name == "local" and smoothed is not None:
                 laws[name] = plan(smoothed, limits, machine=machine)
@@ -89,6 +91,20 @@ def plan_all(
         else:
             ways[name] = _places(law, original.way)
     return Planned(laws, ways, seconds, tuple(left_out))
+
+
+def _that_follows(machine: Machine | None, program: Program, settings: Settings) -> Machine | None:
+    """Return the machine, without limits of its rotary axes where cuts go beyond them: texts may leave such cuts."""
+    if machine is None:
+        return None
+    tolerance = np.degrees(settings.tolerance / settings.axis_length)
+    try:
+        rotary_angles(machine, program.tip, program.axis, tolerance=tolerance, rapid=rapid_moves(program.kind))
+    except InputError as refused:
+        if refused.code == "CS362":
+            return endless(machine)
+        raise
+    return machine
 
 
 def feed_seconds(written: WrittenPath, rapid: float) -> Floats:

@@ -191,8 +191,9 @@ class WordCheck:
         if line.skipped:
             self._wrong(NOT_LISTED, line.number, "block skip: what the control does depends on a switch")
         self._judge(line, words, text)
-        own = any(rule.retract and rule.pattern.fullmatch(text) for rule in self.list.blocks)
-        self.problems += self._positions.take(line, text, retract=own)
+        if self._positions.rules:
+            own = any(rule.retract and rule.pattern.fullmatch(text) for rule in self.list.blocks)
+            self.problems += self._positions.take(line, text, retract=own)
         self._blocks += 1
         self._note(line, words)
         return line
