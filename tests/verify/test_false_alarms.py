@@ -8,10 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.model import Program
+from cornersmooth.nc_reader import read_nc
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
 from nc.cases import Case
@@ -54,7 +56,7 @@ class Alarm:
         settings = Settings(tolerance=self.tolerance, axis_length=self.axis_length, allocation=self.allocation)
         return written(self.program, self.case.choose(endless=True), settings)[0]
 
-    def verified(self, text: str) -> Verification:
+    def verified(self, text: str, *, slower: bool = False) -> Verification:
         """What is found in a text."""
         form = self.case.choose(endless=True)
         return verify(
@@ -65,6 +67,7 @@ class Alarm:
             control=self.case.control,
             machine=form.machine,
             tcp=self.case.tcp,
+            slower=slower,
         )
 
 
@@ -622,6 +625,19 @@ ALARMS = {
 @pytest.mark.parametrize("alarm", ALARMS.values(), ids=ALARMS.keys())
 def test_what_is_written_passes(alarm: Alarm) -> None:
     assert alarm.verified(alarm.text).problems == ()
+
+
+@pytest.mark.parametrize("name", ["creeping", "axis alone"])
+def test_blocks_as_fast_as_f_can_say_are_right_in_a_plan_too(name: str) -> None:
+    assert ALARMS[name].verified(ALARMS[name].text, slower=True).problems == ()
+
+
+def test_a_plan_may_let_the_tip_creep_within_its_digits() -> None:
+    text = read_nc(CREEPING.text.encode(), control="fanuc", machine=CREEPING.case.choose().machine, tcp=False)
+    last = text.feed[-3:]
+    known = replace(text.part(len(text) - 3, len(text)), feed_room=np.array([1.0, -1.0, np.nan])).at_most()
+    assert known.feed.tolist() == [last[0] - 1.0, last[1] - 1.0, last[2]]
+    assert [str(room) for room in known.feed_room.tolist()] == ["nan", "-inf", "nan"]
 
 
 def test_tip_that_turns_round_before_the_axis_point_is_not_going_back() -> None:

@@ -243,7 +243,7 @@ class Elements:
 
         Where the tip may creep its feed may be any lower one (-inf).
         """
-        least = np.maximum(self.feed - np.abs(self.feed_room), np.finfo(np.float64).tiny)
+        least = np.maximum(self.feed - np.abs(np.nan_to_num(self.feed_room)), np.finfo(np.float64).tiny)
         feed = np.where(self.feed > 0.0, least, self.feed)
         return replace(self, feed=feed, feed_room=np.where(self.feed_room < 0.0, -np.inf, np.nan))
 
