@@ -5,7 +5,7 @@ The numbers come from random programs, cut down to the moves that matter.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
