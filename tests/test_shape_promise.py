@@ -21,7 +21,7 @@ from oracle.judge import feeds_out_of_place, judge, not_passed, runs_of
 from oracle.library import exact_poses, original_motion
 from oracle.motion import written_path
 from oracle.nc_text import Curve, Form, Written, parse, without_way_down
-from oracle.share import how_many, share
+from oracle.share import covering_share, how_many
 
 ROOT = Path(__file__).resolve().parent.parent
 FORMS: tuple[Form, ...] = ("g1", "g6.2")
@@ -54,9 +54,13 @@ def write(program: Program, form: Form, options: dict[str, Any]) -> tuple[Writte
     return parse(stream.getvalue(), form), smoothed
 
 
-@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize(("tolerance", "axis_length"), [(0.01, 50.0), (0.15, 10.0)])
+@pytest.mark.parametrize(
+    ("options", "form", "tolerance", "axis_length"),
+    [
+        (OPTIONS[name], form, *limits)
+        for name, form, limits in covering_share(product(OPTIONS, FORMS, [(0.01, 50.0), (0.15, 10.0)]), 3)
+    ],
+)
 def test_random_chains(form: Form, tolerance: float, axis_length: float, options: dict[str, Any]) -> None:
     # every case sees other chains
     case = FORMS.index(form) + 2 * list(OPTIONS.values()).index(options) + 10 * int(tolerance > 0.1)
@@ -79,14 +83,20 @@ def test_samples(name: str, options: dict[str, Any], form: Form) -> None:
     keeps_the_promise(ROOT / "samples" / name, form, options)
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
-@pytest.mark.parametrize("name", ["nx_blade.cls", "creo_vane.ncl", "points_fan.txt"])
+@pytest.mark.parametrize(
+    ("form", "options", "name"),
+    [
+        (form, OPTIONS[option], name)
+        for form, option, name in covering_share(
+            product(FORMS, OPTIONS, ["nx_blade.cls", "creo_vane.ncl", "points_fan.txt"]), 2
+        )
+    ],
+)
 def test_own_files(name: str, options: dict[str, Any], form: Form) -> None:
     keeps_the_promise(cl_file(name), form, options)
 
 
-@pytest.mark.parametrize(("name", "options", "form"), of_corpus(share(product(FILES, OPTIONS, FORMS), 7)))
+@pytest.mark.parametrize(("name", "options", "form"), of_corpus(covering_share(product(FILES, OPTIONS, FORMS), 7)))
 def test_real_files(name: str, options: str, form: Form) -> None:
     keeps_the_promise(cl_file(name), form, OPTIONS[options])
 

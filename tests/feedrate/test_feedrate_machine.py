@@ -20,7 +20,7 @@ from cornersmooth.kinematics import Dynamics, Machine, load_machine, machine_pos
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from oracle.share import share
+from oracle.share import covering_share
 
 MACHINES = ("table-ac", "head-ac", "nutated-bc", "xyzbc-trt", "head-table-bc")
 IMPELLER = FilePath(__file__).resolve().parents[2] / "samples" / "impeller.cls"
@@ -91,7 +91,7 @@ def test_derivatives_are_those_of_the_kinematics(chain: Callable[[int], Program]
                 assert order[3] == pytest.approx(found, rel=1e-5, abs=1e-6 * np.abs(order).max()), (kind, element)
 
 
-@pytest.mark.parametrize(("seed", "name"), share(product((1, 2, 5), MACHINES), 2))
+@pytest.mark.parametrize(("seed", "name"), covering_share(product((1, 2, 5), MACHINES), 4))
 def test_limits_hold_on_random_chains(chain: Callable[[int], Program], name: str, seed: int) -> None:
     law = plan(
         smooth(tilted(chain(seed)), Settings(tolerance=0.05)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from itertools import product
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from nc.cases import CHOSEN, Case
+from oracle.share import covering_share
 
 EPS, H = 0.01, 10.0
 UPRIGHT, TILTED = "0,0,1", "0.48,0.36,0.8"
@@ -52,8 +54,7 @@ def problems(case: Case, program, lines: list[str], tolerance: float):
     return verify(program, data, tolerance=tolerance, axis_length=H, **options).problems
 
 
-@pytest.mark.parametrize("units", ["MM", "INCHES"])
-@pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.parametrize(("units", "case"), covering_share(product(["MM", "INCHES"], CASES), 2), ids=str)
 def test_rapids_along_the_tool_stand_at_both_ends(case: Case, units: str) -> None:
     program, lines, tolerance = text_of(case, units, Frame(approach=50.0, retract=100.0))
     assert problems(case, program, lines, tolerance) == ()

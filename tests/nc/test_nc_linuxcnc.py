@@ -185,14 +185,14 @@ ARRANGED = [("xyzac-trt", True), ("xyzbc-trt", True), ("xyzac-trt", False)]
 
 @pytest.mark.parametrize(("machine", "tcp"), ARRANGED)
 def test_own_files_are_accepted(machine: str, tcp: bool, tmp_path: Path) -> None:
-    for path in sorted(OWN.iterdir()):
+    for path in share(sorted(OWN.iterdir()), 3, ARRANGED.index((machine, tcp))):
         accepted(written(path.read_bytes(), machine, tcp=tcp, tolerance=0.02, endless=True), tmp_path)
 
 
 @pytest.mark.parametrize(("machine", "tcp"), of_corpus(ARRANGED))
 def test_real_files_are_accepted(machine: str, tcp: bool, corpus: Path, tmp_path: Path) -> None:
     taken = 0
-    for path in share(sorted(corpus.iterdir()), 2, ARRANGED.index((machine, tcp))):
+    for path in share(sorted(corpus.iterdir()), 4, ARRANGED.index((machine, tcp))):
         if path.is_dir() or path.suffix == ".md" or len(read(path.read_bytes(), name=path.name)) > MOST_POSES:
             continue
         data = path.read_bytes().replace(

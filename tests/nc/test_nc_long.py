@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.settings import Settings
 from nc.cases import CHOSEN, Case
 from nc.promise import random_verdict, runs_of, verdict, without_holes, written
-from oracle.share import how_many
+from oracle.share import covering_share, how_many
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 
@@ -23,8 +23,7 @@ LONG = [case for case in CHOSEN if case.choose().long_lines]
 LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
 
 
-@pytest.mark.parametrize("case", LONG, ids=str)
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(("seed", "case"), covering_share(product([0, 1], LONG), 2), ids=str)
 def test_random_chains_keep_the_tolerance(case: Case, seed: int) -> None:
     tolerance, axis_length = LIMITS[(len(str(case)) + seed) % 3]
     settings = Settings(tolerance=tolerance, axis_length=axis_length, lines="long")
@@ -32,7 +31,7 @@ def test_random_chains_keep_the_tolerance(case: Case, seed: int) -> None:
     assert found.deviation.worst <= tolerance, found
 
 
-@pytest.mark.parametrize("case", LONG, ids=str)
+@pytest.mark.parametrize("case", covering_share(LONG, 2, 1), ids=str)
 def test_sample_keeps_the_tolerance(case: Case) -> None:
     program = without_holes(read((SAMPLES / "impeller.cls").read_bytes(), name="impeller.cls"))
     settings = Settings(tolerance=0.02, axis_length=20.0, lines="long")

@@ -19,7 +19,7 @@ from nc.cases import ALL, RUNNABLE, Case
 from nc.grammars import reader
 from nc.promise import written
 from nc.reading import Reading
-from oracle.share import share
+from oracle.share import covering_share, share
 
 POSES = "RAPID\nGOTO/0,0,50{up}\n{feed}\nGOTO/0,0,0{up}\nGOTO/20,0,0{tilted}\nGOTO/20,15,1{other}\nGOTO/0,15,1{other}\n"
 AXES = {"up": ",0,0.099503719,0.995037190", "tilted": ",0.098058068,0,0.995180702", "other": ",0,0.2,0.979795897"}
@@ -97,7 +97,9 @@ def test_the_matrix_holds_what_the_controls_cannot_run() -> None:
 MODES = {"heidenhain": ("M137", "M136", None)}
 
 
-@pytest.mark.parametrize("case", [case for case in RUNNABLE if case.machine in ("", "table-ac")], ids=str)
+@pytest.mark.parametrize(
+    "case", covering_share([case for case in RUNNABLE if case.machine in ("", "table-ac")], 2), ids=str
+)
 def test_feeds_mean_what_the_file_says(case: Case) -> None:
     """F of the first cut in the words of each control; Heidenhain counts tenths of an inch per minute."""
     minute, revolution, _ = MODES.get(case.control, ("G94", "G95", "G93"))
@@ -109,7 +111,7 @@ def test_feeds_mean_what_the_file_says(case: Case) -> None:
         assert (first.mode, first.feed) == (revolution, 0.1)
 
 
-@pytest.mark.parametrize("case", [case for case in RUNNABLE if not case.tcp], ids=str)
+@pytest.mark.parametrize("case", covering_share([case for case in RUNNABLE if not case.tcp], 3), ids=str)
 def test_inverse_time_gives_the_tip_its_feed(case: Case) -> None:
     """1/F minutes for every block: the tip runs with 800 mm/min along the part, whatever the axes do."""
     timed = [piece for piece in read_back(case, "per minute").pieces if not piece.rapid]
@@ -130,7 +132,9 @@ TURN = (
 
 @pytest.mark.parametrize(
     "case",
-    [case for case in RUNNABLE if case.choose().orientation != "fixed" and not case.machine.endswith("trt")],
+    covering_share(
+        [case for case in RUNNABLE if case.choose().orientation != "fixed" and not case.machine.endswith("trt")], 2
+    ),
     ids=str,
 )
 def test_a_tool_that_only_turns(case: Case) -> None:

@@ -20,7 +20,7 @@ from nc.promise import random_verdict, runs_of, verdict, without_holes
 from oracle.chains import Chain, cl_text
 from oracle.files import cl_file, of_corpus
 from oracle.motion import Original, unit
-from oracle.share import how_many, share
+from oracle.share import covering_share, how_many, share
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 
@@ -35,7 +35,7 @@ LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
 )
 def test_random_chains_keep_the_tolerance(case: Case, tolerance: float, axis_length: float, units: str) -> None:
     settings = Settings(tolerance=tolerance, axis_length=axis_length)
-    count = how_many(8, 24) if case.tcp else 6  # without tool tip control every line becomes many
+    count = how_many(6, 24) if case.tcp else 6  # without tool tip control every line becomes many
     found = random_verdict(case, settings, len(str(case)), count, units)
     assert found.deviation.worst <= tolerance, found
 
@@ -56,7 +56,7 @@ def keeps_the_tolerance(path: Path, case: Case, tolerance: float = 0.02, axis_le
     return True
 
 
-@pytest.mark.parametrize("case", CHOSEN, ids=str)
+@pytest.mark.parametrize("case", covering_share(CHOSEN, 2, 1), ids=str)
 def test_samples_keep_the_tolerance(case: Case) -> None:
     tried = [keeps_the_tolerance(SAMPLES / name, case) for name in ("impeller.cls", "paper_table1.csv")]
     upright = case in (Case("heidenhain", "spl"), Case("mitsubishi", "g6.2"))
@@ -83,12 +83,12 @@ OWN = ["nx_blade.cls", "nx_pocket.cls", "creo_plate.ncl", "solidworks_bracket.ap
     [*((name, part) for part, name in enumerate(OWN)), *of_corpus((name, part) for part, name in enumerate(FILES))],
 )
 def test_files_keep_the_tolerance(name: str, part: int) -> None:
-    """Each file in a fifth of the controls and forms: `nc.sweep` does all."""
+    """Each file in an eighth of the controls and forms: `nc.sweep` does all."""
     path = cl_file(name)
     # without tool tip control every line becomes many: `nc.sweep` tries those
     small = path.stat().st_size < 12_000 and name not in OWN
     cases = [case for case in CHOSEN if case.tcp or small]
-    cases = share(cases, 5, part)
+    cases = share(cases, 8, part)
     assert 2 * sum(keeps_the_tolerance(path, case) for case in cases) > len(cases)
 
 
@@ -103,7 +103,9 @@ def test_machine_positions_go_with_the_angles_as_written(control: str) -> None:
     assert found.deviation.worst <= settings.tolerance, found
 
 
-@pytest.mark.parametrize("case", [case for case in CHOSEN if case.choose().orientation != "fixed"], ids=str)
+@pytest.mark.parametrize(
+    "case", covering_share([case for case in CHOSEN if case.choose().orientation != "fixed"], 2), ids=str
+)
 def test_arcs_with_a_turning_tool_keep_the_tolerance(case: Case) -> None:
     """A circular block has no words for it: lines, on which tip and axis run as one."""
     axis = unit(np.array([[0.1, 0.0, 1.0], [0.0, 0.3, 1.0]]))

@@ -18,7 +18,7 @@ from cornersmooth.pipeline import postprocess, reading_back
 from cornersmooth.provenance import read_provenance
 from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
-from oracle.share import share
+from oracle.share import covering_share
 
 CASES = (
     ("fanuc", "g1", "", True),
@@ -58,7 +58,7 @@ def made(form: Form, units: str = "mm", *, planned: bool = True) -> bytes:
 
 @pytest.mark.parametrize(
     ("control", "form", "machine", "tcp", "units"),
-    share([(*case, units) for units in ("mm", "inch") for case in CASES], 2),
+    covering_share([(*case, units) for units in ("mm", "inch") for case in CASES], 3),
 )
 def test_blocks_have_the_mean_speed_of_the_plan(control: str, form: str, machine: str, tcp: bool, units: str) -> None:
     chosen = form_of(control, form, machine, tcp)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from cornersmooth.kinematics import Machine, load_machine, machine_names, poses,
 from cornersmooth.kinematics.poses import angle_between
 from cornersmooth.model import Move
 from cornersmooth.rotary import angle_path, axis_findings, fill, insertions, rapid_moves, rotary_angles, still_poses
+from oracle.share import covering_share
 
 TOLERANCE = 0.02  # degrees
 
@@ -343,8 +345,7 @@ def test_random_walks(seed: int):
         assert len(more.unsolved) == 0
 
 
-@pytest.mark.parametrize("size", [1, 2, 7, 64])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("size", "seed"), covering_share(product([1, 2, 7, 64], range(6)), 5))
 def test_blocks_change_nothing(size: int, seed: int, monkeypatch: pytest.MonkeyPatch):
     """Rows are worked on some at a time: whatever stands at an edge between blocks, the result is the same."""
     rng = np.random.default_rng(seed)

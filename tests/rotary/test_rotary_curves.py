@@ -6,6 +6,7 @@ import io
 import itertools
 import time
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.segments import segments_of
+from oracle.share import covering_share
 
 TOLERANCE = 0.01  # mm
 KNOTS5 = np.array([0, 0, 0, 0, 0.5, 1, 1, 1, 1])
@@ -225,9 +227,18 @@ def test_fan_path_of_the_literature(corpus: Path, name: str):
         assert_straight(smoothed, machine, curves)
 
 
-@pytest.mark.parametrize("name", machine_names())
 @pytest.mark.parametrize(
-    ("tilt", "spread"), [(30, 0.003), (30, 0.03), (30, 0.2), (4, 0.02), (0.3, 0.01), (0, 0.002), (0, 0.3)]
+    ("name", "tilt", "spread"),
+    [
+        (name, *bend)
+        for name, bend in covering_share(
+            product(
+                machine_names(),
+                [(30, 0.003), (30, 0.03), (30, 0.2), (4, 0.02), (0.3, 0.01), (0, 0.002), (0, 0.3)],
+            ),
+            3,
+        )
+    ],
 )
 def test_random_chains(name: str, tilt: float, spread: float):
     machine = endless(name)
@@ -340,9 +351,10 @@ def test_straight_through_the_pole_first_axis_rests(name: str):
     assert_curves(smoothed, machine, curves)
 
 
-@pytest.mark.parametrize("name", ["table-ac", "nutated-bc"])
-@pytest.mark.parametrize("aside", [1e-9, 1e-4, 0.005, 0.02, 0.03, 0.1, 0.5, 2.0])
-@pytest.mark.parametrize("n", [9, 41])
+@pytest.mark.parametrize(
+    ("name", "aside", "n"),
+    covering_share(product(["table-ac", "nutated-bc"], [1e-9, 1e-4, 0.005, 0.02, 0.03, 0.1, 0.5, 2.0], [9, 41]), 3),
+)
 def test_beside_the_pole(name: str, aside: float, n: int):
     machine = endless(name)
     program = zigzag(np.linspace(-23, 20, n), 30.0, n)
@@ -421,8 +433,12 @@ def test_sharp_corners_rapids_and_repeated_poses():
     np.testing.assert_allclose(tool_axis(machine, curves.pose_angles[written]), axis[written], atol=1e-12)
 
 
-@pytest.mark.parametrize("name", [name for name in machine_names() if name != "nutated-bc"])
-@pytest.mark.parametrize("aside", [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 0.01])
+@pytest.mark.parametrize(
+    ("name", "aside"),
+    covering_share(
+        product([name for name in machine_names() if name != "nutated-bc"], [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 0.01]), 5
+    ),
+)
 def test_axis_that_turns_over(name: str, aside: float):
     """Half a turn of the axis in one segment: followed where a way round can be told, else said, never a warning."""
     machine = endless(name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from cornersmooth.nc import Form, choose_form, fit_settings, write
 from cornersmooth.nc.rotary_rows import LARGEST_TURN
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from oracle.share import covering_share
 
 TOLERANCE, AXIS_LENGTH = 0.01, 10.0
 
@@ -68,9 +70,9 @@ def farthest(machine: Machine, program: Program, tip: np.ndarray, words: np.ndar
     return float(np.linalg.norm(gap[:, :3], axis=1).max()), float(np.linalg.norm(gap[:, 3:], axis=1).max())
 
 
-@pytest.mark.parametrize("name", machine_names())
-@pytest.mark.parametrize("aside", [0.0, 1e-9, 1e-4, 2e-3])
-@pytest.mark.parametrize("bend", [0.0, 90.0, 180.0])
+@pytest.mark.parametrize(
+    ("name", "aside", "bend"), covering_share(product(machine_names(), [0.0, 1e-9, 1e-4, 2e-3], [0.0, 90.0, 180.0]), 5)
+)
 def test_written_path_through_the_pole(name: str, aside: float, bend: float):
     """Within the tolerance all along the blocks, and no block turns an axis by more than the stated limit."""
     machine, program = endless(name), over_the_pole(aside, bend)

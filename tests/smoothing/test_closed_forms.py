@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
@@ -9,6 +11,7 @@ from scipy.interpolate import BSpline
 from cornersmooth.model import LimitedBy, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
+from oracle.share import covering_share
 from smoothing.paths import plane_corner, random_program, simultaneous_deviation
 
 TABLE_1 = (
@@ -143,8 +146,7 @@ def test_moving_turning_scaling_and_reversing_the_path_commute_with_smoothing():
     assert turned.status[::-1].tolist() == plain.status.tolist()
 
 
-@pytest.mark.parametrize("wobble", [0.02, 0.3, 1.0])
-@pytest.mark.parametrize("axis_length", [10.0, 50.0])
+@pytest.mark.parametrize(("wobble", "axis_length"), covering_share(product([0.02, 0.3, 1.0], [10.0, 50.0]), 3))
 def test_tip_and_axis_point_keep_the_tolerance_at_one_common_parameter(wobble, axis_length):
     smoothed = smooth(random_program(11, 3000, wobble=wobble), Settings(tolerance=0.04, axis_length=axis_length))
     corners = smoothed.corners

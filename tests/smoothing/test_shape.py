@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,6 +17,7 @@ from cornersmooth.smoothing import nurbs, smooth
 from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
 from cornersmooth.smoothing.sampling import dense_rows
 from cornersmooth.smoothing.segments import lines_per_half
+from oracle.share import covering_share
 from smoothing.paths import grid_program, plane_corner, random_program, simultaneous_deviation
 
 AUTO = Settings(shape="auto")
@@ -106,9 +109,10 @@ def test_auto_goes_with_no_other_choice_of_weights():
 # ---------------------------------------------------------------- the promise
 
 
-@pytest.mark.parametrize("allocation", ["half", "fair"])
-@pytest.mark.parametrize("wobble", [0.02, 0.3, 1.0, 2.0])
-@pytest.mark.parametrize("axis_length", [10.0, 200.0])
+@pytest.mark.parametrize(
+    ("allocation", "wobble", "axis_length"),
+    covering_share(product(["half", "fair"], [0.02, 0.3, 1.0, 2.0], [10.0, 200.0]), 3),
+)
 def test_tip_and_axis_point_keep_the_tolerance(wobble, axis_length, allocation):
     settings = AUTO.but(tolerance=0.04, axis_length=axis_length, allocation=allocation)
     smoothed = smooth(random_program(17, 1500, wobble=wobble), settings)
@@ -120,9 +124,9 @@ def test_tip_and_axis_point_keep_the_tolerance(wobble, axis_length, allocation):
     assert top == pytest.approx(corners.axis_error[rows], rel=3e-3, abs=1e-6)
 
 
-@pytest.mark.parametrize("weights", ANY_WEIGHTS)
-@pytest.mark.parametrize("ratio", BOUNDS["ratio"])
-@pytest.mark.parametrize("wobble", [0.1, 1.5])
+@pytest.mark.parametrize(
+    ("weights", "ratio", "wobble"), covering_share(product(ANY_WEIGHTS, BOUNDS["ratio"], [0.1, 1.5]), 3)
+)
 def test_any_weights_keep_the_tolerance(weights, ratio, wobble):
     settings = Settings(tolerance=0.1, axis_length=50.0, weights=weights, ratio=ratio)
     smoothed = smooth(random_program(23, 600, wobble=wobble), settings)

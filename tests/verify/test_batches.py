@@ -112,17 +112,22 @@ def check(program, text, used, processes=1, batches_used=True, everywhere=True, 
     return found
 
 
-@pytest.mark.parametrize("processes", [1, forks])
+ONE_BY_ONE = [
+    ("fanuc", "g1"),
+    ("fanuc", "g6.2"),
+    ("siemens", "g1"),
+    ("siemens", "bspline"),
+    ("siemens", "poly"),
+    ("heidenhain", "g1"),
+    ("generic", "g1"),
+]
+
+
 @pytest.mark.parametrize(
-    ("control", "form"),
+    ("control", "form", "processes"),
     [
-        ("fanuc", "g1"),
-        ("fanuc", "g6.2"),
-        ("siemens", "g1"),
-        ("siemens", "bspline"),
-        ("siemens", "poly"),
-        ("heidenhain", "g1"),
-        ("generic", "g1"),
+        *((*case, 1) for case in ONE_BY_ONE),
+        *(pytest.param(*case, 3, marks=forks.marks) for case in share(ONE_BY_ONE, 4, 1)),
     ],
 )
 def test_same_as_the_whole(used, control, form, processes):

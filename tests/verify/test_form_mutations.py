@@ -55,7 +55,7 @@ def test_every_mutant_that_matters_is_found(case: Case) -> None:
     program = program_of(case)
     lines = text_of(case, program)
     assert named_in(case, program, lines) == []
-    chosen = share_of_kinds(mutants(case, lines), lambda mutant: mutant.kind, 5)
+    chosen = share_of_kinds(mutants(case, lines), lambda mutant: mutant.kind, 9)
     score = judge(program, lines, chosen, partial(text_of, case), partial(named_in, case))
     print(f"\n{case}: {score}")
     assert score.missed == []
