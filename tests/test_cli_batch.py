@@ -15,6 +15,7 @@ import pytest
 from interruptions import FILES, Bench
 from oracle.chains import cl_text, random_chains
 from oracle.command import BAD_INPUT, BAD_OUTPUT, DONE, SMALL, USAGE, run
+from oracle.share import share
 
 
 @pytest.fixture
@@ -153,7 +154,7 @@ def test_a_batch_that_was_interrupted_goes_on_where_it_was(tmp_path: Path) -> No
     bench = Bench(tmp_path, single=10, several=500)
     out = tmp_path / "out"
     words = [word for word in bench.words(True, out) if word != "--force"]
-    for moment in (0.5, 0.7):
+    for moment in share((0.5, 0.7), 2):
         process = subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True)
         try:
             process.wait(moment * bench.seconds[True])
