@@ -27,6 +27,9 @@ _CLEARLY = 0.25
 #: vertices of a batch that are followed one by one, and how far before a doubtful place one is sure, in `near`
 _MOST_VERTICES, _SURE = 4096, 2.0
 
+#: how many times `Match.near` a vertex is from its path that is on it nowhere, in six dimensions
+_OFF = 2.0
+
 Found = tuple[Floats, Ints, Ints, Floats]
 
 
@@ -62,8 +65,10 @@ def written_backwards(match: Match, written: Reached) -> Found | None:
         vertex, own, free, held = vertex[rows], own[rows], free[rows], held[rows]
         if not len(vertex):
             return None
-    gain = _distance(own, _on(six, held)) - _distance(own, _on(six, free))
-    wrong = (gain > match.slack) & (free < held)
+    off = _distance(own, _on(six, free))
+    gain = _distance(own, _on(six, held)) - off
+    # what is off the path is told by its distance: where along the path it would be nearest says nothing
+    wrong = (gain > match.slack) & (free < held) & (off <= _OFF * match.near)
     wrong &= _way(length, free, held) <= _STRAIGHT * _distance(_on(six, held), _on(six, free)) + match.slack
     rows = np.flatnonzero(wrong)
     wrong[rows] = _gain_alone(match, vertex[rows], held[rows], free[rows]) > match.slack
