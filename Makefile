@@ -30,8 +30,8 @@ docs: $(STAMP)  ## the reference of the library, as pages in build/docs
 packages: $(STAMP)  ## wheel and sdist, installed in every Python that is here
 	.ci/packages
 
-bench: $(STAMP)  ## time the whole command beside a plain C program
-	$(BIN)/python benchmarks/bench.py
+bench: $(STAMP)  ## time the whole command beside a plain C program; with BEFORE=FOLDER beside another checkout
+	$(BIN)/python benchmarks/$(if $(BEFORE),compare.py $(BEFORE),bench.py)
 
 controller: $(STAMP)  ## time texts on LinuxCNC's whole controller
 	$(BIN)/python tests/nc/controller_table.py $(CORNERSMOOTH_CORPUS)

@@ -35,6 +35,7 @@ RUN_BY = {
     "make docs": "test_make_docs_writes_the_reference",
     # an hour, so it runs with few poses
     "make bench": "test_make_bench_times_the_command",
+    "make bench BEFORE=FOLDER": "test_make_bench_compares_checkouts",
     # minutes of LinuxCNC's whole controller in real time: here it gives a made-up answer
     "make controller": "test_make_controller_prints_its_table",
     "pip install .": ".ci/packages",
@@ -130,6 +131,14 @@ def test_make_bench_times_the_command(checkout: Path) -> None:
     few = [*words, "--points", "100", "--runs", "1", "--case", "fanuc g1"]
     done = subprocess.run(few, cwd=checkout, env=environment(), capture_output=True, text=True, check=True)
     assert re.search(r"^fanuc g1( +-?[\d.,]+){9}$", done.stdout, re.MULTILINE)
+
+
+@without_make
+def test_make_bench_compares_checkouts(checkout: Path) -> None:
+    words = shlex.split(make(checkout, "-n", "bench", f"BEFORE={ROOT}"))
+    few = [*words, ROOT, "--points", "100", "--case", "fanuc g1"]
+    done = subprocess.run(few, cwd=checkout, env=environment(), capture_output=True, text=True, check=True)
+    assert re.search(r"^\| fanuc g1( \| [\d.,]+){10} \|$", done.stdout, re.MULTILINE)
 
 
 @without_make
