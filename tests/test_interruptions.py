@@ -9,7 +9,7 @@ from interruptions import Bench, Try, tries
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    return Bench(tmp_path_factory.mktemp("bench"), single=31_000, several=2_000)
+    return Bench(tmp_path_factory.mktemp("bench"), single=31_000, several=1_000)
 
 
 @pytest.mark.parametrize("one", tries(8, seed=7), ids=lambda one: f"{'batch' if one.batch else 'single'}-{one.how}")

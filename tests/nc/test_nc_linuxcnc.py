@@ -30,7 +30,7 @@ from oracle.files import OWN, of_corpus
 from oracle.judge import judge
 from oracle.motion import Path as Motion
 from oracle.motion import unit
-from oracle.share import how_many, share
+from oracle.share import covering_share, how_many, share
 
 Floats = NDArray[np.float64]
 
@@ -113,7 +113,7 @@ WAYS = [
 ]
 
 
-@pytest.mark.parametrize(("machine", "tcp", "units"), WAYS)
+@pytest.mark.parametrize(("machine", "tcp", "units"), covering_share(WAYS, 3))
 def test_positions_are_those_in_the_text(machine: str, tcp: bool, units: str, tmp_path: Path) -> None:
     cl = flat(1, how_many(12, 24))[0]
     text = written(cl if units == "mm" else in_inches(cl), machine, tcp=tcp)
@@ -133,7 +133,7 @@ def test_positions_are_those_in_the_text(machine: str, tcp: bool, units: str, tm
         np.testing.assert_allclose(found[columns], scale * numbers, rtol=1e-12, atol=1e-9)
 
 
-@pytest.mark.parametrize(("machine", "tcp", "units"), WAYS)
+@pytest.mark.parametrize(("machine", "tcp", "units"), covering_share(WAYS, 3, 1))
 def test_tip_and_axis_by_its_own_formulas_keep_the_tolerance(
     machine: str, tcp: bool, units: str, tmp_path: Path
 ) -> None:
@@ -192,7 +192,7 @@ def test_own_files_are_accepted(machine: str, tcp: bool, tmp_path: Path) -> None
 @pytest.mark.parametrize(("machine", "tcp"), of_corpus(ARRANGED))
 def test_real_files_are_accepted(machine: str, tcp: bool, corpus: Path, tmp_path: Path) -> None:
     taken = 0
-    for path in share(sorted(corpus.iterdir()), 4, ARRANGED.index((machine, tcp))):
+    for path in share(sorted(corpus.iterdir()), 2, ARRANGED.index((machine, tcp))):
         if path.is_dir() or path.suffix == ".md" or len(read(path.read_bytes(), name=path.name)) > MOST_POSES:
             continue
         data = path.read_bytes().replace(

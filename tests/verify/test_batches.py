@@ -47,7 +47,7 @@ def used(monkeypatch):
     return found
 
 
-def part(count=900, every=45, units="mm", seed=0, fixed=False):
+def part(count=600, every=45, units="mm", seed=0, fixed=False):
     """Passes between rapids, with changes of feed, tools, stops and an axis that stands still for a while."""
     tip, axis = wavy(count, seed=seed)
     axis[count // 3 : count // 2] = axis[count // 3]
@@ -192,10 +192,17 @@ def test_what_cannot_be_read_says_its_line(used, processes):
     assert failure.value.line == 701
 
 
-@pytest.mark.parametrize("processes", [1, forks])
-@pytest.mark.parametrize(("control", "form"), [("fanuc", "g1"), ("fanuc", "g6.2"), ("siemens", "bspline")])
+@pytest.mark.parametrize(
+    ("control", "form", "processes"),
+    [
+        ("fanuc", "g1", 1),
+        ("fanuc", "g6.2", 1),
+        ("siemens", "bspline", 1),
+        *(pytest.param(*case, 3, marks=forks.marks) for case in share(ONE_BY_ONE[:4], 2, 1)),
+    ],
+)
 def test_pass_longer_than_batches_is_cut(used, control, form, processes):
-    program = part(every=890)
+    program = part(every=590)
     text = text_of(program, control, form)
     assert check(program, text, used, processes, control=control).passed
     lines = text.decode().splitlines()
