@@ -54,7 +54,7 @@ def followed(case: Case, hint: str) -> Case:
     return case
 
 
-@pytest.mark.parametrize("case", RUNNABLE, ids=str)
+@pytest.mark.parametrize("case", covering_share(RUNNABLE, 2), ids=str)
 def test_what_runs_is_text_of_the_control(case: Case) -> None:
     for feed, units in share(product(FEEDS, ("mm", "inch")), 2, RUNNABLE.index(case)):
         found = read_back(case, feed, units)
