@@ -23,7 +23,10 @@ from cornersmooth.verify.wide_search import passed_nearby
 
 #: rows of a batch for which tip and axis point are looked at each on its own: at a time, those that are farther than
 #: the tolerance from a common pose at a time, and at most
-_OWN_ROWS, _SOME_OWN_ROWS, _MOST_OWN_ROWS = 16, 512, 2048
+_OWN_ROWS, _SOME_OWN_ROWS, _MOST_OWN_ROWS = 16, 256, 2048
+
+#: rows farther than the tolerance from which on the worst of them tell enough, if most of these are off by themselves
+_MANY_OVER = 1024
 
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 TOGETHER: Final = 2.0
@@ -84,7 +87,8 @@ def _take(
     for begin in range(0, len(order), _SOME_OWN_ROWS):
         rows = order[begin : begin + _SOME_OWN_ROWS]
         look(rows)
-        if 2 * np.count_nonzero(np.maximum(tip[rows], axis[rows]) > limit) > _SOME_OWN_ROWS:
+        broken = np.count_nonzero(np.maximum(tip[rows], axis[rows]) > limit)
+        if len(over) > _MANY_OVER and 2 * broken > _SOME_OWN_ROWS:
             break  # the text is off everywhere
     for values, worst in ((tip, result.tip), (axis, result.axis_point)):
         looked = 0

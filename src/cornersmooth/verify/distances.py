@@ -160,8 +160,9 @@ def _brackets(match: Match) -> tuple[Ints, Ints, Ints, Ints]:
     return vertex, np.clip(on[k], low, high), low, high
 
 
-#: poses that are looked for on single elements in a batch; and how many tolerances off is far then
-_MOST_SEARCHED, _FAR_OFF = 4096, 10.0
+#: poses of a batch that are looked for on single elements: how many are many, of which those that are far off need no
+#: search, with how many tolerances far is; and how many are looked for at most
+_MANY, _FAR_OFF, _MOST_SEARCHED = 512, 10.0, 4096
 
 #: vectors shorter than this have no direction
 _LEAST = 1e-300
@@ -205,7 +206,7 @@ def _on_bent(match: Match, point: Floats, segment: Ints, at: Floats) -> tuple[Fl
             axis[rows] = directions(nc, found[good, :3], found[good, 3:])
             open_rows[rows] = False
     rest = np.flatnonzero(open_rows)
-    if len(rest) > _MOST_SEARCHED:  # of what is far off anyway the polyline tells enough
+    if len(rest) > _MANY:  # of what is far off anyway the polyline tells enough
         tip[rest], axis[rest] = _on(trail.tip, segment[rest], at[rest]), _unit_on(trail.axis, segment[rest], at[rest])
         away = point[rest, :3] - tip[rest]
         near = np.einsum("ij,ij->i", away, away) <= (_FAR_OFF * match.tolerance) ** 2

@@ -33,8 +33,9 @@ _LOST = 8
 #: to and fro below this part of the tolerance is settled by itself, and pairs and windows that are looked at for it
 _SMALL, _SMALL_PAIRS, _SMALL_WINDOWS = 0.1, 4096, 64
 
-#: windows that are assigned anew, one after another, without much gain: the text itself is off then
-_MOST_FUTILE = 8
+#: windows that are assigned anew, one after another, without much gain: the text itself is off then; a window counts
+#: once more for so many vertices that stay in doubt
+_MOST_FUTILE, _MANY_DOUBTS = 8, 32
 
 #: slack of arithmetic on lengths, mm
 _ARITHMETIC = 1e-9
@@ -221,7 +222,8 @@ class Search:
                 part = slice(first, last + 1)
                 before = self._doubts(part)
                 self._assign(first, last, most_pairs, doubtful, wide=around > ROUNDS[0][0])
-                futile = 0 if 2 * self._doubts(part) < before else futile + bool(before)
+                left = self._doubts(part)
+                futile = 0 if 2 * left < before else futile + bool(before) + left // _MANY_DOUBTS
                 if futile > _MOST_FUTILE:
                     return  # nor here
 
