@@ -10,8 +10,11 @@ WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 run: $(STAMP)  ## install into .venv, smooth the samples, show what came out
 	$(BIN)/python samples/show.py
 
-# the many processes that tests start load what the first has compiled
+# the many processes that tests start load what the first has compiled; they are as many as there is work for, so that
+# threads of each for its arithmetic would only wait for one another
 test thorough: export PYTHONDONTWRITEBYTECODE =
+test thorough: export OMP_NUM_THREADS = 1
+test thorough: export OPENBLAS_NUM_THREADS = 1
 
 test: $(STAMP)  ## the whole test suite, on all processors
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal

@@ -50,7 +50,11 @@ def named_in(case: Case, program: Program, lines: list[str]) -> list[tuple[int, 
     return [(problem.nc_line, f"{problem.code} {problem.text}") for problem in found.problems]
 
 
-@pytest.mark.parametrize("case", covering_share(CASES, 2), ids=str)
+#: each control and each form, and the one form in which a fold may be lost: all kinds of mutants are among theirs
+USUAL = [*covering_share(CASES, 2), *(case for case in CASES if str(case) == "heidenhain-spl-table-ac")]
+
+
+@pytest.mark.parametrize("case", dict.fromkeys(USUAL), ids=str)
 def test_every_mutant_that_matters_is_found(case: Case) -> None:
     program = program_of(case)
     lines = text_of(case, program)
