@@ -87,8 +87,8 @@ def _take(
     for begin in range(0, len(order), _SOME_OWN_ROWS):
         rows = order[begin : begin + _SOME_OWN_ROWS]
         look(rows)
-        broken = np.count_nonzero(np.maximum(tip[rows], axis[rows]) > limit)
-        if len(over) > _MANY_OVER and 2 * broken > _SOME_OWN_ROWS:
+        off = int(np.count_nonzero(np.maximum(tip[rows], axis[rows]) > limit))
+        if len(over) > _MANY_OVER and 2 * off > _SOME_OWN_ROWS:
             break  # the text is off everywhere
     for values, worst in ((tip, result.tip), (axis, result.axis_point)):
         looked = 0
