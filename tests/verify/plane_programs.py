@@ -178,7 +178,9 @@ def trial(seed: int) -> PlaneTrial:
         settings = settings.but(lines="long")
     cycles = str(rng.choice(["native", "native", "moves"]))
     approach = float(rng.choice([0.0, 0.0, 15.0]))
-    frame_ = Frame(cycles=cycles, skip_taps=True, approach=approach, retract=float(rng.choice([0.0, 0.0, 20.0])))
+    retract = float(rng.choice([0.0, 0.0, 20.0]))
+    modal = bool(rng.random() < 0.3)
+    frame_ = Frame(cycles=cycles, skip_taps=True, approach=approach, retract=retract, modal=modal)
     return PlaneTrial(seed, form, settings, frame_, "\n".join(text.lines) + "\n")
 
 

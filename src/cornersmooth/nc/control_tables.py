@@ -16,7 +16,6 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.model import FeedMode
 from cornersmooth.nc.control import (
     INVERSE_TIME,
-    STEPS,
     Control,
     CurveStyle,
     Cycles,
@@ -27,10 +26,10 @@ from cornersmooth.nc.control import (
     Mode,
     Motion,
     Orientation,
-    ProgramTable,
     TextStyle,
     Words,
 )
+from cornersmooth.nc.program_table import STEPS, ProgramTable
 from cornersmooth.settings import Lines
 from cornersmooth.tables import Shelf, Table, is_file
 

@@ -13,8 +13,9 @@ import numpy as np
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Program
 from cornersmooth.nc.comments import comment_lines
-from cornersmooth.nc.control import Blocks, ProgramTable, TextStyle
+from cornersmooth.nc.control import Blocks, TextStyle
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.program_table import ProgramTable
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
 

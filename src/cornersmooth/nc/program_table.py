@@ -1,0 +1,78 @@
+"""The blocks of a control around the motion, and the steps that stand among them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cornersmooth.nc.control import Blocks
+
+
+@dataclass(frozen=True)
+class ProgramTable:
+    """The blocks around the motion, in the order in which they are written.
+
+    An item that is nothing but a name in braces is a step (`STEPS`); all others are blocks, with ``{program}``,
+    ``{units}`` and ``{blend}``, a tenth of ε.
+
+    Parameters
+    ----------
+    name : str
+        Name or number of the program where neither the user nor the name of the CL file gives one.
+    file_name : str
+        The same from the name of the CL file, with ``{stem}``, its letters and digits in capitals with underscores
+        between, or ``{number}``, the digits that it ends in, four at least; empty where `name` is for all files.
+    name_pattern : str
+        Regular expression of the names that the control takes; empty for any.
+    work_offset : str
+        What ``{work_offset}`` stands for where the user gives nothing.
+    work_offset_pattern : str
+        Regular expression of what it may be.
+    work_offset_block : tuple of str
+        With ``{work_offset}``.
+    retract : tuple of str
+        Blocks that bring the tool to a height that clears everything; none where the control is told nothing.
+    position : str
+        Block with ``{position}``, words of a position of the machine; empty where the control has no such.
+    start : tuple of str
+        Before everything else.
+    begin : tuple of str
+        Before the first motion of each tool, and after a retract.
+    tool_end : tuple of str
+        After the last motion of each tool.
+    between_tools : tuple of str
+        Behind `tool_end`, before another tool than the first, where the CL file does not stop there anyway.
+    end : tuple of str
+        After everything else, `tool_end` included.
+    """
+
+    name: str = "O0001"
+    file_name: str = ""
+    name_pattern: str = ""
+    work_offset: str = ""
+    work_offset_pattern: str = ""
+    work_offset_block: Blocks = ()
+    retract: Blocks = ()
+    position: str = ""
+    start: Blocks = ("{header}",)
+    begin: Blocks = ("{tip_control_on}",)
+    tool_end: Blocks = ("{tip_control_off}",)
+    between_tools: Blocks = ()
+    end: Blocks = ("{footer}",)
+
+
+#: steps that `ProgramTable` may name; what is off already, or not asked for, is no block
+STEPS = {
+    "retract": "the blocks of `retract`, where the tool is not there yet",
+    "work_offset": "the block of the work offset",
+    "rotary_zero": "both rotary axes to zero, with a machine only",
+    "rotary_start": "both rotary axes to the angles of the first motion, with a machine only",
+    "tip_control_on": "functions that stand outside, tool tip control or the length of the tool, functions within",
+    "functions_off": "functions within tool tip control off",
+    "tip_control_off": "tool tip control or the length of the tool off, then functions that stand outside",
+    "spindle_off": "the spindle, where it turns",
+    "coolant_off": "the coolant, where it flows",
+    "header": "the user's lines of --header",
+    "footer": "the user's lines of --footer",
+}
