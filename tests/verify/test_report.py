@@ -10,6 +10,7 @@ import pytest
 
 from cornersmooth.cli import run
 from cornersmooth.nc_reader import read_nc
+from cornersmooth.report.along import deviation_along
 from cornersmooth.report.verification import (
     CSV_COLUMNS,
     along_lines,
@@ -17,7 +18,7 @@ from cornersmooth.report.verification import (
     verification_csv,
     verification_json,
 )
-from cornersmooth.verify import deviation_along, verify
+from cornersmooth.verify import verify
 from cornersmooth.verify.polyline import original_motion, written_at
 
 from .writing import encode, job

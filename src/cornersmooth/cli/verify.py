@@ -21,7 +21,8 @@ from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.model import Program
-    from cornersmooth.verify import Distribution, Verification, Where
+    from cornersmooth.report.along import Distribution
+    from cornersmooth.verify import Verification, Where
 
 #: problems shown without -v
 _PROBLEMS_SHOWN = 20
@@ -73,7 +74,8 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.cl import read
     from cornersmooth.nc import own_words
     from cornersmooth.nc_reader.source import readable_twice
-    from cornersmooth.verify import deviation_along, useful_processes, verify
+    from cornersmooth.report.along import deviation_along
+    from cornersmooth.verify import useful_processes, verify
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")

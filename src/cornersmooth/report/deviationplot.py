@@ -12,7 +12,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.extras import install_hint
-from cornersmooth.verify import Distribution
+from cornersmooth.report.along import Distribution
 
 FORMATS = ("png", "svg", "pdf")
 

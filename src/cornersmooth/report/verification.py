@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from cornersmooth.model import Floats, Program
-from cornersmooth.verify import Distribution, Verification
+from cornersmooth.report.along import Distribution
+from cornersmooth.verify import Verification
 
 CSV_COLUMNS = (
     "pose",

@@ -29,20 +29,17 @@ Where is what:
 - checks (`checks` lists them): `deviation`, `backtracking`, `feeds`, `continuity`; they share `distances`, with
   `wide_search`, `hull_bounds`; what they find is in `findings`
 - words: `statements` (beside the motion), `word_check` against `nc_reader.word_list`
-- all of it: `verifier`, `result`; `along` for pictures
+- all of it: `verifier`, `result`
 """
 
 from cornersmooth.processes import useful_processes
-from cornersmooth.verify.along import Distribution, deviation_along
 from cornersmooth.verify.result import Verification, Where
 from cornersmooth.verify.verifier import Verifier, verify
 
 __all__ = [
-    "Distribution",
     "Verification",
     "Verifier",
     "Where",
-    "deviation_along",
     "useful_processes",
     "verify",
 ]

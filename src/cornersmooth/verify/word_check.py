@@ -10,12 +10,12 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.errors import InputError
+from cornersmooth.nc_reader.block_texts import any_numbers, any_of, numbers_in, said, shown, text_of
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.word_list import WordList, WordRule, word_list
 from cornersmooth.nc_reader.words import Line, Table
-from cornersmooth.verify.block_texts import any_numbers, any_of, numbers_in, said, shown, text_of
 
 #: code of words that are not on the list or not in their place, and of what is not established
 NOT_LISTED: Final = "CS571"
