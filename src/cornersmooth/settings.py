@@ -190,17 +190,23 @@ class Settings:
         excess = METHODS[self.method].excess
         if not excess:
             return self.tolerance
-        rounding = self._axis_point_rounding if self.axis_tolerance is None else self._tip_rounding
-        return (1.0 + excess) * self.tolerance + rounding
+        if self.axis_tolerance is not None:
+            return self._excess_of_both * self.tolerance
+        return (1.0 + excess) * self.tolerance + self._axis_point_rounding
 
     @property
     def verified_axis_tolerance(self) -> float | None:
         """What verification allows the tool axis, degrees; None where the axis point has to keep ε."""
-        excess = METHODS[self.method].excess
-        if self.axis_tolerance is None or not excess:
+        if self.axis_tolerance is None or not METHODS[self.method].excess:
             return self.axis_tolerance
-        rounding = (self._tip_rounding + self._axis_point_rounding) / self.axis_length
-        return (1.0 + excess) * self.axis_tolerance + math.degrees(rounding)
+        chord = self._excess_of_both * chord_of(self.axis_tolerance)
+        return math.degrees(2.0 * math.asin(min(chord / 2.0, 1.0)))
+
+    @property
+    def _excess_of_both(self) -> float:
+        """How many times as much is allowed of tip and axis as they are promised: the same, so `axis_scale` holds."""
+        axis = (self._tip_rounding + self._axis_point_rounding) / self.axis_length * self.axis_scale
+        return 1.0 + METHODS[self.method].excess + max(self._tip_rounding, axis) / self.tolerance
 
     @property
     def chord(self) -> float:

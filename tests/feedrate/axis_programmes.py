@@ -1,0 +1,121 @@
+"""Reference times under the limits of a machine's axes, by sequential linear programmes.
+
+As `linear_programmes`, with the rows of every axis and their signs: for q(s) the speed q₁·√z, the acceleration
+q₂·z + q₁·z′/2 and the jerk √z·(q₃·z + 3/2·q₂·z′ + q₁·z″/2). Nodes stand at all borders of elements, where derivatives
+jump: there those of both sides count. The derivatives are those of `machine_axes`, which a test holds against the
+kinematics; nothing else is the planner's.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from linear_programmes import SETTLED, WIDEST, _crawl, _differences, _duration, node_caps
+from scipy.optimize import linprog
+from scipy.sparse import csr_array, diags_array, vstack
+
+from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.speed_limits import find_speed_limits
+from cornersmooth.feedrate.timelaw import TimeLaw, shares_at
+from cornersmooth.model import Floats
+
+#: how far beside a border of elements derivatives are taken, mm, and elements that have no length
+BESIDE, NOTHING = 1e-7, 1e-9
+#: rounds, steps that are tried where a whole one brings nothing, and the factor at which the rounds end
+ROUNDS, STEPS, NARROWEST = 60, (0.5, 0.25, 0.1), 1.1
+
+
+def reference_time(law: TimeLaw, limits: Limits, step: float) -> float:
+    """Shortest time, s, of the path of a law that runs from rest to rest; nodes are `step` mm apart at most."""
+    path, axes = law.path, law.machine_axes
+    assert axes is not None
+    edge = np.concatenate(([0.0], np.cumsum(path.length)))
+    pieces = [
+        np.linspace(low, high, max(2, int(np.ceil((high - low) / step)) + 1))[:-1]
+        for low, high in pairwise(edge)
+        if high - low > NOTHING
+    ]
+    x = np.concatenate([*pieces, edge[-1:]])
+
+    def orders(way: Floats) -> tuple[Floats, Floats, Floats]:
+        element = np.clip(np.searchsorted(edge, way, side="right") - 1, 0, len(path) - 1)
+        return axes.orders(element, shares_at(path, element, way - edge[element]))[1:]
+
+    sides = [orders(x[1:-1] + away) for away in (BESIDE, -BESIDE)]
+    speed, accel, jerk = axes.limits
+    h, n = np.diff(x), len(x) - 2
+    speed_limits = find_speed_limits(path, limits)
+    upper = node_caps(x, speed_limits.edge, speed_limits.cap)[1:-1].copy()
+    for one, _, _ in sides:
+        upper = np.minimum(upper, ((speed / np.maximum(np.abs(one), 1e-12)) ** 2).min(axis=1))
+    for at, end, length in ((0, x[:1] + NOTHING, h[0]), (-1, x[-1:] - NOTHING, h[-1])):  # constant jerk from rest
+        rate = np.maximum(np.abs(sides[0][0][at]), np.abs(orders(end)[0][0]))
+        slowest = min(limits.jerk, float((jerk / np.maximum(rate, 1e-12)).min()))
+        upper[at] = min(upper[at], (4.5 * slowest * length**2) ** (2.0 / 3.0))
+    slopes, middle, bend = _operators(x, h, n)
+
+    def rows(order: int) -> list[Any]:
+        found = []
+        for one, two, three in sides:
+            for k in range(axes.limits.shape[1]):
+                if order == 2:
+                    found.append(_scaled(two[:, k] / accel[k], None) + _scaled(0.5 * one[:, k] / accel[k], middle))
+                else:
+                    cross = _scaled(1.5 * two[:, k] / jerk[k], middle) + _scaled(one[:, k] / jerk[k], bend)
+                    found.append(_scaled(three[:, k] / jerk[k], None) + cross)
+        return found
+
+    straight = [slopes / (2.0 * limits.accel), *rows(2)]
+    curved = [bend / limits.jerk, *rows(3)]
+    z = 0.1 * _crawl(upper, h)
+    time, reach = _duration(z, h), WIDEST
+    for _ in range(ROUNDS):
+        scale, root = diags_array(z), diags_array(z**0.5)
+        tangent = diags_array(np.full(n, 0.5))
+        matrices, right = [], []
+        for row in curved:
+            own = root @ row @ scale
+            matrices += [own + tangent, -own + tangent]
+            right += [np.full(n, 1.5)] * 2
+        for row in straight:
+            own = row @ scale
+            matrices += [own, -own]
+            right += [np.ones(own.shape[0])] * 2
+        gain = 0.5 * (h[1:] + h[:-1]) * z**-0.5
+        bounds = np.stack((np.full(n, 1.0 / reach), np.minimum(upper / z, reach)), axis=1)
+        result: Any = linprog(
+            -gain / gain.mean(),
+            A_ub=vstack(matrices, format="csr"),  # type: ignore[call-overload]  # sparse matrices are taken, and meant
+            b_ub=np.concatenate(right),
+            bounds=bounds,
+            method="highs-ipm",
+        )
+        if result.x is None:
+            raise ArithmeticError(f"the linear programme has no solution: {result.message}")
+        tried = [result.x * z] + [z + part * (result.x * z - z) for part in STEPS]
+        times = [_duration(profile, h) for profile in tried]
+        best = int(np.argmin(times))
+        gained = time - times[best]
+        if gained > 0.0:
+            z, time = tried[best], times[best]
+        if best > 0 or gained < SETTLED * time:
+            reach = np.sqrt(reach)
+            if reach < NARROWEST:
+                break
+    return time
+
+
+def _scaled(factor: Floats, matrix: Any) -> Any:
+    return diags_array(factor) if matrix is None else diags_array(factor) @ matrix
+
+
+def _operators(x: Floats, h: Floats, n: int) -> tuple[Any, Any, Any]:
+    """z′ in the middle of every step (n + 1, n), z′ and z″/2 at the nodes (n, n), from z at the inner nodes."""
+    ends = csr_array(([4.0 / 3.0 / h[0], -4.0 / 3.0 / h[-1]], ([0, 1], [0, n - 1])), shape=(2, n))
+    slopes = vstack([ends[[0]], _differences(1.0 / h[1:-1]), ends[[1]]], format="csr")
+    places = np.concatenate((x[1:2], 0.5 * (x[1:-2] + x[2:-1]), x[-2:-1]))
+    rows = np.arange(n)
+    halves = np.full(2 * n, 0.5), (np.tile(rows, 2), np.concatenate((rows, rows + 1)))
+    return slopes, csr_array(halves, shape=(n, n + 1)) @ slopes, _differences(0.5 / np.diff(places)) @ slopes
