@@ -20,6 +20,9 @@ from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices
 from cornersmooth.vectors import norm
 
+#: bends of corners are no smaller, so that no blend divided by one is too large a number
+_LEAST_BEND = 1e-300
+
 #: b₁ over P/|Δt|: 4, and what its controller was found to go beyond that
 _REACH = 4.8
 
@@ -152,7 +155,7 @@ def _carried(blends: Floats, enough: Floats) -> Floats:
 
 def _deviation(rows: Vertices, limits: LineLimits, corners: _Corners, blend: Floats) -> Floats:
     """(v,) largest distance of tip or axis point from the original at a common parameter, within blends."""
-    bend = np.maximum(corners.bend, np.finfo(np.float64).tiny)
+    bend = np.maximum(corners.bend, _LEAST_BEND)
     before = np.minimum(corners.half[0], _REACH * blend / bend)
     behind = np.minimum(corners.half[1], corners.quicker * before)
     largest = np.zeros(len(blend))
