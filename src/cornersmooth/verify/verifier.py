@@ -391,10 +391,11 @@ def _noted(text: _Text, found: _Measured) -> Iterable[Elements]:
     offset = 0
     for nc in text.chunks:
         found.margin = found.task.margin(nc)
-        if nc.rotary and len(nc):
+        if len(nc) and (nc.rotary or nc.tip_room.any()):
             last = offset + len(nc) - 1
             for element in {*_elements(text.events, offset, last).tolist(), last}:  # words behind it are still to come
-                found.rooms[element] = found.task.axis_length * float(nc.second_room[element - offset])
+                row = element - offset
+                found.rooms[element] = found.task.axis_length * float(nc.second_room[row]) + float(nc.tip_room[row])
         offset += len(nc)
         yield nc
 
