@@ -21,11 +21,11 @@ from cornersmooth.cl import read
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Form, choose_form, fit_settings, write
+from cornersmooth.nc_reader.block_texts import said
 from cornersmooth.nc_reader.reading_options import ReadingOptions
 from cornersmooth.nc_reader.word_list import WordRule, word_list
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.verify.block_texts import said
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "two_tools.md"
