@@ -58,27 +58,24 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
     tilted &= program.kind != Move.FROM
     starts = tool_starts(program)
-    tapped = [one.pose for one in program.statements if one.word == "CYCLE" and "TAP" in one.args]
     if not form.rotary and tilted.any():  # without a machine no words bring the rotary axes back
         tilted[int(np.argmax(tilted)) :] = True
     for first, stop in zip(starts, [*starts[1:], len(program)], strict=True):
         here = slice(first, stop)
         if holes[here].any() and not tilted[here].any():
-            chosen[here] = any(first <= pose <= stop for pose in tapped) or (
-                drills and _any_as_cycle(program, form, first, stop)
-            )
+            chosen[here] = _any_as_cycle(program, form, first, stop, drills=drills)
     return chosen
 
 
-def _any_as_cycle(program: Program, form: Form, first: int, stop: int) -> bool:
-    """Whether any hole from one pose to another can be a cycle of the control, apart from taps."""
+def _any_as_cycle(program: Program, form: Form, first: int, stop: int, *, drills: bool) -> bool:
+    """Whether any hole from one pose to another can be a cycle of the control; only taps where drills are not asked."""
     said = [statement for statement in program.statements if statement.word == "CYCLE" and len(statement.args) > 1]
     for k, statement in enumerate(said):
         until = said[k + 1].pose if k + 1 < len(said) else len(program)
         poses = np.arange(max(statement.pose, first), min(until, stop))
         poses = poses[program.kind[poses] == Move.HOLE]
         cycle = read_cycle(statement.args, program, None) if len(poses) else None
-        if cycle is not None and kind_of(cycle, form, program, poses[:1]):
+        if cycle is not None and (drills or cycle.tap) and kind_of(cycle, form, program, poses[:1]):
             return True
     return False
 

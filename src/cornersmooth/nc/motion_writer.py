@@ -318,10 +318,10 @@ class MotionWriter:
 
     def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
         """Why the control's cycle cannot do a tap, in words."""
-        if not self.writers.takes_cycles(self.writer):
-            return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
         if not kind_of(cycle, self.writer.form, self.program, poses):
             return "the control has no such cycle for it"
+        if not self.writers.takes_cycles(self.writer):
+            return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
         return "it takes a spindle that turns clockwise at a known speed"
 
     def _cycles(self, cycle: Cycle, kind: str, poses: Ints, approach: Ints) -> Iterator[bytes]:
