@@ -13,6 +13,7 @@ from cornersmooth.feedrate import Limits, block_feeds, plan_text
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import Form, choose_form
+from cornersmooth.nc.planned_feeds import PlannedFeeds
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import postprocess, reading_back
 from cornersmooth.provenance import read_provenance
@@ -105,3 +106,8 @@ def test_feeds_that_the_plan_reaches_stay_as_they_are() -> None:
     stream = io.BytesIO()
     postprocess(line, stream, Settings(tolerance=0.02), form=choose_form("fanuc"), plan_feeds=Limits(), processes=1)
     assert set(re.findall(rb"F[\d.]+", stream.getvalue())) == {b"F300."}
+
+
+def test_a_block_that_takes_no_time_has_a_feed() -> None:
+    feeds = PlannedFeeds(np.array([1]), np.array([100.0]), np.array([0.0]), np.array([200.0]))
+    assert feeds.write(b"G1 X1. F200.", form_of("fanuc", "g1", "", True), "mm", 1.0) == b"G1 X1. F100."

@@ -18,6 +18,9 @@ from cornersmooth.text import format_number
 _FIGURES: Final = 4
 _ALL_BUT: Final = 0.999
 
+#: minutes; no block takes less
+_SHORTEST: Final = 1e-9
+
 #: feed word at the end of a line, with its number
 _FEED: Final = re.compile(rb" ?F(\d+\.?\d*|\.\d+)$")
 
@@ -57,7 +60,7 @@ class PlannedFeeds:
         step = np.maximum(10.0 ** np.floor(np.log10(np.maximum(planned, 1.0)) - _FIGURES + 1), 1.0)
         planned = np.where(planned >= _ALL_BUT * asked, asked, np.maximum(np.floor(planned / step) * step, 1.0))
         ticks = np.where(np.isnan(self.feed), asked, planned)
-        rate = np.floor(10.0**INVERSE_TIME_DECIMALS / np.maximum(self.minutes, np.finfo(np.float64).tiny))
+        rate = np.floor(10.0**INVERSE_TIME_DECIMALS / np.maximum(self.minutes, _SHORTEST))
         lines = text.split(b"\n")
         word = (" " if motion.spaces else "") + motion.feed
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.runs.polylines import Polylines
-from cornersmooth.smoothing.runs.ranges import spread, starts
+from cornersmooth.smoothing.runs.ranges import spread
 from cornersmooth.smoothing.runs.splines import Splines
 
 
@@ -93,10 +93,6 @@ class Samples:
         share = (s - lines.s[segment]) / (lines.s[segment + 1] - lines.s[segment])
         target = lines.point[segment] + share[:, None] * (lines.point[segment + 1] - lines.point[segment])
         return cls(piece, span, s, splines.basis(span, s), target)
-
-    def first_of_spans(self, spans: int) -> Ints:
-        """(spans + 1,) where the samples of each span begin; they are in order of the spans."""
-        return starts(np.bincount(self.span, minlength=spans))
 
     def only(self, rows: Ints) -> Samples:
         """Some of the samples."""
