@@ -241,11 +241,12 @@ class Elements:
     def at_most(self) -> Self:
         """Return the same elements with feeds below which those of the moves may not be (`feed_room` NaN).
 
-        Where the tip may creep its feed may be any lower one (-inf).
+        Where the tip may creep its feed may be any lower one (-inf). No plan lowers a feed per revolution: threads.
         """
         least = np.maximum(self.feed - np.abs(np.nan_to_num(self.feed_room)), np.finfo(np.float64).tiny)
-        feed = np.where(self.feed > 0.0, least, self.feed)
-        return replace(self, feed=feed, feed_room=np.where(self.feed_room < 0.0, -np.inf, np.nan))
+        feed = np.where((self.feed > 0.0) & ~self.per_revolution, least, self.feed)
+        any_lower = np.where(self.feed_room < 0.0, -np.inf, np.nan)
+        return replace(self, feed=feed, feed_room=np.where(self.per_revolution, self.feed_room, any_lower))
 
     @classmethod
     def joined(cls, parts: Sequence[Elements]) -> Elements:

@@ -32,10 +32,6 @@ _TOGETHER, _KEPT = 1 << 14, 16
 _STEPS = 1.0
 
 
-#: part of its pitch by which a thread may differ where a feed may be lower than asked for
-_PITCH = 1e-3
-
-
 class Ahead:
     """Elements of a text as they are read: those that have been read and are still wanted.
 
@@ -310,9 +306,8 @@ class _Search:
         while self.over(move, element):
             if self.feeds([element]):
                 nc, own = self.ahead.nc, element - self.ahead.base
-                room = abs(nc.feed_room[own])
-                room = _PITCH * cycle.feed if np.isnan(room) else 2 * room
-                return bool(nc.per_revolution[own] and abs(nc.feed[own] - cycle.feed) <= room)
+                near = abs(nc.feed[own] - cycle.feed) <= 2 * abs(nc.feed_room[own])
+                return bool(nc.per_revolution[own] and near)
             element += 1
         return False
 
