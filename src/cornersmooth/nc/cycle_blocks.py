@@ -75,9 +75,20 @@ def _any_as_cycle(program: Program, form: Form, first: int, stop: int, *, drills
         poses = np.arange(max(statement.pose, first), min(until, stop))
         poses = poses[program.kind[poses] == Move.HOLE]
         cycle = read_cycle(statement.args, program, None) if len(poses) else None
-        if cycle is not None and (drills or cycle.tap) and kind_of(cycle, form, program, poses[:1]):
+        wanted = cycle is not None and (_turns_clockwise(program, statement) if cycle.tap else drills)
+        if cycle is not None and wanted and kind_of(cycle, form, program, poses[:1]):
             return True
     return False
+
+
+def _turns_clockwise(program: Program, until: Statement) -> bool:
+    """Whether the last SPINDL before a statement starts the spindle clockwise, as a tap needs it."""
+    last: Statement | None = None
+    for statement in program.statements:
+        if statement is until:
+            break
+        last = statement if statement.word == "SPINDL" else last
+    return last is not None and not {"OFF", "NOMORE", "CCLW", "LOCK", "ORIENT"} & set(words_of(last))
 
 
 def tool_starts(program: Program) -> list[int]:
