@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,6 @@ from cornersmooth.feedrate import Limits, block_feeds, plan_text
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
 from cornersmooth.nc import Form, choose_form
-from cornersmooth.nc.planned_feeds import PlannedFeeds
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.pipeline import postprocess, reading_back
 from cornersmooth.provenance import read_provenance
@@ -109,5 +109,15 @@ def test_feeds_that_the_plan_reaches_stay_as_they_are() -> None:
 
 
 def test_a_block_that_takes_no_time_has_a_feed() -> None:
-    feeds = PlannedFeeds(np.array([1]), np.array([100.0]), np.array([0.0]), np.array([200.0]))
-    assert feeds.write(b"G1 X1. F200.", form_of("fanuc", "g1", "", True), "mm", 1.0) == b"G1 X1. F100."
+    path = SimpleNamespace(
+        rapid=np.array([False, False]),
+        program=SimpleNamespace(line=np.array([7, 8])),
+        move=np.array([0, 1]),
+        turning=np.array([False, False]),
+        length=np.array([100.0, 3.0]),
+    )
+    law = SimpleNamespace(path=path, edge=np.array([0.0, 1.0, 2.0]), times_at=lambda edge: np.array([0.0, 0.0, 6.0]))
+    line, feed, minutes = block_feeds(law)  # type: ignore[arg-type]
+    assert line.tolist() == [7, 8]
+    assert np.isfinite(feed).all() and (minutes > 0.0).all()
+    assert feed[1] == pytest.approx(30.0)

@@ -26,6 +26,9 @@ _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Mov
 #: parts of blocks add up to whole ones but for this
 _PART_OF_A_BLOCK = 1e-6
 
+#: minutes: no block takes less
+_SHORTEST = 1e-9
+
 #: letters of words at which the motion stops; G only where it dwells
 _STOPPING = ("M", "T")
 _DWELL = 4.0
@@ -201,7 +204,7 @@ def block_feeds(law: TimeLaw) -> tuple[Ints, Floats, Floats]:
     feed : (b,) float64, mm/min
         Mean speed of the tip; NaN where it stands still for a part of the block.
     minutes : (b,) float64
-        What each block takes.
+        What each block takes, more than nothing.
     """
     path = law.path
     feeding = np.flatnonzero(~path.rapid)
@@ -211,8 +214,8 @@ def block_feeds(law: TimeLaw) -> tuple[Ints, Floats, Floats]:
     line = path.program.line[path.move[feeding]]
     first = np.flatnonzero(np.concatenate(([True], line[1:] != line[:-1])))
     length = np.add.reduceat(np.where(path.turning[feeding], np.nan, path.length[feeding]), first)
-    taken = np.add.reduceat(minutes, first)
-    return line[first], length / np.maximum(taken, np.finfo(np.float64).tiny), taken
+    taken = np.maximum(np.add.reduceat(minutes, first), _SHORTEST)
+    return line[first], length / taken, taken
 
 
 def plan_text(

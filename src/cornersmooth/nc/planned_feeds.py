@@ -18,9 +18,6 @@ from cornersmooth.text import format_number
 _FIGURES: Final = 4
 _ALL_BUT: Final = 0.999
 
-#: minutes; no block takes less
-_SHORTEST: Final = 1e-9
-
 #: feed word at the end of a line, with its number
 _FEED: Final = re.compile(rb" ?F(\d+\.?\d*|\.\d+)$")
 
@@ -36,7 +33,7 @@ class PlannedFeeds:
     feed : (b,) float64, mm/min
         NaN where the plan says none, as where the tip stands still.
     minutes : (b,) float64
-        What a block takes, for inverse time.
+        What a block takes, more than nothing, for inverse time.
     programmed : (b,) float64, mm/min
         What the feed may not exceed; the feed where the plan says none.
     """
@@ -60,7 +57,7 @@ class PlannedFeeds:
         step = np.maximum(10.0 ** np.floor(np.log10(np.maximum(planned, 1.0)) - _FIGURES + 1), 1.0)
         planned = np.where(planned >= _ALL_BUT * asked, asked, np.maximum(np.floor(planned / step) * step, 1.0))
         ticks = np.where(np.isnan(self.feed), asked, planned)
-        rate = np.floor(10.0**INVERSE_TIME_DECIMALS / np.maximum(self.minutes, _SHORTEST))
+        rate = np.floor(10.0**INVERSE_TIME_DECIMALS / self.minutes)
         lines = text.split(b"\n")
         word = (" " if motion.spaces else "") + motion.feed
 
