@@ -119,5 +119,6 @@ def test_a_block_that_takes_no_time_has_a_feed() -> None:
     law = SimpleNamespace(path=path, edge=np.array([0.0, 1.0, 2.0]), times_at=lambda edge: np.array([0.0, 0.0, 6.0]))
     line, feed, minutes = block_feeds(law)  # type: ignore[arg-type]
     assert line.tolist() == [7, 8]
-    assert np.isfinite(feed).all() and (minutes > 0.0).all()
+    assert np.isfinite(feed).all()
+    assert (minutes > 0.0).all()
     assert feed[1] == pytest.approx(30.0)

@@ -312,7 +312,7 @@ class MotionWriter:
         """Cycle of the control that drills holes, as `kind_of` names it; empty for none."""
         if cycle is None or not self.writers.takes_cycles(self.writer) or not (self.native or cycle.tap):
             return ""
-        if cycle.tap and not (self.statements.clockwise and self.statements.speed and self.operation.spindle):
+        if cycle.tap and not self._can_thread():
             return ""
         return kind_of(cycle, self.writer.form, self.program, poses)
 
@@ -320,9 +320,13 @@ class MotionWriter:
         """Why the control's cycle cannot do a tap, in words."""
         if not kind_of(cycle, self.writer.form, self.program, poses):
             return "the control has no such cycle for it"
-        if not self.writers.takes_cycles(self.writer):
-            return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
-        return "it takes a spindle that turns clockwise at a known speed"
+        if not self._can_thread():
+            return "it takes a spindle that turns clockwise at a known speed"
+        return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
+
+    def _can_thread(self) -> bool:
+        """Whether the spindle turns as a thread needs it."""
+        return bool(self.statements.clockwise and self.statements.speed and self.operation.spindle)
 
     def _cycles(self, cycle: Cycle, kind: str, poses: Ints, approach: Ints) -> Iterator[bytes]:
         """Holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
