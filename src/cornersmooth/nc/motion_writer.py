@@ -312,9 +312,7 @@ class MotionWriter:
         """Cycle of the control that drills holes, as `kind_of` names it; empty for none."""
         if cycle is None or not self.writers.takes_cycles(self.writer) or not (self.native or cycle.tap):
             return ""
-        if cycle.tap and not self._can_thread():
-            return ""
-        return kind_of(cycle, self.writer.form, self.program, poses)
+        return "" if cycle.tap and not self._can_thread() else kind_of(cycle, self.writer.form, self.program, poses)
 
     def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
         """Why the control's cycle cannot do a tap, in words."""
