@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from linear_programmes import SETTLED, WIDEST, _crawl, _differences, _duration, node_caps
+from linear_programmes import NARROWEST, WIDEST, _crawl, _differences, _duration, after_step, node_caps
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, vstack
 
@@ -24,7 +24,7 @@ from cornersmooth.model import Floats
 #: how far beside a border of elements derivatives are taken, mm, and elements that have no length
 BESIDE, NOTHING = 1e-7, 1e-9
 #: rounds, steps that are tried where a whole one brings nothing, and the factor at which the rounds end
-ROUNDS, STEPS, NARROWEST = 60, (0.5, 0.25, 0.1), 1.1
+ROUNDS = 60
 
 
 def reference_time(law: TimeLaw, limits: Limits, step: float) -> float:
@@ -94,16 +94,9 @@ def reference_time(law: TimeLaw, limits: Limits, step: float) -> float:
         )
         if result.x is None:
             raise ArithmeticError(f"the linear programme has no solution: {result.message}")
-        tried = [result.x * z] + [z + part * (result.x * z - z) for part in STEPS]
-        times = [_duration(profile, h) for profile in tried]
-        best = int(np.argmin(times))
-        gained = time - times[best]
-        if gained > 0.0:
-            z, time = tried[best], times[best]
-        if best > 0 or gained < SETTLED * time:
-            reach = np.sqrt(reach)
-            if reach < NARROWEST:
-                break
+        z, time, reach = after_step(z, result.x * z, h, time, reach)
+        if reach < NARROWEST:
+            break
     return time
 
 

@@ -138,19 +138,22 @@ def fastest(x: Floats, cap: Floats, accel: float, jerk: float) -> tuple[float, F
         )
         if result.x is None:
             raise ArithmeticError(f"the linear programme has no solution: {result.message}")
-        found = result.x * z
-        # both profiles keep the tangents, so everything between them does
-        tried = [found] + [z + part * (found - z) for part in STEPS]
-        times = [_duration(profile, h) for profile in tried]
-        best = int(np.argmin(times))
-        gained = time - times[best]
-        if gained > 0.0:
-            z, time = tried[best], times[best]
-        if best > 0 or gained < SETTLED * time:
-            reach = np.sqrt(reach)
-            if reach < NARROWEST:
-                break
+        z, time, reach = after_step(z, result.x * z, h, time, reach)
+        if reach < NARROWEST:
+            break
     return time, np.concatenate(([0.0], z, [0.0]))
+
+
+def after_step(z: Floats, found: Floats, h: Floats, time: float, reach: float) -> tuple[Floats, float, float]:
+    """The better of a profile and those between it and the one found, its time, and how far the next step may go."""
+    # both profiles keep the tangents, so everything between them does
+    tried = [found] + [z + part * (found - z) for part in STEPS]
+    times = [_duration(profile, h) for profile in tried]
+    best = int(np.argmin(times))
+    gained = time - times[best]
+    if best > 0 or gained < SETTLED * time:
+        reach = np.sqrt(reach)
+    return (tried[best], times[best], reach) if gained > 0.0 else (z, time, reach)
 
 
 def _duration(z: Floats, h: Floats) -> float:
