@@ -21,6 +21,9 @@ from cornersmooth.vectors import angle_between, norm, unit
 #: share of ε that turning the axis inside a line may take; `global_runs` leaves it free
 TURNING = 0.02
 
+#: mm of a piece in which the tip stands, however short the piece is
+_STANDING = 1e-30
+
 #: pieces measured together
 _TOGETHER = 8192
 
@@ -55,7 +58,7 @@ def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Fl
         first, second = 3.0 * slope @ np.diff(hull, axis=1), 6.0 * bend @ np.diff(hull, 2, axis=1)
         speed = norm(first)
         # where the tip all but stands there is no curvature to speak of
-        least = 1e-6 * (high - low)[:, None] * lines.step
+        least = np.maximum(1e-6 * (high - low)[:, None] * lines.step, _STANDING)
         curvature = np.divide(norm(np.cross(first, second)), speed**3, out=np.zeros_like(speed), where=speed > least)
         middle = (lines.s[segment] + lines.s[segment + 1])[:, None] / 2.0
         nearer = segment[:, None] + (low[:, None] + at * (high - low)[:, None] > middle)
