@@ -57,49 +57,54 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
         return chosen
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
     tilted &= program.kind != Move.FROM
-    starts = tool_starts(program)
+    starts, said = tool_starts(program), _said_cycles(program)
     if not form.rotary and tilted.any():  # without a machine no words bring the rotary axes back
         tilted[int(np.argmax(tilted)) :] = True
     for first, stop in zip(starts, [*starts[1:], len(program)], strict=True):
         here = slice(first, stop)
         if holes[here].any() and not tilted[here].any():
-            chosen[here] = _any_as_cycle(program, form, first, stop, drills=drills)
+            chosen[here] = _any_as_cycle(program, form, said, first, stop, drills=drills)
     return chosen
 
 
-def _any_as_cycle(program: Program, form: Form, first: int, stop: int, *, drills: bool) -> bool:
+def _any_as_cycle(
+    program: Program, form: Form, said: list[tuple[Statement, bool]], first: int, stop: int, *, drills: bool
+) -> bool:
     """Whether any hole from one pose to another can be a cycle of the control; only taps where drills are not asked."""
-    said = [statement for statement in program.statements if statement.word == "CYCLE" and len(statement.args) > 1]
-    for k, statement in enumerate(said):
-        until = said[k + 1].pose if k + 1 < len(said) else len(program)
+    for k, (statement, clockwise) in enumerate(said):
+        until = said[k + 1][0].pose if k + 1 < len(said) else len(program)
         poses = np.arange(max(statement.pose, first), min(until, stop))
         poses = poses[program.kind[poses] == Move.HOLE]
         cycle = read_cycle(statement.args, program, None) if len(poses) else None
-        wanted = cycle is not None and (_turns_clockwise(program, statement) if cycle.tap else drills)
-        if cycle is not None and wanted and kind_of(cycle, form, program, poses[:1]):
+        if cycle is not None and (clockwise if cycle.tap else drills) and kind_of(cycle, form, program, poses[:1]):
             return True
     return False
 
 
-def _turns_clockwise(program: Program, until: Statement) -> bool:
-    """Whether the last SPINDL before a statement starts the spindle clockwise, as a tap needs it."""
-    last: Statement | None = None
+def _said_cycles(program: Program) -> list[tuple[Statement, bool]]:
+    """CYCLE statements, and whether the last SPINDL before them starts the spindle clockwise, as a tap needs it."""
+    said, clockwise = [], False
     for statement in program.statements:
-        if statement is until:
-            break
-        last = statement if statement.word == "SPINDL" else last
-    return last is not None and not {"OFF", "NOMORE", "CCLW", "LOCK", "ORIENT"} & set(words_of(last))
+        if statement.word == "SPINDL":
+            clockwise = not {"OFF", "NOMORE", "CCLW", "LOCK", "ORIENT"} & set(words_of(statement))
+        elif statement.word == "CYCLE" and len(statement.args) > 1:
+            said.append((statement, clockwise))
+    return said
+
+
+def tool_loads(program: Program) -> list[tuple[int, tuple[int, int]]]:
+    """Pose, and tool and length register, of every statement that loads a tool."""
+    words = TOOL_WORDS if TOOL_WORDS & {statement.word for statement in program.statements} else {"TOOLNO"}
+    loads = [(statement.pose, loaded_tool(statement)) for statement in program.statements if statement.word in words]
+    return [(pose, tool) for pose, tool in loads if tool is not None]
 
 
 def tool_starts(program: Program) -> list[int]:
     """Poses at which another tool begins, the first pose among them; ascending."""
-    said = {statement.word for statement in program.statements}
-    words = TOOL_WORDS if TOOL_WORDS & said else {"TOOLNO"}
     starts, tool = [0], None
-    for statement in program.statements:
-        loaded = loaded_tool(statement) if statement.word in words else None
-        if loaded is not None and loaded != tool:
-            starts.append(statement.pose)
+    for pose, loaded in tool_loads(program):
+        if loaded != tool:
+            starts.append(pose)
             tool = loaded
     return sorted({min(pose, len(program)) for pose in starts})
 

@@ -113,9 +113,14 @@ def _check_curves(table: Control, form: FormTable, machine: Machine | None) -> N
     """Refuse curves in rotary words of a machine with one rotary axis."""
     if machine is None or not form.curve or len(machine.names) > 1:
         return
-    lines = next((name for name, other in table.forms.items() if not other.curve), "")
     what = f"{table.name} form {form.name} has no curves for a machine with one rotary axis"
-    raise SettingsError("CS215", what, f"use -f {lines}" if lines else "leave out --machine")
+    raise SettingsError("CS215", what, _use_lines(table, "leave out --machine"))
+
+
+def _use_lines(table: Control, otherwise: str) -> str:
+    """Hint at the first form of a control that has lines; at something else where it has none."""
+    lines = next((name for name, other in table.forms.items() if not other.curve), "")
+    return f"use -f {lines}" if lines else otherwise
 
 
 def _check_modulo(table: Control, form: FormTable, mode: Mode, machine: Machine | None) -> None:
@@ -124,9 +129,8 @@ def _check_modulo(table: Control, form: FormTable, mode: Mode, machine: Machine 
         return
     axes, hint = " and ".join(machine.modulo), "leave out modulo in the machine file"
     if form.curve:
-        lines = next((name for name, other in table.forms.items() if not other.curve), "")
         text = f"{table.name} form {form.name} has curves of the words of {axes}, which a modulo axis cannot follow"
-        raise SettingsError("CS215", text, f"use -f {lines}" if lines else hint)
+        raise SettingsError("CS215", text, _use_lines(table, hint))
     if not mode.motion.shortest:
         raise SettingsError("CS215", f"{table.name} has no words by which {axes} goes the shorter way", hint)
 
@@ -141,8 +145,7 @@ def _check_rewind(form: Form) -> None:
     if not form.rotary:
         raise SettingsError("CS215", f"{here} has no rotary axes here that could turn back", "leave out --rewind")
     if form.curves:
-        lines = next((name for name, other in form.table.forms.items() if not other.curve), "")
-        hint = f"use -f {lines}" if lines else "leave out --rewind"
+        hint = _use_lines(form.table, "leave out --rewind")
         raise SettingsError("CS215", f"{here} has curves, which are not left on the way", hint)
     if not form.table.program.retract:
         what = f"the table of {form.control} has no retract above which rotary axes could turn back"

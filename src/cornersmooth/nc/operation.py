@@ -226,13 +226,13 @@ class Operation:
         return [*(self._let_turn() if turning else ()), block, *(self._hold() if turning else ())]
 
     def _retract(self) -> list[str]:
+        there, self.retracted = self.retracted, bool(self.form.table.program.retract)
+        if there:
+            return []
         home = self._own_position("home")
-        blocks = [block.format(**self.values) for block in self.form.table.program.retract]
         if "Z" in home:
-            blocks = self._to_position({"Z": home["Z"]})
-        blocks = [] if self.retracted else blocks
-        self.retracted = bool(self.form.table.program.retract)
-        return blocks
+            return self._to_position({"Z": home["Z"]})
+        return [block.format(**self.values) for block in self.form.table.program.retract]
 
     def _tip_control_on(self) -> list[str]:
         self._tip_control = self._functions = True

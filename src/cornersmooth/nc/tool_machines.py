@@ -8,16 +8,14 @@ import numpy as np
 
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Ints, Program
-from cornersmooth.nc.cycle_blocks import TOOL_WORDS, loaded_tool
+from cornersmooth.nc.cycle_blocks import tool_loads
 
 
 def tools_of_poses(program: Program) -> Ints:
     """(n,) number of the tool that moves to each pose, -1 before the first."""
-    words = TOOL_WORDS if TOOL_WORDS & {statement.word for statement in program.statements} else {"TOOLNO"}
-    loads = [(one.pose, loaded_tool(one)) for one in program.statements if one.word in words]
-    known = [(pose, tool[0]) for pose, tool in loads if tool is not None]
-    begins = np.array([pose for pose, _ in known], np.int64)
-    numbers = np.array([-1, *(number for _, number in known)], np.int64)
+    loads = tool_loads(program)
+    begins = np.array([pose for pose, _ in loads], np.int64)
+    numbers = np.array([-1, *(number for _, (number, _) in loads)], np.int64)
     found: Ints = numbers[np.searchsorted(begins, np.arange(len(program)), side="right")]
     return found
 
