@@ -12,7 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.distances import Distances, Reached
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import COLUMNS, Metric, nearest_segments
+from cornersmooth.verify.nearest import COLUMNS, Metric, distance_between, nearest_segments
 from cornersmooth.verify.wide_search import nearest_alone
 
 #: segments looked at on either side
@@ -65,11 +65,11 @@ def written_backwards(match: Match, written: Reached) -> Found | None:
         vertex, own, free, held = vertex[rows], own[rows], free[rows], held[rows]
         if not len(vertex):
             return None
-    off = _distance(own, _on(six, free))
-    gain = _distance(own, _on(six, held)) - off
+    off = distance_between(own, _on(six, free))
+    gain = distance_between(own, _on(six, held)) - off
     # what is off the path is told by its distance: where along the path it would be nearest says nothing
     wrong = (gain > match.slack) & (free < held) & (off <= _OFF * match.near)
-    wrong &= _way(length, free, held) <= _STRAIGHT * _distance(_on(six, held), _on(six, free)) + match.slack
+    wrong &= _way(length, free, held) <= _STRAIGHT * distance_between(_on(six, held), _on(six, free)) + match.slack
     rows = np.flatnonzero(wrong)
     wrong[rows] = _gain_alone(match, vertex[rows], held[rows], free[rows]) > match.slack
     rows = np.flatnonzero(wrong)
@@ -165,10 +165,10 @@ def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Float
     ways: tuple[Metric, ...] = ("tip", "axis point")
     for gain, metric in zip(gains, ways, strict=True):
         column = COLUMNS[metric]
-        off = _distance(own[:, column], here[:, column])
+        off = distance_between(own[:, column], here[:, column])
         beyond = nearest_alone(own, six, ahead, ahead, high, match.near, metric)[2]
         off = np.where(ahead > held, np.minimum(off, beyond), off)
-        gain[:] = off - _distance(own[:, column], there[:, column])
+        gain[:] = off - distance_between(own[:, column], there[:, column])
     one_goes_on = gains.min(axis=0) < -_CLEARLY * match.slack
     found: Floats = np.where(one_goes_on, 0.0, gains.max(axis=0))
     return found
@@ -186,9 +186,9 @@ def original_backwards(match: Match, theirs: Reached) -> Found | None:
         return None
     six, trail = match.six, match.written.trail
     before, here = theirs.place[falls - 1], theirs.place[falls]
-    length = np.concatenate(([0.0], np.cumsum(_distance(six[1:], six[:-1]))))
+    length = np.concatenate(([0.0], np.cumsum(distance_between(six[1:], six[:-1]))))
     way = _way(length, here, before)
-    straight = way <= _STRAIGHT * _distance(_on(six, before), _on(six, here)) + match.slack
+    straight = way <= _STRAIGHT * distance_between(_on(six, before), _on(six, here)) + match.slack
     falls, before, here = falls[straight], before[straight], here[straight]
     later, comes_back = _cost(match, theirs.vertex[falls], here, before, forward=True)
     earlier, came = _cost(match, theirs.vertex[falls - 1], before, here, forward=False)
@@ -222,21 +222,21 @@ def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: b
     segment, at = nearest_segments(own, six, middle, 0, middle, middle)
     limited = np.maximum(at, bound - middle) if forward else np.minimum(at, bound - middle)
     reached = _on(six, middle + limited)
-    best = _distance(own, reached)
+    best = distance_between(own, reached)
     beyond = middle + (1 if forward else -1)
     there = (beyond <= last) & (beyond >= first)
     low, high = (beyond, np.maximum(last, beyond)) if forward else (np.minimum(first, beyond), beyond)
     rows = np.flatnonzero(there)
     segment, at = nearest_segments(own[rows], six, beyond[rows], _REACH, low[rows], high[rows])
     other = _on(six, segment + at)
-    away = _distance(own[rows], other)
+    away = distance_between(own[rows], other)
     nearer = away < best[rows]
     reached[rows[nearer]] = other[nearer]
     best[rows] = np.minimum(best[rows], away)
     off = own - reached
-    own_way = np.maximum(_distance(off[:, :3], 0.0), _distance(off[:, 3:], 0.0))
+    own_way = np.maximum(distance_between(off[:, :3], 0.0), distance_between(off[:, 3:], 0.0))
     comes = own_way <= match.tolerance
-    return best - _distance(own, _on(six, free)), comes
+    return best - distance_between(own, _on(six, free)), comes
 
 
 def _on(six: Floats, place: Floats) -> Floats:
@@ -252,9 +252,3 @@ def _way(length: Floats, start: Floats, end: Floats) -> Floats:
     vertices = np.arange(len(length))
     way: Floats = np.interp(end, vertices, length) - np.interp(start, vertices, length)
     return way
-
-
-def _distance(a: Floats, b: Floats | float) -> Floats:
-    away = a - b
-    distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
-    return distance

@@ -16,7 +16,7 @@ from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import Gap, Metric, climb, nearest_segments
+from cornersmooth.verify.nearest import Gap, Metric, climb, distance_between, nearest_segments
 from cornersmooth.verify.polyline import directions, written_at
 from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.wide_search import look_farther, nearest_alone
@@ -232,8 +232,7 @@ def _newton_from_knot(
     if vectors:  # of length one
         value, slope, bend = (match.task.six(part[:, :3], part[:, 3:]) for part in (value, slope, bend))
     else:
-        share = (match.axis_length / np.linalg.norm(value[:, 3:] - value[:, :3], axis=1))[:, None]
-        share /= match.axis_length
+        share = 1.0 / np.linalg.norm(value[:, 3:] - value[:, :3], axis=1)[:, None]
         value, slope, bend = (
             match.task.six(part[:, :3], share * (part[:, 3:] - part[:, :3])) for part in (value, slope, bend)
         )
@@ -376,12 +375,6 @@ def common_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> Float
     return np.minimum(gap.larger, reached.gap.larger[rows])
 
 
-def _distance(point: Floats, other: Floats) -> Floats:
-    away = point - other
-    distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
-    return distance
-
-
 def elements_around(match: Match, segment: Ints) -> Ints:
     """(k, e) element of each segment of the written trail, and those beside it."""
     nc, written = match.nc, match.written
@@ -408,7 +401,7 @@ def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Fl
         near, at = nearest_segments(point, match.six, segment, REACH * match.parts, low, high, metric)
         climb(point, match.six, segment, low, high, near, at, metric)
         elements = elements_around(match, near)
-        values = np.minimum(known, _distance(_on(match.six, near, at)[:, column], point[:, column]))
+        values = np.minimum(known, distance_between(_on(match.six, near, at)[:, column], point[:, column]))
         bent = np.flatnonzero(~match.written.straight[elements - match.written.first].all(axis=1))
         if metric == "axis point":  # which runs a little off its chords where the tool turns
             bent = np.arange(len(rows))

@@ -50,6 +50,13 @@ class Gap:
         return np.maximum(self.tip, self.axis_point)
 
 
+def distance_between(points: Floats, others: Floats | float) -> Floats:
+    """(k,) distances of points taken pairwise."""
+    away = points - others
+    distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
+    return distance
+
+
 def gap_between(
     tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats, axis_length: float, *, own_axis: bool = False
 ) -> Gap:

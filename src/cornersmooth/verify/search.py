@@ -13,7 +13,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.assignment import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.guide import LONG, STRIDE, guide
-from cornersmooth.verify.nearest import Metric, nearest_from, nearest_places
+from cornersmooth.verify.nearest import Metric, distance_between, nearest_from, nearest_places
 from cornersmooth.verify.polyline import Polyline
 from cornersmooth.verify.task import Task
 
@@ -126,8 +126,7 @@ class Search:
         known = np.flatnonzero(sure)
         step, way = np.diff(place[known]), np.diff(length[every[known]])
         aside = np.flatnonzero(np.diff(known) > 1)
-        came = self.six[every[known[aside + 1]]] - self.six[every[known[aside]]]
-        way[aside] = np.sqrt(np.einsum("ij,ij->i", came, came))
+        way[aside] = distance_between(self.six[every[known[aside + 1]]], self.six[every[known[aside]]])
         self.apart[every[known[1:]]] = (np.abs(step - way) > _SHORTCUT * self.far) & ~begins[known[1:]]
         tail = np.searchsorted(every, rows["last"])
         self.apart[rows["last"]] |= np.abs(place[tail] - self.end) > _SHORTCUT * self.far
@@ -135,8 +134,8 @@ class Search:
     def _hold(self, vertex: Ints, leader: Ints) -> None:
         """Put vertices where others are."""
         self.segment[vertex], self.fraction[vertex] = self.segment[leader], self.fraction[leader]
-        away = self.six[vertex] - self.path.point_at(self.segment[vertex], self.fraction[vertex])
-        self.distance[vertex] = np.sqrt(np.einsum("ij,ij->i", away, away))
+        place = self.path.point_at(self.segment[vertex], self.fraction[vertex])
+        self.distance[vertex] = distance_between(self.six[vertex], place)
         self.nearest[vertex] = False
 
     def _about(self, length: Floats) -> Floats:
@@ -308,8 +307,7 @@ class Search:
         if found is None:
             return
         segment, fraction, back = found
-        away = self.six[part] - self.path.point_at(segment, fraction)
-        off = np.sqrt(np.einsum("ij,ij->i", away, away))
+        off = distance_between(self.six[part], self.path.point_at(segment, fraction))
         begin, end = 1, len(off)
         if wide:  # most of so wide a window has its place already
             begin, end = self._moved(part, segment, fraction, doubtful[part])
@@ -353,10 +351,7 @@ def _leaders(found: Floats, begins: Bools) -> Ints:
 
 def _length_without_detours(six: Floats, far: float) -> Floats:
     """(v,) path length up to every vertex as if those that lie aside of their neighbours were between them."""
-    step = np.diff(six, axis=0)
-    way = np.sqrt(np.einsum("ij,ij->i", step, step))
-    past = six[2:] - six[:-2]
-    direct = np.sqrt(np.einsum("ij,ij->i", past, past))
+    way, direct = distance_between(six[1:], six[:-1]), distance_between(six[2:], six[:-2])
     detour = way[:-1] + way[1:] - direct
     around = np.pad(detour, 1, constant_values=-np.inf)
     aside = np.flatnonzero((detour > 2 * far) & (detour > around[:-2]) & (detour >= around[2:]))

@@ -29,8 +29,8 @@ class Task:
         Whether the end of every move must be passed exactly: all but the inner poses of chains.
     tolerance, axis_length : float, mm
         ε and H; H is the distance at which the axis tolerance shows as ε, where there is one.
-    own_axis : bool
-        Whether the tool axis has a tolerance of its own. The *axis point* then is H times the axis wherever the tip
+    axis_tolerance : float or None, degrees
+        That of the tool axis, where it has one of its own. The *axis point* then is H times the axis wherever the tip
         is: it is off by ε where the axis is off by its tolerance.
     """
 
@@ -39,7 +39,12 @@ class Task:
     exact: Bools
     tolerance: float
     axis_length: float
-    own_axis: bool = False
+    axis_tolerance: float | None = None
+
+    @property
+    def own_axis(self) -> bool:
+        """Whether the tool axis has a tolerance of its own."""
+        return self.axis_tolerance is not None
 
     @classmethod
     def of(cls, program: Program, tolerance: float, axis_length: float, axis_tolerance: float | None = None) -> Task:
@@ -51,7 +56,7 @@ class Task:
         path = Polyline.of(side_by_side(original.trail.tip, original.trail.axis, axis_length, own_axis))
         # tips are held once only
         original = replace(original, trail=replace(original.trail, tip=path.six[:, :3]))
-        return cls(original, path, _exact_poses(original), tolerance, axis_length, own_axis)
+        return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance)
 
     def six(self, tip: Floats, axis: Floats) -> Floats:
         """(..., 6) tips and axis points side by side, mm."""

@@ -166,7 +166,6 @@ class Verifier:
         elements, events = OwnRapids(task).left_out(nc)
         text = _Text(iter([elements.at_most() if self._slower else elements]), events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
-        measured.axis_tolerance = self._axis_tolerance
         found = measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
         unverified = "the words of the text: they are looked at where it is read, not afterwards"
         return replace(found, unverified=unverified, rewinds=tuple((out, back) for *_, out, back in nc.left_cuts))
@@ -191,7 +190,7 @@ class Verifier:
         measured = _measure(task, text, words=self._words, processes=self._processes)
         problems = [*reader.problems, *check.problems]
         own = KINDS & set(self._trusted)
-        measured.own, measured.axis_tolerance, measured.clamps = own, self._axis_tolerance, self._clamps
+        measured.own, measured.clamps = own, self._clamps
         found = measured.verification(
             problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
@@ -260,7 +259,6 @@ class _Measured:
         Kinds of statements that the user says in words of his own.
     clamps : frozenset of float
         M words that clamp a rotary axis or let it turn.
-    axis_tolerance : float or None, degrees
     """
 
     task: Task
@@ -274,7 +272,6 @@ class _Measured:
     margin: float = 0.0
     own: frozenset[str] = frozenset()
     clamps: frozenset[float] = frozenset()
-    axis_tolerance: float | None = None
 
     def verification(
         self,
@@ -303,7 +300,6 @@ class _Measured:
             self.poses,
             problems,
             task=self.task,
-            axis_tolerance=self.axis_tolerance,
             poses=len(program),
             blocks=blocks,
             elements=self.batches.elements,
