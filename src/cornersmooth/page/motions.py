@@ -24,6 +24,9 @@ _MANY = 100_000
 #: steps to the nearest point of a move
 _STEPS = 3
 
+#: points whose distance is found at a time: what that needs does not grow with the text
+_AT_ONCE = 65_536
+
 #: chords of an original arc
 _ARC_CHORD = np.radians(3.0)
 
@@ -146,6 +149,8 @@ def written_path(
     element = np.repeat(np.arange(len(nc)), pieces)
     share = (np.arange(len(element)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1) / pieces[element]
     tip, axis = written_at(nc, element, share)
+    end = (share == 1.0) | bent[element]
+    curvature = _curvature(tip, end, rapid[element])
     along = deviation_along(
         program, nc, tolerance=tolerance, axis_length=axis_length, axis_tolerance=axis_tolerance, samples=samples
     )
@@ -153,6 +158,7 @@ def written_path(
     own = np.flatnonzero(along.element >= 0)
     row[along.element[own] * samples + np.round(along.fraction[own] * samples).astype(np.int64) - 1] = own
     at = row[element * samples + np.round(share * samples).astype(np.int64) - 1]
+    del row
     there = at >= 0
     rows = at[there]
     pose = np.zeros(len(element), np.int64)
@@ -165,12 +171,12 @@ def written_path(
     tip_off, axis_off, angle_off = np.full((3, len(element)), np.nan)
     tip_off[there], axis_off[there], angle_off[there] = along.tip[rows], along.axis_point[rows], along.angle[rows]
     straight = np.flatnonzero(there & (program.kind[pose] == Move.LINEAR))
-    place = along.share[at[straight]]
     second = () if axis_tolerance is not None else ((axis_off, axis_length),)
-    for off, height in ((tip_off, 0.0), *second):
-        near = _distance(program, tip[straight] + height * axis[straight], pose[straight], place, height)
-        off[straight] = np.minimum(off[straight], near)
-    end = (share == 1.0) | bent[element]
+    for first in range(0, len(straight), _AT_ONCE):
+        some = straight[first : first + _AT_ONCE]
+        for off, height in ((tip_off, 0.0), *second):
+            near = _distance(program, tip[some] + height * axis[some], pose[some], along.share[at[some]], height)
+            off[some] = np.minimum(off[some], near)
     return WrittenPath(
         tip=tip,
         axis=axis,
@@ -184,7 +190,7 @@ def written_path(
         axis_off=axis_off,
         angle_off=angle_off,
         feed=np.where(nc.per_revolution[element], np.nan, nc.feed[element]),
-        curvature=_curvature(tip, end, rapid[element]),
+        curvature=curvature,
         cl_line=program.line[pose],
         nc_line=nc.line[element],
     )

@@ -101,7 +101,9 @@ def deviation_along(
         matched = match(task, batch)
         parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
     rows = np.concatenate(parts)
-    columns = rows[np.argsort(rows[:, 0], kind="stable")].T
+    parts.clear()
+    order = np.argsort(rows[:, 0], kind="stable")
+    columns = [column[order] for column in rows.T]
     return Distribution(*columns[:6], *(column.astype(np.int64) for column in columns[6:]))
 
 
