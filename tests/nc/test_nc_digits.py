@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,11 @@ import pytest
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
-from cornersmooth.nc import Form, choose_form, fit_settings, load_control, write
+from cornersmooth.nc import Form, choose_form, fit_settings, load_control, parse_control, write
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from cornersmooth.verify import verify
 from nc.grammars import reader
 
 #: control, form, machine, and decimals of X and of the last word in mm
@@ -109,9 +111,69 @@ def test_a_second_point_stands_a_hundred_millimetres_up_the_axis_or_farther() ->
         assert reach.min() > 0.98 * lever
 
 
+def vectors(text: str) -> np.ndarray:
+    numbers = re.findall(r"^G1 .*I(\S+) J(\S+) K(\S+)", text, re.MULTILINE)
+    assert len(numbers) > 20
+    return np.array(numbers, np.float64)
+
+
+@pytest.mark.parametrize("control", ["fanuc", "mitsubishi"])
+@pytest.mark.parametrize(("digits", "decimals"), [("IS-B", 3), ("IS-C", 4), ("IS-D", 5), ("IS-E", 6)])
+@pytest.mark.parametrize("units", ["mm", "inch"])
+def test_vectors_lose_nothing_where_the_control_rounds_them_to_its_increment(
+    control: str, digits: str, decimals: int, units: str
+) -> None:
+    """Seven digits of a direction: at the axis point, 10 mm away, they are worth less than a millionth of a mm."""
+    long = vectors(written(choose_form(control, digits=digits), units))
+    length = np.linalg.norm(long, axis=1)
+    assert np.abs(length - 10.0 ** (7 - decimals)).max() <= np.sqrt(3) / 2 * 10.0**-decimals
+    assert np.array_equal(np.round(long, decimals), long)
+    exact = np.concatenate((program().axis, -program().axis))
+    apart = np.linalg.norm(long[:, None] / length[:, None, None] - exact[None], axis=2).min(axis=0)
+    assert 0.0 < 10.0 * apart[: len(program())][[0, -1]].max() < 1e-6
+
+
+def test_a_unit_vector_that_the_control_rounds_turns_the_tool_by_far_more() -> None:
+    plain = vectors(written(choose_form("fanuc")))
+    cut = np.round(plain, 3)
+    off = 10.0 * np.linalg.norm(cut / np.linalg.norm(cut, axis=1, keepdims=True) - plain, axis=1)
+    assert off.max() > 0.003
+
+
+@pytest.mark.parametrize(("length", "decimals"), [(0.1, 7), (3.0, 6), (1000.0, 4), (1234.5, 3)])
+def test_length_of_vectors_is_of_no_account_when_read(length: float, decimals: int) -> None:
+    text = written(choose_form("fanuc"))
+
+    def longer(match: re.Match[str]) -> str:
+        return f"{match[1]}{length * float(match[2]):.{decimals}f}"
+
+    other = re.sub(r"(?<= )([IJK])(\S+)", longer, text)
+    assert other != text
+    found = verify(program(), other.encode(), tolerance=0.02, axis_length=10.0, control="fanuc")
+    assert found.passed, found.problems
+
+
+@pytest.mark.parametrize("digits", ["IS-B", "IS-C", "IS-E"])
+def test_a_long_vector_that_is_wrong_is_found(digits: str) -> None:
+    lines = written(choose_form("fanuc", digits=digits)).splitlines()
+    length = load_control("fanuc").systems[digits].vector_length
+    places = [k for k, line in enumerate(lines) if line.startswith("G1 ")]
+    for place in (places[3], places[len(places) // 2], places[-2]):
+        wrong = re.sub(r" I(\S+)", lambda found: f" I{float(found[1]) + 0.01 * length:.3f}", lines[place])
+        text = "\n".join([*lines[:place], wrong, *lines[place + 1 :]])
+        found = verify(program(), text.encode(), tolerance=0.02, axis_length=10.0, control="fanuc")
+        assert not found.passed
+
+
+def test_length_of_vectors_has_to_be_one_at_least() -> None:
+    with pytest.raises(SettingsError, match=r"digits.vector_length is 0; give a whole number from 1 to 1000000"):
+        parse_control("like = 'fanuc'\n[digits]\nvector_length = 0\n")
+
+
 def test_systems_are_those_of_the_table() -> None:
     assert list(load_control("fanuc").systems) == ["IS-B", "IS-C", "IS-D", "IS-E"]
-    assert load_control("fanuc").systems["IS-C"] == load_control("fanuc").digits
+    fanuc = load_control("fanuc")
+    assert replace(fanuc.systems["IS-C"], vector=7, vector_length=1) == fanuc.digits
     assert not load_control("siemens").systems
 
 

@@ -85,7 +85,8 @@ def plan_circles(program: Program, settings: Settings, form: Form, planes: Plane
     unit = program.mm_per_unit
     decimals = form.tip_decimals(program.units)
     ticks = to_ticks(np.minimum(radius, _LARGEST_RADIUS) / unit, decimals)
-    vectors = to_ticks(program.axis, form.table.digits.vector)
+    digits = form.table.digits
+    vectors = to_ticks(digits.vector_length * program.axis, digits.vector)
     fits = (
         np.where(tilted, form.plane is not None and form.plane.circles, form.mode.circles)
         & (np.abs(height) > 1.0 - _UPRIGHT)

@@ -139,6 +139,9 @@ class Digits:
     lever : int, mm
         Distance from the tip at which a second point is written at least. Curves are the same whatever it is, as only
         the direction counts; the farther the point, the less its rounded digits turn the tool.
+    vector_length : int
+        Length of written tool vectors. Only their direction counts; where the control rounds their words as it rounds
+        lengths, a longer one keeps more of it.
     """
 
     mm: int = 4
@@ -151,6 +154,7 @@ class Digits:
     speed: int = 0
     most: int = 6
     lever: int = 100
+    vector_length: int = 1
 
 
 @dataclass(frozen=True)

@@ -370,9 +370,11 @@ def _record(kind: type[Record], table: Table, where: str) -> Record:
         elif isinstance(default, bool):
             values[key] = _flag(value, f"{where}.{key}")
         elif isinstance(default, int):
-            most = _MOST_DIGITS if kind is Digits and key != "lever" else 1_000_000
-            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
-                raise _SHELF.wrong(f"{where}.{key} is {value!r}", f"give a whole number up to {most}")
+            most = _MOST_DIGITS if kind is Digits and key not in ("lever", "vector_length") else 1_000_000
+            least = int(key == "vector_length")
+            if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+                span = f"from {least} to {most}" if least else f"up to {most}"
+                raise _SHELF.wrong(f"{where}.{key} is {value!r}", f"give a whole number {span}")
             values[key] = value
         elif isinstance(default, float):
             if isinstance(value, bool) or not isinstance(value, (int, float)):

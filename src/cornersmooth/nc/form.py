@@ -69,7 +69,7 @@ class Form:
 
     @property
     def vectors(self) -> bool:
-        """Whether the words behind the tip are a unit vector."""
+        """Whether the words behind the tip are a tool vector."""
         return self.orientation == "vector"
 
     @property
@@ -121,7 +121,12 @@ class Form:
             if self.plane is None
             else 2.0 / math.sqrt(3.0) * self.plane_reserve(settings.axis_point_allowed, axis_length)
         )
-        return max(axis_length * float(10.0**-self.table.digits.vector), in_plane)
+        return max(axis_length * self.vector_step, in_plane)
+
+    @property
+    def vector_step(self) -> float:
+        """Step of the last digit of tool vectors, as a share of their length."""
+        return float(10.0**-self.table.digits.vector / self.table.digits.vector_length)
 
     def plane_reserve(self, tolerance: float, axis_length: float) -> float:
         """By how much the angles of a tilted plane may be off at the axis point, mm: a step of their last digit."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,12 @@ from cornersmooth.nc_reader.splines import CurveTable, interval_curves, knot_cur
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, POLY, SPL, Table
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"
+
+#: by how much the square of the length of a unit vector may be off in printed digits
+_UNIT: Final = 1e-3
+
+#: by how much lengths of vectors may be off the whole number that they are but for rounded digits
+_WHOLE: Final = 2e-3
 
 
 @dataclass(frozen=True)
@@ -71,6 +78,8 @@ class Executed:
     arc_centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     arc_normal: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     arc_sweep: Floats = field(default_factory=lambda: np.zeros(0))
+    #: of the shortest tool vector that is said; `second` has unit vectors
+    vector_length: float = math.inf
     problems: list[Problem] = field(default_factory=list)
 
     @property
@@ -107,11 +116,14 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
     is_arc = np.zeros(len(table), np.bool_) if straight.all() else (code == 2) | (code == 3)
     letters = modal.rotary or (_POINT if points else _VECTOR)
     problems: list[Problem] = []
+    vector_length = math.inf
     if modal.rotary or points:
         known = modal.rotary or modal.points  # else there has been a vector, which is no point
         placed |= held.columns(table, letters, modal.second if known else (np.nan,) * 3, second)
     else:
-        placed |= _vectors(table, modal, straight, second, problems)
+        given = _vectors(table, modal, straight, second, problems)
+        vector_length = _to_unit_length(second, given)
+        placed |= given
     curves = CurveTable()
     element_rows = placed
     if not (straight | is_arc).all():
@@ -145,6 +157,7 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
         per_revolution=np.full(len(rows), modal.per_revolution),
         feed_room=np.zeros(len(rows)),
         curves=curves,
+        vector_length=vector_length,
         problems=problems,
     )
     unknown = np.flatnonzero(np.isnan(code[rows]))
@@ -235,6 +248,24 @@ def _vectors(table: Table, modal: Modal, straight: Bools, values: Floats, proble
         text = "a tool vector without length"
         problems.extend(Problem("CS507", 0, int(table.line[row]), text) for row in np.flatnonzero(bare).tolist())
     return given
+
+
+def _to_unit_length(vectors: Floats, given: Bools) -> float:
+    """Divide tool vectors by their length, of which controls take no notice; return that of the shortest given.
+
+    Lengths are taken for the whole numbers that they are but for rounded digits, so that digits stay those of the text.
+    """
+    square = np.einsum("ij,ij->i", vectors, vectors)
+    if not given.any():
+        return math.inf
+    if np.abs(square - 1.0).max() <= _UNIT:
+        return 1.0
+    length = np.sqrt(square)
+    whole = np.rint(length)
+    length = np.where((whole >= 1.0) & (np.abs(length - whole) <= _WHOLE), whole, length)
+    length[length == 0.0] = 1.0  # said to be wrong elsewhere
+    vectors /= length[:, None]
+    return float(length[given].min())
 
 
 def _curves(

@@ -74,6 +74,8 @@ class Reader:
         self.problems: list[Problem] = []
         self._axis_words = AxisWords(self.dialect)
         self.lever, self._given_lever = 0.0, lever
+        #: of the shortest tool vector so far
+        self.vector_length = math.inf
         self.elements = self.given_out = self.curves = 0
         #: elements before any word of a second point on the axis
         self.pointless = 0
@@ -279,7 +281,9 @@ class Reader:
             return
         second_is: Second = "point" if self.modal.points else "vector"
         scale = MM_PER_UNIT[self.units]
-        steps = (self.steps.tip * scale, self.steps.second * (scale if second_is == "point" else 1.0))
+        self.vector_length = min(self.vector_length, run.vector_length)
+        length = self.vector_length if math.isfinite(self.vector_length) else 1.0
+        steps = (self.steps.tip * scale, self.steps.second * (scale if second_is == "point" else 1.0 / length))
         if self.rotary is not None:
             lever = self.lever if self._given_lever is None else self._given_lever
             steps = replace(self.rotary, tip_step=steps[0]).steps(lever)
