@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.feedrate import bezier_halves
 from cornersmooth.feedrate.cubics import cubics, curved, stalling
@@ -65,6 +66,32 @@ def _tool_axis(tip: Floats, axis: Floats) -> Floats:
     return axis
 
 
+Singles = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class AxisSamples:
+    """Derivatives of the axes of a machine, signs and all, at start, middle and end of the same intervals.
+
+    Parameters
+    ----------
+    value : (3, d, k, 3) float32
+        First, second and third derivative of every axis.
+    middle : (k,) float64
+        Share of the length of an interval that is before its middle.
+    known : (k,) bool
+        Whether all derivatives are finite.
+    accel, jerk : (d,) float64
+        Limits of the axes, inf for none.
+    """
+
+    value: Singles
+    middle: Floats
+    known: Bools
+    accel: Floats
+    jerk: Floats
+
+
 @dataclass(frozen=True)
 class LimitCoefficients:
     """Coefficients over intervals of the path coordinate, in the names of `interior_point.Batch`.
@@ -74,6 +101,10 @@ class LimitCoefficients:
     speed_limits : SpeedLimits
         The intervals and their bounds of v², which keep the speed limits and, at steady speed, all others.
     accel_slope, accel_level, jerk_bend, jerk_slope, jerk_level : (k,) float64
+    others : LimitCoefficients or None
+        The same without the axes of the machine, which then have only their speed in it.
+    samples : AxisSamples or None
+        What is known of the axes of the machine besides.
     """
 
     speed_limits: SpeedLimits
@@ -82,6 +113,8 @@ class LimitCoefficients:
     jerk_bend: Floats
     jerk_slope: Floats
     jerk_level: Floats
+    others: LimitCoefficients | None = None
+    samples: AxisSamples | None = None
 
     @property
     def rows(self) -> Floats:
@@ -119,9 +152,10 @@ def find_limit_coefficients(
     ]
     slow = stalling(path)
     close = slow.copy()
+    own_bounds = np.full((3, 0), np.inf) if machine_axes is None else machine_axes.limits
     if machine_axes is not None:
         machine_axes = replace(machine_axes, cone=WITHIN * machine_axes.cone)
-        given.append((_signed(machine_axes), machine_axes.limits, steady))
+        given.append((_signed(machine_axes), own_bounds, steady))
         close |= machine_axes.near_pole() & steady
     given = [(orders, bounds, where) for orders, bounds, where in given if np.isfinite(bounds).any()]
     if not given:
@@ -133,6 +167,9 @@ def find_limit_coefficients(
     total = int(begin[-1])
     width, cap = np.repeat(path.length, count), np.full(total, np.inf)
     rows = np.zeros((5, total))
+    other_cap, other_rows = cap.copy(), rows.copy()
+    value = np.zeros((3, own_bounds.shape[1], total, 3), np.float32)
+    middle, known = np.full(total, 0.5), np.ones(total, np.bool_)
     for curve in (True, False):
         for near in (True, False):
             chosen = np.flatnonzero(asked & (bent == curve) & (close == near))
@@ -146,13 +183,32 @@ def find_limit_coefficients(
                     counts = where[element][:, None]
                     if not counts.any():
                         continue
-                    bound, row = _judge(element, borders, orders, bounds)
+                    low, high, along = _ranges(element, borders, orders)
+                    bound, row = _judge(np.maximum(-low, high), bounds)
                     cap[into] = np.minimum(cap[into], np.where(counts, bound, np.inf))
                     rows[:, into] = np.maximum(rows[:, into], np.where(counts, row, 0.0))
+                    if machine_axes is not None and bounds is own_bounds:
+                        with np.errstate(divide="ignore"):
+                            speed = ((bounds[0] / np.maximum(-low, high)[0]) ** 2).min(axis=-1)
+                        other_cap[into] = np.minimum(other_cap[into], np.where(counts, speed, np.inf))
+                        finite = np.isfinite(along).all(axis=(0, 3, 4))
+                        known[into] = (finite & ~slow[element][:, None]) | ~counts
+                        chosen_here = (counts & finite)[..., None, None]
+                        for of_order, values in zip(value, np.where(chosen_here, along, 0.0), strict=True):
+                            of_order[:, into] = values.transpose(3, 0, 1, 2)
+                        if curve:
+                            middle[into] = _middles(path, element, borders)
+                    else:
+                        other_cap[into] = np.minimum(other_cap[into], np.where(counts, bound, np.inf))
+                        other_rows[:, into] = np.maximum(other_rows[:, into], np.where(counts, row, 0.0))
     edge = np.concatenate(([0.0], np.cumsum(width)))
-    return LimitCoefficients(
-        SpeedLimits(edge=edge, cap=cap, run=begin[speed_limits.element], element=speed_limits.element), *rows
-    )
+    run, element = begin[speed_limits.element], speed_limits.element
+    others, samples = None, None
+    if machine_axes is not None:
+        others = LimitCoefficients(SpeedLimits(edge, other_cap, run, element), *other_rows)
+        samples = AxisSamples(value, middle, known, machine_axes.limits[1], machine_axes.limits[2])
+    own = SpeedLimits(edge, cap, run, element)
+    return LimitCoefficients(own, rows[0], rows[1], rows[2], rows[3], rows[4], others, samples)
 
 
 def _orders(path: Path, item: AxisLimits) -> Orders:
@@ -222,13 +278,9 @@ def _borders(path: Path, element: Ints, curve: bool, given: Floats | None) -> tu
     return borders, lengths / lengths.sum(axis=1, keepdims=True)
 
 
-def _judge(element: Ints, borders: Floats, orders: Orders, bounds: Floats) -> tuple[Floats, Floats]:
-    """Bounds of v² (g, p) and coefficients (5, g, p) from samples at the ends and inside every interval."""
-    step = np.diff(borders, axis=1)
-    inner = borders[:, :-1, None] + step[..., None] * _INNER
-    share = np.concatenate((borders, inner.reshape(len(borders), -1)), axis=1)
-    found = orders(np.repeat(element, share.shape[1]), share.ravel())
-    one, two, three = _largest(found, share.shape, step.shape[1])
+def _judge(amounts: Floats, bounds: Floats) -> tuple[Floats, Floats]:
+    """Bounds of v² (g, p) and coefficients (5, g, p) from the largest amounts (3, g, p, d) of derivatives."""
+    one, two, three = amounts
     speed, accel, jerk = bounds
     with np.errstate(divide="ignore"):
         steady = np.minimum(np.minimum((speed / one) ** 2, accel / two), np.cbrt(jerk / three) ** 2)
@@ -236,21 +288,40 @@ def _judge(element: Ints, borders: Floats, orders: Orders, bounds: Floats) -> tu
     return steady.min(axis=-1), rows.max(axis=-1)
 
 
-def _largest(orders: tuple[Floats, Floats, Floats], shape: tuple[int, ...], intervals: int) -> list[Floats]:
-    """Largest amounts (g, p, d) in every interval; not at an end where the tip comes to a stand and they are infinite.
+def _middles(path: Path, element: Ints, borders: Floats) -> Floats:
+    """Shares (g, p) of the lengths of intervals of curves that are before the middle of their parameter."""
+    halves = np.repeat(borders, 2, axis=1)[:, :-1]
+    halves[:, 1::2] = (borders[:, 1:] + borders[:, :-1]) / 2.0
+    lengths = bezier_halves.interval_lengths(cubics(path, element).tip, halves)
+    before, behind = lengths[:, ::2], lengths[:, 1::2]
+    return np.where(before + behind > 0.0, before / np.maximum(before + behind, 1e-300), 0.5)
 
-    Between two samples a smooth function exceeds them by at most an eighth of its second difference.
+
+def _ranges(element: Ints, borders: Floats, orders: Orders) -> tuple[Floats, Floats, Floats]:
+    """Least and largest derivatives (3, g, p, d) in every interval, from samples at its ends and inside.
+
+    Third come those at start, middle and end, (3, g, p, 3, d).
+
+    Not at an end where the tip comes to a stand and they are infinite. Between two samples a smooth function leaves
+    their range by at most an eighth of its second difference.
     """
-    largest = []
-    for order in orders:
-        values = order.reshape(*shape, -1)
-        ends, inner = (
+    step = np.diff(borders, axis=1)
+    inner = borders[:, :-1, None] + step[..., None] * _INNER
+    share = np.concatenate((borders, inner.reshape(len(borders), -1)), axis=1)
+    found = orders(np.repeat(element, share.shape[1]), share.ravel())
+    low, high, three = [], [], []
+    for order in found:
+        values = order.reshape(*share.shape, -1)
+        intervals = step.shape[1]
+        ends, inside = (
             values[:, : intervals + 1, None],
             values[:, intervals + 1 :].reshape(len(values), intervals, len(_INNER), -1),
         )
-        along = np.concatenate((ends[:, :-1], inner, ends[:, 1:]), axis=2)
+        along = np.concatenate((ends[:, :-1], inside, ends[:, 1:]), axis=2)
+        three.append(along[:, :, ::2])
         known = np.isfinite(along).all(axis=2)
         along = np.where(np.isfinite(along), along, 0.0)
-        between = np.abs(np.diff(along, n=2, axis=2)).max(axis=2) / 8.0
-        largest.append(np.abs(along).max(axis=2) + np.where(known, between, 0.0))
-    return largest
+        between = np.where(known, np.abs(np.diff(along, n=2, axis=2)).max(axis=2) / 8.0, 0.0)
+        low.append(along.min(axis=2) - between)
+        high.append(along.max(axis=2) + between)
+    return np.stack(low), np.stack(high), np.stack(three)

@@ -64,6 +64,13 @@ class Grid:
         """(r,) last cell of each run."""
         return np.append(self.first[1:], len(self.start)) - 1
 
+    def of(self, runs: Bools) -> Grid:
+        """Cells of some runs, (r,) bool."""
+        size = self.last - self.first + 1
+        cells = np.repeat(runs, size)
+        first = np.cumsum(size[runs]) - size[runs]
+        return Grid(self.start[cells], self.width[cells], self.cap[cells], first)
+
 
 def make_grid(
     speed_limits: SpeedLimits,

@@ -37,8 +37,10 @@ from cornersmooth.model import Bools, Floats, Ints
 
 #: the remaining duality gap over the time, at which the profile is taken
 GAP = 2e-4
-#: change of the time in one step, over the time, below which the dual variables are taken to have arrived too
-SETTLED = 1e-3
+#: change of the time in one step, over what may remain, below which the dual variables are taken to have arrived too
+SETTLED = 5.0
+#: barrier to begin with, over that of a cold start, where a plan that keeps most of the limits is known
+WARM = 0.05
 #: Newton steps after which the profile is taken as it is; it is feasible at every step
 MAX_STEPS = 500
 #: what is added to the main diagonal of the normal equations, relative to it, where they cannot be solved without
@@ -60,6 +62,41 @@ class Row(NamedTuple):
     slope: Floats | None
     bend: Floats | None
     right: Floats | None
+
+
+class Signed(NamedTuple):
+    """A limit whose terms may cancel: |level·z + slope·z′ + bend·z″/2| ≤ z^(−1/2), or ≤ 1 where `bend` is None.
+
+    (n,) each; z and z′ are those of node k (`at` 0) or of node k + 1 (`at` 1).
+    """
+
+    at: int
+    level: Floats
+    slope: Floats
+    bend: Floats | None
+
+    def part(self, slots: slice | Bools) -> Signed:
+        """A copy of some slots."""
+        bend = None if self.bend is None else self.bend[slots].copy()
+        return Signed(self.at, self.level[slots].copy(), self.slope[slots].copy(), bend)
+
+
+#: arrays of `Batch` that have one value, or column, per slot
+_PER_SLOT = (
+    "near",
+    "far",
+    "slope",
+    "bend",
+    "node_cap",
+    "cell_cap",
+    "accel_level",
+    "accel_slope",
+    "jerk_level",
+    "jerk_slope",
+    "jerk_bend",
+    "weight",
+    "frozen",
+)
 
 
 @dataclass(frozen=True)
@@ -89,6 +126,8 @@ class Batch:
         That coefficient over its neighbour where the run starts (ends) at rest; NaN where it does not.
     frozen : (n,) bool
         Coefficients that keep their value.
+    signed : tuple of Signed
+        More limits.
     """
 
     near: Floats
@@ -108,9 +147,25 @@ class Batch:
     first_ratio: Floats
     last_ratio: Floats
     frozen: Bools
+    signed: tuple[Signed, ...] = ()
 
     def __len__(self) -> int:
         return len(self.near)
+
+    def of(self, runs: Bools) -> Batch:
+        """The problem of some runs, (r,) bool."""
+        size = self.last - self.first + 1
+        slots = np.repeat(runs, size)
+        last = np.cumsum(size[runs]) - 1
+        values = {name: getattr(self, name)[..., slots] for name in _PER_SLOT}
+        return Batch(
+            **values,
+            first=last + 1 - size[runs],
+            last=last,
+            first_ratio=self.first_ratio[runs],
+            last_ratio=self.last_ratio[runs],
+            signed=tuple(limit.part(slots) for limit in self.signed),
+        )
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
@@ -128,6 +183,11 @@ class Batch:
             rows += [Row(at, None, None, bend, None) for at in (0, 1) for bend in bends]
             # where z″ < 0 the largest z in the cell may lie inside
             rows.append(Row(3, None, None, bends[1], None))
+        for limit in self.signed:
+            right = one if limit.bend is None else None
+            for sign in (1.0, -1.0):
+                bend = None if limit.bend is None else sign * limit.bend
+                rows.append(Row(limit.at, sign * limit.level, sign * limit.slope, bend, right))
         return tuple(rows)
 
     @cached_property
@@ -181,7 +241,7 @@ class Batch:
         c[self.last[at_rest]] = self.last_ratio[at_rest] * c[self.last[at_rest] - 1]
 
 
-def solve(batch: Batch, c: Floats) -> Floats:
+def solve(batch: Batch, c: Floats, gap: float = GAP) -> Floats:
     """Fastest profile of every run.
 
     Parameters
@@ -189,15 +249,17 @@ def solve(batch: Batch, c: Floats) -> Floats:
     batch : Batch
     c : (n,) float64
         Strictly feasible coefficients to start from.
+    gap : float
+        Remaining duality gap over the time at which a profile is taken.
 
     Returns
     -------
     (n,) float64
-        Strictly feasible coefficients; the time is within about `GAP` of the smallest on this grid.
+        Strictly feasible coefficients; the time is within about `gap` of the smallest on this grid.
     """
     slack, z = batch.slacks(c)
     time = float((batch.weight / np.sqrt(c)).sum())
-    barrier = time / slack.size
+    barrier = (WARM if batch.signed else 1.0) * time / slack.size
     dual = barrier / slack
     for _ in range(MAX_STEPS):
         bites = [0.5 * values**-1.5 for values in z]  # −d(z^(−1/2))/dz
@@ -214,15 +276,15 @@ def solve(batch: Batch, c: Floats) -> Floats:
             length *= 0.7
         c, slack, z = trial, new_slack, new_z
         dual += dual_length * dual_step
-        gap = float((dual * slack).sum())
+        remaining = float((dual * slack).sum())
         worst = min(length, dual_length)
         before, time = time, float((batch.weight / np.sqrt(c)).sum())
         # the gap says how far the time is from the smallest only once the duals balance the forces
-        if worst > 0.5 and gap < GAP * time and abs(before - time) < SETTLED * time:
+        if worst > 0.5 and remaining < gap * time and abs(before - time) < SETTLED * gap * time:
             break
         # lower the barrier only as fast as the steps arrive; raise it where they are cut short
         shrink = 0.2 if worst > 0.9 else 0.5 if worst > 0.6 else 1.0 if worst > 0.2 else 2.0
-        barrier = shrink * gap / slack.size
+        barrier = shrink * remaining / slack.size
     return c
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.feedrate.grid import Grid
-from cornersmooth.feedrate.interior_point import Batch, solve
+from cornersmooth.feedrate.interior_point import GAP, Batch, solve
 from cornersmooth.feedrate.scurve import stopping_distance
 from cornersmooth.model import Floats, Ints
 
@@ -99,15 +99,25 @@ def batch_of(grid: Grid, accel: Floats, jerk: Floats, coefficients: Floats | Non
     )
 
 
-def solve_runs(batch: Batch, grid: Grid, progress: Callable[[int, int], None] | None = None) -> Floats:
+def solve_runs(
+    batch: Batch,
+    grid: Grid,
+    progress: Callable[[int, int], None] | None = None,
+    start: Floats | None = None,
+    gap: float = GAP,
+) -> Floats:
     """Coefficients of the fastest profiles, (n,); short runs together, long ones window by window.
 
     Parameters
     ----------
     progress : callable, optional
         Called with (cells done, cells in all).
+    start : (n,) float64, optional
+        Coefficients to begin with that keep all limits with room to spare.
+    gap : float
+        Remaining duality gap over the time at which a profile is taken.
     """
-    c = batch.start()
+    c = batch.start() if start is None else start.copy()
     n = len(c)
     run = 0
     while run < len(batch.first):
@@ -116,9 +126,9 @@ def solve_runs(batch: Batch, grid: Grid, progress: Callable[[int, int], None] | 
         end_run = max(end_run, run + 1)
         end = int(batch.last[end_run - 1]) + 1
         if end - begin <= WINDOW:
-            c[begin:end] = solve(_part(batch, begin, end), c[begin:end])
+            c[begin:end] = solve(_part(batch, begin, end), c[begin:end], gap)
         else:
-            _solve_long(batch, grid, c, begin, end, progress)
+            _solve_long(batch, grid, c, begin, end, gap, progress)
         run = end_run
         if progress is not None:
             progress(end, n)
@@ -126,15 +136,21 @@ def solve_runs(batch: Batch, grid: Grid, progress: Callable[[int, int], None] | 
 
 
 def _solve_long(
-    batch: Batch, grid: Grid, c: Floats, begin: int, end: int, progress: Callable[[int, int], None] | None
+    batch: Batch, grid: Grid, c: Floats, begin: int, end: int, gap: float, progress: Callable[[int, int], None] | None
 ) -> None:
     speed = np.sqrt(batch.cell_cap[begin + 1 : end - 1].max())
-    accel, jerk = 0.5 / batch.accel_slope[begin:end].max(), 1.0 / batch.jerk_bend[begin:end].max()
+    steepest, most_bent = batch.accel_slope[begin:end].max(), batch.jerk_bend[begin:end].max()
+    for limit in batch.signed:
+        if limit.bend is None:
+            steepest = max(steepest, np.abs(limit.slope[begin:end]).max())
+        else:
+            most_bent = max(most_bent, np.abs(limit.bend[begin:end]).max())
+    accel, jerk = 0.5 / steepest, 1.0 / most_bent
     brake = 1.1 * float(stopping_distance(speed, accel, jerk))
     at = begin
     while True:
         stop = min(at + WINDOW, end)
-        c[at:stop] = solve(_part(batch, at, stop), c[at:stop])
+        c[at:stop] = solve(_part(batch, at, stop), c[at:stop], gap)
         if stop == end:
             return
         keep = int(np.searchsorted(grid.start, grid.start[stop - CRAWLING] - brake))
@@ -153,6 +169,7 @@ def _part(batch: Batch, begin: int, end: int) -> Batch:
     bend, node_cap = batch.bend[:, begin:end].copy(), batch.node_cap[begin:end].copy()
     levels = batch.accel_level[begin:end].copy(), batch.jerk_level[begin:end].copy(), batch.jerk_slope[begin:end].copy()
     frozen = np.zeros(end - begin, np.bool_)
+    signed = [limit.part(slice(begin, end)) for limit in batch.signed]
     if cut_front:
         frozen[:2] = True
     if cut_back:
@@ -163,6 +180,10 @@ def _part(batch: Batch, begin: int, end: int) -> Batch:
         levels[0][-1] = 0.0
         for level in levels[1:]:
             level[-2:] = 0.0
+        for limit in signed:
+            for part in limit[1:]:
+                if part is not None:
+                    part[-2:] = 0.0
     if len(runs):
         first, last = batch.first[runs] - begin, batch.last[runs] - begin
         first_ratio, last_ratio = batch.first_ratio[runs], batch.last_ratio[runs]
@@ -190,6 +211,7 @@ def _part(batch: Batch, begin: int, end: int) -> Batch:
         first_ratio=first_ratio,
         last_ratio=last_ratio,
         frozen=frozen,
+        signed=tuple(signed),
     )
 
 

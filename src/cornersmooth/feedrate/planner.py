@@ -10,10 +10,11 @@ import numpy as np
 
 from cornersmooth.feedrate import lookahead, scurve
 from cornersmooth.feedrate.axis_limits import AxisLimits, LimitCoefficients, find_limit_coefficients
-from cornersmooth.feedrate.grid import Grid, Resolution, cell_intervals, make_grid
+from cornersmooth.feedrate.grid import Resolution, make_grid
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import follow
 from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.signed_limits import ROUGH, Given, faster
 from cornersmooth.feedrate.speed_limits import SpeedLimits, find_speed_limits
 from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
 from cornersmooth.kinematics import Machine
@@ -216,14 +217,14 @@ def _uneven_runs(
 ) -> tuple[Floats | Ints, ...]:
     """Phases of runs whose speed limit changes on the way: one per cell."""
     more = None if coefficients is None else coefficients.speed_limits
-    grid: Grid = make_grid(speed_limits, runs, accel[runs], jerk[runs], resolution, more)
+    given = Given(speed_limits, coefficients, runs, accel[runs], jerk[runs])
+    grid = make_grid(speed_limits, runs, accel[runs], jerk[runs], resolution, more)
+    batch = given.problem(grid)
+    if coefficients is None or coefficients.samples is None:
+        c = lookahead.solve_runs(batch, grid, progress)
+    else:
+        c = faster(given, grid, batch, lookahead.solve_runs(batch, grid, progress, gap=ROUGH))
     of_cell = lookahead.run_of_cells(grid)
-    of_cells = None
-    if coefficients is not None:
-        rows = np.concatenate((coefficients.rows, np.zeros((5, 1))), axis=1)
-        of_cells = np.maximum.reduceat(rows, cell_intervals(coefficients.speed_limits, grid, runs), axis=1)[:, ::2]
-    batch = lookahead.batch_of(grid, accel[runs][of_cell], jerk[runs][of_cell], of_cells)
-    c = lookahead.solve_runs(batch, grid, progress)
     z, slope, bend = batch.forms(c)
     v, a = np.sqrt(z), 0.5 * slope  # at the end of each cell
     before_v = np.concatenate(([0.0], v[:-1]))
