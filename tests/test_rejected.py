@@ -34,8 +34,9 @@ END-OF-PATH
 @pytest.fixture(autouse=True)
 def careless(monkeypatch: pytest.MonkeyPatch) -> None:
     """The paper's method without a look at what it makes."""
-    nothing = lambda smoothed, rows: np.zeros(len(rows), np.bool_)  # noqa: E731
-    monkeypatch.setattr("cornersmooth.smoothing.zhang2016._strays", nothing)
+    nothing = lambda smoothed: np.zeros(0, np.int64)  # noqa: E731
+    monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_transitions", nothing)
+    monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_remainders", nothing)
 
 
 @pytest.fixture

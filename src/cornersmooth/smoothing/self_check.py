@@ -1,7 +1,7 @@
 """Which transitions of the paper's method keep the tolerance: measured, since its equations do not promise it.
 
-Equation (10) bounds each of the two curves, not the motion that their synchronisation makes of them. So transitions are
-sampled and measured here against the original motion.
+Equation (10) bounds each of the two curves, not the motion that their synchronisation makes of them. So transitions,
+and what they leave of the segments between them, are sampled and measured here against the original motion.
 """
 
 from __future__ import annotations
@@ -25,15 +25,14 @@ _LEAST: Final = 1e-30
 
 
 class Common(NamedTuple):
-    """Distances (g, m) from one pose of the original, mm: of tip, of axis point, and of that with the tips together."""
+    """Distances (g, m) of tip and of axis point from one pose of the original, mm."""
 
     tip: Floats
     axis_point: Floats
-    turned: Floats
 
 
 def distances(
-    program: Program, axis_length: float, poses: Ints, tip: Floats, axis: Floats
+    program: Program, axis_length: float, poses: Ints, tip: Floats, axis: Floats, *, own_axis: bool = False
 ) -> tuple[Floats, Floats, Common, Floats]:
     """How far sampled poses are from the original motion through some poses of a program.
 
@@ -45,6 +44,8 @@ def distances(
     poses : (g, q) int64
     tip, axis : (g, m, 3) float64
         Samples: mm, unit vectors.
+    own_axis : bool
+        Whether the axis point is H times the axis wherever the tip is, as where the axis has a tolerance of its own.
 
     Returns
     -------
@@ -53,11 +54,11 @@ def distances(
     common : Common
         From the pose that is nearest in six dimensions.
     backwards : (g,) float64, mm
-        By how much that pose goes back at most from one sample to the next.
+        By how much that pose is behind the farthest of those before it, at most.
     """
-    own = tip, tip + axis_length * axis
+    own = tip, axis_length * axis if own_axis else tip + axis_length * axis
     legs = [
-        _Leg(program.tip[start], program.tip[end], program.axis[start], program.axis[end], axis_length)
+        _Leg(program.tip[start], program.tip[end], program.axis[start], program.axis[end], axis_length, own_axis)
         for start, end in pairwise(poses.T)
     ]
 
@@ -68,12 +69,12 @@ def distances(
         """Distances from the pose at which those `chosen` are nearest together, and its length."""
         found = [leg.nearest(own, chosen) for leg in legs]
         which = np.stack([row[0] for row in found]).argmin(axis=0)[None]
-        share, *away = (np.take_along_axis(np.stack([row[k] for row in found]), which, axis=0)[0] for k in (1, 2, 3, 4))
+        share, *away = (np.take_along_axis(np.stack([row[k] for row in found]), which, axis=0)[0] for k in (1, 2, 3))
         row = np.arange(len(poses))[:, None]
         return Common(*away), start[which[0], row] + share * size[which[0], row]
 
     common, length = nearest(0, 1)
-    back = -np.diff(length, axis=1).min(axis=1, initial=0.0)
+    back = (np.maximum.accumulate(length, axis=1) - length).max(axis=1)
     return nearest(0)[0].tip, nearest(1)[0].axis_point, common, back
 
 
@@ -94,11 +95,13 @@ class _Leg:
     axis_start: Floats
     axis_end: Floats
     axis_length: float
+    own_axis: bool
 
     @property
     def swing(self) -> Floats:
         """(g, 3) way of the axis point, mm."""
-        return self.tip_end - self.tip_start + self.axis_length * (self.axis_end - self.axis_start)
+        turn = self.axis_length * (self.axis_end - self.axis_start)
+        return turn if self.own_axis else self.tip_end - self.tip_start + turn
 
     def at(self, share: Floats) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
         """Tips and axis points (g, m, 3) at shares (g, m) of it, and their slopes."""
@@ -109,14 +112,17 @@ class _Leg:
         across = turn - dot(ruled, turn)[..., None] * ruled / size**2
         tip = self.tip_start[:, None] + part * way
         lever, turning = self.axis_length * ruled / size, self.axis_length * across / size
-        return (tip, tip + lever), (np.broadcast_to(way, tip.shape), way + turning)
+        moving = np.broadcast_to(way, tip.shape)
+        if self.own_axis:
+            return (tip, lever), (moving, turning)
+        return (tip, tip + lever), (moving, way + turning)
 
     def nearest(self, own: tuple[Floats, Floats], chosen: tuple[int, ...]) -> tuple[Floats, ...]:
         """Where those of tip and axis point (g, m, 3) that are `chosen` are nearest together.
 
         Returns
         -------
-        square, share, tip, axis_point, turned : (g, m) float64
+        square, share, tip, axis_point : (g, m) float64
             Sum of the chosen squares of distances, where on the segment, and the distances, mm.
         """
         grid = np.linspace(0.0, 1.0, _PARTS + 1)
@@ -132,8 +138,7 @@ class _Leg:
                 steep = sum(dot(slope[k], slope[k]) for k in chosen)
                 share = np.clip(share + towards / np.maximum(steep, _LEAST), 0.0, 1.0)
         here, _ = self.at(found)
-        off, top = own[0] - here[0], own[1] - here[1]
-        return best, found, norm(off), norm(top), norm(top - off)
+        return best, found, norm(own[0] - here[0]), norm(own[1] - here[1])
 
 
 def _squares(

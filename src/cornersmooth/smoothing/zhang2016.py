@@ -16,7 +16,7 @@ from cornersmooth.smoothing.construction import Construction
 from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
 from cornersmooth.smoothing.legs import Legs, divide, half_angle_cosine
 from cornersmooth.smoothing.sampling import nodes
-from cornersmooth.smoothing.segments import lines_of
+from cornersmooth.smoothing.segments import Segments, lines_of, segments_of
 from cornersmooth.smoothing.self_check import distances, passing
 from cornersmooth.smoothing.synchronise import REPORT_PARAMETERS, matching_parameters, synchronisation_report
 from cornersmooth.vectors import angle_between, dot, norm, unit
@@ -28,6 +28,9 @@ EXTRA = ("sync_residual", "jump_in", "jump_out")
 #: parameters at which transitions are measured, u = ½ in the middle, and corners measured at once
 _SAMPLES: Final = np.linspace(0.0, 1.0, 17)
 _MEASURED: Final = 1024
+
+#: parts in which what is left of segments is measured
+_PARTS: Final = 16
 
 #: how far tip and axis point may be from a common pose, in what is allowed for each: nearly what verification allows
 _TOGETHER: Final = 1.8
@@ -122,13 +125,13 @@ class Zhang2016(Construction):
         progress: Callable[[int, int], None] | None = None,
         processes: int = 1,
     ) -> SmoothProgram:
-        """Smooth a whole program; corners whose transitions stray by more than the method's bound stay sharp."""
+        """Smooth a whole program; corners that make the motion stray by more than the method's bound stay sharp."""
         smoothed = super().smooth(program, settings, progress, processes)
-        rows = np.flatnonzero(smoothed.corners.smoothed)
-        strays = [_strays(smoothed, rows[at : at + _MEASURED]) for at in range(0, len(rows), _MEASURED)]
-        if not any(part.any() for part in strays):
-            return smoothed
-        return replace(smoothed, corners=_left_sharp(smoothed.corners, rows[np.concatenate(strays)]))
+        for strays in (_straying_transitions, _straying_remainders):
+            rows = strays(smoothed)
+            if len(rows):
+                smoothed = replace(smoothed, corners=_left_sharp(smoothed.corners, rows))
+        return smoothed
 
     def place(self, shaped: ShapedCorners, settings: Settings, room: Floats | None) -> Placed:
         """Trim by the paper's equations; half of each segment is the most."""
@@ -206,6 +209,30 @@ class Zhang2016(Construction):
 CONSTRUCTION = Zhang2016()
 
 
+def _straying_transitions(smoothed: SmoothProgram) -> Ints:
+    """Rows of corners whose transitions stray."""
+    rows = np.flatnonzero(smoothed.corners.smoothed)
+    strays = [_strays(smoothed, rows[at : at + _MEASURED]) for at in range(0, len(rows), _MEASURED)]
+    return rows[np.concatenate([np.zeros(0, np.bool_), *strays])]
+
+
+def _straying_remainders(smoothed: SmoothProgram) -> Ints:
+    """Rows of corners beside segments of which the transitions leave what strays.
+
+    There the tip is ahead of the axis, or behind it, by what the two were cut unlike: the more of it is left, the less,
+    but the axis of the original turns fastest in the middle of its segment.
+    """
+    segments = segments_of(smoothed, dense=False)
+    unlike = (segments.entry != segments.axis_entry) | (segments.exit != segments.axis_exit)
+    pose = np.flatnonzero(unlike & segments.has_line & (segments.start >= 0))
+    strays = np.zeros(len(pose), np.bool_)
+    for at in range(0, len(pose), _MEASURED):
+        strays[at : at + _MEASURED] = _remainder_strays(smoothed, segments, pose[at : at + _MEASURED])
+    ends = np.concatenate((segments.start[pose[strays]], pose[strays]))
+    rows = np.unique(segments.row[ends])
+    return rows[rows >= 0]
+
+
 def _strays(smoothed: SmoothProgram, rows: Ints) -> Bools:
     """(g,) whether transitions stray, as synchronised lines or, as controls run both curves, at common parameters."""
     found = np.zeros(len(rows), np.bool_)
@@ -225,23 +252,47 @@ def _beyond(smoothed: SmoothProgram, rows: Ints, tip: Floats, lever: Floats) -> 
     """(g,) whether sampled transitions are farther from the original than the method allows."""
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
     poses = np.stack((corners.before[rows], corners.pose[rows], corners.after[rows]), axis=1)
-    allowed, height, axis = (
-        (1.0 + METHODS[settings.method].excess) * settings.tolerance,
-        settings.axis_scale,
-        unit(lever),
-    )
-    alone_tip, alone_axis, common, backwards = distances(program, height, poses, tip, axis)
-    corner, direction = program.tip[poses[:, 1]], program.axis[poses[:, 1]]
+    axis = unit(lever)
+    found = _off_the_motion(smoothed, poses, tip, axis)
+    corner, direction, height = program.tip[poses[:, 1]], program.axis[poses[:, 1]], settings.axis_scale
+    passed = passing(corner, tip)
     if settings.axis_tolerance is None:
-        worst = np.maximum(alone_tip, alone_axis).max(axis=1)
-        worst = np.maximum(worst, passing(corner + height * direction, tip + height * axis))
-        worst = np.maximum(worst, np.maximum(common.tip, common.axis_point).max(axis=1) / _TOGETHER)
+        passed = np.maximum(passed, passing(corner + height * direction, tip + height * axis))
     else:  # both at one pose
-        worst = np.maximum(common.tip, common.turned).max(axis=1)
         at_corner = norm(tip - corner[:, None]), height * norm(axis - direction[:, None])
-        worst = np.maximum(worst, np.maximum(*at_corner).min(axis=1))
-    beyond: Bools = np.maximum(worst, passing(corner, tip)) > allowed
-    return beyond | (backwards > 2.0 * max(settings.tip_resolution, settings.axis_point_resolution, _LEAST_BACK))
+        passed = np.maximum(passed, np.maximum(*at_corner).min(axis=1))
+    return found | (passed > _allowed(settings))
+
+
+def _remainder_strays(smoothed: SmoothProgram, segments: Segments, pose: Ints) -> Bools:
+    """(g,) whether what is left of the segments into some poses strays, divided as it is written, or as it is run."""
+    program, settings = smoothed.program, smoothed.settings
+    start = segments.start[pose]
+    at = [
+        np.stack((one[pose], other[pose]), axis=1)
+        for one, other in ((segments.entry, segments.exit), (segments.axis_entry, segments.axis_exit))
+    ]
+    fraction, axis = CONSTRUCTION.divide(program, settings, Remainders(start, pose, *at), _PARTS)
+    tips = (program.tip[pose] - program.tip[start])[:, None]
+    tip = program.tip[start][:, None] + fraction[..., None] * tips
+    return _off_the_motion(smoothed, np.stack((start, pose), axis=1), tip, axis)
+
+
+def _off_the_motion(smoothed: SmoothProgram, poses: Ints, tip: Floats, axis: Floats) -> Bools:
+    """(g,) whether samples are farther from the original through `poses`, or go back along it by more, than allowed."""
+    settings = smoothed.settings
+    height, own_axis = settings.axis_scale, settings.axis_tolerance is not None
+    alone_tip, alone_axis, common, backwards = distances(smoothed.program, height, poses, tip, axis, own_axis=own_axis)
+    together = np.maximum(common.tip, common.axis_point)
+    off = together if own_axis else np.maximum(np.maximum(alone_tip, alone_axis), together / _TOGETHER)
+    steps = settings.tip_resolution, settings.axis_point_resolution * (height / settings.axis_length), _LEAST_BACK
+    beyond: Bools = (off.max(axis=1) > _allowed(settings)) | (backwards > 2.0 * max(steps))
+    return beyond
+
+
+def _allowed(settings: Settings) -> float:
+    """What tip and axis point may be off, mm."""
+    return (1.0 + METHODS[settings.method].excess) * settings.tolerance
 
 
 def _halved(points: Floats) -> Floats:

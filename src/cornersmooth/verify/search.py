@@ -89,7 +89,21 @@ class Search:
         self.segment[rows["first"]], self.fraction[rows["first"]] = rows["start"], rows["fraction"]
         self.nearest[vertex] = True
         self.distance[vertex] = np.sqrt(square)
+        self._put_at_the_ends(rows["last"][rows["last"] > rows["first"]])
         self._put_in_order(length)
+
+    def _put_at_the_ends(self, last: Ints) -> None:
+        """Put the last vertices of stretches where the stretches end, if they are as near to that as to their places.
+
+        Where the path goes to and fro the digits decide which of its turns is nearest.
+        """
+        goal = self.goal[last]
+        segment = np.clip(np.ceil(goal).astype(np.int64) - 1, 0, len(self.path.six) - 2)
+        away = distance_between(self.six[last], self.path.point_at(segment, goal - segment))
+        there = away <= self.distance[last] + self.margin
+        last = last[there]
+        self.segment[last], self.fraction[last] = segment[there], (goal - segment)[there]
+        self.distance[last] = away[there]
 
     def _put_in_order(self, length: Floats) -> None:
         """Let no place be behind one before it, and say which vertices are behind or far along the path.
@@ -217,7 +231,10 @@ class Search:
             windows = doubtful_windows(doubtful, self.number, around, most_windows + 1)
             if around > ROUNDS[0][0] and len(windows) > most_windows:
                 return  # no mishap of the search: the text is off everywhere
-            for first, last in windows[:most_windows]:
+            # those with few doubts first: others may be futile
+            for first, last in sorted(
+                windows[:most_windows], key=lambda ends: self._doubts(slice(ends[0], ends[1] + 1))
+            ):
                 part = slice(first, last + 1)
                 before = self._doubts(part)
                 self._assign(first, last, most_pairs, doubtful, wide=around > ROUNDS[0][0])
