@@ -230,7 +230,8 @@ def _straying_remainders(smoothed: SmoothProgram) -> Ints:
         strays[at : at + _MEASURED] = _remainder_strays(smoothed, segments, pose[at : at + _MEASURED])
     ends = np.concatenate((segments.start[pose[strays]], pose[strays]))
     rows = np.unique(segments.row[ends])
-    return rows[rows >= 0]
+    beside: Ints = rows[rows >= 0]
+    return beside
 
 
 def _strays(smoothed: SmoothProgram, rows: Ints) -> Bools:
