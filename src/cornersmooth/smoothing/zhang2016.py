@@ -213,7 +213,8 @@ def _straying_transitions(smoothed: SmoothProgram) -> Ints:
     """Rows of corners whose transitions stray."""
     rows = np.flatnonzero(smoothed.corners.smoothed)
     strays = [_strays(smoothed, rows[at : at + _MEASURED]) for at in range(0, len(rows), _MEASURED)]
-    return rows[np.concatenate([np.zeros(0, np.bool_), *strays])]
+    straying: Ints = rows[np.concatenate([np.zeros(0, np.bool_), *strays])]
+    return straying
 
 
 def _straying_remainders(smoothed: SmoothProgram) -> Ints:
@@ -257,11 +258,15 @@ def _beyond(smoothed: SmoothProgram, rows: Ints, tip: Floats, lever: Floats) -> 
     found = _off_the_motion(smoothed, poses, tip, axis)
     corner, direction, height = program.tip[poses[:, 1]], program.axis[poses[:, 1]], settings.axis_scale
     passed = passing(corner, tip)
+    away = tip - corner[:, None], height * (axis - direction[:, None])
     if settings.axis_tolerance is None:
         passed = np.maximum(passed, passing(corner + height * direction, tip + height * axis))
-    else:  # both at one pose
-        at_corner = norm(tip - corner[:, None]), height * norm(axis - direction[:, None])
-        passed = np.maximum(passed, np.maximum(*at_corner).min(axis=1))
+        away = away[0], away[0] + away[1]
+    at_corner = np.maximum(norm(away[0]), norm(away[1]))
+    if settings.lines == "long":  # of the points around the corner only that of its own parameter is sure to be kept
+        passed = np.maximum(passed, at_corner[:, tip.shape[1] // 2])
+    elif settings.axis_tolerance is not None:  # both at one pose
+        passed = np.maximum(passed, at_corner.min(axis=1))
     return found | (passed > _allowed(settings))
 
 

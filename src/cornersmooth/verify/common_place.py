@@ -22,22 +22,30 @@ from cornersmooth.verify.polyline import written_at
 _PLACES: Final = np.linspace(0.0, 1.0, 17)
 _ROUNDS: Final = 32
 
+#: poses looked at at a time
+_ROWS: Final = 256
+
 #: section of an interval in which the larger part is kept
 _GOLDEN: Final = (np.sqrt(5.0) - 1.0) / 2.0
 
+#: how many times as far moves and elements are looked at where those around a place are all beyond, and the most
+_FARTHER: Final = 8
+_MOST: Final = 128
+
 #: tip and axis (k, 3) at fractions (k,) of owners (k,)
 Motion = Callable[[Ints, Floats], tuple[Floats, Floats]]
+
+#: moves or elements (m, e) that are so many away at most from some of the poses (m,) looked at
+Around = Callable[[Ints, int], Ints]
 
 
 def axis_off_of_written(match: Match, reached: Reached, rows: Ints) -> Floats:
     """What is off at the best place of the original for some written vertices, mm: see `_least`."""
     trail, original = match.written.trail, match.original
     vertex = reached.vertex[rows]
-    theirs = original.trail.owner[match.segment[vertex] + 1]
-    first, last = (original.trail.owner[bound[vertex] + 1] for bound in (match.low, match.high))
-    owners = np.clip(theirs[:, None] + np.arange(-REACH, REACH + 1), first[:, None], last[:, None])
+    moves = _moves_around(match, match.segment[vertex], match.low[vertex], match.high[vertex])
     known = reached.gap.tip[rows], reached.gap.axis_point[rows]
-    return _least(match, original.at, owners, (trail.tip[vertex], trail.axis[vertex]), known)
+    return _least(match, original.at, moves, (trail.tip[vertex], trail.axis[vertex]), known)
 
 
 def axis_off_of_original(match: Match, reached: Reached, rows: Ints) -> Floats:
@@ -50,7 +58,11 @@ def axis_off_of_original(match: Match, reached: Reached, rows: Ints) -> Floats:
 
     known = reached.gap.tip[rows], reached.gap.axis_point[rows]
     pose = trail.tip[vertex], trail.axis[vertex]
-    return _least(match, motion, elements_around(match, segment), pose, known)
+
+    def elements(some: Ints, reach: int) -> Ints:
+        return elements_around(match, segment[some], reach)
+
+    return _least(match, motion, elements, pose, known)
 
 
 def axis_off_at(match: Match, tip: Floats, axis: Floats, middle: Ints, reach: int, low: Ints, high: Ints) -> Floats:
@@ -58,30 +70,49 @@ def axis_off_at(match: Match, tip: Floats, axis: Floats, middle: Ints, reach: in
     original, trail = match.original, match.original.trail
     middle, at = nearest_segments(match.task.six(tip, axis), match.path.six, middle, reach, low, high)
     gap = match.task.gap(tip, axis, *original.at(*owner_fraction(trail.owner, trail.fraction, middle, at)))
-    theirs, first, last = (original.trail.owner[segment + 1] for segment in (middle, low, high))
-    owners = np.clip(theirs[:, None] + np.arange(-REACH, REACH + 1), first[:, None], last[:, None])
-    return _least(match, original.at, owners, (tip, axis), (gap.tip, gap.axis_point))
+    return _least(match, original.at, _moves_around(match, middle, low, high), (tip, axis), (gap.tip, gap.axis_point))
+
+
+def _moves_around(match: Match, *segments: Ints) -> Around:
+    """Moves of the original around path segments (k,), from the first to the last allowed."""
+    theirs, first, last = (match.original.trail.owner[segment + 1] for segment in segments)
+
+    def moves(some: Ints, reach: int) -> Ints:
+        near = theirs[some, None] + np.arange(-reach, reach + 1)
+        clipped: Ints = np.clip(near, first[some, None], last[some, None])
+        return clipped
+
+    return moves
 
 
 def _least(
-    match: Match, motion: Motion, owners: Ints, pose: tuple[Floats, Floats], known: tuple[Floats, Floats]
+    match: Match, motion: Motion, around: Around, pose: tuple[Floats, Floats], known: tuple[Floats, Floats]
 ) -> Floats:
     """(k,) mm: what the axis is off at the best of all places, or the tip where that is more and beyond ε.
 
     Parameters
     ----------
-    owners : (k, e) int64
-        Moves or elements that are looked at for each pose.
+    around : Around
+        Moves or elements that are looked at for each pose: few, and more where these are beyond.
     pose : two (k, 3) float64
         Tips and axes.
     known : two (k,) float64, mm
         What tip and axis are off at a place that is known.
     """
-    found = np.array(known[1])
-    beyond = np.flatnonzero(np.maximum(*known) > match.tolerance)
-    if not len(beyond):
-        return found
-    owners, tip, axis = owners[beyond], pose[0][beyond], pose[1][beyond]
+    found, best = np.array(known[1]), np.maximum(*known)
+    for reach in (REACH, min(_FARTHER * REACH * match.parts, _MOST)):
+        rows = np.flatnonzero(best > match.tolerance)
+        for begin in range(0, len(rows), _ROWS):
+            some = rows[begin : begin + _ROWS]
+            least, turned = _least_among(match, motion, around(some, reach), (pose[0][some], pose[1][some]))
+            best[some] = np.minimum(least, best[some])
+            found[some] = np.where(best[some] > match.tolerance, best[some], turned)
+    return found
+
+
+def _least_among(match: Match, motion: Motion, owners: Ints, pose: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """(m,) the larger of tip and axis at the best place on moves or elements (m, e), and the axis there, mm."""
+    tip, axis = pose
 
     def off(owner: Ints, at: Floats) -> tuple[Floats, Floats]:
         """Of tip and axis (k, m), at fractions `at` of owners (k, m)."""
@@ -92,8 +123,11 @@ def _least(
 
     shape = (len(tip), owners.shape[1] * len(_PLACES))
     first = np.maximum(*off(np.repeat(owners, len(_PLACES), axis=1), np.tile(_PLACES, owners.shape).reshape(shape)))
+    first = first.reshape(*owners.shape, len(_PLACES))
+    most = np.argsort(first.min(axis=2), axis=1, kind="stable")[:, : 2 * REACH + 1]
+    owners = np.take_along_axis(owners, most, axis=1)
     # on each for itself: they may be of very different length
-    best = first.reshape(*owners.shape, len(_PLACES)).argmin(axis=2)
+    best = np.take_along_axis(first, most[..., None], axis=1).argmin(axis=2)
     low = _PLACES[np.maximum(best - 1, 0)]
     high = _PLACES[np.minimum(best + 1, len(_PLACES) - 1)]
     for _ in range(_ROUNDS):
@@ -103,7 +137,4 @@ def _least(
     both = off(np.hstack((owners, owners, owners)), np.hstack((low, (low + high) / 2.0, high)))
     larger = np.maximum(*both)
     row, which = np.arange(len(tip)), larger.argmin(axis=1)
-    least, turned = larger[row, which], both[1][row, which]
-    least = np.minimum(least, np.maximum(*known)[beyond])
-    found[beyond] = np.where(least > match.tolerance, least, turned)
-    return found
+    return larger[row, which], both[1][row, which]

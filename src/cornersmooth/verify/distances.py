@@ -375,12 +375,12 @@ def common_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> Float
     return np.minimum(gap.larger, reached.gap.larger[rows])
 
 
-def elements_around(match: Match, segment: Ints) -> Ints:
-    """(k, e) element of each segment of the written trail, and those beside it."""
+def elements_around(match: Match, segment: Ints, reach: int = REACH) -> Ints:
+    """(k, e) element of each segment of the written trail, and `reach` of those beside it on either side."""
     nc, written = match.nc, match.written
     first, last = written.first + 1, written.first + len(written.trail.last) - 1
     owner = written.trail.owner[segment + 1]
-    elements = np.clip(owner[:, None] + np.arange(-REACH, REACH + 1), first, last)
+    elements = np.clip(owner[:, None] + np.arange(-reach, reach + 1), first, last)
     return np.where(nc.kind[elements] == Element.RAPID, owner[:, None], elements)
 
 
