@@ -20,6 +20,7 @@ import numpy as np
 from cornersmooth import __version__, nc, smoothing
 from cornersmooth.cl import read
 from cornersmooth.errors import Finding, InputError, PromiseError
+from cornersmooth.memory import return_free_memory
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
@@ -215,6 +216,7 @@ def postprocess(
     with _timed(seconds, "smooth"):
         told = _stage(progress, "smoothing")
         smoothed = smooth(program, settings, form=form, progress=told, processes=processes)
+    return_free_memory()  # before processes share what there is
     provenance = _provenance(source, program, smoothed.settings, form)
     provenance = replace(provenance, planned_feeds=plan_feeds is not None)
     frame = replace(frame or Frame(), provenance=provenance.lines())

@@ -16,6 +16,7 @@ import numpy as np
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import Machine, inverse_time, machine_position, solutions
 from cornersmooth.kinematics.travel import check_travel
+from cornersmooth.memory import return_free_memory
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
@@ -108,6 +109,7 @@ def rotary_rows(
         findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
     angles = path.angles
     del path, line  # all that is still held as long as rows are written counts
+    return_free_memory()
     largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
     limits = line_limits(settings, form, largest_turn)
     timed = _timed_cuts(angles, move, program) if form.orientation == "machine" else None
@@ -275,6 +277,7 @@ def _whole(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:
             part = parts.popleft()
             whole[begin : begin + len(part)] = part
             begin += len(part)
+        return_free_memory()
     return tip, axis, move
 
 

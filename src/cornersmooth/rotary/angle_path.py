@@ -107,13 +107,15 @@ def rotary_angles(
     cone = np.full(n, tolerance / 2)
     if still is not None:
         cone[still] = still_tolerance / 2
-    poses = _sorted_poses(machine, axis, tolerance, cone, line, file)
-    run: Ints = np.cumsum(rapid | left, dtype=np.int64)
+    poses, both = _sorted_poses(machine, axis, tolerance, cone, line, file)
+    del cone  # with millions of poses every array counts
+    run = np.cumsum(rapid | left, dtype=np.int32)
     branch, swaps = np.full(n, -1, np.int8), np.zeros(0, np.int64)
     if len(poses.steady):
         angles, branch[poses.steady], swaps = _steady_angles(
-            machine, axis, poses, run, tolerance, line, file, divide=divide
+            machine, axis, poses.steady, both, run, tolerance, line, file, divide=divide
         )
+        del both
         if len(poses.cone):
             steady, angles = angles, np.full((n, 2), np.nan)
             angles[poses.steady] = steady
@@ -167,24 +169,22 @@ class _Poses:
     ----------
     cone, steady : (c,) and (s,) int64
         In the cone of the pole, and outside of it.
-    angles : (s, 2, 2) float64, degrees
-        ``[pose, branch, axis]`` of the steady ones, in (-180, 180] until they are unwrapped.
     beyond : (b,) int64
         Just out of reach of the machine.
     """
 
     cone: Ints
     steady: Ints
-    angles: Floats
     beyond: Ints
 
 
 def _sorted_poses(
     machine: Machine, axis: Floats, tolerance: float, cones: Floats, line: Ints, file: str | None
-) -> _Poses:
-    """Both solutions of all poses outside of the cone of the pole, given for each in degrees.
+) -> tuple[_Poses, Floats]:
+    """Poses outside of the cone of the pole, given for each in degrees, and both solutions of those.
 
-    Half of what an axis may deviate is the cone: two axes inside it are within that of each other.
+    Half of what an axis may deviate is the cone: two axes inside it are within that of each other. Solutions are
+    (s, 2, 2) degrees ``[pose, branch, axis]`` in (-180, 180].
     """
     n, count = len(axis), 0
     angles, steady = np.empty((n, 2, 2)), np.empty(n, np.int64)
@@ -201,22 +201,25 @@ def _sorted_poses(
         count += len(own)
         cone.append(here.start + np.flatnonzero(inside))
         beyond.append(here.start + np.flatnonzero(found.beyond > 0))
-    return _Poses(np.concatenate(cone), steady[:count], angles[:count], np.concatenate(beyond))
+    return _Poses(np.concatenate(cone), steady[:count], np.concatenate(beyond)), angles[:count]
 
 
 def _steady_angles(
     machine: Machine,
     axis: Floats,
-    poses: _Poses,
-    run: Ints,
+    steady: Ints,
+    unwrapped: Floats,
+    run: NDArray[np.int32],
     tolerance: float,
     line: Ints,
     file: str | None,
     *,
     divide: bool,
 ) -> tuple[Floats, NDArray[np.int8], Ints]:
-    """Angles (s, 2) and branches (s,) of the poses outside the cone, and poses before which a rapid changes branch."""
-    steady, unwrapped = poses.steady, poses.angles
+    """Angles (s, 2) and branches (s,) of the poses outside the cone, and poses before which a rapid changes branch.
+
+    `unwrapped` are their solutions, which are unwrapped in place.
+    """
     dislike = _dislike(machine, unwrapped[0])
     free, first = [np.ones(1, np.bool_)], [np.zeros(1, np.int64)]
     wide = [WideSteps(np.zeros(0, np.int64), *np.zeros((2, 0, 2, 2)))]
@@ -246,7 +249,7 @@ def _steady_angles(
         free=np.concatenate(free),
         dislike=dislike,
     )
-    stretch = np.repeat(np.arange(len(begins)), np.diff(begins, append=len(steady)))
+    stretch = np.repeat(np.arange(len(begins), dtype=np.int32), np.diff(begins, append=len(steady)))
     try:
         branch, turns = choose(stretches, machine.limits)
     except NoChoiceError as stuck:
@@ -254,12 +257,13 @@ def _steady_angles(
         if left is not None:
             raise CutTooFarError(steady[left]) from None
         raise _stuck_error(machine, stuck, stretch, axis, unwrapped, way, steady, run, line, file) from stuck
-    angles = np.empty((len(steady), 2))
+    angles, chosen = np.empty((len(steady), 2)), np.empty(len(steady), np.int8)
     for here in _chunks(len(steady)):
         own = stretch[here]
+        chosen[here] = branch[own]
         angles[here] = unwrapped[here][np.arange(len(own)), branch[own]] + 360 * turns[own]
     swaps = begins[1:][stretches.free[1:] & (branch[1:] != branch[:-1])]
-    return angles, branch.astype(np.int8)[stretch], steady[swaps]
+    return angles, chosen, steady[swaps]
 
 
 def _dislike(machine: Machine, start: Floats) -> Floats:
@@ -272,7 +276,7 @@ def _dislike(machine: Machine, start: Floats) -> Floats:
 
 
 def _fill_cone(
-    machine: Machine, length: Floats, axis: Floats, angles: Floats, poses: Ints, steady: Ints, run: Ints
+    machine: Machine, length: Floats, axis: Floats, angles: Floats, poses: Ints, steady: Ints, run: NDArray[np.int32]
 ) -> None:
     """Angles of poses inside the cone, in place; `length` is that of the path up to each pose.
 
@@ -339,12 +343,12 @@ def _divided(
 def _stuck_error(
     machine: Machine,
     stuck: NoChoiceError,
-    stretch: Ints,
+    stretch: NDArray[np.int32],
     axis: Floats,
     unwrapped: Floats,
     way: WideSteps,
     steady: Ints,
-    run: Ints,
+    run: NDArray[np.int32],
     line: Ints,
     file: str | None,
 ) -> InputError:

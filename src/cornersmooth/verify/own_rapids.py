@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints, Move
+from cornersmooth.model import Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram
 from cornersmooth.verify.task import Task
 
@@ -21,19 +21,22 @@ class OwnRapids:
     Parameters
     ----------
     task : Task
+
+    Attributes
+    ----------
+    rapids, holes : (k,) int64
+        Moves that are.
     """
 
     task: Task
-    tip: Floats = field(init=False)
-    rapid: Ints = field(init=False)
-    moving: Ints = field(init=False)
+    rapids: Ints = field(init=False)
+    holes: Ints = field(init=False)
 
     def __post_init__(self) -> None:
-        program, pose = self.task.original.program, self.task.original.pose
-        rapid = np.flatnonzero(program.kind[pose] == Move.RAPID)
-        object.__setattr__(self, "tip", program.tip[pose])
-        object.__setattr__(self, "rapid", rapid)
-        object.__setattr__(self, "moving", np.flatnonzero(program.kind[pose] != Move.HOLE))
+        original = self.task.original
+        kind = original.program.kind[original.pose]
+        object.__setattr__(self, "rapids", np.flatnonzero(kind == Move.RAPID))
+        object.__setattr__(self, "holes", np.flatnonzero(kind == Move.HOLE))
 
     def added(self, start: Floats, end: Floats, step: float, near: Floats) -> bool:
         """Whether the CL file has a pose at the end of a rapid nearer to the part, and does not ask for the rapid.
@@ -49,17 +52,30 @@ class OwnRapids:
             That of both which is nearer to the part.
         """
         leaves = np.array_equal(near, start)
-        at_near, at_far = (_close(self.tip, tip, step) for tip in (near, end if leaves else start))
-        at_far[np.setdiff1d(np.arange(len(at_far)), self.rapid)] = False
-        asked = False
-        for poses in (slice(None), self.moving):  # at holes that are left out nothing moves
-            one, other = (at_near[poses], at_far[poses]) if leaves else (at_far[poses], at_near[poses])
-            asked |= bool((one[:-1] & other[1:]).any())
-        return bool(at_near.any()) and not asked
+        at_near, at_far = self._moves_to(near, step), self._moves_to(end if leaves else start, step)
+        at_far = at_far[np.isin(at_far, self.rapids)]
+        one, other = (at_near, at_far) if leaves else (at_far, at_near)
+        # at holes that are left out nothing moves
+        asked = _follow(one, other) or _follow(self._without_holes(one), self._without_holes(other))
+        return bool(len(at_near)) and not asked
 
     def goes_to(self, tip: Floats, step: float) -> bool:
         """Whether the CL file goes to a tip in rapid, up to printed digits."""
-        return bool(_close(self.tip[self.rapid], tip, step).any())
+        return bool(np.isin(self._moves_to(tip, step), self.rapids).any())
+
+    def _moves_to(self, tip: Floats, step: float) -> Ints:
+        """Moves of the CL file that end at a tip (3,), up to printed digits."""
+        original = self.task.original
+        poses = np.flatnonzero(np.abs(original.program.tip[:, 0] - tip[0]) <= _STEPS * step)
+        close = np.abs(original.program.tip[poses] - tip) <= _STEPS * step
+        poses = poses[close.all(axis=1)]
+        moves = np.searchsorted(original.pose, poses)
+        return moves[np.isin(poses, original.pose[moves[moves < len(original.pose)]])]
+
+    def _without_holes(self, moves: Ints) -> Ints:
+        """The moves that are no holes, counted without holes."""
+        moves = moves[~np.isin(moves, self.holes)]
+        return moves - np.searchsorted(self.holes, moves)
 
     def left_out(self, nc: NcProgram) -> tuple[Elements, list[Event]]:
         """Elements and events of a text that was read before, where rapids that posts add do not move the tool.
@@ -86,7 +102,6 @@ class OwnRapids:
         return replace(elements, tip=tip, second=second), events
 
 
-def _close(tips: Floats, tip: Floats, step: float) -> Bools:
-    """(n,) which of some tips (n, 3) are another, up to printed digits."""
-    close: Bools = np.logical_and.reduce(np.abs(tips - tip) <= _STEPS * step, axis=1)
-    return close
+def _follow(moves: Ints, others: Ints) -> bool:
+    """Whether one of the others is the next behind one of the moves."""
+    return bool(np.isin(moves + 1, others).any())
