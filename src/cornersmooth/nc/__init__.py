@@ -35,6 +35,7 @@ from cornersmooth.nc.planes import plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
+from cornersmooth.nc.rotary_run_rows import rotary_run_rows
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
 from cornersmooth.nc.writers import Writers
@@ -97,12 +98,6 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
         The form cannot hold what the settings ask for.
     """
     tolerance = settings.tolerance
-    if settings.method == "global" and form.curves and form.rotary:
-        raise SettingsError(
-            "CS227",
-            f"{form.control} form {form.name} holds no curves through whole runs of corners: its words are rotary",
-            "use --method proportional, or a form of lines",
-        )
     if form.curve in _POLYNOMIAL and (settings.weights != (1.0, 1.0) or settings.shape != "paper"):
         raise SettingsError(
             "CS217",
@@ -222,7 +217,8 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findi
     if form.machine is not None and not form.rotary:
         _check_travel(form.machine, smoothed.program)
     if form.curves and form.rotary:
-        return rotary_curve_rows(smoothed, form, findings)
+        write_rows = rotary_curve_rows if smoothed.runs is None else rotary_run_rows
+        return write_rows(smoothed, form, findings)
     if form.curves:
         return curve_rows(smoothed, divide=form.curve in _TURNING)
     long = smoothed.settings.lines == "long"

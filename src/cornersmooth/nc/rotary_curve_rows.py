@@ -58,11 +58,17 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
         text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
         findings.add("CS367", "note", int(program.line[found.inserted.segment.min()]), text, len(found.inserted))
     if any(len(group) for group in found.groups):
-        text = "G6.2 with rotary axes under tool tip control is the machine builder's to allow; ask before running it"
-        findings.add("CS370", "warning", 0, text)
+        warn_of_curves(form, findings)
     for chunk in _Table(smoothed, found).chunks():
         check_travel(machine, chunk.tip, chunk.other, program.line[chunk.move], program.source.name)
         yield chunk
+
+
+def warn_of_curves(form: Form, findings: Findings) -> None:
+    """Say that curves in rotary words are not every machine's."""
+    curve = form.curve.upper()
+    text = f"{curve} with rotary axes under tool tip control is the machine builder's to allow; ask before running it"
+    findings.add("CS370", "warning", 0, text)
 
 
 class _Table:

@@ -84,7 +84,7 @@ def rotary_rows(
     program, settings, machine = smoothed.program, smoothed.settings, form.machine
     if machine is None:
         raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
-    tip, axis, move = _whole(rows)
+    tip, axis, move = whole_rows(rows)
     if not len(move):
         return
     tools = tools_of_poses(program) if machine.tool_lengths else None
@@ -260,7 +260,7 @@ def _tell_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, fin
     findings.add("CS376", "warning", int(line[rows[0]]), text, len(rows))
 
 
-def _whole(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:
+def whole_rows(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:
     """Tip, axis and move of all rows; what they were gathered in is given back part by part."""
     tips: deque[Floats] = deque()
     axes: deque[Floats] = deque()

@@ -7,6 +7,8 @@ are put only where lines would cut the curve.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from cornersmooth.model import Floats, Ints, Runs
@@ -66,6 +68,27 @@ def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Fl
     return largest
 
 
+@dataclass(frozen=True)
+class LinePlaces:
+    """Where the lines that runs are written as end: m places in path order.
+
+    Parameters
+    ----------
+    pose : (m,) int64
+        Pose that the segment of each line ends in.
+    span : (m,) int64
+        Of the curves of all runs.
+    s : (m,) float64, steps
+    end : (m,) int64
+        Row of the polylines that a place at the end of a run is, -1 for the others.
+    """
+
+    pose: Ints
+    span: Ints
+    s: Floats
+    end: Ints
+
+
 def run_lines(runs: Runs, lines: Polylines, settings: Settings) -> tuple[Ints, Floats, Floats]:
     """Ends of the lines that runs are written as.
 
@@ -76,10 +99,21 @@ def run_lines(runs: Runs, lines: Polylines, settings: Settings) -> tuple[Ints, F
     tip, axis : (m, 3) float64
         mm, and unit vectors. The last of a run are its last pose.
     """
+    found = line_places(runs, lines, settings)
+    tip, axis = points_at(runs.control, Splines(runs.knot, runs.knot_count), found.span, found.s)
+    at = np.flatnonzero(found.end >= 0)
+    ends = lines.point[found.end[at]]  # which are passed exactly
+    tip[at], axis[at] = ends[:, :3], unit(ends[:, 3:] - ends[:, :3])
+    return found.pose, tip, axis
+
+
+def line_places(runs: Runs, lines: Polylines, settings: Settings) -> LinePlaces:
+    """Places on the curves where the lines end that runs are written as."""
     splines = Splines(runs.knot, runs.knot_count)
     pieces = Pieces.of(splines, lines)
     if not len(pieces.segment):  # no run has been left with a curve
-        return np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3))
+        none = np.zeros(0, np.int64)
+        return LinePlaces(none, none, np.zeros(0), none)
     segment, first = np.unique(pieces.segment, return_index=True)  # one piece or more for every segment
     effort = _effort(runs, splines, lines, pieces, settings)
     number = np.clip(np.ceil(np.add.reduceat(effort, first) - 1e-9), 1, _MOST_LINES).astype(np.int64)
@@ -99,14 +133,10 @@ def run_lines(runs: Runs, lines: Polylines, settings: Settings) -> tuple[Ints, F
     s = pieces.low[piece] + np.clip(share, 0.0, 1.0) * (pieces.high - pieces.low)[piece]
     final = np.append(first[1:], len(grown)) - 1
     s[last], piece[last] = pieces.high[final], final
-    tip, axis = points_at(runs.control, splines, pieces.span[piece], s)
-    pose = runs.pose[segment + 1][row]
-    # ends are passed exactly
     ends = starts(runs.count)[1:] - 1
-    at = np.flatnonzero(last & np.isin(segment[row] + 1, ends))
-    tip[at] = lines.point[ends, :3]
-    axis[at] = unit(lines.point[ends, 3:] - lines.point[ends, :3])
-    return pose, tip, axis
+    pose_row = segment[row] + 1
+    end = np.where(last & np.isin(pose_row, ends), pose_row, -1)
+    return LinePlaces(runs.pose[pose_row], pieces.span[piece], s, end)
 
 
 def _effort(runs: Runs, splines: Splines, lines: Polylines, pieces: Pieces, settings: Settings) -> Floats:

@@ -1,0 +1,246 @@
+"""Rotary angles of whole runs as cubic B-splines on the knots of the curves: further axes of the same curve.
+
+The tip of a run is a cubic B-spline, and its tool axis the direction of another one, the lever (docs/global.md). On the
+same knots both angles get control points of their own. Each is the blossom of the cubic that meets the angles at four
+places between the knots it hangs on (T. Lyche, L. L. Schumaker, "Local spline approximation methods", J. Approx. Theory
+15, 1975): cubics stay what they are, the joints of all spans are C², and what the angles do at a pole stays there.
+
+Where the tool axis that they give leaves the lever by more than the tolerance, knots are put into the middle of spans,
+which leaves tip and lever what they are. What is not within the tolerance then is for lines to follow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.poses import angle_between, continued, tool_axis
+from cornersmooth.model import Floats, Ints, Runs
+from cornersmooth.smoothing.runs.ranges import spread, starts
+from cornersmooth.smoothing.runs.splines import Splines
+from cornersmooth.vectors import dot, norm, unit
+
+#: rounds in which spans are halved, and steps below which one is not
+ROUNDS, NARROWEST = 5, 8.0
+#: share of the tolerance that a proof leaves to what lies between its samples, and the most stretches of a span
+PROOF, MOST_SAMPLES = 0.1, 64
+#: places of a cubic, as shares of the way between the outer ones of three knots
+SHARES = np.array([0.0, 1.0, 2.0, 3.0]) / 3.0
+#: coefficients of u and u² of the cubic through four values at these shares
+LINEAR = np.array([-5.5, 9.0, -4.5, 1.0])
+SQUARE = np.array([9.0, -22.5, 18.0, -4.5])
+#: control points or samples worked on at a time
+CHUNK = 1 << 14
+
+
+@dataclass(frozen=True)
+class Guide:
+    """Angles known along the runs, m places in path order; both ends of every run are among them.
+
+    Parameters
+    ----------
+    run : (m,) int64
+    s : (m,) float64, steps
+    angles : (m, 2) float64, degrees
+        Unwrapped, as `rotary_angles` gives them.
+    branch : (m,) int64
+        Which solution they are, -1 at the pole.
+    """
+
+    run: Ints
+    s: Floats
+    angles: Floats
+    branch: Ints
+
+    def between(self, run: Ints, s: Floats) -> tuple[Floats, Ints]:
+        """Angles (k, 2) evenly between the known ones, and the branch (k,) of both neighbours, -1 for none."""
+        counts = np.bincount(self.run)
+        first = starts(counts)
+        base = starts(np.floor(self.s[first[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
+        before = np.searchsorted(self.s + base[self.run], s + base[run], side="right") - 1
+        before = np.clip(before, first[run], first[run + 1] - 2)
+        share = (s - self.s[before]) / (self.s[before + 1] - self.s[before])
+        angles = self.angles[before] + share[:, None] * (self.angles[before + 1] - self.angles[before])
+        one, other = self.branch[before], self.branch[before + 1]
+        return angles, np.where((one == other) | (other < 0), one, np.where(one < 0, other, -1))
+
+
+@dataclass(frozen=True)
+class RunAngles:
+    """Runs with angles.
+
+    Parameters
+    ----------
+    runs : Runs
+        The same curves, on more knots where the angles need them.
+    angles : (c, 2) float64, degrees
+        Control points, those of `runs.control`.
+    error : (spans,) float64, degrees
+        Bound on the angle between the tool axis of the angles and that of the run in each span.
+    """
+
+    runs: Runs
+    angles: Floats
+    error: Floats
+
+
+def run_angles(runs: Runs, machine: Machine, guide: Guide, *, tolerance: float, cone: float) -> RunAngles:
+    """Angles of runs within a tolerance, as far as halving spans brings them there.
+
+    Parameters
+    ----------
+    runs : Runs
+    machine : Machine
+        With two rotary axes.
+    guide : Guide
+    tolerance : float, degrees
+        Between the tool axis of the angles and that of the run.
+    cone : float, degrees
+        From the pole: within it the first angle follows the guide, as in `continued`.
+    """
+    splines, control = Splines(runs.knot, runs.knot_count), runs.control
+    for left in range(ROUNDS, -1, -1):
+        angles = _fitted(machine, splines, control, guide, cone)
+        error = _bounds(machine, splines, control, angles, tolerance)
+        halved = np.flatnonzero((error > tolerance) & (splines.width >= NARROWEST))
+        if not left or not len(halved):
+            break
+        splines, control = _halved(splines, control, halved)
+    changed = replace(runs, knot=splines.knot, knot_count=splines.count, control=control)
+    return RunAngles(changed, angles, error)
+
+
+def lever_at(splines: Splines, control: Floats, run: Ints, s: Floats) -> Floats:
+    """(m, 3) mm from the tip to the axis point at places of runs; `control` (c, 6)."""
+    span = _span_at(splines, run, s)
+    lever = control[:, 3:] - control[:, :3]
+    points: Floats = np.einsum(
+        "mk,mkd->md", splines.basis(span, s), lever[splines.span_control[span][:, None] + np.arange(4)]
+    )
+    return points
+
+
+def _span_at(splines: Splines, run: Ints, s: Floats) -> Ints:
+    """Span that each place lies in."""
+    base = starts(splines.knot[splines.first[1:] - 1].astype(np.int64) + 2)[:-1].astype(np.float64)
+    keys = splines.knot + np.repeat(base, splines.count)
+    knot = np.searchsorted(keys, s + base[run], side="right") - 1
+    spans: Ints = np.clip(knot, splines.first[run], splines.first[run + 1] - 2) - run
+    return spans
+
+
+def _inner_knots(splines: Splines) -> Floats:
+    """(c, 3) the knots whose blossom each control point is."""
+    run, place = spread(splines.count + 2)
+    local = np.minimum(place, splines.count[run] - 2)
+    around = splines.around(splines.span_first[run] + local)
+    knots: Floats = around[np.arange(len(run))[:, None], (place - local)[:, None] + np.arange(3)]
+    return knots
+
+
+def _fitted(machine: Machine, splines: Splines, control: Floats, guide: Guide, cone: float) -> Floats:
+    """(c, 2) control points of the angles."""
+    knots, run = _inner_knots(splines), splines.control_run
+    points = np.empty((len(knots), 2))
+    for begin in range(0, len(knots), CHUNK):
+        own = knots[begin : begin + CHUNK]
+        low, width = own[:, 0], own[:, 2] - own[:, 0]
+        s = (low[:, None] + width[:, None] * SHARES).ravel()
+        of = np.repeat(run[begin : begin + CHUNK], len(SHARES))
+        guess, branch = guide.between(of, s)
+        angles, _ = continued(machine, unit(lever_at(splines, control, of, s)), guess, branch, cone)
+        values = angles.reshape(-1, len(SHARES), 2)
+        middle = np.divide(own[:, 1] - low, width, out=np.zeros_like(width), where=width > 0)[:, None]
+        # the blossom of a + b u + c u² + d u³ at 0, m and 1
+        slope, bend = np.einsum("k,mkd->md", LINEAR, values), np.einsum("k,mkd->md", SQUARE, values)
+        points[begin : begin + CHUNK] = values[:, 0] + (1.0 + middle) / 3.0 * slope + middle / 3.0 * bend
+        ends = np.flatnonzero(width == 0.0)
+        points[begin + ends] = values[ends, 0]
+    first = splines.control_first
+    ends = np.concatenate((first[:-1], first[1:] - 1))  # passed exactly
+    at = starts(np.bincount(guide.run))
+    points[ends] = guide.angles[np.concatenate((at[:-1], at[1:] - 1))]
+    return points
+
+
+def _bounds(machine: Machine, splines: Splines, control: Floats, angles: Floats, tolerance: float) -> Floats:
+    """(spans,) degrees: no axis in a span is farther off than this; infinite where too many samples would be asked for.
+
+    Both axes leave the chord of a stretch of 1/N of a span by at most M/(8 N²), where |k″| ≤ M, so the difference is
+    between two samples no larger than at them but for the sum of both.
+    """
+    count = len(splines.span_run)
+    bounds = np.full(count, np.inf)
+    for begin in range(0, count, CHUNK):
+        span = np.arange(begin, min(begin + CHUNK, count))
+        taps = splines.span_control[span][:, None] + np.arange(4)
+        whole = splines.bernstein(
+            span, splines.knot[splines.span_knot[span]], splines.knot[splines.span_knot[span] + 1]
+        )
+        lever, words = whole @ (control[taps, 3:] - control[taps, :3]), whole @ angles[taps]
+        bend = _lever_bend(lever) + _axis_bend(machine, lever, np.radians(words))
+        least = np.sqrt(bend / (8.0 * PROOF * np.radians(tolerance)))
+        number = np.exp2(np.ceil(np.log2(np.clip(least, 2.0, 2.0 * MOST_SAMPLES)))).astype(np.int64)
+        for samples in np.unique(number[number <= MOST_SAMPLES]).tolist():
+            chosen = np.flatnonzero(number == samples)
+            size = max(1, CHUNK // samples)
+            for part in (chosen[i : i + size] for i in range(0, len(chosen), size)):
+                off = _off(machine, lever[part], words[part], samples)
+                bounds[span[part]] = off + np.degrees(bend[part] / (8.0 * samples**2))
+    return bounds
+
+
+def _off(machine: Machine, lever: Floats, words: Floats, samples: int) -> Floats:
+    """(k,) degrees: largest angle between both axes at even samples of spans with these Bézier points (k, 4, d)."""
+    t = np.linspace(0.0, 1.0, samples + 1)
+    share = np.stack(((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3), axis=1)
+    given = tool_axis(machine, (share @ words).reshape(-1, 2))
+    largest: Floats = angle_between(given, unit((share @ lever).reshape(-1, 3))).reshape(-1, samples + 1).max(axis=1)
+    return largest
+
+
+def _lever_bend(lever: Floats) -> Floats:
+    """(k,) bound on |u″| of the direction u of levers with the Bézier points (k, 4, 3), over whole spans.
+
+    With l = r u the part of u″ across u is that of (l″ − 2 r′ u′)/r, the part along it |u′|²; both |r′| and r |u′| are
+    at most |l′|.
+    """
+    middle = unit(lever.mean(axis=1))
+    shortest = np.einsum("kid,kd->ki", lever, middle).min(axis=1)
+    first, second = 3.0 * np.diff(lever, axis=1), 6.0 * np.diff(lever, 2, axis=1)
+    inverse = np.divide(1.0, shortest, out=np.full(len(lever), np.inf), where=shortest > 0)
+    fastest, sharpest = norm(first).max(axis=1), norm(second).max(axis=1)
+    with np.errstate(invalid="ignore"):
+        bend: Floats = np.nan_to_num(sharpest * inverse + 3.0 * (fastest * inverse) ** 2, nan=np.inf, posinf=np.inf)
+    return bend
+
+
+def _axis_bend(machine: Machine, lever: Floats, words: Floats) -> Floats:
+    """(k,) bound on |k″| of k = R₁(q₁) R₂(q₂) k₀ for angles with the Bézier points (k, 4, 2), rad, over whole spans.
+
+    What the first axis does counts with the distance of k from that axis.
+    """
+    first, second = 3.0 * np.diff(words, axis=1), 6.0 * np.diff(words, 2, axis=1)
+    speed, bend = np.abs(first).max(axis=1), np.abs(second).max(axis=1)
+    # k is somewhere at a sample within the tolerance, which is far below the turn that is added
+    start = tool_axis(machine, np.degrees(words[:, 0]))
+    about = machine.axes[0].unit
+    sine = norm(start - dot(start, np.broadcast_to(about, start.shape))[:, None] * about)
+    away = np.minimum(sine + speed[:, 1], 1.0)  # only the second axis changes this distance
+    whole: Floats = away * speed[:, 0] ** 2 + 2.0 * speed[:, 0] * speed[:, 1] + speed[:, 1] ** 2
+    whole += away * bend[:, 0] + bend[:, 1]
+    return whole
+
+
+def _halved(splines: Splines, control: Floats, span: Ints) -> tuple[Splines, Floats]:
+    """The same curves with a knot more in the middle of spans, at whole steps: knot insertion by blossoms."""
+    at = splines.span_knot[span]
+    middle = np.floor((splines.knot[at] + splines.knot[at + 1]) / 2.0)
+    more = np.bincount(splines.span_run[span], minlength=len(splines.count))
+    refined = Splines(np.insert(splines.knot, at + 1, middle), splines.count + more)
+    run, place = spread(refined.count + 2)
+    local = np.clip(place - 1, 0, refined.count[run] - 2)  # a span that the control point belongs to
+    start = refined.knot[refined.span_knot[refined.span_first[run] + local]]
+    return refined, splines.blossom(_span_at(splines, run, start), _inner_knots(refined), control)
