@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -12,6 +13,10 @@ from nc.reading import Floats, Piece, Reader, Reading, TextError
 
 #: samples of a knot interval; an even number, so that the middle is one
 SAMPLES = 48
+#: share of ε by which chords between samples of a long curve may leave it
+CHORD = 2e-3
+#: last knots of curves at one corner
+ENDS = (1.0, 2.0, 4.0)
 #: mm and degrees from the end of the block before to the start of an SPL: rounding of its factors; 1e-3 is allowed
 SPL_START = 2e-6
 
@@ -24,6 +29,27 @@ def rational(points: Floats, weights: Floats, knots: Floats, parameters: Floats)
     homogeneous = np.concatenate((points * weights[:, None], weights[:, None]), axis=1)
     values: Floats = BSpline(knots, homogeneous, 3)(parameters)
     return values[:, :-1] / values[:, -1:]
+
+
+def long_places(reader: Reader, points: Floats, weights: Floats, knots: Floats) -> Floats:
+    """Parameters at which a curve through many corners is looked at, so close that chords leave it by a hair of ε.
+
+    Its second derivative is linear between knots, so it is largest at them. Rotary words count with the axis length.
+    """
+    assert (weights == 1.0).all()
+    scale = np.ones(points.shape[1])
+    if reader.turn == "angles":
+        scale[3:] = np.radians(reader.axis_length)
+    curve = BSpline(knots, points * scale, 3)
+    ends = np.unique(knots)
+    size = np.linalg.norm(curve.derivative(2)(ends), axis=1)
+    if reader.turn == "angles":
+        size += (np.abs(curve.derivative(1)(ends)[:, 3:]).sum(axis=1) * 1.5) ** 2 / reader.axis_length
+    width = np.diff(ends)
+    many = np.sqrt(np.maximum(size[1:], size[:-1]) * width**2 / (8 * CHORD * reader.limit))
+    counts = np.clip(np.ceil(many), 4, 4000).astype(int)
+    parts = [low + step * np.arange(n) / n for low, step, n in zip(ends[:-1], width, counts, strict=True)]
+    return np.append(np.concatenate(parts), ends[-1])
 
 
 def number(decimals: int) -> str:
@@ -52,13 +78,21 @@ class SplineRun:
 
     @property
     def samples(self) -> int:
-        return SAMPLES * int(np.count_nonzero(self.intervals))
+        return len(self.places) - 1
+
+    @cached_property
+    def places(self) -> Floats:
+        """Parameters at which the curve is looked at; a run is complete when it is asked for them."""
+        weights = np.array(self.weights)
+        if (weights == 1.0).all() and not set(self.intervals) <= {0.0, 0.5}:
+            return long_places(self.reader, np.array(self.points), weights, self.knots)
+        return np.linspace(0.0, self.knots[-4], SAMPLES * int(np.count_nonzero(self.intervals)) + 1)
 
     def at(self, share: Floats) -> tuple[Floats, Floats]:
         knots = self.knots
-        places = knots[3] + share * (knots[-4] - knots[3])
-        six = rational(np.array(self.points), np.array(self.weights), knots, places)
-        return six[:, :3], six[:, 3:] - six[:, :3]
+        places = np.interp(share, np.linspace(0, 1, len(self.places)), self.places)
+        values = rational(np.array(self.points), np.array(self.weights), knots, places)
+        return values[:, :3], self.reader.direction(values)
 
 
 class SiemensSplines:
@@ -88,7 +122,7 @@ class SiemensSplines:
         weight = float(match.groups()[-1])
         if not 0 < weight <= 3:
             raise TextError(f"{at}: PW out of range")
-        six = reader.numbers(at, match.groups()[1:7])
+        six = reader.numbers(at, match.groups()[1 : 1 + len(reader.words)])
         self.run.points.append(six)
         self.run.intervals.append(float(match.groups()[-2]))
         self.run.weights.append(weight)
@@ -197,9 +231,13 @@ class KnotSplines:
         if not (np.diff(knots) >= 0).all() or len(set(self.knots[:4])) > 1 or len(set(self.knots[-4:])) > 1:
             raise TextError(f"{at}: PS1007, knots {self.knots}")
 
+        plain = bool((weights == 1.0).all()) and knots[-1] not in ENDS
+        places = long_places(reader, points, weights, knots) if plain else np.array((0.0, knots[-1]))
+        count = len(places) - 1 if plain else 2 * SAMPLES + 8 * len(points)
+
         def curve(share: Floats) -> tuple[Floats, Floats]:
-            values = rational(points, weights, knots, share * knots[-1])
+            values = rational(points, weights, knots, np.interp(share, np.linspace(0, 1, len(places)), places))
             return values[:, :3], reader.direction(values)
 
-        reading.pieces.append(Piece(at, False, curve, 2 * SAMPLES + 8 * len(points)))
+        reading.pieces.append(Piece(at, False, curve, count))
         self.points, self.weights, self.knots = [], [], []

@@ -51,7 +51,7 @@ def test_a_statement_is_said_in_the_words_of_the_control(control: str) -> None:
             True,
             "haas form g1 has no tool vectors, only rotary words; name your machine with --machine",
         ),
-        ("siemens", "bspline", "table-ac", True, "siemens form bspline has no rotary words; use -f g1"),
+        ("siemens", "poly", "table-ac", True, "siemens form poly has no rotary words; use -f g1"),
         (
             "fanuc",
             "g6.2",

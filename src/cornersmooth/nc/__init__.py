@@ -60,7 +60,7 @@ __all__ = [
 ]
 
 
-#: curve styles without weights
+#: curve styles without weights; BSPLINE takes none above 3, which the knots of rotary words may ask for
 _POLYNOMIAL = ("poly", "spl")
 
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
@@ -98,7 +98,8 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
         The form cannot hold what the settings ask for.
     """
     tolerance = settings.tolerance
-    if form.curve in _POLYNOMIAL and (settings.weights != (1.0, 1.0) or settings.shape != "paper"):
+    polynomial = form.curve in _POLYNOMIAL or (form.curve == "bspline" and form.rotary)
+    if polynomial and (settings.weights != (1.0, 1.0) or settings.shape != "paper"):
         raise SettingsError(
             "CS217",
             f"{form.control} form {form.name} holds curves with weights 1 only",

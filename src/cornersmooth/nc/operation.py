@@ -236,7 +236,8 @@ class Operation:
 
     def _tip_control_on(self) -> list[str]:
         self._tip_control = self._functions = True
-        on = [block.format(offset=self.offset, **self.plane) for block in self.mode.on]
+        rotary = ",".join(self.form.other_words if self.form.rotary else ())
+        on = [block.format(offset=self.offset, rotary=rotary, **self.plane) for block in self.mode.on]
         return [*self._extras("on", outside=True), *on, *self.mode.within_on, *self._extras("on", outside=False)]
 
     def _functions_off(self) -> list[str]:

@@ -58,7 +58,7 @@ class SplineShare:
         stop = np.minimum(starts + _WINDOW, len(flags))
         few = starts[total[stop] - total[starts] < _LEAST]
         if len(few):
-            text = "fewer than six of ten blocks are BSPLINE, which SINUMERIK wants; -f poly has no such rule"
+            text = "fewer than six of ten blocks are BSPLINE, which SINUMERIK wants; -f poly (vectors) has no such rule"
             self.findings.add("CS325", "warning", int(self.line[self._moves[few[0]]]), text, len(few))
         self._before = bool(flags[last])
         self._flags, self._moves = flags[last + 1 :], self._moves[last + 1 :]

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.dialects.base import BY_WORD, CLAMPED, HIGH_SPEED, Dialect
+from cornersmooth.nc_reader.dialects.base import BY_WORD, CLAMPED, HIGH_SPEED, SPLINE_AXES, Dialect
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.words import NURBS, Table
+from cornersmooth.nc_reader.words import BSPLINE, NURBS, Table
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -33,6 +33,17 @@ def curve_problem(table: Table, dialect: Dialect, memory: Mapping[str, Any]) -> 
     if not needed or memory.get(HIGH_SPEED) or not (curves := np.flatnonzero(table.column("G") == NURBS)).size:
         return None
     return Problem(CONTROL_WORDS, 0, int(table.line[curves[0]]), f"a curve where {needed} must be in force")
+
+
+def spline_problem(table: Table, dialect: Dialect, memory: Mapping[str, Any], letters: Set[str]) -> Problem | None:
+    """Return what is wrong with the first spline of a run: its rotary axes must have been said to be of splines."""
+    missing = letters - memory.get(SPLINE_AXES, set())
+    if not (dialect.names_spline_axes and missing):
+        return None
+    if not (splines := np.flatnonzero(table.column("G") == BSPLINE)).size:
+        return None
+    text = f"a spline of {' and '.join(sorted(missing))}, which no SPLINEPATH(1,X,Y,Z,...) has said"
+    return Problem(CONTROL_WORDS, 0, int(table.line[splines[0]]), text)
 
 
 def modulo_problems(table: Table, machine: Machine, words: str, memory: Mapping[str, Any]) -> list[Problem]:

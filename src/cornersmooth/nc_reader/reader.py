@@ -22,6 +22,7 @@ from cornersmooth.nc_reader.needed_states import (
     curve_problem,
     limit_problems,
     modulo_problems,
+    spline_problem,
     take_clamp,
     unclamped_problems,
 )
@@ -404,6 +405,7 @@ class Reader:
             kind, letters = ("point", set("UVW")) if self.modal.points else ("vector", set("IJ"))
         found = (
             curve_problem(table, self.dialect, self.memory),
+            spline_problem(table, self.dialect, self.memory, letters if kind == "angles" else set()),
             self._axis_words.problem(table, kind, letters, self.tip_control, code, approach),
         )
         self.problems += [problem for problem in found if problem is not None]

@@ -26,6 +26,9 @@ INCREMENTAL = "incremental"
 HIGH_SPEED = "high speed"
 
 
+#: name in `State.memory` of the set of axes that have been said to be those of splines
+SPLINE_AXES = "spline axes"
+
 #: name in `State.memory` of whether each rotary axis that has been spoken of is clamped
 CLAMPED = "clamped"
 
@@ -96,6 +99,8 @@ class Dialect:
     shorter_way: str = ""
     #: what must be in force for curves; empty for nothing
     curves_need: str = ""
+    #: whether SPLINEPATH says which axes are those of splines, the first three where it says nothing
+    names_spline_axes: bool = False
     #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 

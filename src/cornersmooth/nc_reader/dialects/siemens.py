@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, BY_WORD, Dialect, State
+from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, BY_WORD, SPLINE_AXES, Dialect, State
 from cornersmooth.nc_reader.hole_cycles import HoleCycle, drill, numbers
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame
@@ -70,6 +70,7 @@ class Siemens(Dialect):
     """
 
     shorter_way = BY_WORD
+    names_spline_axes = True
     unsaid = frozenset(("offset", "register", ("coolant", 88.0)))
     controls = {  # noqa: RUF012
         "vector": ("TRAORI ORIVECT", "TRAORI ORIPLANE", "TRAORI"),
@@ -115,6 +116,8 @@ class Siemens(Dialect):
                 motion[name] = value
             elif name in ("TRAORI", "TRAFOOF", *_ORIENTATIONS):
                 self._transform(name, state)
+            elif name == "SPLINEPATH":
+                state.memory[SPLINE_AXES] = frozenset(re.split("[(), ]+", text)[2:])
             elif name not in ("D", "N", "%") and name not in _SILENT_CALLS:
                 self._refuse(line, name, text, state)
         state.move(line, motion)
