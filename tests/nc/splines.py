@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, PPoly
 
 from nc.reading import Floats, Piece, Reader, Reading, TextError
 
@@ -40,16 +40,22 @@ def long_places(reader: Reader, points: Floats, weights: Floats, knots: Floats) 
     scale = np.ones(points.shape[1])
     if reader.turn == "angles":
         scale[3:] = np.radians(reader.axis_length)
-    curve = BSpline(knots, points * scale, 3)
-    ends = np.unique(knots)
-    size = np.linalg.norm(curve.derivative(2)(ends), axis=1)
+    columns = [PPoly.from_spline(BSpline(knots, column, 3)) for column in (points * scale).T]
+    x, factors = columns[0].x, np.stack([column.c for column in columns], axis=2)
+    width = np.diff(x)
+    some = width > 0
+    low, width = x[:-1][some], width[some]
+    cube, square, slope = (factors[k][some] for k in range(3))
+    begin, end = 2 * square, 2 * square + 6 * cube * width[:, None]
+    size = np.maximum(np.linalg.norm(begin, axis=1), np.linalg.norm(end, axis=1))
     if reader.turn == "angles":
-        size += (np.abs(curve.derivative(1)(ends)[:, 3:]).sum(axis=1) * 1.5) ** 2 / reader.axis_length
-    width = np.diff(ends)
-    many = np.sqrt(np.maximum(size[1:], size[:-1]) * width**2 / (8 * CHORD * reader.limit))
+        last = slope + (begin + end) / 2 * width[:, None]
+        fastest = np.maximum(np.abs(slope), np.abs(last))[:, 3:].sum(axis=1)
+        size += (1.5 * fastest) ** 2 / reader.axis_length
+    many = np.sqrt(size * width**2 / (8 * CHORD * reader.limit))
     counts = np.clip(np.ceil(many), 4, 4000).astype(int)
-    parts = [low + step * np.arange(n) / n for low, step, n in zip(ends[:-1], width, counts, strict=True)]
-    return np.append(np.concatenate(parts), ends[-1])
+    parts = [start + step * np.arange(n) / n for start, step, n in zip(low, width, counts, strict=True)]
+    return np.append(np.concatenate(parts), low[-1] + width[-1])
 
 
 def number(decimals: int) -> str:
@@ -107,7 +113,7 @@ class SiemensSplines:
 
     def __call__(self, reader: Reader, line: str, at: int, position: Floats | None, reading: Reading) -> Floats | None:
         words = " ".join(f"{word}{number(d)}" for word, d in zip(reader.words, reader.decimals, strict=True))
-        pattern = rf"(BSPLINE SD=3 )?{words} PL=(0|0\.[1-9]\d*|[1-9]\d*\.?\d*) PW=(\d+(?:\.\d{{1,4}})?){FEED}"
+        pattern = rf"(BSPLINE SD=3 )?{words} PL=(0|0\.\d*[1-9]|[1-9]\d*\.?\d*) PW=(\d+(?:\.\d{{1,4}})?){FEED}"
         match = re.fullmatch(pattern, line)
         if match is None:
             if line.startswith(";") and self.last == at - 1:

@@ -83,14 +83,19 @@ def test_the_matrix_holds_what_the_controls_cannot_run() -> None:
         "linuxcnc-g1",
         "fanuc-g6.2-table-ac-axes",  # PS1006: G6.2 under G93
         "mitsubishi-g6.2-table-ac",  # three basic axes
-        "siemens-bspline-table-ac",
+        "siemens-bspline-table-ac-axes",
         "siemens-poly-table-ac",
         "heidenhain-g1-table-ac-axes",  # no inverse time
         "heidenhain-spl-table-ac-axes",
         *(f"{case.control}-{case.form}-axes" for case in ALL),  # machine positions without a machine
     }
     assert set(load_control("linuxcnc").forms) == {"g1"}  # G5.2, G6.2 run in a plane only
-    assert {"siemens-g1-table-ac-axes", "haas-g1-table-ac-axes", "linuxcnc-g1-xyzac-trt-axes"} <= runs
+    assert {
+        "siemens-bspline-table-ac",
+        "siemens-g1-table-ac-axes",
+        "haas-g1-table-ac-axes",
+        "linuxcnc-g1-xyzac-trt-axes",
+    } <= runs
 
 
 #: words by which a control is told feed per minute, per revolution and inverse time
