@@ -4,6 +4,8 @@
 
 Cuts go round farther than an axis turns and are left on the way (`--rewind`), tools have holes and changes between.
 Every text must pass verification, or be refused for a reason; words of rotary axes must be within their limits.
+With `options` as the third word each program is also written with options at random: digits, repeated words left out,
+tilted planes, ways along the tool beside retracts, block numbers, work offsets, inches, functions of the control.
 """
 
 from __future__ import annotations
@@ -12,17 +14,15 @@ import io
 import re
 import sys
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cornersmooth.cl import read
 from cornersmooth.errors import CornersmoothError, SettingsError
 from cornersmooth.kinematics import Machine, parse_machine
-from cornersmooth.nc import Form, Frame, choose_form, fit_settings, write
+from cornersmooth.nc import Form, Frame, choose_form, load_control
+from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
-from cornersmooth.verify import verify
 
 CONTROLS = ("fanuc", "mitsubishi", "haas", "siemens", "heidenhain", "linuxcnc")
 
@@ -42,17 +42,36 @@ class ShopTrial:
     settings: Settings
     cl: str
     native: bool
+    frame: Frame = field(default_factory=Frame)
+    digits: str = ""
+    planes: bool = False
+    extras: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         s, kind = self.settings, self.machine.kind or "three axes"
         return (
             f"seed {self.seed}: {self.control} {kind}{'' if self.tcp else ' no tcp'} rewind {self.rewind:g} "
-            f"eps {s.tolerance:g} H {s.axis_length:g} {s.method} {s.lines}"
+            f"eps {s.tolerance:g} H {s.axis_length:g} {s.method} {s.lines}{self._options()}"
         )
+
+    def _options(self) -> str:
+        usual = Frame()
+        said = {name: value for name, value in vars(self.frame).items() if value != getattr(usual, name)}
+        more = {"digits": self.digits, "planes": self.planes, "extras": self.extras}
+        said |= {name: value for name, value in more.items() if value}
+        return "".join(f" {name}={value}" for name, value in said.items()) + " inch" * self.cl.startswith("UNITS/INCH")
 
     def form(self) -> Form:
         """Form that the text is written in."""
-        return choose_form(self.control, machine=self.machine, tcp=self.tcp, rewind=self.rewind)
+        return choose_form(
+            self.control,
+            machine=self.machine,
+            tcp=self.tcp,
+            rewind=self.rewind,
+            digits=self.digits,
+            planes=self.planes,
+            extras=self.extras,
+        )
 
 
 def _machine(rng: np.random.Generator, axes: int, limit: float) -> Machine:
@@ -139,30 +158,55 @@ def shop_trial(seed: int) -> ShopTrial:
     )
 
 
+def with_options(one: ShopTrial) -> ShopTrial:
+    """Return the same program with options at random, the same each time."""
+    rng = np.random.default_rng((one.seed, 8))
+    table = load_control(one.control)
+    offsets = [None, None, "", table.program.work_offset[:-1] + "5"]
+    frame = Frame(
+        modal=bool(rng.random() < 0.5),
+        approach=float(rng.choice([0.0, 0.0, 15.0])),
+        retract=float(rng.choice([0.0, 0.0, 20.0])),
+        block_numbers=bool(rng.random() < 0.3),
+        comments=bool(rng.random() < 0.8),
+        header=("(MINE {units})",) if rng.random() < 0.2 and table.layout.comment[0] == "(" else (),
+        work_offset=offsets[int(rng.integers(len(offsets)))],
+        skip_taps=True,
+    )
+    digits = str(rng.choice(["", *map(str, range(3, table.digits.most + 1)), *table.systems]))
+    two = len(one.machine.names) == 2
+    planes = table.forms["g1"].plane is not None and two and bool(rng.random() < 0.6)
+    planes = planes and not (one.control == "haas" and one.machine.swings_the_tool)
+    cl = one.cl
+    if rng.random() < 0.3:
+        cl = re.sub(
+            r"MMPM,(\d+),RAPTO,3,RTRCTO,25", r"IPM,\1,RAPTO,3,RTRCTO,25", cl.replace("UNITS/MM", "UNITS/INCHES")
+        )
+        cl = cl.replace(",MMPM", ",IPM")
+    if rng.random() < 0.4:  # holes of other kinds, in a tilted plane where there is one
+        cl = cl.replace("CYCLE/DRILL,FEDTO,9", str(rng.choice(["CYCLE/DEEP,STEP,4,FEDTO,9", "CYCLE/BORE,FEDTO,9"])))
+    extras = [name for name, extra in table.extras.items() if not extra.forms or "g1" in extra.forms]
+    chosen = tuple(str(name) for name in rng.permutation(extras)[: int(rng.integers(0, 2))])
+    return replace(one, frame=frame, digits=digits, planes=planes, extras=chosen, cl=cl)
+
+
 def outcome(one: ShopTrial) -> tuple[str, str, int]:
     """Outcome of a trial, what is to be said of it, and how many cuts are left."""
-    program, stream = read(one.cl.encode()), io.BytesIO()
+    stream, frame = io.BytesIO(), replace(one.frame, cycles="native" if one.native else "moves")
     try:
-        form = one.form()
-        fitted = fit_settings(one.settings, form, "mm")
-        write(smooth(program, fitted), stream, form=form, frame=Frame(cycles="native" if one.native else "moves"))
-    except (CornersmoothError, SettingsError) as refusal:
-        return "refused", str(refusal), 0
-    text = stream.getvalue()
-    try:
-        found = verify(
-            program,
-            text,
-            tolerance=fitted.verified_tolerance,
-            axis_length=one.settings.axis_length,
-            control=one.control,
-            machine=one.machine,
-            tcp=one.tcp,
-        )
+        result = postprocess(one.cl.encode(), stream, one.settings, form=one.form(), frame=frame, processes=1)
     except CornersmoothError as refusal:
-        return "FALSE ALARM", str(refusal), 0
-    if found.problems:
-        return "FALSE ALARM", " | ".join(f"{one.nc_line}: {one.code} {one.text}" for one in found.problems[:3]), 0
+        made = getattr(refusal, "result", None)
+        if made is None:
+            return "refused", str(refusal), 0
+        wrong = [] if made.verification is None else made.verification.problems
+        text = " | ".join(f"{one.nc_line}: {one.code} {one.text}" for one in wrong[:3])
+        return "FALSE ALARM", text or str(refusal), 0
+    except SettingsError as refusal:
+        return "refused", str(refusal), 0
+    text, found = stream.getvalue(), result.verification
+    if found is None or result.unverified:
+        return "FALSE ALARM", f"not verified: {result.unverified}", 0
     for axis in one.machine.axes:
         words = (
             [float(value) for value in re.findall(rf" {axis.name}([-+]?\d+\.\d*)", text.decode())] if axis.name else []
@@ -178,7 +222,7 @@ def main() -> int:
     count: Counter[str] = Counter()
     rewinds = 0
     for seed in range(first, last):
-        one = shop_trial(seed)
+        one = with_options(shop_trial(seed)) if sys.argv[3:] == ["options"] else shop_trial(seed)
         word, why, left = outcome(one)
         count[word] += 1
         count[f"{len(one.machine.names)} rotary axes"] += 1
