@@ -348,3 +348,19 @@ def test_planned_feeds_leave_cycles_alone(case: Case) -> None:
     assert result.verification.problems == ()
     lines = stream.getvalue().decode("ascii").splitlines()
     assert [match[1] for match in map(_CYCLE.fullmatch, lines) if match] == EXPECTED[case.control].splitlines()
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_a_tap_behind_a_place_that_the_tool_was_at_before_is_found(case: Case) -> None:
+    """Out along a line and back: the place before the tap is in the text twice."""
+    cl = (
+        "LOADTL/1\nSPINDL/500,RPM,CLW\nFEDRAT/MMPM,900\nRAPID\nGOTO/30,20,80,0,0,1\nGOTO/50,10,60\nGOTO/30,20,80\n"
+        "CYCLE/TAP,FEDTO,12,MMPM,500,RAPTO,3,RTRCTO,20\nGOTO/10,22,70\nCYCLE/OFF\nRAPID\nGOTO/10,22,90\nFINI\n"
+    )
+    lines = text_of(case, cl)
+    assert problems(case, lines, cl) == []
+    tap = next(k for k, line in enumerate(lines) if re.search(r"G84|CYCLE84|M99", line))
+    assert "CS561 a hole of the CL file is not tapped" in problems(case, [*lines[:tap], *lines[tap + 1 :]], cl)
+    left_out = lines_of(case.choose(), cl, frame=Frame(skip_taps=True, comments=False))
+    assert sum("NOT DRILLED" in line for line in left_out) == 1
+    assert problems(case, left_out, cl) == []

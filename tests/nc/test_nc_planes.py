@@ -299,14 +299,144 @@ def test_arcs_are_circles_in_the_plane() -> None:
     cl = ARC.format(**{name: ",".join(f"{value:.7f}" for value in place) for name, place in places.items()})
     for case in CASES[:4]:
         lines, said = text_of(case, cl)
-        circles = [line for line in lines if re.match(r"G[23] ", line)]
+        circles = [line for line in lines if re.match(r"G[23] |\d+ CR ", line)]
+        assert said["CS313"] == 1
+        assert len(circles) == 1
         if case.control == "heidenhain":
-            assert said["CS314"] == 1
+            assert re.match(r"\d+ CR X\S+ Y\S+ R\+10\.0+ DR\+$", circles[0])
         else:
-            assert said["CS313"] == 1
-            assert len(circles) == 1
             assert re.match(r"G3 X\S+ Y\S+ Z(-?5\.0+|-?\S+) (R|CR=)10\.0+( F300\.)?$", circles[0])
         assert problems(case, lines, cl) == []
+
+
+def arcs(back: float, height: float = 0.0) -> str:
+    """A semicircle and one the other way round in a tilted plane, `back` times as far round, the latter a helix."""
+    frame = np.array([[0.8, 0, -0.6], [0, 1, 0], [0.6, 0, 0.8]])
+
+    def said(*place: float) -> str:
+        return ",".join(f"{value:.7f}" for value in np.array(place) @ frame)
+
+    angle = np.pi * (1.0 - back)
+    last = said(10 * np.cos(angle), 40 + 10 * np.sin(angle), height)
+    return (
+        "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nFEDRAT/MMPM,300\nRAPID\n"
+        f"GOTO/{said(10, 0, 50)},0.6,0,0.8\nGOTO/{said(10, 0, 0)}\nCIRCLE/{said(0, 0, 0)},0.6,0,0.8,10\n"
+        f"GOTO/{said(-10, 0, 0)}\nGOTO/{said(-10, 40, 0)}\nCIRCLE/{said(0, 40, 0)},-0.6,0,-0.8,10\n"
+        f"GOTO/{last}\nRAPID\nGOTO/{said(0, 0, 60)}\nFINI\n"
+    )
+
+
+def test_klartext_arcs_go_round_as_they_should() -> None:
+    """CR, at most 120 degrees each; a helix has no words there."""
+    case = CASES[2]
+    for cl, blocks in (
+        (arcs(1.0), {"DR+": 2, "DR-": 2}),
+        (arcs(0.5), {"DR+": 2, "DR-": 1}),
+        (arcs(1.0, 2.0), {"DR+": 2}),
+    ):
+        lines, _ = text_of(case, cl)
+        found = [line for line in lines if " CR " in line]
+        assert {turn: sum(line.count(turn) for line in found) for turn in blocks} == blocks
+        assert len(found) == sum(blocks.values())
+        assert problems(case, lines, cl) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (r"DR\+", "DR-"),
+        (r"DR-", "DR+"),
+        (r"R\+10\.0000", "R+10.5000"),
+        (r"R\+10\.0000", "R-10.0000"),
+        (r" R\+10\.0000", ""),
+        (r" DR[-+]", ""),
+        (r"(CR X\S+ Y\S+)", r"\1 Z+1.0000"),
+        (r"CR X(\S+)", r"CR X\g<1>1"),
+        ("CR ", "C "),
+        ("CR ", "L "),
+    ],
+)
+def test_mutants_of_klartext_arcs_are_found(old: str, new: str) -> None:
+    cl = arcs(1.0)
+    lines, _ = text_of(CASES[2], cl)
+    for k, line in enumerate(lines):
+        if " CR " in line and (wrong := re.sub(old, new, line)) != line:
+            if wrong.endswith("01 DR+") or "X" in old:
+                wrong = re.sub(r"X([-+]\d+)\.(\d)", lambda found: f"X{int(found[1]) + 1}.{found[2]}", line)
+            assert problems(CASES[2], [*lines[:k], wrong, *lines[k + 1 :]], cl), wrong
+
+
+TOP = """UNITS/MM
+LOADTL/1
+SPINDL/500,RPM,CLW
+RAPID
+GOTO/0,0,80,0,0,1
+CYCLE/DRILL,FEDTO,12,MMPM,150,RAPTO,3,RTRCTO,20
+GOTO/5,5,0
+GOTO/14,13,0
+CYCLE/OFF
+RAPID
+GOTO/30,20,80
+RAPID
+GOTO/50,10,60,0.48,0.36,0.8
+FEDRAT/MMPM,300
+GOTO/20,-12.5,10
+GOTO/26,-20.5,10
+RAPID
+GOTO/50,10,60
+RAPID
+GOTO/30,20,80,0,0,1
+CYCLE/TAP,FEDTO,12,MMPM,500,RAPTO,3,RTRCTO,20
+GOTO/7,5,0
+CYCLE/OFF
+RAPID
+GOTO/30,20,80
+RAPID
+GOTO/10,20,70,0.1,0,0.9949874
+GOTO/10,22,70,0.2,0,0.9797959
+RAPID
+GOTO/10,22,90
+FINI
+"""
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_holes_along_z_of_a_tool_that_tilts_are_cycles_in_a_plane_that_does_not(case: Case) -> None:
+    lines, said = text_of(case, TOP)
+    on, _, _ = words_of(case)
+    planes = [match.groups() for line in lines if (match := re.fullmatch(on, line))]
+    level = [words for words in planes if all(float(word) == 0.0 for word in words)]
+    assert said["CS356"] == 3
+    assert len(level) >= 2
+    assert said["CS347"] == 3
+    assert said["CS348"] == 1
+    assert problems(case, lines, TOP) == []
+
+
+@pytest.mark.parametrize("case", [*CASES[:4]], ids=str)
+def test_a_tool_along_z_needs_no_plane_where_no_hole_is_a_cycle(case: Case) -> None:
+    cl = TOP.replace("CYCLE/TAP", "CYCLE/DRILL")
+    assert text_of(case, cl, cycles="moves")[1]["CS356"] == 1
+
+
+@pytest.mark.parametrize("case", CASES[:3], ids=str)
+def test_mutants_of_planes_that_do_not_tilt_are_found(case: Case) -> None:
+    lines, _ = text_of(case, TOP)
+    on, off, _ = words_of(case)
+    off_first = next(k for k, line in enumerate(lines) if re.fullmatch(_RETRACT, line) and k > 12)
+    wrong = []
+    for k in range(off_first, len(lines)):  # before the first tilted plane one that does not tilt changes nothing
+        if re.fullmatch(rf"{_ABOUT}|{_RETRACT}", lines[k]) and not re.fullmatch(off, lines[k]):
+            end = k + 1 + lines[k].startswith("G91 G28")
+            if not re.match(r"M30|\d+ M30|G49$|M5|\d+ M5|TRAFOOF", lines[end]) or re.fullmatch(_ABOUT, lines[k]):
+                wrong.append((f"{k} {lines[k]}", [*lines[:k], *lines[k + 1 :]]))
+        if re.fullmatch(on, lines[k]) and (case.control != "haas" or lines[k + 1] == "G254"):
+            word = list(re.finditer(r"[-+]?\d+\.\d+", lines[k]))[-2]
+            sign = "+" if case.control == "heidenhain" else ""
+            turned = f"{lines[k][: word.start()]}{sign}1.0000{lines[k][word.end() :]}"
+            wrong.append((turned, [*lines[:k], turned, *lines[k + 1 :]]))
+    assert len(wrong) >= 4
+    assert [kind for kind, text in wrong if not problems(case, text, TOP)] == []
 
 
 TAP = """UNITS/MM

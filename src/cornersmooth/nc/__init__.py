@@ -190,8 +190,9 @@ def write(
         chosen, program, findings, operation, comments=frame.comments, skip_taps=frame.skip_taps
     )
     native = frame.cycles == "native"
-    upright = upright_poses(program, chosen, drills=native, taps=not frame.skip_taps)
-    planes = plan_planes(program, smoothed.settings, chosen, upright, findings)
+    taps = not frame.skip_taps
+    upright = upright_poses(program, chosen, drills=native, taps=taps)
+    planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native, taps=taps)
     circles = plan_circles(program, smoothed.settings, chosen, planes)
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)

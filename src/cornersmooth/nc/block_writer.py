@@ -92,7 +92,8 @@ class BlockWriter:
             spaced = (self._blank.encode() + spaced[0], *spaced[1:])
         self._format = self._row_format(spaced, decimals)
         radius = f"{self._blank}{motion.radius}".encode()
-        self._arc_format = self._row_format((*spaced[:3], radius), decimals[:3] + decimals[:1])
+        said = 2 if motion.arc_directions else 3
+        self._arc_format = self._row_format((*spaced[:said], radius), decimals[:said] + decimals[:1])
         self._curves = curves_for(self.form, self.program.units)
         self._share = SplineShare(self.program.line, self.findings) if self.form.curve == "bspline" else None
         self._said_blend = self._usual_blend
@@ -257,8 +258,13 @@ class BlockWriter:
         self.blocks += len(run) + extra
         apart: list[tuple[Bools, RowWriter, Ints]] = []  # rows with words of their own
         if run.arc is not None and (circular := run.arc >= 0).any():
-            numbers = np.column_stack((run.ticks[circular, :3], self.circles.radius[run.arc[circular]]))
+            said = len(self._arc_format.decimals) - 1
+            numbers = np.column_stack((run.ticks[circular, :said], self.circles.radius[run.arc[circular]]))
             apart.append((circular, self._arc_format, numbers))
+            if directions := self.form.mode.motion.arc_directions:
+                turns = [f"{self._blank}{turn}".encode() for turn in directions]
+                suffix_id[circular] += len(suffix) * (1 + ~self.circles.clockwise[run.arc[circular]])
+                suffix += [turn + end for turn in turns for end in suffix]
         if self._curves.format is not None and (curved := run.curve > 0).any():
             apart.append((curved, self._curves.format, self._curves.numbers(run, curved)))
         if not apart:

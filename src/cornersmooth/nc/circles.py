@@ -87,8 +87,11 @@ def plan_circles(program: Program, settings: Settings, form: Form, planes: Plane
     ticks = to_ticks(np.minimum(radius, _LARGEST_RADIUS) / unit, decimals)
     digits = form.table.digits
     vectors = to_ticks(digits.vector_length * program.axis, digits.vector)
+    modes = (form.mode if form.plane is None else form.plane, form.mode)
+    flat = np.where(tilted, *(bool(mode.motion.arc_directions) for mode in modes))
     fits = (
-        np.where(tilted, form.plane is not None and form.plane.circles, form.mode.circles)
+        np.where(tilted, *(mode.circles for mode in modes))
+        & (~flat | (plane == 0))
         & (np.abs(height) > 1.0 - _UPRIGHT)
         & (radius < _LARGEST_RADIUS)
         & (ticks > 0)
@@ -101,7 +104,7 @@ def plan_circles(program: Program, settings: Settings, form: Form, planes: Plane
         step = float(unit * 10.0**-decimals)
         tolerance = min(settings.tip_tolerance, settings.axis_point_tolerance)
         written: Floats = ticks.astype(np.float64) * step
-        deviation = _deviation(program, blocks, PLANES[plane], height > 0.0, written, step, frames)
+        deviation = _deviation(program, blocks, PLANES[plane], height > 0.0, written, step, frames, flat)
         blocks[deviation > tolerance] = 0
     return Circles(blocks, plane + FIRST_PLANE, height < 0.0, ticks)
 
@@ -116,9 +119,19 @@ def with_arcs(rows: Iterator[Rows], program: Program, circles: Circles) -> Itera
 
 
 def _deviation(
-    program: Program, blocks: Ints, planes: Ints, counterclockwise: Bools, radius: Floats, step: float, frames: Floats
+    program: Program,
+    blocks: Ints,
+    planes: Ints,
+    counterclockwise: Bools,
+    radius: Floats,
+    step: float,
+    frames: Floats,
+    flat: Bools,
 ) -> Floats:
-    """(k,) mm from the written circles to the arcs at equal shares; infinite for a block that is too short."""
+    """(k,) mm from the written circles to the arcs at equal shares; infinite for a block that is too short.
+
+    Infinite, too, where the ends of an arc that has to be flat differ in height.
+    """
     rows, share = divided(blocks)
     before = share - 1.0 / blocks[rows]
     frames = frames[rows]
@@ -128,7 +141,11 @@ def _deviation(
     chord = np.stack([end[own, axis] - start[own, axis] for axis in (first, second, third)], axis=1)
     length = np.hypot(chord[:, 0], chord[:, 1])
     size, left = radius[rows], np.where(counterclockwise[rows], 1.0, -1.0)
-    proper = (length >= _SHORTEST_CHORD * step) & (length < 2.0 * size)
+    proper = (
+        (length >= _SHORTEST_CHORD * step)
+        & (length < 2.0 * size)
+        & ~(flat[rows] & (np.rint(chord[:, 2] / step) != 0.0))
+    )
     safe = np.where(proper, length, 1.0)
     across = np.stack((-chord[:, 1], chord[:, 0]), axis=1) / safe[:, None]
     rise = np.sqrt(np.maximum(size**2 - length**2 / 4.0, 0.0))

@@ -84,6 +84,9 @@ class Motion:
         Addresses of X, Y and Z.
     radius, feed : str
         Addresses.
+    arc_directions : tuple of str
+        What says behind the radius of a circular block that it goes clockwise, and counterclockwise. Such blocks have X
+        and Y alone: arcs in the plane XY at one height. Empty where the code says it, in blocks of X, Y and Z.
     feed_point : bool
         Whether a whole feed is written with a point.
     signs : bool
@@ -114,6 +117,7 @@ class Motion:
     rapid_end: str = ""
     coordinates: tuple[str, ...] = ("X", "Y", "Z")
     radius: str = "R"
+    arc_directions: tuple[str, ...] = ()
     feed: str = "F"
     feed_point: bool = True
     signs: bool = False

@@ -57,23 +57,33 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
         return chosen
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
     tilted &= program.kind != Move.FROM
-    starts, said = tool_starts(program), _said_cycles(program)
+    starts = tool_starts(program)
     if not form.rotary and tilted.any():  # without a machine no words bring the rotary axes back
         tilted[int(np.argmax(tilted)) :] = True
     for first, stop in zip(starts, [*starts[1:], len(program)], strict=True):
         here = slice(first, stop)
-        if holes[here].any() and not tilted[here].any():
-            chosen[here] = _any_as_cycle(program, form, said, first, stop, drills=drills)
+        if not tilted[here].any():
+            chosen[here] = has_cycles(program, form, here, drills=drills, taps=taps)
     return chosen
 
 
-def _any_as_cycle(
-    program: Program, form: Form, said: list[tuple[Statement, bool]], first: int, stop: int, *, drills: bool
-) -> bool:
-    """Whether any hole from one pose to another can be a cycle of the control; only taps where drills are not asked."""
+def has_cycles(program: Program, form: Form, part: slice, *, drills: bool, taps: bool) -> bool:
+    """Whether any hole of a part of the poses can be a cycle of the control.
+
+    Parameters
+    ----------
+    program : Program
+    form : Form
+    part : slice
+    drills, taps : bool
+        What is to be written as a cycle.
+    """
+    if not (drills or taps) or not (program.kind[part] == Move.HOLE).any():
+        return False
+    said = _said_cycles(program)
     for k, (statement, clockwise) in enumerate(said):
         until = said[k + 1][0].pose if k + 1 < len(said) else len(program)
-        poses = np.arange(max(statement.pose, first), min(until, stop))
+        poses = np.arange(max(statement.pose, part.start), min(until, part.stop))
         poses = poses[program.kind[poses] == Move.HOLE]
         cycle = read_cycle(statement.args, program, None) if len(poses) else None
         if cycle is not None and (clockwise if cycle.tap else drills) and kind_of(cycle, form, program, poses[:1]):

@@ -15,9 +15,9 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.kinematics import Machine, machine_position, solutions
+from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, Keep, Move, Program
-from cornersmooth.nc.cycle_blocks import tool_starts
+from cornersmooth.nc.cycle_blocks import has_cycles, tool_starts
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
@@ -73,10 +73,14 @@ class Planes:
         return frames[self.of[poses]]
 
 
-def plan_planes(program: Program, settings: Settings, form: Form, upright: Bools, findings: Findings) -> Planes:
+def plan_planes(
+    program: Program, settings: Settings, form: Form, upright: Bools, findings: Findings, *, drills: bool, taps: bool
+) -> Planes:
     """Choose the runs of poses that are written in tilted planes.
 
-    A run has one tilted axis, cuts, and lies between rapids or changes of the tool: there it can go up and be turned.
+    A run has one axis, cuts, and lies between rapids or changes of the tool: there it can go up and be turned. Along Z
+    it needs no plane, but for holes that are cycles of the control, which tool tip control does not take: then it is
+    written in a plane that is not tilted.
 
     Parameters
     ----------
@@ -88,6 +92,8 @@ def plan_planes(program: Program, settings: Settings, form: Form, upright: Bools
         Poses of tools that stay along Z, which need no plane.
     findings : Findings
         Takes which runs are in planes, and which are not although they could.
+    drills, taps : bool
+        What is to be written as a cycle.
     """
     of = np.full(len(program), -1, np.int64)
     if form.plane is None:
@@ -95,7 +101,8 @@ def plan_planes(program: Program, settings: Settings, form: Form, upright: Bools
     planes: dict[tuple[str, ...], int] = {}
     found: list[Plane] = []
     for first, stop in _runs(program):
-        if upright[first]:
+        along_z = bool(norm(program.axis[first] - _UNIT["z"]) <= _SAME)
+        if upright[first] or (along_z and not has_cycles(program, form, slice(first, stop), drills=drills, taps=taps)):
             continue
         line = int(program.line[first])
         plane, why = _plane(program.axis[first], settings, form)
@@ -130,8 +137,7 @@ def _runs(program: Program) -> list[tuple[int, int]]:
         here = moving[(moving >= first) & (moving < stop)]
         if not (free[first] and free[stop] and (~np.isin(kind[here], _IDLE)).any()):
             continue
-        near = norm(axis[here] - axis[first]).max() <= _SAME
-        if near and norm(axis[first] - (0.0, 0.0, 1.0)) > _SAME:
+        if norm(axis[here] - axis[first]).max() <= _SAME:
             runs.append((first, stop))
     return runs
 
@@ -155,7 +161,7 @@ def _plane(axis: Floats, settings: Settings, form: Form) -> tuple[Plane | None, 
     off = settings.axis_length * float(norm(plane.frame[None, :, 2] - axis)[0])
     if off > form.plane_reserve(settings.axis_point_allowed, settings.axis_length):
         return None, f"its angles of {digits} decimals would turn the tool by more than the tolerance leaves"
-    if norm(plane.frame[None, :, 2] - (0.0, 0.0, 1.0))[0] < _SAME:
+    if (norm(np.stack((plane.frame[:, 2], axis)) - _UNIT["z"]) < _SAME).tolist() == [True, False]:
         return None, "in the written angles the tool is not tilted"
     return plane, ""
 
@@ -203,12 +209,15 @@ def turned_part(machine: Machine, angles: Floats) -> Floats:
 
 def _rotary_angles(machine: Machine, axis: Floats) -> Floats | None:
     """(2,) degrees within the limits that bring the tool to an axis: as preferred, else as little as possible."""
+    low, high = machine.limits.T
+    zero = np.zeros(2)
+    if (low <= zero).all() and (zero <= high).all() and norm(tool_axis(machine, zero[None]) - axis)[0] <= _SAME:
+        return zero
     found = solutions(machine, axis[None])
     if found.beyond[0] > 0.0:
         return None
     turns = np.array([[one, other] for one in (-360.0, 0.0, 360.0) for other in (-360.0, 0.0, 360.0)])
     angles = (found.angles[0][:, None, :] + turns).reshape(-1, 2)
-    low, high = machine.limits.T
     angles = angles[((angles >= low) & (angles <= high)).all(axis=1)]
     if not len(angles):
         return None

@@ -52,7 +52,7 @@ def _coarse_digits(form: Form, smoothed: SmoothProgram, findings: Findings) -> N
 
 def _arcs(circles: Circles, program: Program, findings: Findings) -> None:
     for chosen, code, text in (
-        (circles.blocks > 0, "CS313", "arc written as G2 or G3"),
+        (circles.blocks > 0, "CS313", "arc written as circular blocks"),
         (circles.blocks == 0, "CS314", "arc written as lines"),
     ):
         rows = np.flatnonzero(chosen)

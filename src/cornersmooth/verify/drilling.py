@@ -246,11 +246,11 @@ class _Search:
             window = np.arange(begin, min(begin + _WINDOW, self.ahead.count))
             for k in window[self.exact(hole - 1, window)].tolist():
                 reached = k if reached is None or k == reached + 1 else reached  # the same place twice: as new
-                if not np.isnan(cycle.depth) and self.over(hole, k + 1):
+                if (cycle.tap or not np.isnan(cycle.depth)) and self.over(hole, k + 1):
                     yield k + 1, True
                     return
             begin += len(window)
-            if reached is not None and np.isnan(cycle.depth):
+            if reached is not None and np.isnan(cycle.depth) and not (cycle.tap and begin - reached <= _UNDECIDED):
                 break
             if reached is not None and begin - reached > _UNDECIDED:
                 reached = None

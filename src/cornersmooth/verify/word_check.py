@@ -98,7 +98,7 @@ class WordCheck:
         self._retract = 0
         self._high = False
         #: states that an approach establishes again
-        self._approach = {rule.state for rule in self.list.words if rule.off} | {"work offset"}
+        self._approach = {rule.state for rule in self.list.words if rule.off} | {"work offset", "cutting edge"}
         #: where the rotary axes have been sent, as far as that is said
         self._angles: dict[str, float] = {}
         self._arc: tuple[str, int] | None = None

@@ -88,7 +88,7 @@ class Heidenhain(Dialect):
                 state.event(line, "G", value, text)
             elif name == "S":
                 state.event(line, "S", value, text)
-            elif name in self.lexer.names or name in ("circle", "centre", "turn"):
+            elif name in self.lexer.names or name in ("circle", "centre", "turn", "R"):
                 motion[name] = value
             elif name in "ABC":
                 state.refuse(line, f"{text}: rotary words", "name the machine they are for, with --machine")
@@ -160,12 +160,16 @@ class Heidenhain(Dialect):
         state.leave(axes)
 
     def _circle(self, motion: dict[str, float], line: Line, state: State) -> dict[str, float]:
-        """C: about the centre that CC has said, in the plane XY."""
+        """C: about the centre that CC has said, in the plane XY; CR: with a radius."""
         centre = state.memory.get("centre", {})
-        if "turn" not in motion or len(centre) != 2 or {*motion} & {"Z", *self.rotary}:
-            state.refuse(line, "an arc that is not in the plane XY about a CC", "write it as lines")
+        by_radius = line.words[0].text == "CR"
+        known = "R" in motion if by_radius else "R" not in motion and len(centre) == 2
+        if "turn" not in motion or not known or {*motion} & {"Z", *self.rotary}:
+            state.refuse(line, "an arc that is not in the plane XY about a CC or with a radius", "write it as lines")
         x, y, _ = state.modal.tip
-        row: dict[str, float] = {name: motion[name] for name in ("X", "Y", "F") if name in motion}
+        row: dict[str, float] = {name: motion[name] for name in ("X", "Y", "F", "R") if name in motion}
+        if by_radius:
+            return {**row, "G": motion["turn"]}
         return {**row, "G": motion["turn"], "I": centre["X"] - x, "J": centre["Y"] - y}
 
     def _miscellaneous(self, value: float, text: str, line: Line, state: State) -> None:
@@ -248,7 +252,7 @@ class _KlartextLexer(Lexer):
         head = rest[place:].partition(" ")[0]
         if not head:
             return []
-        heads = {"C": "circle", "CC": "centre"} | dict(zip(_PATHS, _PATHS, strict=True))
+        heads = {"C": "circle", "CR": "circle", "CC": "centre"} | dict(zip(_PATHS, _PATHS, strict=True))
         if head in heads:
             tail = place + len(head)
             tail += len(rest[tail:]) - len(rest[tail:].lstrip())
