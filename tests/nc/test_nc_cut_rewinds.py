@@ -15,8 +15,8 @@ from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits
 from cornersmooth.kinematics import Dynamics, Machine, load_machine
-from cornersmooth.nc import choose_form, fit_settings, write
-from cornersmooth.nc_reader import read_nc
+from cornersmooth.nc import Frame, choose_form, fit_settings, write
+from cornersmooth.nc_reader import read_nc, reader
 from cornersmooth.rotary import rewound_angles
 from cornersmooth.saving import estimate_saving
 from cornersmooth.settings import Settings
@@ -263,3 +263,37 @@ def test_as_few_rewinds_as_can_be() -> None:
     step = np.abs(np.diff(path.angles, axis=0)).max(axis=1)
     assert (step[left[1:]] > 170.0).all()
     assert (step[~left[1:]] < 10.0).all()
+
+
+@pytest.mark.parametrize("along", [0.0, 20.0])
+def test_cuts_are_found_left_wherever_the_reader_gives_out_what_it_has(
+    along: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Elements are given out in chunks: none of these ends between the way up and the retract behind it."""
+    form = choose_form("siemens", machine=short("table-ac"), tcp=False, rewind=AWAY, extras=["cycle832"])
+    program, stream = read(program_text()), io.BytesIO()
+    write(
+        smooth(program, fit_settings(Settings(tolerance=EPS), form, "mm")),
+        stream,
+        form=form,
+        frame=Frame(retract=along),
+    )
+    text = stream.getvalue()
+    count = len(read_nc(text, control="siemens", machine=form.machine, tcp=False, tolerance=EPS).kind)
+    left = read_nc(text, control="siemens", machine=form.machine, tcp=False, tolerance=EPS).left_cuts
+    assert left
+    for size in {element + more for element, *_ in left for more in (-1, 0, 1, 2)} | {count - 2, count - 1}:
+        monkeypatch.setattr(reader, "GIVEN_OUT", size)
+        found = verify(program, text, tolerance=EPS, control="siemens", machine=form.machine, tcp=False)
+        assert found.problems == (), size
+        assert len(found.rewinds) == len(left)
+
+
+def test_a_cut_is_left_without_a_work_offset() -> None:
+    """On SINUMERIK nothing but D1 says then that the tool comes back from its retract."""
+    form = choose_form("siemens", machine=short("table-ac"), tcp=False, rewind=AWAY)
+    stream = io.BytesIO()
+    result = postprocess(program_text(), stream, Settings(tolerance=EPS), form=form, frame=Frame(work_offset=""))
+    assert result.verification is not None
+    assert len(result.verification.rewinds) == 1
+    assert b"G54" not in stream.getvalue()

@@ -108,7 +108,8 @@ class Reader:
                 self.rows(item)
             else:
                 self.line(item)
-            if self.placed and self.elements - self.given_out >= GIVEN_OUT and not self.left_cuts.open:
+            waiting = self.elements - self.given_out
+            if self.placed and waiting >= GIVEN_OUT and not (self.left_cuts.open or self._may_go_up(waiting)):
                 yield self._collected()
         self.flush()
         if self.rotary is not None:
@@ -299,6 +300,10 @@ class Reader:
         self.curves += len(run.curves)
         if not self.placed and (run.kind != Element.RAPID).any():
             self._settle()
+
+    def _may_go_up(self, waiting: int) -> bool:
+        """Whether the last element may be a way up to a retract, which is then changed."""
+        return waiting < 2 * GIVEN_OUT and bool(self.ready) and self.ready[-1].kind[-1] == Element.RAPID
 
     def _settle(self) -> None:
         """Where words of the position come late, put the tool where they send it first."""
