@@ -13,6 +13,7 @@ from cornersmooth.verify.distances import Distances, Reached
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, Metric, distance_between, nearest_segments
+from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.wide_search import nearest_alone
 
 #: segments looked at on either side
@@ -29,6 +30,9 @@ _MOST_VERTICES, _SURE = 4096, 2.0
 
 #: how many times `Match.near` a vertex is from its path that is on it nowhere, in six dimensions
 _OFF = 2.0
+
+#: times that a segment is cut to two thirds
+_HALVINGS = 40
 
 Found = tuple[Floats, Ints, Ints, Floats]
 
@@ -194,12 +198,43 @@ def original_backwards(match: Match, theirs: Reached) -> Found | None:
     earlier, came = _cost(match, theirs.vertex[falls - 1], before, here, forward=False)
     gain = np.minimum(later, earlier)
     wrong = np.flatnonzero((gain > match.slack) & ~comes_back & ~came)
+    wrong = wrong[~_waits(match, theirs.vertex[falls[wrong]], here[wrong], before[wrong])]
     if not len(wrong):
         return None
     original, vertex = match.original, theirs.vertex[falls[wrong]]
     cl_line = original.program.line[original.pose[original.trail.owner[vertex]]]
     nc_line = match.nc.line[trail.owner[np.minimum(before[wrong].astype(np.int64) + 1, len(trail) - 1)]]
     return vertex.astype(np.float64), cl_line, nc_line, gain[wrong]
+
+
+def _waits(match: Match, vertex: Ints, low: Floats, high: Floats) -> Bools:
+    """(k,) whether the text is within the tolerance of original vertices, and of those before them, at one place.
+
+    It waits there while the original goes from one to the other: both are passed in order then. The places are looked
+    for between `low` and `high`. On a segment the largest of the distances has one minimum only.
+    """
+    found = np.zeros(len(vertex), np.bool_)
+    for k in range(min(len(vertex), _MOST_VERTICES)):
+        first, last = int(low[k]), min(int(np.ceil(high[k])), len(match.six) - 1)
+        if last - first > _MOST_VERTICES:
+            continue
+        start = match.six[first:last]
+        way = match.six[first + 1 : last + 1] - start
+        theirs = match.path.six[vertex[k] - 1 : vertex[k] + 1]
+
+        def off(share: Floats, start: Floats = start, way: Floats = way, theirs: Floats = theirs) -> Floats:
+            away = (start + share[:, None] * way)[:, None] - theirs
+            largest: Floats = np.linalg.norm(away.reshape(len(share), 4, 3), axis=2).max(axis=1)
+            return largest
+
+        begin, end = np.zeros(len(start)), np.ones(len(start))
+        begin[0], end[-1] = low[k] - first, high[k] - (last - 1)
+        for _ in range(_HALVINGS):
+            left, right = (2.0 * begin + end) / 3.0, (begin + 2.0 * end) / 3.0
+            falls = off(right) < off(left)
+            begin, end = np.where(falls, left, begin), np.where(falls, end, right)
+        found[k] = off((begin + end) / 2.0).min() <= match.tolerance + ARITHMETIC
+    return found
 
 
 def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: bool) -> tuple[Floats, Bools]:

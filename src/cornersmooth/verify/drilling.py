@@ -25,6 +25,12 @@ _WINDOW = 512
 #: elements behind the pose before a run in which the run is looked for before the pose is taken for a passing one
 _UNDECIDED = 1 << 16
 
+#: elements in which it is looked for what a cycle asks for, where the text first goes over its hole
+_DOUBTFUL = 1 << 12
+
+#: moves behind a hole in which the next feed move or hole is looked for
+_NEXT = 16
+
 #: elements between runs that are given out together, and those held of what has been given out
 _TOGETHER, _KEPT = 1 << 14, 16
 
@@ -136,7 +142,7 @@ class Holes:
             cycles = all_cycles[used : used + stop - first]
             used += stop - first
             if first > move and not self._search.stands(move, first, element):
-                for begin, found in self._search.starts(first, element, cycles[0].if_drilled):
+                for begin, found in self._search.starts(move, first, element, cycles[0].if_drilled):
                     yield Between(move, first - 1, element, begin, found)
                     element = begin
                     ahead.forget(element - _KEPT)
@@ -190,7 +196,7 @@ class _Search:
         self.ahead, self.axis_length = ahead, axis_length
         program = original.program
         self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]
-        self.line = program.line[original.pose]
+        self.line, self.kind = program.line[original.pose], program.kind[original.pose]
 
     @property
     def room(self) -> float:
@@ -226,38 +232,99 @@ class _Search:
 
     def same_hole(self, one: int, other: int) -> bool:
         """Whether two moves are to the same hole."""
-        apart = np.linalg.norm(self.tip[one] - self.tip[other]), np.linalg.norm(self.axis[one] - self.axis[other])
-        return bool(apart[0] <= self.room and apart[1] * self.axis_length <= 2 * self.room)
+        return bool(self.near(one, slice(other, other + 1))[0])
+
+    def goes_on(self, move: int) -> bool:
+        """Whether the next move of the CL file that is no rapid, too, is along the line of a hole."""
+        others = np.flatnonzero(self.kind[move + 1 : move + 1 + _NEXT] != Move.RAPID)
+        if not len(others):
+            return False
+        following = move + 1 + int(others[0])
+        away, turned = (values[following] - values[move] for values in (self.tip, self.axis))
+        beside = np.linalg.norm(away - (away @ self.axis[move]) * self.axis[move])
+        return bool(beside <= self.room and np.linalg.norm(turned) * self.axis_length <= 2 * self.room)
+
+    def near(self, move: int, others: slice) -> Bools:
+        """(k,) whether others are to the pose of a move, as far as the digits show."""
+        apart, turned = (np.linalg.norm(values[others] - values[move], axis=1) for values in (self.tip, self.axis))
+        same: Bools = (apart <= self.room) & (turned * self.axis_length <= 2 * self.room)
+        return same
 
     def over(self, move: int, element: int) -> bool:
         """Whether there is such an element, and it ends in the line of the hole."""
         return self.ahead.has(element) and not np.isnan(self.heights(move, np.array([element]))[0])
 
-    def starts(self, hole: int, element: int, cycle: Drilling) -> Iterator[tuple[int, bool]]:
+    def visits(self, move: int, hole: int) -> int:
+        """How often the moves before a hole, from one on, come to the pose before it and must pass it exactly."""
+        here = self.near(hole - 1, slice(move, hole))
+        ends = np.append(self.kind[move + 1 : hole] != Move.LINEAR, True) | (self.kind[move:hole] == Move.RAPID)
+        begins = here & ~np.append(False, here[:-1])
+        return max(len(np.unique(np.cumsum(begins)[here & ends])), 1)
+
+    def starts(self, move: int, hole: int, element: int, cycle: Drilling) -> Iterator[tuple[int, bool]]:
         """Look for the first element of a run of holes, and say how far it is not yet met, and where it is.
 
         It is behind the pose before it, where the text goes over to the first hole. There need be nothing at a hole
         whose cycle cannot be carried out. A text that never goes over to it has its holes, if any, behind
-        where it has met that pose, or behind what has been given out as before them.
+        where it has met that pose, or behind what has been given out as before them. Where feed moves run along the
+        hole, too, it is the first time that the text does what the cycle asks for.
         """
         reached: int | None = None
+        doubtful: int | None = None
+        visits, seen, before = self.visits(move, hole), 0, -2
         begin = given = element
         while self.ahead.has(begin + _WINDOW) or self.ahead.has(begin):
             window = np.arange(begin, min(begin + _WINDOW, self.ahead.count))
             for k in window[self.exact(hole - 1, window)].tolist():
-                reached = k if reached is None or k == reached + 1 else reached  # the same place twice: as new
-                if (cycle.tap or not np.isnan(cycle.depth)) and self.over(hole, k + 1):
+                seen, before = seen + (k > before + 1), k  # the same place twice: as new
+                if seen < visits:
+                    continue
+                reached = k if reached is None or k == reached + 1 else reached
+                if (np.isnan(cycle.depth) and not cycle.tap) or not self.over(hole, k + 1):
+                    continue
+                if cycle.tap or self.drills(hole, k + 1, cycle):
                     yield k + 1, True
                     return
+                doubtful = k + 1 if doubtful is None else doubtful
             begin += len(window)
+            if doubtful is not None and begin - doubtful > _DOUBTFUL:
+                break
             if reached is not None and np.isnan(cycle.depth) and not (cycle.tap and begin - reached <= _UNDECIDED):
                 break
             if reached is not None and begin - reached > _UNDECIDED:
                 reached = None
-            if reached is None and begin - given >= _TOGETHER:
+            if reached is None and doubtful is None and begin - given >= _TOGETHER:
                 yield begin, False
                 given = begin
+        if doubtful is not None:
+            yield doubtful, True
+            return
         yield (given if reached is None else reached + 1), True
+
+    def drills(self, move: int, element: int, cycle: Drilling) -> bool:
+        """Whether the text drills a hole from an element on: to its depth, no farther, at the cycle's feeds."""
+        while self.over(move, element):
+            if self.feeds([element]):
+                height = self.heights(move, np.array([element]))[0]
+                if self.wrong_feed(element, cycle) or height < -cycle.depth - self.room:
+                    return False
+                if height <= self.room - cycle.depth:
+                    return True
+            element += 1
+        return False
+
+    def wrong_feed(self, element: int, cycle: Drilling) -> bool:
+        """Whether the feed of an element is not that of a cycle."""
+        nc, own = self.ahead.nc, element - self.ahead.base
+        return bool(
+            not np.isnan(cycle.feed)
+            and (
+                np.isnan(nc.feed[own])
+                or abs(nc.feed[own] - cycle.feed) > 2 * abs(nc.feed_room[own])
+                or (np.isnan(nc.feed_room[own]) and nc.feed[own] > cycle.feed + ARITHMETIC)
+                or nc.per_revolution[own] != cycle.per_revolution
+            )
+        )
 
     def consume(
         self, first: int, stop: int, element: int, cycles: list[Drilling], *, again: bool
@@ -285,14 +352,19 @@ class _Search:
                 entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
             depth = cycles[move - first].depth
             other = move + 1 < stop and cycles[move + 1 - first] != cycles[move - first]
-            twice, deep = other and self.same_hole(move, move + 1), False
+            twice, deep, left = other and self.same_hole(move, move + 1), False, False
             while self.ahead.has(element):
                 height = self.heights(move, np.array([element]))[0]
                 if np.isnan(height) or abs(height - entered) > self.room:
                     break
+                fed = bool(self.feeds([element]))
+                down = not group or height < self.heights(move, np.array(group[-1:]))[0] - self.room
+                if (left and (fed or down)) or (fed and np.isnan(depth) and self.goes_on(move)):
+                    break  # what goes on behind a hole, or is fed where nothing is drilled, is not the hole's
                 group.append(element)
                 element += 1
                 deep = deep or height <= self.room - depth
+                left = left or (deep and height > self.room)
                 if twice and deep and height > self.room and not self.feeds(group[-1:]):
                     break
             if not group and groups and groups[-1]:  # the same hole again
@@ -377,15 +449,8 @@ class _Search:
             else:
                 if k == group[0] and np.isnan(before):
                     problems.append(Problem("CS563", cl_line, line, "a feed move enters a hole from the side"))
-                nc, own = self.ahead.nc, k - self.ahead.base
-                wrong = not np.isnan(cycle.feed) and (
-                    np.isnan(nc.feed[own])
-                    or abs(nc.feed[own] - cycle.feed) > 2 * abs(nc.feed_room[own])
-                    or (np.isnan(nc.feed_room[own]) and nc.feed[own] > cycle.feed + ARITHMETIC)
-                    or nc.per_revolution[own] != cycle.per_revolution
-                )
-                if wrong:
-                    text = f"the feed is {nc.feed[own]:g}, the cycle says {cycle.feed:g}"
+                if self.wrong_feed(k, cycle):
+                    text = f"the feed is {self.ahead.nc.feed[k - self.ahead.base]:g}, the cycle says {cycle.feed:g}"
                     problems.append(Problem("CS541", cl_line, line, text))
                 down = height.get(k - 1, np.inf) > height[k]
                 if alone and down and drilled > self.room and self.room < -height[k] <= drilled + self.room:
