@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
-from cornersmooth.verify.drilling import Ahead, Holes
+from cornersmooth.verify.ahead import Ahead
+from cornersmooth.verify.drilling import Holes
 from cornersmooth.verify.guide import STRIDE, cut, guide
 from cornersmooth.verify.polyline import Polyline, directions
 from cornersmooth.verify.rapids import Rapids, fraction_along, moving_rapids

@@ -8,13 +8,14 @@ above the holes. How often it retracts is its own affair. How deep they are the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
-from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.elements import Element, Problem
+from cornersmooth.verify.ahead import Ahead
 from cornersmooth.verify.cycles import Drilling, drillings
 from cornersmooth.verify.polyline import Original, directions
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
@@ -36,50 +37,6 @@ _TOGETHER, _KEPT = 1 << 14, 16
 
 #: last printed digits that a point may be beside its hole
 _STEPS = 1.0
-
-
-class Ahead:
-    """Elements of a text as they are read: those that have been read and are still wanted.
-
-    Parameters
-    ----------
-    chunks : iterable of Elements
-    """
-
-    def __init__(self, chunks: Iterable[Elements]) -> None:
-        self._chunks = iter(chunks)
-        self._held: Elements | None = None
-        #: number of the first element that is held
-        self.base = 0
-        #: elements read so far
-        self.count = 0
-
-    @property
-    def nc(self) -> Elements:
-        """What is held; at least one element must have been read."""
-        assert self._held is not None
-        return self._held
-
-    def has(self, element: int) -> bool:
-        """Whether there is such an element; reads on as far as need be."""
-        if element >= self.count:
-            # what is long already grows by a half, so that it is not copied too often
-            wanted = max(element + 1, self.count + (self.count - self.base) // 2)
-            parts = [] if self._held is None else [self._held]
-            while self.count < wanted and (chunk := next(self._chunks, None)) is not None:
-                self.count += len(chunk)
-                parts.append(chunk)
-            self._held = Elements.joined(parts) if parts else None
-        return element < self.count
-
-    def part(self, first: int, stop: int) -> Elements:
-        """Elements from `first` to `stop`, the latter excluded, counted anew."""
-        return self.nc.part(first - self.base, stop - self.base)
-
-    def forget(self, element: int) -> None:
-        """Drop all elements before one."""
-        if element > self.base:
-            self._held, self.base = self.part(element, self.count), element
 
 
 class Between(NamedTuple):
@@ -177,7 +134,10 @@ class Holes:
         for k, group in enumerate(groups):
             self.element_move.update(dict.fromkeys(group, first + k))
             again = search.repeats(first, stop, first + k)
-            self.problems += search.check(first + k, group, cycles[k], alone=not again)
+            if not (
+                k and np.isnan(cycles[k].depth) and set(group) & set(groups[k - 1])
+            ):  # that hole's, looked at there
+                self.problems += search.check(first + k, group, cycles[k], alone=not again)
             if group and cycles[k].dwell:
                 self.dwells.append((first + k, cycles[k].dwell))
             if cycles[k].tap and not np.isnan(cycles[k].depth):
@@ -258,6 +218,7 @@ class _Search:
         """How often the moves before a hole, from one on, come to the pose before it and must pass it exactly."""
         here = self.near(hole - 1, slice(move, hole))
         ends = np.append(self.kind[move + 1 : hole] != Move.LINEAR, True) | (self.kind[move:hole] == Move.RAPID)
+        ends[0] |= move == 0  # the first pose of all
         begins = here & ~np.append(False, here[:-1])
         return max(len(np.unique(np.cumsum(begins)[here & ends])), 1)
 
