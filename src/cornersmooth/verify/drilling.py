@@ -241,7 +241,8 @@ class _Search:
                 if seen < visits:
                     continue
                 reached = k if reached is None or k == reached + 1 else reached
-                if (np.isnan(cycle.depth) and not cycle.tap) or not self.over(hole, k + 1):
+                left_out = np.isnan(cycle.depth) and (k > reached or not cycle.tap)
+                if left_out or not self.over(hole, k + 1):
                     continue
                 if cycle.tap or self.drills(hole, k + 1, cycle):
                     yield k + 1, True
@@ -250,7 +251,7 @@ class _Search:
             begin += len(window)
             if doubtful is not None and begin - doubtful > _DOUBTFUL:
                 break
-            if reached is not None and np.isnan(cycle.depth) and not (cycle.tap and begin - reached <= _UNDECIDED):
+            if reached is not None and np.isnan(cycle.depth):
                 break
             if reached is not None and begin - reached > _UNDECIDED:
                 reached = None
