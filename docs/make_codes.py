@@ -58,13 +58,15 @@ class Module:
 
     def __init__(self, path: Path, names: dict[str, frozenset[str]]) -> None:
         self.package = path.relative_to(SOURCE).with_suffix("").parts[0]
-        self.tree = ast.parse(path.read_text(encoding="utf-8"))
+        self.tree = parsed(path)
         self.names = names
-        self.parent = {child: node for node in ast.walk(self.tree) for child in ast.iter_child_nodes(node)}
+        self.nodes = list(ast.walk(self.tree))
+        self.calls = [node for node in self.nodes if isinstance(node, ast.Call)]
+        self.parent = {child: node for node in self.nodes for child in ast.iter_child_nodes(node)}
 
     def entries(self) -> Iterator[Entry]:
         """Codes with the texts beside them."""
-        for node in ast.walk(self.tree):
+        for node in self.nodes:
             for code in self.codes(node):
                 around, siblings = self._beside(node)
                 texts = [list(self._texts(sibling)) for sibling in siblings]
@@ -94,7 +96,7 @@ class Module:
             return around, items[items.index(node) + 1 :] or items[:-1]
         if isinstance(around, ast.keyword) and around.arg in CALLS:
             name = CALLS[around.arg]
-            calls = [call for call in ast.walk(self.tree) if isinstance(call, ast.Call) and called(call) == name]
+            calls = [call for call in self.calls if called(call) == name]
             return around, [ast.Tuple([call.args[0] for call in calls])]
         return around, []
 
@@ -137,17 +139,25 @@ class Module:
         given_here = [
             node
             for node in ast.walk(around)
-            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == name.id and node.lineno <= name.lineno
+            if isinstance(node, ast.Assign)
+            and getattr(node.targets[0], "id", "") == name.id
+            and node.lineno <= name.lineno
         ]
         if given_here:
             yield from self._texts(max(given_here, key=lambda node: node.lineno).value)
         if isinstance(around, ast.FunctionDef):
             names = [argument.arg for argument in around.args.args]
             own = set(ast.walk(around))  # a method that calls that of its base hands the name on
-            for call in ast.walk(self.tree) if name.id in names else ():
-                if isinstance(call, ast.Call) and called(call) == around.name and call not in own:
+            for call in self.calls if name.id in names else ():
+                if called(call) == around.name and call not in own:
                     given = call.args[names.index(name.id) - (names[0] == "self") :][:1]
                     yield from (text for value in given for text in self._texts(value))
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    """A source file."""
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 @cache
@@ -155,14 +165,14 @@ def names_of_codes() -> dict[str, frozenset[str]]:
     """Names of the source that stand for codes: constants, and arguments by name."""
     found: dict[str, set[str]] = {}
     for path in SOURCE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.keyword):
-                name = node.arg or ""
-            elif isinstance(node, (ast.Assign, ast.AnnAssign)):
-                name = ast.unparse(node.targets[0] if isinstance(node, ast.Assign) else node.target)
-            else:
+        for node in ast.walk(parsed(path)):
+            if not isinstance(node, (ast.keyword, ast.Assign, ast.AnnAssign)):
                 continue
             if isinstance(node.value, ast.Constant) and CODE.fullmatch(str(node.value.value)):
+                if isinstance(node, ast.keyword):
+                    name = node.arg or ""
+                else:
+                    name = ast.unparse(node.targets[0] if isinstance(node, ast.Assign) else node.target)
                 found.setdefault(name, set()).add(str(node.value.value))
     return {name: frozenset(codes) for name, codes in found.items()}
 

@@ -3,8 +3,8 @@
 python docs/run_examples.py PAGE [FOLDER]
 
 Examples are fenced as ``python``, with what they print behind them, fenced as ``text``, or as ``sh``: commands of
-cornersmooth, a line each. They run in a folder in which ``part.cls`` is the sample ``impeller.cls``: a temporary one;
-the folder ``gallery`` that they write is then moved to FOLDER.
+cornersmooth, a line each. They run in a folder in which ``part.cls`` is the sample ``impeller.cls``, if there is no
+other: a temporary one; the folder ``gallery`` that they write is then moved to FOLDER.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ EXAMPLE = re.compile(r"```(?P<kind>python|sh)\n(?P<code>.*?)```\n(\n```text\n.*?
 
 def run_page(text: str, folder: Path) -> str:
     """Return the page with what its examples print now, run in the folder."""
-    shutil.copy(ROOT / "samples" / "impeller.cls", folder / "part.cls")
+    part = folder / "part.cls"
+    if not part.exists():
+        shutil.copy(ROOT / "samples" / "impeller.cls", part)
     (folder / "gallery").mkdir()
     names: dict[str, object] = {"__name__": "examples"}
 

@@ -6,13 +6,18 @@ import gc
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from oracle.command import large, medium, small
 from oracle.files import NO_CORPUS, corpus_folder
+from oracle.share import how_many
 
 __all__ = ["corpus", "large", "medium", "small"]
 
 ROOT = Path(__file__).resolve().parent.parent
+
+settings.register_profile("share", max_examples=how_many(50, 100))
+settings.load_profile("share")
 
 
 @pytest.fixture(scope="session")

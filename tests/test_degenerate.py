@@ -182,7 +182,7 @@ Pose = tuple[float, float, float, int]
 pose = st.tuples(coordinate, coordinate, coordinate, st.integers(0, len(AXES) - 1))
 
 
-@settings(max_examples=how_many(75, 150), deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=how_many(40, 150), deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(
     poses=st.lists(pose, min_size=2, max_size=9), form=st.sampled_from(FORMS), tolerance=st.sampled_from([0.002, 0.1])
 )

@@ -58,13 +58,13 @@ def write(program: Program, form: Form, options: dict[str, Any]) -> tuple[Writte
     ("options", "form", "tolerance", "axis_length"),
     [
         (OPTIONS[name], form, *limits)
-        for name, form, limits in covering_share(product(OPTIONS, FORMS, [(0.01, 50.0), (0.15, 10.0)]), 3)
+        for name, form, limits in covering_share(product(OPTIONS, FORMS, [(0.01, 50.0), (0.15, 10.0)]), 5)
     ],
 )
 def test_random_chains(form: Form, tolerance: float, axis_length: float, options: dict[str, Any]) -> None:
     # every case sees other chains
     case = FORMS.index(form) + 2 * list(OPTIONS.values()).index(options) + 10 * int(tolerance > 0.1)
-    chains = random_chains(100 + case, how_many(30, 150))
+    chains = random_chains(100 + case, how_many(15, 150))
     program = cornersmooth.read(cl_text(chains)[0])
     written, smoothed = write(program, form, {"tolerance": tolerance, "axis_length": axis_length, **options})
     assert smoothed.corners.smoothed.mean() > 0.6
@@ -88,7 +88,7 @@ def test_samples(name: str, options: dict[str, Any], form: Form) -> None:
     [
         (form, OPTIONS[option], name)
         for form, option, name in covering_share(
-            product(FORMS, OPTIONS, ["nx_blade.cls", "creo_vane.ncl", "points_fan.txt"]), 2
+            product(FORMS, OPTIONS, ["nx_blade.cls", "creo_vane.ncl", "points_fan.txt"]), 4
         )
     ],
 )
@@ -96,7 +96,7 @@ def test_own_files(name: str, options: dict[str, Any], form: Form) -> None:
     keeps_the_promise(cl_file(name), form, options)
 
 
-@pytest.mark.parametrize(("name", "options", "form"), of_corpus(covering_share(product(FILES, OPTIONS, FORMS), 7)))
+@pytest.mark.parametrize(("name", "options", "form"), of_corpus(covering_share(product(FILES, OPTIONS, FORMS), 12)))
 def test_real_files(name: str, options: str, form: Form) -> None:
     keeps_the_promise(cl_file(name), form, OPTIONS[options])
 

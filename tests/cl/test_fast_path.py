@@ -105,7 +105,7 @@ good_programs = st.lists(st.one_of(positions(), positions(), harmless), min_size
 programs = st.lists(st.one_of(positions(), positions(), harmless, harmful, odd_positions()), min_size=1, max_size=12)
 
 
-@settings(max_examples=how_many(100, 300), deadline=None)
+@settings(max_examples=how_many(50, 300), deadline=None)
 @given(
     st.one_of(programs, good_programs, good_programs),
     st.sampled_from(["", "$$-> FEATNO / 1\n", "TLDATA/MILL,1.\n"]),

@@ -292,7 +292,7 @@ ROW = st.tuples(
 GOOD_ROW = st.lists(CELLS.filter(lambda cell: cell[:1].isdigit()), min_size=6, max_size=6).map(",".join)
 
 
-@settings(max_examples=how_many(100, 300), deadline=None)
+@settings(max_examples=how_many(50, 300), deadline=None)
 @given(st.lists(st.one_of(GOOD_ROW, GOOD_ROW, ROW, st.just(""), st.just(", ,")), max_size=8))
 def test_fast_way_equals_careful_way(lines: list[str]):
     columns = points_table.Columns(6, (0, 1, 2), (3, 4, 5), "vectors")

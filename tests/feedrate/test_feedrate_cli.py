@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from cornersmooth.cli import run
+from oracle.files import beginning
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE_1 = str(ROOT / "samples" / "paper_table1.csv")
-IMPELLER = str(ROOT / "samples" / "impeller.cls")
+IMPELLER = ROOT / "samples" / "impeller.cls"
 PAPER = ["--units", "mm", "--feed", "1800", "--accel", "1000", "--jerk", "5000", "--period", "2ms"]
 
 
@@ -27,8 +28,10 @@ def test_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert contents["settings"]["tolerance"] == 0.15
 
 
-def test_tables(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["time", IMPELLER, "-e", "0.02"]) == 0
+def test_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    part = tmp_path / "part.cls"
+    part.write_bytes(beginning(IMPELLER, 205))
+    assert run(["time", str(part), "-e", "0.02"]) == 0
     text = capsys.readouterr().out
     for words in ("direct, exact stop", "smoothed, proportional", "where the time goes", "at constant feed"):
         assert words in text

@@ -32,7 +32,7 @@ def check_limits(law: TimeLaw, limits: Limits, feed: float) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("seed", range(how_many(6, 20)))
+@pytest.mark.parametrize("seed", range(how_many(4, 20)))
 def test_limits_hold_every_period(chain: Callable[[int], Program], seed: int, method: str) -> None:
     program, limits = chain(seed), Limits()
     law = plan(smooth(program, Settings(tolerance=0.02, method=method)), limits)

@@ -14,7 +14,7 @@ from cornersmooth.smoothing import smooth
 from oracle.share import share
 
 
-@pytest.mark.parametrize("seed", share(range(1, 21), 4))
+@pytest.mark.parametrize("seed", share(range(1, 21), 7))
 def test_smoothed_paths(chain: Callable[[int], Program], seed: int) -> None:
     limits = Limits()
     law = plan(smooth(chain(seed), Settings(tolerance=(0.005, 0.02, 0.1)[seed % 3])), limits)

@@ -18,6 +18,7 @@ from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from oracle.command import run
+from oracle.files import beginning
 
 SAMPLE = Path(__file__).parents[2] / "samples" / "impeller.cls"
 LIMITS = Limits()
@@ -56,7 +57,7 @@ def test_text_of_the_poses_takes_as_long_as_the_direct_path() -> None:
 
 
 def test_text_of_the_poses_keeps_the_limits_of_a_machine() -> None:
-    program, machine = read(SAMPLE.read_bytes(), name="impeller.cls"), load_machine("table-ac")
+    program, machine = read(beginning(SAMPLE, 205), name="impeller.cls"), load_machine("table-ac")
     law = plan_text(read_nc(text_of(kept(program), tolerance=0.01)), LIMITS, machine=machine)
     expected = direct(program, LIMITS, "velocity_jump", machine=machine)
     assert law.total == pytest.approx(expected.total, rel=0.01)
@@ -207,9 +208,11 @@ def test_blocks_of_a_curve_are_counted() -> None:
 
 
 def test_command_shows_the_text_beside_the_paths(tmp_path: Path) -> None:
-    (tmp_path / "part.nc").write_bytes(text_of(read(SAMPLE.read_bytes(), name="impeller.cls"), tolerance=0.01))
-    done = run("time", SAMPLE, "--text", tmp_path / "part.nc", "--look-ahead", "50", "--block-time", "1ms")
+    part = tmp_path / "part.cls"
+    part.write_bytes(beginning(SAMPLE, 205))
+    (tmp_path / "part.nc").write_bytes(text_of(read(part), tolerance=0.01))
+    done = run("time", part, "--text", tmp_path / "part.nc", "--look-ahead", "50", "--block-time", "1ms")
     assert done.returncode == 0, done.stderr
     assert "as written" in done.stdout.decode()
-    wrong = run("time", SAMPLE, "--law", "as_written", "--csv", tmp_path / "a.csv")
+    wrong = run("time", part, "--law", "as_written", "--csv", tmp_path / "a.csv")
     assert wrong.returncode == 2

@@ -54,7 +54,7 @@ def problems(case: Case, program, lines: list[str], tolerance: float):
     return verify(program, data, tolerance=tolerance, axis_length=H, **options).problems
 
 
-@pytest.mark.parametrize(("units", "case"), covering_share(product(["MM", "INCHES"], CASES), 2), ids=str)
+@pytest.mark.parametrize(("units", "case"), covering_share(product(["MM", "INCHES"], CASES), 3), ids=str)
 def test_rapids_along_the_tool_stand_at_both_ends(case: Case, units: str) -> None:
     program, lines, tolerance = text_of(case, units, Frame(approach=50.0, retract=100.0))
     assert problems(case, program, lines, tolerance) == ()

@@ -81,7 +81,7 @@ def arc_about(number: int, seed: int) -> tuple[Program, Callable[[float], Floats
 @pytest.mark.parametrize("tolerance", [0.01, 0.0005])
 def test_circles_keep_the_tolerance(number: int, tolerance: float) -> None:
     """At equal shares of the way, so both ways and in order."""
-    for seed in range(how_many(20, 40)):
+    for seed in range(how_many(10, 40)):
         program, at = arc_about(number, seed)
         lines, written = text_of(program, tolerance=tolerance, axis_length=50.0)
         assert codes(written) == {"CS313": 1}

@@ -285,7 +285,7 @@ def mutants(lines: list[str]) -> Iterator[Mutant]:
 def test_mutants_of_cycles_are_found(case: Case) -> None:
     every = list(mutants(text_of(case)))
     assert len(every) > 40
-    chosen = share(every, 6, CASES.index(case))
+    chosen = share(every, 10, CASES.index(case))
     assert [mutant.kind for mutant in chosen if not problems(case, list(mutant.lines))] == []
 
 

@@ -592,7 +592,7 @@ def mutants(case: Case) -> Iterator[tuple[str, list[str]]]:
 def test_mutants_of_planes_are_found(case: Case) -> None:
     every = list(mutants(case))
     assert len(every) > 20
-    chosen = share(every, 4, CASES.index(case))
+    chosen = share(every, 7, CASES.index(case))
     assert [kind for kind, lines in chosen if not problems(case, lines)] == []
 
 

@@ -30,6 +30,13 @@ def of_corpus(rows: Iterable[tuple[object, ...]]) -> list[object]:
     return [pytest.param(*row, marks=marks) for row in rows]
 
 
+def beginning(path: Path, poses: int) -> bytes:
+    """A CL file up to so many of its poses: whole lines."""
+    lines = path.read_bytes().splitlines(keepends=True)
+    goto = [number for number, line in enumerate(lines) if line.startswith(b"GOTO")]
+    return b"".join([*lines[: goto[poses - 1] + 1], lines[-1]])
+
+
 def cl_file(name: str) -> Path:
     """Path of an own file or of a real one."""
     own = OWN / name

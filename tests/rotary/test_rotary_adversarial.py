@@ -22,7 +22,7 @@ from cornersmooth.rotary import FilledPath, fill, insertions, rotary_angles
 from oracle.share import how_many
 
 TOLERANCE = 0.02  # degrees
-CASES = how_many(60, 200)
+CASES = how_many(45, 200)
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from cornersmooth.smoothing.runs.samples import Pieces, Samples
 from cornersmooth.smoothing.runs.solving import RunCurves, solve_runs
 from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.smoothing.runs.windows import Windows
+from oracle.share import how_many
 from smoothing.runs_oracle import deviation, random_runs, spline_of, through
 
 H = 10.0
@@ -119,7 +120,7 @@ def test_every_run_is_within_its_bounds(seed: int, tolerance: float) -> None:
         assert curves.axis_bound[run] <= tolerance
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=how_many(12, 25), deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     corners=st.integers(1, 40),

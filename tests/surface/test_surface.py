@@ -222,7 +222,7 @@ def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance, req
         path, height = request.getfixturevalue("corpus") / "hecc_flank_nx.cls", 10.0
     program, text = case(path, tolerance, height)
     [(_, tool, _)] = tools_of(program)
-    stations = how_many(60, 150)
+    stations = how_many(40, 150)
     found = measure_surface(program, text, tool, tolerance=tolerance, edge=height, stations=stations)
     assert len(found) > 2.6 * stations
     assert found.known.all()

@@ -137,7 +137,8 @@ def test_same_as_the_whole(used, control, form, processes):
 
 @pytest.mark.parametrize("processes", [1, forks])
 def test_inches_block_numbers_and_a_fixed_tool(used, processes):
-    for program, frame in ((part(units="inch"), None), (part(fixed=True), None), (part(), Frame(block_numbers=True))):
+    cases = ((part(units="inch"), None), (part(fixed=True), None), (part(), Frame(block_numbers=True)))
+    for program, frame in share(cases, 2, processes != 1):
         assert check(program, text_of(program, frame=frame), used, processes).passed
 
 
@@ -174,7 +175,7 @@ def _spoilt(lines):
 def test_what_is_wrong_is_reported_as_for_the_whole(used, processes):
     program = part()
     lines = text_of(program, chord_tolerance=TOLERANCE / 10).decode().splitlines()
-    for name, spoilt, code in share(_spoilt(lines), 2, processes != 1):
+    for name, spoilt, code in share(_spoilt(lines), 3, processes != 1):
         # behind a change of units no rapid fits any more: which is missed for which is decided batch by batch
         text = ("\n".join(spoilt) + "\n").encode()
         found = check(program, text, used, processes, batches_used=False, everywhere=name != "units")
@@ -195,10 +196,8 @@ def test_what_cannot_be_read_says_its_line(used, processes):
 @pytest.mark.parametrize(
     ("control", "form", "processes"),
     [
-        ("fanuc", "g1", 1),
-        ("fanuc", "g6.2", 1),
-        ("siemens", "bspline", 1),
-        *(pytest.param(*case, 3, marks=forks.marks) for case in share(ONE_BY_ONE[:4], 2, 1)),
+        *((*case, 1) for case in share(ONE_BY_ONE[:4], 3)),
+        *(pytest.param(*case, 3, marks=forks.marks) for case in share(ONE_BY_ONE[:4], 4, 1)),
     ],
 )
 def test_pass_longer_than_batches_is_cut(used, control, form, processes):

@@ -7,13 +7,14 @@ from functools import partial
 
 import pytest
 
+from cornersmooth.errors import InputError
 from cornersmooth.model import Program
 from cornersmooth.nc import fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from nc.cases import RUNNABLE, Case
-from oracle.share import covering_share, share_of_kinds
+from oracle.share import THOROUGH, share_of_kinds
 
 from .form_mutations import EPS, H, mutants, program_of
 from .judging import judge
@@ -50,11 +51,22 @@ def named_in(case: Case, program: Program, lines: list[str]) -> list[tuple[int, 
     return [(problem.nc_line, f"{problem.code} {problem.text}") for problem in found.problems]
 
 
-#: each control and each form, and the one form in which a fold may be lost: all kinds of mutants are among theirs
-USUAL = [*covering_share(CASES, 2), *(case for case in CASES if str(case) == "heidenhain-spl-table-ac")]
+#: each control and each form: with the one form in which a fold may be lost, all kinds of mutants are among theirs
+USUAL = (
+    "fanuc-g1",
+    "fanuc-g1-table-ac-axes",
+    "generic-g6.2",
+    "haas-g1-table-ac",
+    "heidenhain-g1",
+    "heidenhain-spl",
+    "linuxcnc-g1-xyzac-trt",
+    "mitsubishi-g6.2",
+    "siemens-bspline",
+    "siemens-poly",
+)
 
 
-@pytest.mark.parametrize("case", dict.fromkeys(USUAL), ids=str)
+@pytest.mark.parametrize("case", [case for case in CASES if THOROUGH or str(case) in USUAL], ids=str)
 def test_every_mutant_that_matters_is_found(case: Case) -> None:
     program = program_of(case)
     lines = text_of(case, program)
@@ -64,3 +76,16 @@ def test_every_mutant_that_matters_is_found(case: Case) -> None:
     print(f"\n{case}: {score}")
     assert score.missed == []
     assert sum(score.judged.values()) == len(chosen) >= 20
+
+
+def test_a_fold_that_is_lost_is_found() -> None:
+    (case,) = (case for case in CASES if str(case) == "heidenhain-spl-table-ac")
+    program = program_of(case)
+    lines = text_of(case, program)
+    folds = [mutant for mutant in mutants(case, lines) if mutant.kind == "fold lost"]
+    assert folds
+    for mutant in folds:
+        assert mutant.where is not None
+        with pytest.raises(InputError) as refused:
+            named_in(case, program, mutant.lines)
+        assert refused.value.line in range(mutant.where[0], mutant.where[1] + 1)

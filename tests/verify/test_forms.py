@@ -48,7 +48,7 @@ def readings(case: Case, machine: Machine | None, settings: Settings) -> dict[st
     return {"control": case.control, "machine": machine, "tcp": case.tcp, **limits}
 
 
-@pytest.mark.parametrize(("units", "case"), covering_share(product(("mm", "inch"), CHOSEN), 2), ids=str)
+@pytest.mark.parametrize(("units", "case"), covering_share(product(("mm", "inch"), CHOSEN), 3), ids=str)
 def test_no_false_alarm_on_random_chains(case: Case, units: str) -> None:
     form, place = case.choose(), CHOSEN.index(case)
     tolerance, axis_length = LIMITS[(place + (units == "inch")) % len(LIMITS)]
@@ -72,7 +72,7 @@ def _is_block(line: str) -> bool:
 def test_motion_is_that_of_the_independent_readers(case: Case) -> None:
     form = case.choose()
     settings = Settings(tolerance=0.02, axis_length=10.0)
-    text, _ = written(chains_for(case, form, 3, count=how_many(2, 8)), form, settings)
+    text, _ = written(chains_for(case, form, 3, count=how_many(1, 8)), form, settings)
     nc = read_nc(text.encode(), **readings(case, form.machine, settings))
     pieces = reader(case.control, case.form, case.machine, case.tcp, "mm").read(text, 10.0, 0.02).pieces
     blocks = np.split(np.arange(len(nc)), np.flatnonzero(np.diff(nc.line)) + 1)
@@ -104,7 +104,7 @@ def _distance(nc: NcProgram, block: np.ndarray, wanted: np.ndarray) -> float:
     return float(np.linalg.norm(start + along[..., None] * way - wanted[:, None], axis=2).min(axis=1).max())
 
 
-@pytest.mark.parametrize("case", covering_share([case for case in CHOSEN if case.control != "linuxcnc"], 2), ids=str)
+@pytest.mark.parametrize("case", covering_share([case for case in CHOSEN if case.control != "linuxcnc"], 3), ids=str)
 def test_no_false_alarm_on_the_sample(case: Case) -> None:
     _passes_on(case, SAMPLES / "impeller.cls", 0.04)
 
@@ -122,7 +122,7 @@ OWN = ["nx_blade.cls", "nx_holes.cls", "nx_pocket.cls", "creo_plate.ncl", "solid
 def test_no_false_alarm_on_files(name: str, number: int, third: int) -> None:
     """Each file in each control and form at one of three tolerances, in turn: `verify.sweep` does all."""
     tolerance = (0.001, 0.04, 0.15)[(number + third) % 3]
-    for case in share(CHOSEN[third::3], 6, number):
+    for case in share(CHOSEN[third::3], 9, number):
         _passes_on(case, cl_file(name), tolerance)
 
 
