@@ -364,3 +364,16 @@ def test_a_tap_behind_a_place_that_the_tool_was_at_before_is_found(case: Case) -
     left_out = lines_of(case.choose(), cl, frame=Frame(skip_taps=True, comments=False))
     assert sum("NOT DRILLED" in line for line in left_out) == 1
     assert problems(case, left_out, cl) == []
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_arcs_of_a_tool_whose_holes_are_cycles_are_circular_blocks(case: Case) -> None:
+    cl = PLAIN.replace(
+        "FEDRAT/MMPM,100",
+        "FEDRAT/MMPM,100\nGOTO/0,0,0\nGOTO/30,0,0\nCIRCLE/30,10,0,0,0,1,10\nGOTO/40,10,0\nRAPID\nGOTO/40,10,30",
+        1,
+    )
+    lines = text_of(case, cl)
+    assert sum(bool(re.search(r"^G3 X|^\d+ CR X", line)) for line in lines) == 1
+    assert any(map(_CYCLE.fullmatch, lines))
+    assert problems(case, lines, cl) == []

@@ -157,7 +157,7 @@ def level(count: int = 12) -> list[str]:
     return [f"GOTO/{3 * k},{5 * (k % 3)},{(k * 7) % 4},0,0,1" for k in range(count)]
 
 
-@pytest.mark.parametrize("control", CONTROLS[:-1])
+@pytest.mark.parametrize("control", CONTROLS)
 def test_no_axis_and_a_tool_along_z(control: str) -> None:
     program = program_of(level())
     form = choose_form(control, machine=THREE)
@@ -166,6 +166,36 @@ def test_no_axis_and_a_tool_along_z(control: str) -> None:
     assert not re.search(r"(^|\s)[ABCIJK][-+]?\d|TX|A3=|G43\.4|G43\.5|G234|TRAORI|TCPM", text.decode())
     if control in ("fanuc", "linuxcnc"):
         assert "G43 H2" in text.decode().splitlines()
+
+
+ROUND = ["GOTO/0,0,0,0,0,1", "GOTO/30,0,0", "CIRCLE/30,10,0,0,0,1,10", "GOTO/40,10,0", "CIRCLE/50,10,0,0,0,-1,10"]
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("last", ["GOTO/50,20,0", "GOTO/50,20,2"])
+def test_arcs_of_a_machine_without_rotary_axes_are_circular_blocks(control: str, last: str) -> None:
+    program, form = program_of([*ROUND, last]), choose_form(control, machine=THREE)
+    lines = text_of(program, form).decode().splitlines()
+    if control == "heidenhain":
+        said = [(turn, "Z" in line) for line in lines for turn in re.findall(r"CR .* DR([-+])", line)]
+        wanted = [("+", False), ("-", False)][: 1 + last.endswith(",0")]  # CR does not climb
+    else:
+        said = [(code, "Z2." in line) for line in lines for code in re.findall(r"^G([23]) .*R=?10\.", line)]
+        wanted = [("3", False), ("2", last.endswith(",2"))]
+    assert said == wanted
+
+    def found(lines: list[str]) -> list[str]:
+        text = ("\n".join(lines) + "\n").encode()
+        checked = verify(program, text, tolerance=EPS, control=control, machine=THREE)
+        return [problem.code for problem in checked.problems]
+
+    assert found(lines) == []
+    other = {"G2 ": "G3 ", "G3 ": "G2 ", "DR-": "DR+", "DR+": "DR-", "10.00": "11.00"}
+    for k, line in enumerate(lines):
+        for old, new in other.items():
+            if re.search(r"G[23] | CR ", line) and old in line:
+                wrong = line[::-1].replace(old[::-1], new[::-1], 1)[::-1]
+                assert found([*lines[:k], wrong, *lines[k + 1 :]]), wrong
 
 
 def test_no_axis_and_holes_as_cycles() -> None:
@@ -187,8 +217,8 @@ def test_what_a_machine_without_axes_cannot_do_is_named() -> None:
     assert travel.value.code == "CS374"
     with pytest.raises(SettingsError, match="no rotary axes here that could turn back"):
         choose_form("fanuc", machine=THREE, rewind=20.0)
-    with pytest.raises(SettingsError, match="no blocks without words"):
-        choose_form("generic", machine=THREE)
+    with pytest.raises(SettingsError, match="no blocks without words of the tool axis; use -f g1"):
+        choose_form("generic", "g6.2", machine=THREE)
     with pytest.raises(SettingsError, match="one rotary axis; use -f g1"):
         choose_form("fanuc", "g6.2", machine=FOUR["table A"])
 

@@ -193,7 +193,7 @@ def write(
     taps = not frame.skip_taps
     upright = upright_poses(program, chosen, drills=native, taps=taps)
     planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native, taps=taps)
-    circles = plan_circles(program, smoothed.settings, chosen, planes)
+    circles = plan_circles(program, smoothed.settings, chosen, planes, upright)
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
     writer = BlockWriter(chosen, program, statements, findings, circles, stretch, values["blend"], modal=frame.modal)

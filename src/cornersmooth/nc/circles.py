@@ -65,7 +65,7 @@ class Circles:
     radius: Ints
 
 
-def plan_circles(program: Program, settings: Settings, form: Form, planes: Planes) -> Circles:
+def plan_circles(program: Program, settings: Settings, form: Form, planes: Planes, upright: Bools) -> Circles:
     """Choose the arcs that a form can write as circles.
 
     Parameters
@@ -74,6 +74,8 @@ def plan_circles(program: Program, settings: Settings, form: Form, planes: Plane
         The circle through the written numbers keeps its tolerance, at the tip and at the axis point.
     planes : Planes
         In a tilted plane arcs are those of its own coordinates.
+    upright : (n,) bool
+        Poses of tools that stay along Z, without tool tip control.
     """
     arcs = program.arcs
     frames, tilted = planes.frames(arcs.pose), planes.of[arcs.pose] >= 0
@@ -87,10 +89,15 @@ def plan_circles(program: Program, settings: Settings, form: Form, planes: Plane
     ticks = to_ticks(np.minimum(radius, _LARGEST_RADIUS) / unit, decimals)
     digits = form.table.digits
     vectors = to_ticks(digits.vector_length * program.axis, digits.vector)
-    modes = (form.mode if form.plane is None else form.plane, form.mode)
-    flat = np.where(tilted, *(bool(mode.motion.arc_directions) for mode in modes))
+    modes = [(upright[arcs.pose], form.upright), (tilted, form.plane)]
+    flat, circular = (
+        np.full(len(tilted), value) for value in (bool(form.mode.motion.arc_directions), form.mode.circles)
+    )
+    for here, mode in modes:
+        if mode is not None:
+            flat[here], circular[here] = bool(mode.motion.arc_directions), mode.circles
     fits = (
-        np.where(tilted, *(mode.circles for mode in modes))
+        circular
         & (~flat | (plane == 0))
         & (np.abs(height) > 1.0 - _UPRIGHT)
         & (radius < _LARGEST_RADIUS)

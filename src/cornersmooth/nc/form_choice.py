@@ -103,7 +103,8 @@ def _without_rotary_axes(
     mode = form.modes.get("fixed", None if form.curve else form.upright)
     if mode is None:
         here = f"{table.name} form {form.name}"
-        lines = next((name for name, other in table.forms.items() if not other.curve and other.upright), "")
+        with_such = (name for name, other in table.forms.items() if "fixed" in other.modes or other.upright)
+        lines = next((name for name in with_such if not table.forms[name].curve), "")
         hint = f"use -f {lines}" if lines else "leave out --machine"
         raise SettingsError("CS215", f"{here} has no blocks without words of the tool axis", hint)
     return Form(table, form.name, form.curve, "fixed", mode, machine, extras, form.upright, rewind)
