@@ -36,7 +36,7 @@ from cornersmooth.verify.statements import TAP, Token, asked, said
 from cornersmooth.verify.task import Task, length_of
 from cornersmooth.verify.token_comparison import KINDS, compare
 from cornersmooth.verify.wide_search import way_apart
-from cornersmooth.verify.word_check import WordCheck
+from cornersmooth.verify.word_check import GONE_ON, WordCheck
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -294,7 +294,8 @@ class _Measured:
         if left_out < len(self.batches.untapped):
             problems += self.batches.untapped
         if self.words and self.batches.elements:  # without any motion nothing has a place
-            problems += self._statement_problems(unsaid)
+            of_statements, at_home = self._statement_problems(unsaid)
+            problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
         return Verification.of(
             self.findings,
             self.poses,
@@ -306,8 +307,8 @@ class _Measured:
             curves=curves,
         )
 
-    def _statement_problems(self, unsaid: frozenset[str | tuple[str, float]]) -> list[Problem]:
-        """What words beside the motion say wrongly."""
+    def _statement_problems(self, unsaid: frozenset[str | tuple[str, float]]) -> tuple[list[Problem], set[int]]:
+        """What words beside the motion say wrongly, and the NC lines of those where the CL file has GOHOME."""
         original, length = self.task.original, self.task.path.length
         program = original.program
         move = np.searchsorted(original.pose, [statement.pose for statement in program.statements]) - 1
@@ -325,7 +326,8 @@ class _Measured:
         dwells += [
             Token("tap", TAP, length_at(move), int(program.line[original.pose[move]])) for move in self.batches.taps
         ]
-        theirs = asked(program, np.where(move >= 0, there, _BEFORE).tolist(), end, dwells)
+        before = np.where(move >= 0, there, _BEFORE).tolist()
+        theirs = asked(program, before, end, dwells)
         # clamps of rotary axes stand where the machine wants them, not where AUXFUN has them
         theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in self.clamps]
         known = self.lengths | self.batches.stops.lengths()
@@ -348,7 +350,13 @@ class _Measured:
         places = [place(event.element - 1) for event in self.events]
         rooms = [self.rooms.get(stands(event.element - 1), 0.0) for event in self.events]
         apart: Callable[[float, float], float] = partial(way_apart, self.task.path)
-        return compare(theirs, said(self.events, places, rooms), self.margin, unsaid, apart, self.own)
+        homes = [place for place, one in zip(before, program.statements, strict=True) if one.word == "GOHOME"]
+        at_home = {
+            event.line
+            for event, here, room in zip(self.events, places, rooms, strict=True)
+            if homes and any(abs(here - home) <= self.margin + room for home in homes)
+        }
+        return compare(theirs, said(self.events, places, rooms), self.margin, unsaid, apart, self.own), at_home
 
 
 def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measured:

@@ -19,6 +19,8 @@ from cornersmooth.nc_reader.words import Line, Table
 
 #: code of words that are not on the list or not in their place, and of what is not established
 NOT_LISTED: Final = "CS571"
+#: what is said of a retract with the same tool, which only GOHOME of the CL file asks for
+GONE_ON: Final = "a retract that another motion of the same tool follows"
 NOT_ESTABLISHED: Final = "CS572"
 
 #: words of positions along the linear axes: with them a block is a motion that the states count for
@@ -427,7 +429,7 @@ class WordCheck:
             self._retract, self._arc = 0, None
             return
         if self._retract:
-            self._wrong(NOT_LISTED, self._retract, "a retract that another motion of the same tool follows")
+            self._wrong(NOT_LISTED, self._retract, GONE_ON)
             self._retract = 0
         if self._arc is not None:
             word, line = self._arc
