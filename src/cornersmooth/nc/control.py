@@ -186,6 +186,8 @@ class Mode:
         Of a tilted plane: the axes of its three rotations, each that of the frame which those before it have made, as
         in ``zxz``; their degrees stand for ``{first}``, ``{second}`` and ``{third}`` in `on`. Empty where the rotary
         axes are turned by words (``{rotary_start}``), and the part with them.
+    reset : tuple of str
+        Of a tilted plane: blocks at the start of the program that end one which another program has left.
     """
 
     words: tuple[str, ...]
@@ -199,6 +201,7 @@ class Mode:
     begin: Blocks | None = None
     tool_end: Blocks | None = None
     rotations: str = ""
+    reset: Blocks = ()
 
 
 @dataclass(frozen=True)

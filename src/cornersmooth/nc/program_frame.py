@@ -130,6 +130,7 @@ class Frame:
                 raise SettingsError("CS216", f"{form.control} has no step for a {name}", f'write "{{{name}}}" into it')
         return {
             "work_offset": tuple(block.format(work_offset=offset) for block in blocks),
+            "plane_reset": () if form.plane is None else form.plane.reset,
             "header": (*self._told(form.table.layout), *_filled(self.header, values)),
             "footer": tuple(_filled(self.footer, values)),
         }

@@ -68,6 +68,7 @@ STEPS = {
     "work_offset": "the block of the work offset",
     "rotary_zero": "both rotary axes to zero, with a machine only",
     "rotary_start": "both rotary axes to the angles of the first motion, with a machine only",
+    "plane_reset": "a tilted plane that another program has left, off; where such planes are asked for",
     "tip_control_on": "functions that stand outside, tool tip control or the length of the tool, functions within",
     "functions_off": "functions within tool tip control off",
     "tip_control_off": "tool tip control or the length of the tool off, then functions that stand outside",
