@@ -77,6 +77,8 @@ class AxisSamples:
     ----------
     value : (3, d, k, 3) float32
         First, second and third derivative of every axis.
+    missed : (3, d, k) float32
+        By how much the parabolas through these three miss what was seen between them.
     middle : (k,) float64
         Share of the length of an interval that is before its middle.
     known : (k,) bool
@@ -86,6 +88,7 @@ class AxisSamples:
     """
 
     value: Singles
+    missed: Singles
     middle: Floats
     known: Bools
     accel: Floats
@@ -169,6 +172,7 @@ def find_limit_coefficients(
     rows = np.zeros((5, total))
     other_cap, other_rows = cap.copy(), rows.copy()
     value = np.zeros((3, own_bounds.shape[1], total, 3), np.float32)
+    missed = np.zeros(value.shape[:-1], np.float32)
     middle, known = np.full(total, 0.5), np.ones(total, np.bool_)
     for curve in (True, False):
         for near in (True, False):
@@ -192,12 +196,17 @@ def find_limit_coefficients(
                             speed = ((bounds[0] / np.maximum(-low, high)[0]) ** 2).min(axis=-1)
                         other_cap[into] = np.minimum(other_cap[into], np.where(counts, speed, np.inf))
                         finite = np.isfinite(along).all(axis=(0, 3, 4))
-                        known[into] = (finite & ~slow[element][:, None]) | ~counts
-                        chosen_here = (counts & finite)[..., None, None]
-                        for of_order, values in zip(value, np.where(chosen_here, along, 0.0), strict=True):
-                            of_order[:, into] = values.transpose(3, 0, 1, 2)
+                        known[into] = finite | ~counts
                         if curve:
                             middle[into] = _middles(path, element, borders)
+                        chosen_here = (counts & finite)[..., None, None]
+                        for order, values in enumerate(np.where(chosen_here, along, 0.0)):
+                            value[order][:, into] = values[:, :, ::2].transpose(3, 0, 1, 2)
+                            off = _missed(values, middle[into])
+                            missed[order][:, into] = off.transpose(2, 0, 1)
+                            # where the tip all but stands, and derivatives change much, huge terms cancel
+                            even = (off <= EVEN * np.abs(values).max(axis=2)).all(axis=-1)
+                            known[into] &= even | ~(slow[element][:, None] & counts)
                     else:
                         other_cap[into] = np.minimum(other_cap[into], np.where(counts, bound, np.inf))
                         other_rows[:, into] = np.maximum(other_rows[:, into], np.where(counts, row, 0.0))
@@ -206,7 +215,7 @@ def find_limit_coefficients(
     others, samples = None, None
     if machine_axes is not None:
         others = LimitCoefficients(SpeedLimits(edge, other_cap, run, element), *other_rows)
-        samples = AxisSamples(value, middle, known, machine_axes.limits[1], machine_axes.limits[2])
+        samples = AxisSamples(value, missed, middle, known, machine_axes.limits[1], machine_axes.limits[2])
     own = SpeedLimits(edge, cap, run, element)
     return LimitCoefficients(own, rows[0], rows[1], rows[2], rows[3], rows[4], others, samples)
 
@@ -297,10 +306,40 @@ def _middles(path: Path, element: Ints, borders: Floats) -> Floats:
     return np.where(before + behind > 0.0, before / np.maximum(before + behind, 1e-300), 0.5)
 
 
+#: most that parabolas may miss of derivatives where the tip all but stands
+EVEN = 0.02
+
+#: what parabolas miss at most, over what they miss at the quarters
+MISSED = 2.0
+
+
+def parabola(share: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
+    """Factors of the values at start, middle and end of intervals of which `middle` is before the middle one."""
+    m = np.clip(middle, 0.05, 0.95)
+    return (
+        (share - m) * (share - 1.0) / m,
+        share * (1.0 - share) / (m * (1.0 - m)),
+        share * (share - m) / (1.0 - m),
+    )
+
+
+def _missed(values: Floats, middle: Floats) -> Floats:
+    """(g, p, d) by how much parabolas over the length miss the quarters of the parameter; values (g, p, 5, d)."""
+    found = np.zeros((*values.shape[:2], values.shape[-1]))
+    for at in (1, 3):
+        # the length before a quarter, by the parabola through the lengths at the ends and in the middle
+        one, two, three = parabola(0.75 * middle + (at - 1) / 4.0 - 0.125, middle)
+        expected = (
+            one[..., None] * values[:, :, 0] + two[..., None] * values[:, :, 2] + three[..., None] * values[:, :, 4]
+        )
+        np.maximum(found, np.abs(values[:, :, at] - expected), out=found)
+    return MISSED * found
+
+
 def _ranges(element: Ints, borders: Floats, orders: Orders) -> tuple[Floats, Floats, Floats]:
     """Least and largest derivatives (3, g, p, d) in every interval, from samples at its ends and inside.
 
-    Third come those at start, middle and end, (3, g, p, 3, d).
+    Third come those at start, quarters and end, (3, g, p, 5, d).
 
     Not at an end where the tip comes to a stand and they are infinite. Between two samples a smooth function leaves
     their range by at most an eighth of its second difference.
@@ -309,7 +348,7 @@ def _ranges(element: Ints, borders: Floats, orders: Orders) -> tuple[Floats, Flo
     inner = borders[:, :-1, None] + step[..., None] * _INNER
     share = np.concatenate((borders, inner.reshape(len(borders), -1)), axis=1)
     found = orders(np.repeat(element, share.shape[1]), share.ravel())
-    low, high, three = [], [], []
+    low, high, samples = [], [], []
     for order in found:
         values = order.reshape(*share.shape, -1)
         intervals = step.shape[1]
@@ -318,10 +357,10 @@ def _ranges(element: Ints, borders: Floats, orders: Orders) -> tuple[Floats, Flo
             values[:, intervals + 1 :].reshape(len(values), intervals, len(_INNER), -1),
         )
         along = np.concatenate((ends[:, :-1], inside, ends[:, 1:]), axis=2)
-        three.append(along[:, :, ::2])
+        samples.append(along)
         known = np.isfinite(along).all(axis=2)
         along = np.where(np.isfinite(along), along, 0.0)
         between = np.where(known, np.abs(np.diff(along, n=2, axis=2)).max(axis=2) / 8.0, 0.0)
         low.append(along.min(axis=2) - between)
         high.append(along.max(axis=2) + between)
-    return np.stack(low), np.stack(high), np.stack(three)
+    return np.stack(low), np.stack(high), np.stack(samples)

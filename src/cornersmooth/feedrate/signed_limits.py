@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cornersmooth.feedrate.axis_limits import LimitCoefficients
+from cornersmooth.feedrate.axis_limits import LimitCoefficients, parabola
 from cornersmooth.feedrate.grid import Grid, cell_intervals
 from cornersmooth.feedrate.interior_point import GAP, Batch, Signed
 from cornersmooth.feedrate.lookahead import batch_of, run_of_cells, solve_runs
@@ -109,8 +109,8 @@ class _Places:
         at = (edge[:-1, None] + inside * width[:, None]).ravel()
         cell = np.searchsorted(grid.start, at, side="right") - 1
         second = np.abs(samples.value[..., 0] - 2.0 * samples.value[..., 1] + samples.value[..., 2]) / 8.0
-        bump = np.zeros_like(samples.value)
-        bump[..., 1] = second
+        bump = np.repeat(samples.missed[..., None], 3, axis=-1)
+        bump[..., 1] += second
         taken = np.flatnonzero((cell >= 0) & np.repeat(width > 0.0, 3))
         cell, at = cell[taken], at[taken]
         within = at < grid.start[cell] + grid.width[cell]
@@ -123,11 +123,11 @@ class _Places:
         here = grid.start[own] + part * grid.width[own]
         interval = np.clip(np.searchsorted(edge, here, side="right") - 1, 0, len(width) - 1)
         share = (here - edge[interval]) / np.maximum(width[interval], 1e-300)
-        m = np.clip(samples.middle[interval], 0.05, 0.95)
         value = samples.value[:, :, interval].astype(np.float64)
-        between = value[..., 0] * (share - m) * (share - 1.0) / m
-        between -= value[..., 1] * share * (share - 1.0) / (m * (1.0 - m))
-        between += value[..., 2] * share * (share - m) / (1.0 - m)
+        factors = parabola(share, samples.middle[interval])
+        between: Floats = np.zeros(value.shape[:-1])
+        for number, factor in enumerate(factors):
+            between += factor * value[..., number]
         slot = np.concatenate((cell, own)) - 1
         way = np.concatenate((at - grid.start[cell], here - grid.start[own]))
         order = np.lexsort((way, slot))
@@ -136,7 +136,7 @@ class _Places:
             slot[order],
             way[order],
             np.concatenate((flat.astype(np.float64), between), axis=2)[..., order],
-            np.concatenate((flat_bump.astype(np.float64), np.zeros_like(between)), axis=2)[..., order],
+            np.concatenate((flat_bump, samples.missed[:, :, interval]), axis=2).astype(np.float64)[..., order],
             _USED * samples.accel,
             _USED * samples.jerk,
         )
