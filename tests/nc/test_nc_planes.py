@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.kinematics import load_machine
+from cornersmooth.kinematics import Travel, load_machine, nose_position, solutions
 from cornersmooth.model import Move
 from cornersmooth.nc import Form, Frame, choose_form, fit_settings, parse_control, write
 from cornersmooth.nc.planes import rotations_frame, tilting_angles
@@ -655,3 +655,63 @@ on = ['CYCLE800(1,"TC1",100000,57,0,0,0,{first},{second},{third},0,0,0,1)']
     assert result.verification is not None
     assert result.verification.problems == ()
     assert result.unverified == ""
+
+
+def _beside(axis: int) -> tuple[str, NDArray[np.float64]]:
+    """A cut in one tilted plane, and where the linear axes stand at its poses for both pairs of angles, (2, n)."""
+    cl = "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nFEDRAT/MMPM,300\nRAPID\nGOTO/50,10,60,0.48,0.36,0.8\n"
+    cl += "GOTO/20,-12.5,10\nGOTO/26,-20.5,10\nRAPID\nGOTO/50,10,60\nFINI\n"
+    machine, program = load_machine("table-ac"), read(cl.encode())
+    both = solutions(machine, program.axis[:1]).angles[0]
+    places = [nose_position(machine, program.tip, np.tile(one, (len(program), 1)))[:, axis] for one in both]
+    return cl, np.array(places)
+
+
+@pytest.mark.parametrize("control", ["fanuc", "siemens", "heidenhain"])
+@pytest.mark.parametrize(("which", "code"), [((), ""), ((0,), "CS379"), ((1,), "CS379"), ((0, 1), "CS374")])
+def test_one_of_the_positions_of_the_rotary_axes_keeps_the_travel(
+    control: str, which: tuple[int, ...], code: str
+) -> None:
+    cl, places = _beside(1)
+    apart = places.max(axis=1) < places.min(axis=1)[::-1]
+    assert apart.any()  # the two are on either side of a gap
+    lower = int(np.argmax(apart))
+    low, high = places.min() - 1.0, places.max() + 1.0
+    gap = (places[lower].max() + places[1 - lower].min()) / 2.0
+    ends = {(): (low, high), (lower,): (gap, high), (1 - lower,): (low, gap), (0, 1): (gap - 0.01, gap)}[which]
+    machine = replace(load_machine("table-ac"), travel=(Travel("Y", *ends),))
+    order = ["AC".index(name) for name in machine.names]
+    form = choose_form(control, machine=machine, planes=True)
+    program, stream = read(cl.encode()), io.BytesIO()
+    smoothed = smooth(program, fit_settings(Settings(tolerance=EPS), form, "mm"))
+    if code == "CS374":
+        with pytest.raises(InputError, match="Y of table-ac would have to go to") as refused:
+            write(smoothed, stream, form=form)
+        assert refused.value.code == code
+        return
+    said = {one.code: one.text for one in write(smoothed, stream, form=form).findings}
+    assert ("CS379" in said) == (code == "CS379")
+    if code:
+        told = re.search(r"A(\S+) C(\S+)|C(\S+) A(\S+)", said[code])
+        assert told is not None
+        angles = [float(told[1] or told[4]), float(told[2] or told[3])]
+        there = nose_position(machine, program.tip, np.tile([angles[k] for k in order], (len(program), 1)))[:, 1]
+        assert (ends[0] <= there).all()
+        assert (there <= ends[1]).all()
+
+
+def test_haas_turns_its_axes_itself_and_their_travel_is_known() -> None:
+    cl, _ = _beside(1)
+    form = choose_form("haas", machine=load_machine("table-bc"), planes=True)
+    program = read(cl.encode())
+    place = nose_position(form.machine, program.tip, np.tile([36.8699, 36.8699], (len(program), 1)))
+    assert np.isfinite(place).all()
+    for high, good in ((400.0, True), (-400.0, False)):
+        machine = replace(form.machine, travel=(Travel("Z", -500.0, high),))
+        chosen = choose_form("haas", machine=machine, planes=True)
+        smoothed = smooth(program, fit_settings(Settings(tolerance=EPS), chosen, "mm"))
+        if good:
+            assert "CS379" not in {one.code for one in write(smoothed, io.BytesIO(), form=chosen).findings}
+        else:
+            with pytest.raises(InputError, match="Z of table-bc"):
+                write(smoothed, io.BytesIO(), form=chosen)

@@ -31,7 +31,8 @@ from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.motion_writer import MotionWriter
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.own_words import own_words
-from cornersmooth.nc.planes import plan_planes
+from cornersmooth.nc.plane_travel import check_travel_in_planes
+from cornersmooth.nc.planes import Planes, plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
@@ -193,6 +194,7 @@ def write(
     taps = not frame.skip_taps
     upright = upright_poses(program, chosen, drills=native, taps=taps)
     planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native, taps=taps)
+    check_travel_in_planes(planes, program, chosen, findings)
     circles = plan_circles(program, smoothed.settings, chosen, planes, upright)
     add_warnings(chosen, smoothed, circles, findings)
     stretch = chosen.stretch(smoothed.settings.axis_length)
@@ -203,7 +205,9 @@ def write(
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
         text.write_blocks(operation.start())
-        chunks = ((rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, findings))
+        chunks = (
+            (rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, planes, findings)
+        )
         for rows, ticks in _one_ahead(chunks):
             for lines in motion.write(rows, ticks):
                 text.write(lines)
@@ -215,7 +219,7 @@ def write(
     return Written(text.blocks + motion.written, findings.all())
 
 
-def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findings) -> Iterator[Rows]:
+def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes, findings: Findings) -> Iterator[Rows]:
     if form.machine is not None and not form.rotary:
         _check_travel(form.machine, smoothed.program)
     if form.curves and form.rotary:
@@ -226,7 +230,10 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, findings: Findi
     long = smoothed.settings.lines == "long"
     rows = coarse_rows(smoothed, circles.blocks) if long else dense_rows(smoothed, circles.blocks)
     if form.rotary:
-        return with_arcs(rotary_rows(rows, smoothed, form, findings, long=long), smoothed.program, circles)
+        inside = planes.of >= 0 if planes.planes else None
+        return with_arcs(
+            rotary_rows(rows, smoothed, form, findings, long=long, in_planes=inside), smoothed.program, circles
+        )
     return long_rows(rows, smoothed, form) if long else rows
 
 

@@ -61,7 +61,13 @@ _NO_TURN = 1e-9
 
 
 def rotary_rows(
-    rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findings: Findings, *, long: bool = False
+    rows: Iterator[Rows],
+    smoothed: SmoothProgram,
+    form: Form,
+    findings: Findings,
+    *,
+    long: bool = False,
+    in_planes: Bools | None = None,
 ) -> Iterator[Rows]:
     """Rows of lines with the words of the form's machine in `Rows.other`, in the order of its axes.
 
@@ -75,6 +81,8 @@ def rotary_rows(
         Takes what the kinematics notice.
     long : bool
         Whether only those rows are left that ε asks for (`cornersmooth.smoothing.long_lines`).
+    in_planes : (n,) bool, optional
+        Poses in tilted planes, whose rotary axes the control turns, and whose travel is not looked at here.
 
     Raises
     ------
@@ -163,8 +171,13 @@ def rotary_rows(
             rate = np.minimum(rate, fastest)
         if rate is not None:
             rate = np.round(rate, INVERSE_TIME_DECIMALS)
-        for chosen, one in machines_of_rows(own_machine, tools, move[here][filled.pose[own]]):
-            check_travel(one, filled.tip[own][chosen], filled.angles[own][chosen], line[filled.pose[own]][chosen], file)
+        seen = np.arange(len(filled.pose))[own]
+        if in_planes is not None:
+            seen = seen[~in_planes[move[here][filled.pose[seen]]]]
+        for chosen, one in machines_of_rows(own_machine, tools, move[here][filled.pose[seen]]):
+            rows_of_tool = seen[chosen]
+            at = filled.pose[rows_of_tool]
+            check_travel(one, filled.tip[rows_of_tool], filled.angles[rows_of_tool], line[at], file)
         count = len(filled.pose[own])
         yield Rows(
             tip=filled.tip[own],

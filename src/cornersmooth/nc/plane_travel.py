@@ -1,0 +1,75 @@
+"""Travel of the linear axes in tilted planes, where the control chooses between two positions of the rotary axes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.errors import InputError
+from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
+from cornersmooth.model import Floats, Move, Program
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.planes import Plane, Planes
+from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
+from cornersmooth.vectors import norm
+
+#: by how much a tool axis may be off that of the rotary axes at zero
+_SAME = 1e-7
+
+
+def check_travel_in_planes(planes: Planes, program: Program, form: Form, findings: Findings) -> None:
+    """Refuse poses in tilted planes beyond the travel of the machine, whichever of its angles the control takes.
+
+    Parameters
+    ----------
+    planes : Planes
+    program : Program
+    form : Form
+        Without a machine with travel nothing is known.
+    findings : Findings
+        Takes CS379 where only some of the angles will do.
+
+    Raises
+    ------
+    InputError
+        CS374: the first position beyond the travel of an axis.
+    """
+    machine = form.machine
+    if machine is None or not machine.travel:
+        return
+    tools = tools_of_poses(program) if machine.tool_lengths else None
+    for number, plane in enumerate(planes.planes):
+        poses = np.flatnonzero((planes.of == number) & (program.kind != Move.FROM))
+        fit, refused = [], None
+        for angles in _angles(machine, plane):
+            try:
+                for chosen, one in machines_of_rows(machine, tools, poses):
+                    own = poses[chosen]
+                    turned = np.tile(angles, (len(own), 1))
+                    check_travel(one, program.tip[own], turned, program.line[own], program.source.name)
+                fit.append(angles)
+            except InputError as error:
+                refused = refused or error
+        if refused is not None and not fit:
+            raise refused
+        if refused is not None:
+            said = " ".join(f"{name}{angle:.3f}" for name, angle in zip(machine.names, fit[0].tolist(), strict=True))
+            text = f"a tilted plane stays within the travel with {said} only; see that the control takes these angles"
+            findings.add("CS379", "warning", int(program.line[poses[0]]), text)
+
+
+def _angles(machine: Machine, plane: Plane) -> list[Floats]:
+    """Angles, (2,) degrees each, of which the control may take any: within their limits."""
+    if plane.angles is not None:
+        return [plane.angles]
+    axis, zero = plane.frame[None, :, 2], np.zeros((1, 2))
+    low, high = machine.limits.T
+    turns = 360.0 * np.array([0.0, -1.0, 1.0])[:, None]
+    if norm(tool_axis(machine, zero) - axis)[0] <= _SAME:  # any angle of the axis along the tool would do: it stays
+        return [zero[0]]
+    found = []
+    for angles in solutions(machine, axis).angles[0]:
+        within = (angles + turns >= low) & (angles + turns <= high)
+        if within.any(axis=0).all():
+            found.append(angles + turns[np.argmax(within, axis=0), 0])
+    return found
