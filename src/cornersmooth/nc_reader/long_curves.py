@@ -13,15 +13,18 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.splines import CurveTable
 
-#: pieces that a part is divided into, and the turn of the tool up to which that will do, rad
+#: pieces that a part is divided into, and the turn of the tool up to which that will do, rad; in rotary words half as
+#: many will do, since each becomes a curve of a higher degree
 _PIECES = {4: 0.035, 16: 0.14, 64: 0.56, 256: np.inf}
+_ROTARY_PIECES = {number // 2: turn for number, turn in _PIECES.items()}
 
 
-def cut_long(curves: CurveTable) -> tuple[CurveTable, Bools]:
+def cut_long(curves: CurveTable, *, rotary: bool = False) -> tuple[CurveTable, Bools]:
     """Cut curves through several corners at their knots, so that what is measured is near one place of the path.
 
     Cubics with all weights 1, distinct inner knots and a parameter that does not run from 0 to 1 are cut; the curve of
-    one corner has knots from 0 to 1. The part between two knots belongs to the block whose control point ends it.
+    one corner has knots from 0 to 1. `rotary` says that the second triples are degrees. The part between two knots
+    belongs to the block whose control point ends it.
 
     Returns
     -------
@@ -54,7 +57,7 @@ def cut_long(curves: CurveTable) -> tuple[CurveTable, Bools]:
     block = end - curves.points[owner] + 4 + k  # of the control point that ends each part
     end = np.where(mine, block, end)
     row = np.where(mine & (k > 0), block, row)
-    parts = CurveTable.joined(list(_refined(row[mine], end[mine], bezier)))
+    parts = CurveTable.joined(list(_refined(row[mine], end[mine], bezier, rotary)))
     others = curves.only(np.flatnonzero(~long))
     joined = CurveTable.joined([parts, others])
     return joined, np.isin(joined.row, parts.row)
@@ -76,14 +79,17 @@ def _intervals_alone(curves: CurveTable, knot: Ints, point: Ints) -> Floats:
     return np.stack((start, second, third, end), axis=1)
 
 
-def _refined(row: Ints, end: Ints, bezier: Floats) -> Iterator[CurveTable]:
+def _refined(row: Ints, end: Ints, bezier: Floats, rotary: bool) -> Iterator[CurveTable]:
     """Cubics with Bézier points (r, 4, 6) as curves with inner knots, from 0 to 1."""
-    lever = bezier[..., 3:] - bezier[..., :3]
-    size = np.linalg.norm(lever, axis=2)
-    unit = lever / np.where(size > 0, size, 1.0)[..., None]
-    turn = np.linalg.norm(np.diff(unit, axis=1), axis=2).sum(axis=1)
+    if rotary:
+        turn = np.radians(np.abs(np.diff(bezier[..., 3:], axis=1)).sum(axis=(1, 2)))
+    else:
+        lever = bezier[..., 3:] - bezier[..., :3]
+        size = np.linalg.norm(lever, axis=2)
+        unit = lever / np.where(size > 0, size, 1.0)[..., None]
+        turn = np.linalg.norm(np.diff(unit, axis=1), axis=2).sum(axis=1)
     least = 0.0
-    for number, most in _PIECES.items():
+    for number, most in (_ROTARY_PIECES if rotary else _PIECES).items():
         chosen = np.flatnonzero((turn >= least) & (turn < most))
         least = most
         if not len(chosen):
