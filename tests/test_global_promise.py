@@ -120,7 +120,14 @@ def test_program_of_a_single_corner_and_of_none() -> None:
 
 def test_forms_without_long_curves_are_refused(tmp_path: Path) -> None:
     source = Path(__file__).parents[1] / "samples" / "paper_table1.csv"
-    form = ["--control", "fanuc", "-f", "g6.2", "--machine", "table-ac"]
-    result = run("smooth", source, "-o", tmp_path / "o.nc", "--method", "global", *form)
-    assert result.returncode == 2
-    assert "proportional" in result.stderr.decode()
+    for control, form, tcp, instead in (
+        ("fanuc", "g6.2", ["--no-tcp"], "cannot run without tool tip control"),
+        ("siemens", "bspline", ["--no-tcp"], "cannot run without tool tip control"),
+        ("siemens", "poly", [], "has no rotary words"),
+        ("mitsubishi", "g6.2", [], "has no rotary words"),
+    ):
+        options = ["--control", control, "-f", form, "--machine", "table-ac", *tcp]
+        result = run("smooth", source, "-o", tmp_path / "o.nc", "--method", "global", *options)
+        assert result.returncode == 2
+        assert instead in result.stderr.decode()
+        assert "use -f g1" in result.stderr.decode()
