@@ -197,12 +197,12 @@ def find_limit_coefficients(
                         other_cap[into] = np.minimum(other_cap[into], np.where(counts, speed, np.inf))
                         finite = np.isfinite(along).all(axis=(0, 3, 4))
                         known[into] = finite | ~counts
-                        if curve:
-                            middle[into] = _middles(path, element, borders)
+                        shares = _quarters(path, element, borders, curve)
+                        middle[into] = shares[1]
                         chosen_here = (counts & finite)[..., None, None]
                         for order, values in enumerate(np.where(chosen_here, along, 0.0)):
                             value[order][:, into] = values[:, :, ::2].transpose(3, 0, 1, 2)
-                            off = _missed(values, middle[into])
+                            off = _missed(values, shares)
                             missed[order][:, into] = off.transpose(2, 0, 1)
                             # where the tip all but stands, and derivatives change much, huge terms cancel
                             even = (off <= EVEN * np.abs(values).max(axis=2)).all(axis=-1)
@@ -283,7 +283,8 @@ def _borders(path: Path, element: Ints, curve: bool, given: Floats | None) -> tu
         return borders, np.diff(borders, axis=1)
     found = cubics(path, element)
     borders = bezier_halves.interval_borders(found.half) if given is None else given
-    lengths = bezier_halves.interval_lengths(found.tip, borders)
+    before = np.maximum.accumulate(bezier_halves.lengths_before(found.tip, found.half, borders), axis=1)
+    lengths = np.diff(before, axis=1)
     return borders, lengths / lengths.sum(axis=1, keepdims=True)
 
 
@@ -297,17 +298,24 @@ def _judge(amounts: Floats, bounds: Floats) -> tuple[Floats, Floats]:
     return steady.min(axis=-1), rows.max(axis=-1)
 
 
-def _middles(path: Path, element: Ints, borders: Floats) -> Floats:
-    """Shares (g, p) of the lengths of intervals of curves that are before the middle of their parameter."""
-    halves = np.repeat(borders, 2, axis=1)[:, :-1]
-    halves[:, 1::2] = (borders[:, 1:] + borders[:, :-1]) / 2.0
-    lengths = bezier_halves.interval_lengths(cubics(path, element).tip, halves)
-    before, behind = lengths[:, ::2], lengths[:, 1::2]
-    return np.where(before + behind > 0.0, before / np.maximum(before + behind, 1e-300), 0.5)
+def _quarters(path: Path, element: Ints, borders: Floats, curve: bool) -> Floats:
+    """(3, g, p) shares of the lengths of intervals that are before the quarters of their parameter."""
+    parts = np.linspace(0.0, 1.0, 5)[1:-1]
+    if not curve:
+        return np.broadcast_to(parts[:, None, None], (3, len(borders), borders.shape[1] - 1))
+    fine = np.repeat(borders, 4, axis=1)[:, :-3]
+    for number, part in enumerate(parts):
+        fine[:, number + 1 :: 4] = borders[:, :-1] + part * (borders[:, 1:] - borders[:, :-1])
+    found = cubics(path, element)
+    before = np.maximum.accumulate(bezier_halves.lengths_before(found.tip, found.half, fine), axis=1)
+    along = before[:, 1:].reshape(len(borders), -1, 4) - before[:, :-1:4, None]
+    whole = along[..., 3:]
+    shares: Floats = np.where(whole > 0.0, along[..., :3] / np.maximum(whole, 1e-300), parts).transpose(2, 0, 1)
+    return shares
 
 
 #: most that parabolas may miss of derivatives where the tip all but stands
-EVEN = 0.02
+EVEN = 0.05
 
 #: what parabolas miss at most, over what they miss at the quarters
 MISSED = 2.0
@@ -323,15 +331,13 @@ def parabola(share: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
     )
 
 
-def _missed(values: Floats, middle: Floats) -> Floats:
+def _missed(values: Floats, shares: Floats) -> Floats:
     """(g, p, d) by how much parabolas over the length miss the quarters of the parameter; values (g, p, 5, d)."""
     found = np.zeros((*values.shape[:2], values.shape[-1]))
     for at in (1, 3):
-        # the length before a quarter, by the parabola through the lengths at the ends and in the middle
-        one, two, three = parabola(0.75 * middle + (at - 1) / 4.0 - 0.125, middle)
-        expected = (
-            one[..., None] * values[:, :, 0] + two[..., None] * values[:, :, 2] + three[..., None] * values[:, :, 4]
-        )
+        expected = np.zeros_like(found)
+        for number, factor in enumerate(parabola(shares[at - 1], shares[1])):
+            expected += factor[..., None] * values[:, :, 2 * number]
         np.maximum(found, np.abs(values[:, :, at] - expected), out=found)
     return MISSED * found
 
