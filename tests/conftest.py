@@ -29,6 +29,25 @@ def corpus() -> Path:
     return folder
 
 
+#: files whose tests wait for processes, or are long. They come first, so that one worker waits while others work, and
+#: none is left with a long one at the end
+FIRST = (
+    "test_browser.py",
+    "test_cli_cluster.py",
+    "test_interruptions.py",
+    "test_cli_files.py",
+    "test_cli_batch.py",
+    "test_docs_tools.py",
+    "test_docs.py",
+    "test_form_mutations.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put some files first."""
+    items.sort(key=lambda item: FIRST.index(item.path.name) if item.path.name in FIRST else len(FIRST))
+
+
 def pytest_collection_finish() -> None:
     """Keep what was collected out of the garbage collection, and collect less often: a few per cent of the time."""
     gc.collect()

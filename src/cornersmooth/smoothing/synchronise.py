@@ -13,12 +13,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cornersmooth.model import Floats
+from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing import nurbs
 from cornersmooth.vectors import angle_between, norm
 
 #: parameters of the tip curve at which residual and jumps are reported
 REPORT_PARAMETERS = np.linspace(0.0, 1.0, 9)
+
+#: what is missing of ``|Q(v) − P(u)| = H`` at parameters v
+Excess = Callable[[Floats], Floats]
 
 _GRID = np.linspace(0.0, 1.0, 33)
 _HALVINGS = 36
@@ -55,53 +58,69 @@ def matching_parameters(
     for j in range(m):
         tip = tips[:, j]
 
-        def excess(parameter: Floats, tip: Floats = tip) -> Floats:
-            point = nurbs.evaluate(axis_curve, weights, parameter[:, None])[:, 0]
-            return norm(point - tip) - axis_length
+        def excess_of(rows: Ints | slice, tip: Floats = tip) -> Excess:
+            curve, own, start = axis_curve[rows], weights[rows], tip[rows]
 
-        found = _follow(norm(grid - tip[:, None]) - axis_length, low_limit, target, excess)
+            def excess(parameter: Floats) -> Floats:
+                return norm(nurbs.evaluate(curve, own, parameter[:, None])[:, 0] - start) - axis_length
+
+            return excess
+
+        found = _follow(norm(grid - tip[:, None]) - axis_length, low_limit, target, excess_of)
         v[:, j] = found
-        residual[:, j] = np.abs(excess(found))
+        residual[:, j] = np.abs(excess_of(slice(None))(found))
         low_limit = found
         if j + 1 < m:
             target = np.clip(found + (u[j + 1] - u[j]), 0.0, 1.0)
     return v, residual
 
 
-def _follow(values: Floats, low_limit: Floats, target: Floats, excess: Callable[[Floats], Floats]) -> Floats:
+def _follow(values: Floats, low_limit: Floats, target: Floats, excess_of: Callable[[Ints | slice], Excess]) -> Floats:
     """One step of the branch: the root at or above `low_limit` nearest to `target`, else the smallest excess.
 
     Parameters
     ----------
     values : (g, grid) float64
         Excess ``|Q(v) − P(u)| − H`` on the grid.
+    excess_of : callable
+        The excess at parameters, one for each of some rows.
     """
-    rows = np.arange(len(values))
     # the cell that holds the limit counts from the limit on
-    at_limit = excess(low_limit)
+    at_limit = excess_of(slice(None))(low_limit)
     below = _GRID[None, :] < low_limit[:, None]
     values = np.where(below, at_limit[:, None], values)
     parameters = np.maximum(_GRID[None, :], low_limit[:, None])
     crossing = (values[:, :-1] <= 0.0) != (values[:, 1:] <= 0.0)
-    distance = np.maximum(parameters[:, :-1] - target[:, None], target[:, None] - parameters[:, 1:])
-    cell = np.argmin(np.where(crossing, np.maximum(distance, 0.0), np.inf), axis=1)
     has_root = crossing.any(axis=1)
+    found = np.empty(len(values))
+    rows = np.flatnonzero(has_root)
+    if len(rows):
+        at = parameters[rows]
+        distance = np.maximum(at[:, :-1] - target[rows, None], target[rows, None] - at[:, 1:])
+        cell = np.argmin(np.where(crossing[rows], np.maximum(distance, 0.0), np.inf), axis=1)
+        each = np.arange(len(rows))
+        root = _halved(at[each, cell], at[each, cell + 1], values[rows, cell] <= 0.0, excess_of(rows))
+        # an exact root at the limit, as at the two ends of a well synchronised corner, is kept exactly
+        limit, wanted = low_limit[rows], target[rows]
+        exact = (np.abs(at_limit[rows]) <= 1e-12) & (np.abs(wanted - limit) <= np.abs(wanted - root))
+        found[rows] = np.where(exact, limit, root)
+    rows = np.flatnonzero(~has_root)
+    if len(rows):
+        found[rows] = _closest(values[rows], parameters[rows], excess_of(rows))
+    return found
 
-    low, high = parameters[rows, cell], parameters[rows, cell + 1]
-    negative_low = values[rows, cell] <= 0.0
+
+def _halved(low: Floats, high: Floats, negative_low: Bools, excess: Excess) -> Floats:
+    """Roots between pairs of parameters, by bisection."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         same = (excess(middle) <= 0.0) == negative_low
         low, high = np.where(same, middle, low), np.where(same, high, middle)
-    root = 0.5 * (low + high)
-    # an exact root at the limit, as at the two ends of a well synchronised corner, is kept exactly
-    root = np.where(
-        (np.abs(at_limit) <= 1e-12) & (np.abs(target - low_limit) <= np.abs(target - root)), low_limit, root
-    )
-    return np.where(has_root, root, _closest(values, parameters, excess))
+    root: Floats = 0.5 * (low + high)
+    return root
 
 
-def _closest(values: Floats, parameters: Floats, excess: Callable[[Floats], Floats]) -> Floats:
+def _closest(values: Floats, parameters: Floats, excess: Excess) -> Floats:
     """Parameter with the smallest ``|excess|``: grid minimum refined by ternary search in its two cells."""
     rows = np.arange(len(values))
     best = np.argmin(np.abs(values), axis=1)
