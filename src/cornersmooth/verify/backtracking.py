@@ -73,7 +73,9 @@ def written_backwards(match: Match, written: Reached) -> Found | None:
     gain = distance_between(own, _on(six, held)) - off
     # what is off the path is told by its distance: where along the path it would be nearest says nothing
     wrong = (gain > match.slack) & (free < held) & (off <= _OFF * match.near)
-    wrong &= _way(length, free, held) <= _STRAIGHT * distance_between(_on(six, held), _on(six, free)) + match.slack
+    way = _way(length, free, held)
+    wrong &= way <= _STRAIGHT * distance_between(_on(six, held), _on(six, free)) + match.slack
+    wrong &= way > off  # what is off the path by so much tells only within that how far along it it is
     rows = np.flatnonzero(wrong)
     wrong[rows] = _gain_alone(match, vertex[rows], held[rows], free[rows]) > match.slack
     rows = np.flatnonzero(wrong)
