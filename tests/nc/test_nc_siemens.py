@@ -12,6 +12,7 @@ import re
 import numpy as np
 import pytest
 
+import cornersmooth
 from cornersmooth.cl import read
 from cornersmooth.model import SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, write
@@ -195,3 +196,17 @@ def test_a_control_point_may_be_the_only_one_of_its_rows() -> None:
     whole = _intervals(points, number)
     assert whole[:, 0].tolist() == [1.0, 2.0, 3.0, 0.0]
     assert _intervals(points[3:], number[3:]).tolist() == whole[3:].tolist()
+
+
+def test_a_spline_begins_anew_behind_lines_between_two_statements() -> None:
+    """What the writer remembers of the block before is forgotten where a run of rows has no spline."""
+    goto = "GOTO/{},{},0.0,0.0,0.0,1.0"
+    places = [(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (10.0, 5.0), (10.0, 12.0), (20.0, 12.0)]  # turns back twice
+    lines = [goto.format(*place) for place in places]
+    lines = ["RAPID", lines[0], "FEDRAT/500.0", *lines[1:3], "PPRINT/ONE", lines[3], "PPRINT/TWO", *lines[4:], "FINI"]
+    out = io.BytesIO()
+    form, settings = choose_form("siemens", "bspline"), cornersmooth.Settings(method="global")
+    result = cornersmooth.postprocess(("\n".join(lines) + "\n").encode(), out, settings, form=form)
+    assert result.verification is not None
+    assert result.verification.passed
+    assert out.getvalue().decode().count("BSPLINE SD=3") == 2

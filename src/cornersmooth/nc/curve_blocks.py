@@ -159,6 +159,7 @@ class SplineBlocks(NoCurves):
         """Leave out the first control points; for curves with knots of their own, find the intervals of the others."""
         if run.spline is not None:
             run = replace(run, spline=_intervals(run.spline, run.curve))
+        self._open &= bool((run.curve > 0).any())  # a run of lines alone gets no prefixes of ours
         return run.only(run.curve != 1)
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
