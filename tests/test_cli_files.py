@@ -299,7 +299,7 @@ def test_any_number_of_processes_gives_the_same_bytes(several: list[Path], tmp_p
     contents = _contents(tmp_path / "one")
     assert len(contents) == len(several)
     assert contents == _contents(tmp_path / "two") == _contents(tmp_path / "all") == _contents(tmp_path / "none")
-    alone = run_process("smooth", several[0]).stdout
+    alone = run("smooth", several[0]).stdout
     assert alone in contents.values()
 
 

@@ -168,7 +168,7 @@ def test_polynomials_of_an_upright_tool_are_planned() -> None:
 
 
 def test_rounded_digits_cost_time_on_a_machine_and_a_far_second_point_saves_it() -> None:
-    dense = blade(30)
+    dense = blade(16)
     dense = replace(dense, tip=0.1 * dense.tip)
     machine = load_machine("table-ac")
     taken = []

@@ -138,7 +138,7 @@ def test_tip_and_axis_by_its_own_formulas_keep_the_tolerance(
     machine: str, tcp: bool, units: str, tmp_path: Path
 ) -> None:
     """The published kinematics of trtfuncs.c over the positions that the interpreter produces."""
-    cl, chains = flat(2, how_many(15, 60) if tcp else how_many(6, 12))
+    cl, chains = flat(2, how_many(15, 60) if tcp else how_many(4, 12))
     if units == "inch":
         cl, chains = in_inches(cl), [replace(chain, tip=25.4 * chain.tip) for chain in chains]
     axis_length, tolerance = 10.0, 0.01

@@ -17,6 +17,7 @@ from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from cornersmooth.verify.word_check import WordCheck
 from nc.cases import CHOSEN, Case
+from oracle.share import how_many
 
 from .form_mutations import EPS, H, program_of
 from .word_mutations import judged, named_in, options_of, text_of
@@ -24,7 +25,7 @@ from .word_mutations import judged, named_in, options_of, text_of
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONTROLS = ("fanuc", "mitsubishi", "haas", "linuxcnc", "generic", "siemens", "heidenhain")
 #: mutants of each control
-SAMPLE = 10
+SAMPLE = how_many(6, 10)
 
 
 @pytest.mark.parametrize("control", CONTROLS)
