@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,7 @@ from cornersmooth.nc.program_frame import BLEND_STEP, blend_word
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.spline_share import SplineShare
 from cornersmooth.nc.statement_writer import StatementWriter
-from cornersmooth.text import RowFormat, format_number, to_ticks
+from cornersmooth.text import RowFormat, format_number, interleave, to_ticks
 
 #: steps of the last digit that a number may be below a whole one and still is it
 _ROUNDING = 1e-6
@@ -282,7 +281,7 @@ class BlockWriter:
                 for rows, layout, numbers in apart
             ),
         ]
-        return _interleave(which, texts)
+        return interleave(which, texts)
 
     def _prefixes(self, run: Run) -> tuple[list[bytes], Ints, int]:
         """Table of what stands before the numbers, an entry for each row, and the blocks hidden in the prefixes."""
@@ -442,17 +441,3 @@ class BlockWriter:
                 int(moves[0]), "a feed move before any feed, which the control refuses", "give one with --feed"
             )
         self.findings.add("CS311", "warning", int(self.program.line[moves[0]]), text, len(moves))
-
-
-def _interleave(which: Ints, texts: Sequence[tuple[bytes, Ints]]) -> bytes:
-    """Put texts of rows together; `which` says for each row in which of them it is."""
-    edges = [0, *(1 + np.flatnonzero(which[1:] != which[:-1])).tolist(), len(which)]
-    at = [0] * len(texts)
-    parts = []
-    for first, last in pairwise(edges):
-        own = int(which[first])
-        text, offsets = texts[own]
-        stop = at[own] + last - first
-        parts.append(text[offsets[at[own]] : offsets[stop]])
-        at[own] = stop
-    return b"".join(parts)

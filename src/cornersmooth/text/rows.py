@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -207,3 +208,25 @@ def _count_by_row(used: NDArray[np.uint64]) -> Ints:
     pairs = (sums & low) + (sums >> np.uint64(8) & low)
     counts: Ints = (pairs * np.uint64(0x0001000100010001) >> np.uint64(48)).astype(np.int64)
     return counts
+
+
+def interleave(which: Ints, texts: Sequence[tuple[bytes, Ints]]) -> bytes:
+    """Put texts of rows together in order.
+
+    Parameters
+    ----------
+    which : (n,) int64
+        Text that has each row.
+    texts : sequence of (bytes, (m + 1,) int64)
+        Each with its m rows, and where these begin in it and end.
+    """
+    edges = [0, *(1 + np.flatnonzero(which[1:] != which[:-1])).tolist(), len(which)]
+    at = [0] * len(texts)
+    parts = []
+    for first, last in pairwise(edges):
+        own = int(which[first])
+        text, offsets = texts[own]
+        stop = at[own] + last - first
+        parts.append(text[offsets[at[own]] : offsets[stop]])
+        at[own] = stop
+    return b"".join(parts)
