@@ -21,7 +21,8 @@ Where is what:
 - tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `long_curves`, `rotary`;
   `needed_states` says which words want another state; `way_back` leads back from retracts,
   `left_cuts` back into cuts
-- what comes out: `path_elements`, `elements`; `curves` evaluates them; `reading` puts a whole text together
+- what comes out: `path_elements`, `elements`; `ahead` reads on as far as need be, `curves` evaluates, `reading` puts a
+  whole text together
 """
 
 from cornersmooth.nc_reader.elements import Event, NcProgram, Problem

@@ -242,12 +242,8 @@ def _waits(match: Match, vertex: Ints, low: Floats, high: Floats) -> Bools:
 def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: bool) -> tuple[Floats, Bools]:
     """Look at original vertices as if the text may not pass them before, or behind, `bound`.
 
-    Returns
-    -------
-    gain : (k,) float64, mm
-        How much farther it is from them then.
-    comes : (k,) bool
-        Whether it is within the tolerance of them there, in order: what it leaves out is no more than a rounding.
+    Returns how much farther it is from them then, mm, and whether it is within the tolerance of them there all the
+    same: what it leaves out is no more than a rounding.
     """
     own, six = match.path.six[vertex], match.six
     middle = np.minimum(bound.astype(np.int64), len(six) - 2)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, Move
+from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
-from cornersmooth.verify.ahead import Ahead
 from cornersmooth.verify.drilling import Holes
 from cornersmooth.verify.guide import STRIDE, cut, guide
 from cornersmooth.verify.polyline import Polyline, directions

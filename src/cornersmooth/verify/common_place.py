@@ -90,14 +90,8 @@ def _least(
 ) -> Floats:
     """(k,) mm: what the axis is off at the best of all places, or the tip where that is more and beyond ε.
 
-    Parameters
-    ----------
-    around : Around
-        Moves or elements that are looked at for each pose: few, and more where these are beyond.
-    pose : two (k, 3) float64
-        Tips and axes.
-    known : two (k,) float64, mm
-        What tip and axis are off at a place that is known.
+    Few moves or elements `around` each pose are looked at, and more where these are beyond. What tips and axes of the
+    poses are off at a place that is known is in `known`, mm.
     """
     found, best = np.array(known[1]), np.maximum(*known)
     for reach in (REACH, min(_FARTHER * REACH * match.parts, _MOST)):

@@ -49,16 +49,8 @@ def _cl_lines(match: Match, elements: Ints) -> Ints:
 def _jumps(match: Match) -> tuple[Ints, Floats, Ints, Floats]:
     """Jumps between neighbouring feed elements of a batch.
 
-    Returns
-    -------
-    element : (k,) int64
-        Elements behind the joints.
-    cosine : (k,) float64
-        Of the angle between the tangents.
-    curved : (c,) int64
-        Elements behind joints of which at least one side is a curve or an arc.
-    curvature : (c,) float64, 1/mm
-        Difference of the curvatures there.
+    Returns the elements (k,) behind the joints and the cosines of the angles between the tangents; those (c,) behind
+    joints of which at least one side is a curve or an arc, and the differences of the curvatures there, 1/mm.
     """
     nc, lead = match.nc, int(match.continued)  # an element in front, if the batch begins in a stretch
     first = match.written.first - lead

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
+from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Problem
-from cornersmooth.verify.ahead import Ahead
 from cornersmooth.verify.cycles import Drilling, drillings
 from cornersmooth.verify.polyline import Original, directions
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors

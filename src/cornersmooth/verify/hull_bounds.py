@@ -98,13 +98,7 @@ def _searched(match: Match, element: Ints, middle: Ints, reach: int) -> tuple[Fl
 def _suspects(match: Match, group: CurveGroup, limit: float) -> tuple[Ints, Floats, Floats]:
     """Curves with a control point between knots farther than the tolerance and than the knots.
 
-    Returns
-    -------
-    element : (k,) int64
-    reached : (k,) float64, mm
-        Distance of their farthest control point.
-    at_knots : (k,) float64, mm
-        Distance of their farthest knot.
+    Returns their elements (k,), and the distances of their farthest control points and knots, mm.
     """
     trail, first = match.written.trail, match.written.first
     element = match.nc.curves.element[group.index]

@@ -239,39 +239,19 @@ class _Text:
 
 @dataclass
 class _Measured:
-    """What all batches show together.
-
-    Parameters
-    ----------
-    task : Task
-    batches : Batches
-    findings : Findings
-    poses : Poses
-        Of the whole CL program.
-    lengths : dict of int to float
-        CL path length, mm, at the ends of elements that have words behind them, where batches tell.
-    rooms : dict of int to float
-        How far that is uncertain, mm.
-    events : list of Event
-    words : bool
-    margin : float, mm
-    own : frozenset of str
-        Kinds of statements that the user says in words of his own.
-    clamps : frozenset of float
-        M words that clamp a rotary axis or let it turn.
-    """
+    """What all batches show together."""
 
     task: Task
     batches: Batches
     findings: Findings
-    poses: Poses
-    lengths: dict[int, float]
-    rooms: dict[int, float]
+    poses: Poses  #: of the whole CL program
+    lengths: dict[int, float]  #: CL path length, mm, at elements that have words behind them, where batches tell
+    rooms: dict[int, float]  #: how far that is uncertain, mm
     events: list[Event]
     words: bool
     margin: float = 0.0
-    own: frozenset[str] = frozenset()
-    clamps: frozenset[float] = frozenset()
+    own: frozenset[str] = frozenset()  #: kinds of statements that the user says in words of his own
+    clamps: frozenset[float] = frozenset()  #: M words that clamp a rotary axis or let it turn
 
     def verification(
         self,

@@ -128,13 +128,8 @@ def _connected(
 ) -> tuple[Bools, Bools, Ints, Floats, Floats]:
     """Nearest places (k,) on what is connected with segments and near, `reach` segments on either side at most.
 
-    Returns
-    -------
-    whole : (k,) bool
-        Whether the path is left on either side within the reach, or ends there.
-    near : (k,) bool
-        Whether the segment itself is near.
-    segment, fraction, distance : (k,)
+    Returns whether the path is left on either side within the reach, or ends there; whether the segment itself is
+    near; segments, fractions and distances.
     """
     low, high = limits
     offset = np.arange(
