@@ -241,7 +241,7 @@ class Batch:
         c[self.last[at_rest]] = self.last_ratio[at_rest] * c[self.last[at_rest] - 1]
 
 
-def solve(batch: Batch, c: Floats, gap: float = GAP) -> Floats:
+def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS) -> Floats:
     """Fastest profile of every run.
 
     Parameters
@@ -251,6 +251,8 @@ def solve(batch: Batch, c: Floats, gap: float = GAP) -> Floats:
         Strictly feasible coefficients to start from.
     gap : float
         Remaining duality gap over the time at which a profile is taken.
+    most : int
+        Newton steps after which it is taken in any case.
 
     Returns
     -------
@@ -261,7 +263,7 @@ def solve(batch: Batch, c: Floats, gap: float = GAP) -> Floats:
     time = float((batch.weight / np.sqrt(c)).sum())
     barrier = (WARM if batch.signed else 1.0) * time / slack.size
     dual = barrier / slack
-    for _ in range(MAX_STEPS):
+    for _ in range(most):
         bites = [0.5 * values**-1.5 for values in z]  # −d(z^(−1/2))/dz
         step = _newton_step(batch, c, slack, dual, barrier, bites)
         relative = _change(batch, step, bites) / slack

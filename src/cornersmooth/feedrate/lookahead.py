@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.feedrate.grid import Grid
-from cornersmooth.feedrate.interior_point import GAP, Batch, solve
+from cornersmooth.feedrate.interior_point import GAP, MAX_STEPS, Batch, solve
 from cornersmooth.feedrate.scurve import stopping_distance
 from cornersmooth.model import Floats, Ints
 
@@ -105,6 +105,7 @@ def solve_runs(
     progress: Callable[[int, int], None] | None = None,
     start: Floats | None = None,
     gap: float = GAP,
+    most: int = MAX_STEPS,
 ) -> Floats:
     """Coefficients of the fastest profiles, (n,); short runs together, long ones window by window.
 
@@ -116,6 +117,8 @@ def solve_runs(
         Coefficients to begin with that keep all limits with room to spare.
     gap : float
         Remaining duality gap over the time at which a profile is taken.
+    most : int
+        Newton steps after which it is taken in any case.
     """
     c = batch.start() if start is None else start.copy()
     n = len(c)
@@ -126,9 +129,9 @@ def solve_runs(
         end_run = max(end_run, run + 1)
         end = int(batch.last[end_run - 1]) + 1
         if end - begin <= WINDOW:
-            c[begin:end] = solve(_part(batch, begin, end), c[begin:end], gap)
+            c[begin:end] = solve(_part(batch, begin, end), c[begin:end], gap, most)
         else:
-            _solve_long(batch, grid, c, begin, end, gap, progress)
+            _solve_long(batch, grid, c, begin, end, gap, most, progress)
         run = end_run
         if progress is not None:
             progress(end, n)
@@ -136,7 +139,14 @@ def solve_runs(
 
 
 def _solve_long(
-    batch: Batch, grid: Grid, c: Floats, begin: int, end: int, gap: float, progress: Callable[[int, int], None] | None
+    batch: Batch,
+    grid: Grid,
+    c: Floats,
+    begin: int,
+    end: int,
+    gap: float,
+    most: int,
+    progress: Callable[[int, int], None] | None,
 ) -> None:
     speed = np.sqrt(batch.cell_cap[begin + 1 : end - 1].max())
     steepest, most_bent = batch.accel_slope[begin:end].max(), batch.jerk_bend[begin:end].max()
@@ -150,7 +160,7 @@ def _solve_long(
     at = begin
     while True:
         stop = min(at + WINDOW, end)
-        c[at:stop] = solve(_part(batch, at, stop), c[at:stop], gap)
+        c[at:stop] = solve(_part(batch, at, stop), c[at:stop], gap, most)
         if stop == end:
             return
         keep = int(np.searchsorted(grid.start, grid.start[stop - CRAWLING] - brake))

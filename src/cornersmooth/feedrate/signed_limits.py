@@ -35,6 +35,9 @@ _SLOWER = 0.97
 #: remaining duality gap over the time of plans that only show where limits are met
 ROUGH = 1e-2
 
+#: Newton steps of one round: most take 20 to 40; where terms are huge and cancel, hundreds gain next to nothing
+_STEPS = 80
+
 #: share of the limits of acceleration and jerk that is used: the rest is for what lies between samples
 _USED = 0.997
 
@@ -310,7 +313,7 @@ def faster(given: Given, grid: Grid, batch: Batch, best: Floats) -> Floats:
             np.put_along_axis(asks, np.argpartition(-high, AXES - 1, axis=0)[:AXES], True, axis=0)
         problem = replace(_summed(bare, batch, summed), signed=_signed(asked, held, taken, summed, inside))
         start, gap = _within(problem, best, run), GAP if number else ROUGH
-        c[going[run]] = solve_runs(problem.of(going), grid.of(going), start=start[going[run]], gap=gap)
+        c[going[run]] = solve_runs(problem.of(going), grid.of(going), start=start[going[run]], gap=gap, most=_STEPS)
         # sums of amounts keep limits by themselves, with less room for what lies between samples than is measured here
         slower = _slower([np.where(summed, 0.0, used) for used in places.uses(bare, c)[0]], batch)
         kept = c * slower[run]
