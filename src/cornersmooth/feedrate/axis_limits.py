@@ -36,6 +36,10 @@ WITHIN = 0.5
 _INNER = np.array([0.25, 0.5, 0.75])
 #: elements looked at together
 _TOGETHER = 4096
+#: most that parabolas may miss of derivatives where the tip all but stands
+_EVEN = 0.05
+#: what parabolas miss at most, over what they miss at the quarters
+_MISSED = 2.0
 
 
 @dataclass(frozen=True)
@@ -187,13 +191,13 @@ def find_limit_coefficients(
                     counts = where[element][:, None]
                     if not counts.any():
                         continue
-                    low, high, along = _ranges(element, borders, orders)
-                    bound, row = _judge(np.maximum(-low, high), bounds)
+                    amounts, along = _largest(element, borders, orders)
+                    bound, row = _judge(amounts, bounds)
                     cap[into] = np.minimum(cap[into], np.where(counts, bound, np.inf))
                     rows[:, into] = np.maximum(rows[:, into], np.where(counts, row, 0.0))
                     if machine_axes is not None and bounds is own_bounds:
                         with np.errstate(divide="ignore"):
-                            speed = ((bounds[0] / np.maximum(-low, high)[0]) ** 2).min(axis=-1)
+                            speed = ((bounds[0] / amounts[0]) ** 2).min(axis=-1)
                         other_cap[into] = np.minimum(other_cap[into], np.where(counts, speed, np.inf))
                         finite = np.isfinite(along).all(axis=(0, 3, 4))
                         known[into] = finite | ~counts
@@ -205,7 +209,7 @@ def find_limit_coefficients(
                             off = _missed(values, shares)
                             missed[order][:, into] = off.transpose(2, 0, 1)
                             # where the tip all but stands, and derivatives change much, huge terms cancel
-                            even = (off <= EVEN * np.abs(values).max(axis=2)).all(axis=-1)
+                            even = (off <= _EVEN * np.abs(values).max(axis=2)).all(axis=-1)
                             known[into] &= even | ~(slow[element][:, None] & counts)
                     else:
                         other_cap[into] = np.minimum(other_cap[into], np.where(counts, bound, np.inf))
@@ -314,13 +318,6 @@ def _quarters(path: Path, element: Ints, borders: Floats, curve: bool) -> Floats
     return shares
 
 
-#: most that parabolas may miss of derivatives where the tip all but stands
-EVEN = 0.05
-
-#: what parabolas miss at most, over what they miss at the quarters
-MISSED = 2.0
-
-
 def parabola(share: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
     """Factors of the values at start, middle and end of intervals of which `middle` is before the middle one."""
     m = np.clip(middle, 0.05, 0.95)
@@ -339,13 +336,13 @@ def _missed(values: Floats, shares: Floats) -> Floats:
         for number, factor in enumerate(parabola(shares[at - 1], shares[1])):
             expected += factor[..., None] * values[:, :, 2 * number]
         np.maximum(found, np.abs(values[:, :, at] - expected), out=found)
-    return MISSED * found
+    return _MISSED * found
 
 
-def _ranges(element: Ints, borders: Floats, orders: Orders) -> tuple[Floats, Floats, Floats]:
-    """Least and largest derivatives (3, g, p, d) in every interval, from samples at its ends and inside.
+def _largest(element: Ints, borders: Floats, orders: Orders) -> tuple[Floats, Floats]:
+    """Largest amounts (3, g, p, d) of derivatives in every interval, from samples at its ends and inside.
 
-    Third come those at start, quarters and end, (3, g, p, 5, d).
+    Second come the derivatives at start, quarters and end, (3, g, p, 5, d).
 
     Not at an end where the tip comes to a stand and they are infinite. Between two samples a smooth function leaves
     their range by at most an eighth of its second difference.
@@ -354,7 +351,7 @@ def _ranges(element: Ints, borders: Floats, orders: Orders) -> tuple[Floats, Flo
     inner = borders[:, :-1, None] + step[..., None] * _INNER
     share = np.concatenate((borders, inner.reshape(len(borders), -1)), axis=1)
     found = orders(np.repeat(element, share.shape[1]), share.ravel())
-    low, high, samples = [], [], []
+    largest, samples = [], []
     for order in found:
         values = order.reshape(*share.shape, -1)
         intervals = step.shape[1]
@@ -367,6 +364,5 @@ def _ranges(element: Ints, borders: Floats, orders: Orders) -> tuple[Floats, Flo
         known = np.isfinite(along).all(axis=2)
         along = np.where(np.isfinite(along), along, 0.0)
         between = np.where(known, np.abs(np.diff(along, n=2, axis=2)).max(axis=2) / 8.0, 0.0)
-        low.append(along.min(axis=2) - between)
-        high.append(along.max(axis=2) + between)
-    return np.stack(low), np.stack(high), np.stack(samples)
+        largest.append(np.abs(along).max(axis=2) + between)
+    return np.stack(largest), np.stack(samples)

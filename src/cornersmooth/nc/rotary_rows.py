@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from cornersmooth.nc.long_rows import corner_blends, line_limits
 from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
 from cornersmooth.rotary import (
     FilledPath,
+    Insertions,
     fill,
     insertions,
     rapid_moves,
@@ -38,7 +39,7 @@ from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.vectors import norm
 
 #: rows handed on at a time
-_CHUNK = 32768
+CHUNK = 32768
 
 #: deg/min that no rotary axis exceeds where we time its blocks ourselves
 _FASTEST_TURN = 36_000.0
@@ -58,6 +59,36 @@ INVERSE_TIME_DECIMALS = 3
 
 #: turns below this many degrees are none
 _NO_TURN = 1e-9
+
+
+@dataclass
+class InsertedPoints:
+    """Points that lines of rotary words needed so far, and CL lines where no points help."""
+
+    count: int = 0
+    first_line: int = 0
+    unsolved: list[int] = field(default_factory=list)
+
+    def add(self, more: Insertions, line: Ints) -> None:
+        """Count those of a chunk of rows with these CL lines (n,)."""
+        if len(more) and not self.count:
+            self.first_line = int(line[more.segment[0] + 1])
+        self.count += len(more)
+        self.unsolved += line[more.unsolved + 1].tolist()
+
+    def warn(self, findings: Findings) -> None:
+        """Name where no points help."""
+        if self.unsolved:
+            text = (
+                "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
+            )
+            findings.add("CS369", "warning", self.unsolved[0], text, len(self.unsolved))
+
+    def tell(self, machine: Machine, findings: Findings) -> None:
+        """Say how many there are."""
+        if self.count:
+            text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
+            findings.add("CS367", "note", self.first_line, text, self.count)
 
 
 def rotary_rows(
@@ -121,10 +152,10 @@ def rotary_rows(
     largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
     limits = line_limits(settings, form, largest_turn)
     timed = _timed_cuts(angles, move, program) if form.orientation == "machine" else None
-    inserted, first_inserted, unsolved = 0, 0, []
+    inserted = InsertedPoints()
     merged, slowed, first_slowed = 0, 0, 0
-    for begin in range(0, max(len(move) - 1, 1), _CHUNK):
-        here = slice(begin, begin + _CHUNK + 1)  # the last row of a chunk is the start of the next
+    for begin in range(0, max(len(move) - 1, 1), CHUNK):
+        here = slice(begin, begin + CHUNK + 1)  # the last row of a chunk is the start of the next
         line = program.line[move[here]]
         more = insertions(
             machine,
@@ -138,10 +169,7 @@ def rotary_rows(
             line=line,
             file=file,
         )
-        if len(more) and not inserted:
-            first_inserted = int(line[more.segment[0] + 1])
-        inserted += len(more)
-        unsolved += line[more.unsolved + 1].tolist()
+        inserted.add(more, line)
         filled = fill(tip[here], axis[here], angles[here], more)
         held = left[here] | np.append(left[here][1:], False)  # both rows of a place where a cut is left
         start, at_pose = segments_of_rows(move, here.start, here.stop)
@@ -189,18 +217,14 @@ def rotary_rows(
             blend=None if blend is None else blend[own],
             left=(left[here][filled.pose] & ~filled.inserted)[own] if left.any() else None,
         )
-    if unsolved:
-        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
-        findings.add("CS369", "warning", unsolved[0], text, len(unsolved))
+    inserted.warn(findings)
     if slowed:
         text = f"block slowed down: it is shorter than F{form.mode.motion.fastest:.10g} of inverse time (G93) can say"
         findings.add("CS371", "warning", first_slowed, text, slowed)
     if merged:
         text = "block merged with its neighbour: shorter than inverse time (G93) can say"
         findings.add("CS372", "note", 0, text, merged)
-    if inserted:
-        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
-        findings.add("CS367", "note", first_inserted, text, inserted)
+    inserted.tell(machine, findings)
 
 
 def _merged(

@@ -18,7 +18,7 @@ from cornersmooth.model import Bools, Floats, Ints, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_curve_rows import warn_of_curves
-from cornersmooth.nc.rotary_rows import LARGEST_TURN, whole_rows
+from cornersmooth.nc.rotary_rows import CHUNK, LARGEST_TURN, InsertedPoints, whole_rows
 from cornersmooth.rotary import fill, insertions, rapid_moves, rotary_angles, still_poses
 from cornersmooth.rotary.run_angles import Guide, RunAngles, lever_at, run_angles
 from cornersmooth.smoothing.runs.lines import line_places, polylines_of
@@ -27,9 +27,6 @@ from cornersmooth.smoothing.runs.sections import STEPS_PER_UNIT, SectionRows, se
 from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 from cornersmooth.vectors import norm, unit
-
-#: rows handed on at a time
-_CHUNK = 32768
 
 #: share of what rotary axes may take of ε that a curve may use: the rest is for the digits of its control points
 _SHARE = 0.95
@@ -267,9 +264,9 @@ def _rows(
     """Rows of the path some thousand at a time, with the points that its lines need."""
     program, machine, settings = smoothed.program, form.machine, smoothed.settings
     assert machine is not None
-    file, inserted, first_inserted, unsolved = program.source.name, 0, 0, []
+    file, inserted = program.source.name, InsertedPoints()
     largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
-    edges = [*range(0, max(len(path.move) - 1, 1), _CHUNK), max(len(path.move) - 1, 1)]
+    edges = [*range(0, max(len(path.move) - 1, 1), CHUNK), max(len(path.move) - 1, 1)]
     for begin, end in pairwise(edges):
         here = slice(begin, end + 1)  # the last row of a chunk is the start of the next
         line = program.line[path.move[here]]
@@ -284,21 +281,14 @@ def _rows(
             line=line,
             file=file,
         )
-        if len(more) and not inserted:
-            first_inserted = int(line[more.segment[0] + 1])
-        inserted += len(more)
-        unsolved += line[more.unsolved + 1].tolist()
+        inserted.add(more, line)
         filled = fill(path.tip[here], path.axis[here], path.angles[here], more)
         own = slice(1 if begin else 0, None)
         pose = filled.pose[own]
         section = np.where(filled.inserted[own], -1, path.section[here][pose])
         yield _with_curves(filled.tip[own], filled.angles[own], path.move[here][pose], section, sections)
-    if unsolved:
-        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
-        findings.add("CS369", "warning", unsolved[0], text, len(unsolved))
-    if inserted:
-        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
-        findings.add("CS367", "note", first_inserted, text, inserted)
+    inserted.warn(findings)
+    inserted.tell(machine, findings)
 
 
 def _with_curves(tip: Floats, angles: Floats, move: Ints, section: Ints, sections: _Sections | None) -> Rows:
