@@ -78,8 +78,6 @@ class Reader:
         #: of the shortest tool vector so far
         self.vector_length = math.inf
         self.elements = self.given_out = self.curves = 0
-        #: elements before any word of a second point on the axis
-        self.pointless = 0
         #: whether the tool has been fed from a position that was known
         self.placed = False
         self.blocks = 0
