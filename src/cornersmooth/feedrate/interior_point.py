@@ -31,8 +31,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgError, solveh_banded
 
+from cornersmooth.lapack import dpbsv
 from cornersmooth.model import Bools, Floats, Ints
 
 #: the remaining duality gap over the time, at which the profile is taken
@@ -381,13 +381,10 @@ def _solved(bands: Floats, right: Floats) -> Floats:
     A stiffened step is shorter or points a little aside: it costs rounds, never a limit.
     """
     for ridge in _RIDGES:
-        matrix = bands.copy()
+        matrix = np.array(bands, order="F")
         matrix[-1] *= 1.0 + ridge
-        try:
-            step = solveh_banded(matrix, right, overwrite_ab=True, check_finite=False)
-        except LinAlgError:
-            continue
-        if np.isfinite(step).all():
+        _, step, info = dpbsv(matrix, right, overwrite_ab=1)
+        if info == 0 and np.isfinite(step).all():
             return np.asarray(step, np.float64)
     return np.zeros_like(right)
 

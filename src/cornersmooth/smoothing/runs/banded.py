@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.linalg.lapack import dpbsv
 from scipy.sparse import csc_array, csr_array
 
+from cornersmooth.lapack import dpbsv
 from cornersmooth.model import Bools, Floats, Ints
 
 #: control points that a span, and so a sample, belongs to
