@@ -10,11 +10,12 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.nc_reader.block_texts import any_numbers, any_of, numbers_in, said, shown, text_of
+from cornersmooth.nc_reader.block_texts import any_numbers, numbers_in, said, shown, text_of
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.word_list import WordList, WordRule, word_list
+from cornersmooth.nc_reader.word_rules import WordRules
 from cornersmooth.nc_reader.words import Line, Table
 
 #: code of words that are not on the list or not in their place, and of what is not established
@@ -28,9 +29,6 @@ _LINEAR: Final = frozenset("XYZ")
 
 #: words of rotary axes
 _ROTARY: Final = frozenset("ABC")
-
-#: words of which a block may have one
-_MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "BSPLINE", "POLY"))
 
 #: how far a weight may be from one that is asked for: half of the last decimal that controls keep
 _WEIGHT_ROOM: Final = 5e-4
@@ -75,8 +73,8 @@ class WordCheck:
     ) -> None:
         self.list: WordList = word_list(control)
         self._positions = MachinePositions(None, 1.0) if positions is None else positions
-        self._known_blocks = (*self.list.blocks, *self._positions.rules)
-        self.lexer, self.tolerance = lexer, tolerance
+        self._rules = WordRules(self.list, self._positions.rules, lexer, tolerance)
+        self.lexer = lexer
         self.problems: list[Problem] = []
         #: blocks taken on trust: line and text
         self.trusted: list[tuple[int, str]] = []
@@ -90,7 +88,6 @@ class WordCheck:
         self._begun = 0
         self._tail: list[tuple[int, str]] = []
         self._state: dict[str, tuple[str, int]] = {}
-        self._fitted: dict[str, list[WordRule | None]] = {}
         self._first: dict[str, str] | None = None
         self._complained: set[tuple[str, int]] = set()
         self._changed = True
@@ -204,10 +201,12 @@ class WordCheck:
         """Look at the words of a block and their places, and take over the states that they change."""
         if self._start(line.number, text):
             return
-        rules = self._rules(line.number, words, text)
+        rules = self._rules.of(words, text)
         before = self._next_block(text, line.number)
         self._said |= set(words)
-        self._places(line, words, rules, before)
+        for complaint in self._rules.complaints(line, words, rules):
+            self._wrong(NOT_LISTED, line.number, complaint)
+        self._places(line.number, words, rules, before)
         self._states(line.number, words, rules)
 
     def _users_block(self, line: Line, words: list[str], text: str) -> Line:
@@ -218,7 +217,7 @@ class WordCheck:
         """
         before = len(self.problems)
         self._judge(line, words, text)
-        rules = self._fitting(words, text)
+        rules = self._rules.of(words, text)
         whole = len(rules) == len(words)
         if line.skipped or len(self.problems) > before or any(rule is not None and rule.compared for rule in rules):
             del self.problems[before:]
@@ -237,9 +236,7 @@ class WordCheck:
         self._angles |= {word.name: word.value for word in line.words if word.name in _ROTARY}
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
-        still = any(rule.pattern.fullmatch(text_of(words)) for rule in self._known_blocks)
-        still |= any(rule.alone and any_of(rule.pattern, words) for rule in self.list.words)
-        if not still and any(word.name in _LINEAR for word in line.words):
+        if not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
             self._moved(line.number, self._code)
 
     # the frame of the program
@@ -295,71 +292,12 @@ class WordCheck:
 
     # the words of a block
 
-    def _fitting(self, words: list[str], text: str) -> list[WordRule | None]:
-        """Rule of every word, or of the whole block; None for a word that is not on the list, or not beside these."""
-        known = self._fitted.get(text)
-        if known is None:
-            known = self._fitted[text] = self._found(words, text)
-        return known
-
-    def _found(self, words: list[str], text: str) -> list[WordRule | None]:
-        whole = next((rule for rule in self._known_blocks if rule.pattern.fullmatch(text)), None)
-        if whole is not None:
-            return [whole]
-        rules: list[WordRule | None] = []
-        for k, word in enumerate(words):
-            others = [*words[:k], *words[k + 1 :]]
-            fitting = [rule for rule in self.list.words if rule.pattern.fullmatch(word)]
-            if fitting and fitting[0].never:
-                fitting = []
-            beside = [rule for rule in fitting if rule.needs is not None and any_of(rule.needs, others)]
-            plain = [rule for rule in fitting if rule.needs is None]
-            rules.append(next(iter(beside + plain), None))
-        return rules
-
-    def _rules(self, number: int, words: list[str], text: str) -> list[WordRule | None]:
-        """Rule of every word; complains of words that are not on the list."""
-        rules = self._fitting(words, text)
-        if len(rules) != len(words):
-            return rules
-        for word, rule in zip(words, rules, strict=True):
-            if rule is not None:
-                continue
-            fitting = [rule for rule in self.list.words if rule.pattern.fullmatch(word)]
-            if fitting and not fitting[0].never:
-                self._wrong(NOT_LISTED, number, f"{word} stands beside nothing that it belongs to")
-            else:
-                self._wrong(NOT_LISTED, number, f"{word} is not on the list of words for this control")
-        return rules
-
-    def _places(self, line: Line, words: list[str], rules: list[WordRule | None], before: str) -> None:
-        """Complain of words that are not in their place."""
-        number = line.number
-        for spelt in filter(self.lexer.without_point, line.words):
-            text = f"{spelt.text} without a decimal point: the control may count it in its least increment"
-            self._wrong(NOT_LISTED, number, text)
-        names = [word.name for word in line.words if word.name not in "GM"]
-        for name in sorted({name for name in names if names.count(name) > 1}):
-            self._wrong(NOT_LISTED, number, f"{name} stands twice in one block")
-        if sum(word.name == "M" for word in line.words) > 1:
-            self._wrong(NOT_LISTED, number, "two M words in one block")
-        if sum(word in _MOTION for word in words) > 1:
-            self._wrong(NOT_LISTED, number, "two motions in one block")
-        states = [rule.state for rule in rules if rule is not None and rule.state]
-        if len(set(states)) < len(states):
-            self._wrong(NOT_LISTED, number, "two words of one group in one block")
+    def _places(self, number: int, words: list[str], rules: list[WordRule | None], before: str) -> None:
+        """Complain of words that are not in their place in the program."""
         for k, rule in enumerate(rules):
             if rule is None:
                 continue
-            others = [*words[:k], *words[k + 1 :]]
             word = words[k] if len(rules) == len(words) else text_of(words)
-            if rule.must is not None and not any_of(rule.must, others):
-                self._wrong(NOT_LISTED, number, f"{word} without {shown(rule.must)}")
-            if rule.alone:
-                own = [bool(theirs and theirs.needs and theirs.needs.fullmatch(word)) for theirs in rules]
-                for other, belongs in zip(words, own, strict=True):
-                    if other != word and (not belongs or sum(own) > 1):
-                        self._wrong(NOT_LISTED, number, f"{other} in the block of {word}")
             if rule.after is not None:
                 if not any(rule.after.fullmatch(said_before) for said_before in self._said):
                     self._wrong(NOT_LISTED, number, f"{word} without {shown(rule.after)} before it")
@@ -368,10 +306,6 @@ class WordCheck:
                 self._wrong(NOT_LISTED, number, f"{word} does not follow what it belongs to")
             if rule.cycle:
                 self._by_tool = None
-            if rule.share is not None:
-                match = rule.pattern.fullmatch(word)
-                if match and float(match[1]) > rule.share * self.tolerance * (1 + 1e-9) + 1e-5:
-                    self._wrong(NOT_LISTED, number, f"{word} is more than {rule.share:g} of the tolerance")
             if rule.then is not None:
                 self._then = (rule, number)
             if rule.zero and (not self._angles or any(self._angles.values())):
