@@ -128,41 +128,13 @@ def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> No
 def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
     from cornersmooth.nc import fit_settings
-    from cornersmooth.settings import TIMED_POSES, TIMED_POSES_VERBOSE, TIMED_STRETCHES, TIMED_STRETCHES_VERBOSE
 
     folder, output = given["directory"], given["output"]
-    quiet, verbose = given["quiet"], given["verbose"]
-    if quiet and verbose:
-        raise click.UsageError("-q and -v exclude each other")
-    if given["no_verify"] and given["require_verify"]:
-        raise click.UsageError("--no-verify and --require-verify exclude each other")
-    if folder and output:
-        raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
+    _check_usage(inputs, given)
     files = find_inputs(inputs, given["glob"]) if folder else [Input(path, _stem(path)) for path in inputs]
-    if given["glob"] and not folder:
-        raise click.UsageError("--glob is for folders, which need -d FOLDER")
-    if given["summary"]:
-        if not folder:
-            raise click.UsageError("--summary is for batches, which need -d FOLDER; --report tells of a single file")
-        check_summary(given["summary"])
-        check_path(given["summary"], [found.path for found in files], force=True)
-    if len(inputs) > 1 and not folder:
-        raise click.UsageError("several inputs need -d FOLDER; -o goes with a single input")
-    if len(inputs) > 1 and STANDARD in inputs:
-        raise click.UsageError("standard input goes with no other input")
-    if given["scheduler"] and (not folder or given["plot"] or given["jobs"] != 1):
-        raise click.UsageError("--scheduler is for batches, which need -d FOLDER and take no --plot and no -j")
-    reports = given["reports"]
-    if given["plot"]:
-        outputs.picture_form(given["plot"])
-        if len(files) > 1:
-            raise click.UsageError("--plot is for a single input; --report out/{stem}.html goes with several")
-    if len(files) > 1 and any("{stem}" not in path for path in reports):
-        raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
+    _check_side_outputs(files, given)
     settings, form, frame = smoothing.settings_of(given), _form(given), _frame(given)
     fit_settings(settings, form, "mm")  # refuses wrong ones before any file is touched
-    if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
-        raise click.UsageError("--feed must be a positive number of mm/min")
     jobs = []
     for found in files:
         target = os.path.join(folder, found.stem + form.table.layout.suffix) if folder else output or STANDARD
@@ -170,7 +142,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
             Job(
                 source=found.path,
                 target=target,
-                reports=tuple(path.replace("{stem}", found.stem) for path in reports),
+                reports=tuple(path.replace("{stem}", found.stem) for path in given["reports"]),
                 reading=reading.reading_of(given),
                 settings=settings,
                 form=form,
@@ -186,25 +158,59 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 plot=given["plot"] or "",
                 tool=given["tool"],
                 beginning=not folder and not output and _to_terminal(),
-                plan=(0, 0)
-                if quiet or folder
-                else (TIMED_POSES_VERBOSE, TIMED_STRETCHES_VERBOSE)
-                if verbose
-                else (TIMED_POSES, TIMED_STRETCHES),
+                plan=_plan_sizes(given),
             )
         )
-    by_target: dict[str, str] = {}
-    for job in jobs:
-        for path in (job.target, *job.reports):
-            if path == STANDARD:
-                continue
-            if path in by_target:
-                raise click.UsageError(f"{by_target[path]} and {job.source} would both be written to {path}")
-            by_target[path] = job.source
+    _check_targets(jobs)
     _check_against_inputs(jobs)
     if folder:
         make_folder(folder)
     return jobs
+
+
+def _plan_sizes(given: dict[str, Any]) -> tuple[int, int]:
+    """Poses up to which the whole path is planned for the verdict, and else how many stretches of it."""
+    from cornersmooth.settings import TIMED_POSES, TIMED_POSES_VERBOSE, TIMED_STRETCHES, TIMED_STRETCHES_VERBOSE
+
+    if given["quiet"] or given["directory"]:
+        return 0, 0
+    return (TIMED_POSES_VERBOSE, TIMED_STRETCHES_VERBOSE) if given["verbose"] else (TIMED_POSES, TIMED_STRETCHES)
+
+
+def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:
+    """Refuse options that do not go together, or not with so many inputs."""
+    folder = given["directory"]
+    if given["quiet"] and given["verbose"]:
+        raise click.UsageError("-q and -v exclude each other")
+    if given["no_verify"] and given["require_verify"]:
+        raise click.UsageError("--no-verify and --require-verify exclude each other")
+    if folder and given["output"]:
+        raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
+    if given["glob"] and not folder:
+        raise click.UsageError("--glob is for folders, which need -d FOLDER")
+    if given["summary"] and not folder:
+        raise click.UsageError("--summary is for batches, which need -d FOLDER; --report tells of a single file")
+    if len(inputs) > 1 and not folder:
+        raise click.UsageError("several inputs need -d FOLDER; -o goes with a single input")
+    if len(inputs) > 1 and STANDARD in inputs:
+        raise click.UsageError("standard input goes with no other input")
+    if given["scheduler"] and (not folder or given["plot"] or given["jobs"] != 1):
+        raise click.UsageError("--scheduler is for batches, which need -d FOLDER and take no --plot and no -j")
+    if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
+        raise click.UsageError("--feed must be a positive number of mm/min")
+
+
+def _check_side_outputs(files: list[Input], given: dict[str, Any]) -> None:
+    """Refuse a summary, a picture or reports that cannot be written for these files."""
+    if given["summary"]:
+        check_summary(given["summary"])
+        check_path(given["summary"], [found.path for found in files], force=True)
+    if given["plot"]:
+        outputs.picture_form(given["plot"])
+        if len(files) > 1:
+            raise click.UsageError("--plot is for a single input; --report out/{stem}.html goes with several")
+    if len(files) > 1 and any("{stem}" not in path for path in given["reports"]):
+        raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
 
 
 def _form(given: dict[str, Any]) -> Form:
@@ -245,6 +251,18 @@ def _frame(given: dict[str, Any]) -> Frame:
         retract=given["retract"] or 0.0,
         work_offset="" if given["work_offset"] == "none" else given["work_offset"],
     )
+
+
+def _check_targets(jobs: list[Job]) -> None:
+    """No two jobs may write to one file."""
+    by_target: dict[str, str] = {}
+    for job in jobs:
+        for path in (job.target, *job.reports):
+            if path == STANDARD:
+                continue
+            if path in by_target:
+                raise click.UsageError(f"{by_target[path]} and {job.source} would both be written to {path}")
+            by_target[path] = job.source
 
 
 def _check_against_inputs(jobs: list[Job]) -> None:
