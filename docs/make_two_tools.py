@@ -86,6 +86,7 @@ _REASONS = (
     ),
     (r"G43\.[45] H\d+|G234 H\d+|TRAORI|FUNCTION TCPM .*", "tool tip control on"),
     (r"G43 H\d+", "length of the tool"),
+    (r"G43 H\d+ .*", "down to it, with the length of the tool: alone it may move the axis (parameter TOS)"),
     (r"ORI.*", "what the words of the tool axis mean, and how it turns between blocks"),
     (
         r"G49|TRAFOOF|FUNCTION RESET TCPM",
@@ -209,6 +210,8 @@ def rows(form: Form, lines: list[str]) -> Iterator[str]:
     feeding = high = False
     for line in lines:
         why = reason(line, form)
+        if re.match(r"G43 H\d+ G0", line):
+            high = False
         motion = why.startswith(("motion", "radius"))
         if motion and not re.search(r"\bG0\b|FMAX", line):
             if not feeding:

@@ -55,6 +55,8 @@ def roles(entry: dict[str, Any], kind: str) -> str:
         said.append("only behind a retract")
     if entry.get("retract"):
         said.append("before the first motion, before an approach or at the end")
+    if entry.get("late"):
+        said.append("behind a retract as late as in the block that first moves Z")
     if entry.get("never"):
         said.append("refused")
     return "; ".join(said) or ("anywhere" if kind == "word" else "")

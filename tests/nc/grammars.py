@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from nc.reading import Reader
 from nc.rotations import machine_letters
@@ -42,7 +43,8 @@ TIP_DIGITS = {"siemens": 6, "linuxcnc": 6, "generic": 6}
 ANGLE_DIGITS = {"siemens": 6, "linuxcnc": 6, "generic": 6}
 
 #: how tip control or the length of the tool is switched on and off
-LENGTH = {"on": r"G43 H\d+", "off": "G49"}
+LENGTH = {"on": r"G43 H\d+", "off": "G49", "with_z": True}
+FUNCTIONS = LENGTH | {"with_z": False}  # further functions follow, or it never moves an axis
 VECTORS = {"on": r"G43\.5 H\d+", "off": "G49"}
 ANGLES = {"on": r"G43\.4 H\d+", "off": "G49"}
 HAAS = {"on": r"G234 H\d+", "off": "G49"}
@@ -63,11 +65,12 @@ def _rotary(machine: str, tcp: bool) -> str:
 
 
 def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
-    switch = LENGTH
+    alone = control == "linuxcnc" or (control, form) == ("mitsubishi", "g6.2")
+    switch: dict[str, Any] = FUNCTIONS if alone else LENGTH
     if control == "generic":
         switch = {"on": "", "off": ""}
     elif tcp and machine:
-        switch = {"haas": HAAS, "linuxcnc": LENGTH}.get(control, ANGLES)
+        switch = {"haas": HAAS, "linuxcnc": FUNCTIONS}.get(control, ANGLES)
     elif tcp and form == "g1":
         switch = VECTORS
     codes = ISO + (SECONDS if control in ("haas", "linuxcnc") else MILLISECONDS)
@@ -78,7 +81,8 @@ def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
         codes += r"|S\d+\.\d{1,3} M[34]|M19 R0|G64 P(?!0\.0* )\d+\.\d+ Q0"
     else:
         codes += "|G5 P10000|G5 P0" if (control, form) == ("mitsubishi", "g6.2") else ""
-    codes = "|".join(part for part in (codes, switch["on"], switch["off"]) if part)
+    on = "" if switch.get("with_z") else switch["on"]
+    codes = "|".join(part for part in (codes, on, switch["off"]) if part)
     if machine:
         words, decimals, turn = machine_letters(machine), (ANGLE_DIGITS.get(control, 4),) * 2, _rotary(machine, tcp)
     elif form == "g1":

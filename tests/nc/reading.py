@@ -144,6 +144,7 @@ class Reader:
     on: str = ""
     off: str = ""
     tool: str = r"T\d+ M6"
+    with_z: bool = False  #: what switches on stands in the first block that moves Z
     modes: tuple[str, ...] = ("G94", "G95", "G93")
     home: str = ""
     retracts_on: bool = False  #: the retract comes before tip control or the length is switched off
@@ -175,6 +176,12 @@ class Reader:
         self.limit, self.plane, self.mode, self.tip_control = limit, 17, self.modes[0], not self.on
         self.compensation, self.raised, self.over, self.wanted = False, False, None, ""
         for number, line in self.blocks(text):
+            if self.with_z and (match := re.fullmatch(f"({self.on}) (.*)", line)):
+                if self.tip_control or not self.raised or not self.straight.fullmatch(match[2]):
+                    raise TextError(f"{number}: {match[1]} beside what does not come down from a retract")
+                self.follow(number, match[1])
+                reading.codes.append(match[1])
+                line = match[2]
             if self.wanted and not re.fullmatch(self.wanted, line):
                 raise TextError(f"{number}: expected {self.wanted}: {line!r}")
             if self.wanted:
@@ -190,7 +197,7 @@ class Reader:
                     raise TextError(f"{number}: rotary axes turn below the height of the retract")
                 reading.codes.append(line)
             elif match := self.above.fullmatch(line):
-                if not self.raised or not self.tip_control or self.over is not None:
+                if not self.raised or self.tip_control is self.with_z or self.over is not None:
                     raise TextError(f"{number}: a rapid without Z that comes from no retract")
                 self.over = match.groups()
                 reading.codes.append(line)

@@ -92,7 +92,7 @@ def test_forms_with_a_point_on_the_axis_come_down_along_the_tool() -> None:
     """They have no words for a place over the position: all axes go at once to a place above it."""
     case = Case("fanuc", "g6.2")
     program, lines, tolerance = text_of(case, "MM", Frame())
-    first = next(k for k, line in enumerate(lines) if line.startswith("G0 X"))
+    first = next(k for k, line in enumerate(lines) if " G0 X" in line)
     above, at = (np.array(re.findall(r"[XYZUVW]([-\d.]+)", line), float) for line in lines[first : first + 2])
     np.testing.assert_allclose(above - at, 20 * np.tile([0.48, 0.36, 0.8], 2), atol=2e-4)
     assert problems(case, program, lines, tolerance) == ()

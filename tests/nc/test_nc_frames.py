@@ -42,7 +42,7 @@ def test_a_tool_is_changed_before_tip_control_is_on(case: Case) -> None:
     assert first < second
     if form.mode.on:
         starts = {form.mode.on[0].format(offset=tool) for tool in (3, 4)}
-        on = [number for number, line in enumerate(lines) if line in starts]
+        on = [number for number, line in enumerate(lines) if line in starts or line.partition(" G0 ")[0] in starts]
         off = [number for number, line in enumerate(lines) if line == form.mode.off[-1] and number > first]
         assert len(on) == len(off) == 2
         assert first < on[0] < off[0] < second < on[1] < off[1] < len(lines) - 1

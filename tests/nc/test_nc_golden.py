@@ -76,7 +76,7 @@ def spoilt(lines: list[str], case: Case, tip: int) -> Iterator[tuple[str, list[s
     for what, blocks in (("never switched on", mode.on[:1]), ("never switched off", mode.off[-1:])):
         for block in blocks:
             own = re.compile(r"(\d+ )?" + re.escape(block).replace(r"\{offset\}", r"\d+"))
-            yield what, [line for line in lines if not own.fullmatch(line)]
+            yield what, [own.sub("", line, count=1).strip() for line in lines if not own.fullmatch(line)]
     if not case.tcp:
         yield "no F under G93", [re.sub(r" F\S+$", "", line) for line in lines]
         yield "G93 to the end", [line for line in lines if line != "G94"]

@@ -20,6 +20,7 @@ SOLIDWORKS = "UNIT/MM\nTRNTYP/WORLD,0,0,0\nCSYS/1.,0,0,0,0,1.,0,0,0,0,1.,0\n"
 
 def moves(cl: str, form: str = "g1") -> tuple[list[str], dict[str, int]]:
     lines, written = text_of_cl(cl, form)
+    lines = [re.sub(r"^G43 H\d+ ", "", line) for line in lines]
     return [line for line in lines if line[:3] in ("G0 ", "G1 ", "G4 ")], codes(written)
 
 

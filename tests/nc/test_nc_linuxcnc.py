@@ -50,7 +50,7 @@ def positions(text: str, folder: Path) -> list[tuple[str, Floats]]:
     """Kind and X Y Z A B C of every move, in full precision."""
     file = folder / "program.ngc"
     # without the running controller its modules have no tool table; `accepted` lets the tools be loaded
-    file.write_text(re.sub(r"^(T\d+ M6|G43 H\d+)$", "", text, flags=re.MULTILINE))
+    file.write_text(re.sub(r"^(T\d+ M6|G43 H\d+( (?=G))?)", "", text, flags=re.MULTILINE))
     result = subprocess.run([PYTHON, CANON, file], capture_output=True, text=True, check=False, timeout=120)
     assert result.returncode == 0, result.stderr
     rows = [line.split() for line in result.stdout.splitlines() if line.startswith(("feed ", "rapid "))]

@@ -107,7 +107,7 @@ def test_the_motion_is_the_same(case: Case) -> None:
         assert len(modal) < 0.95 * len(full)
 
 
-_MOVE = re.compile(r"(?:\d+ )?((?:G[01]|L|)) ?((?:[XYZABCIJK]3?=?[-+]?[\d.]+ ?)+)(.*)")
+_MOVE = re.compile(r"(?:\d+ |G43 H\d+ )?((?:G[01]|L|)) ?((?:[XYZABCIJK]3?=?[-+]?[\d.]+ ?)+)(.*)")
 _WORD = re.compile(r"([XYZABCIJK]3?=?)([-+]?[\d.]+)")
 
 

@@ -182,7 +182,7 @@ def positions(case: Case) -> Iterator[tuple[NDArray[np.float64], NDArray[np.floa
             inside = True
         elif re.fullmatch(off, line):
             inside = False
-        elif inside and (move := re.fullmatch(r"(?:\d+ )?(?:G[01]|L) (X\S+) (Y\S+) (Z\S+)(?: F.*)?", line)):
+        elif inside and (move := re.fullmatch(r"(?:\d+ |G43 H\d+ )?(?:G[01]|L) (X\S+) (Y\S+) (Z\S+)(?: F.*)?", line)):
             assert turned is not None
             place = np.array([float(word[1:]) for word in move.groups()])
             yield turned.apply(place), turned.apply([0.0, 0.0, 1.0])
@@ -610,7 +610,7 @@ def _planes_of(lines: list[str], old: str, new: Callable[[np.ndarray, np.ndarray
             line = re.sub(old, new(turned.as_matrix(), zero), line)
         elif re.fullmatch(off, line):
             turned = None
-        elif turned is not None and (move := re.match(r"G[01] X(\S+) Y(\S+)( Z(\S+))?", line)):
+        elif turned is not None and (move := re.search(r"G[01] X(\S+) Y(\S+)( Z(\S+))?", line)):
             x, y, z = np.array([move[1], move[2], move[4] or 0], float) - turned.inv().apply(zero)
             line = line.replace(move[0], f"{move[0][:2]} X{x:.9f} Y{y:.9f}" + (f" Z{z:.9f}" if move[4] else ""))
         found.append(line)

@@ -94,14 +94,14 @@ def test_the_tool_goes_up_before_an_axis_turns_back(control: str, name: str, for
     assert starts
     for start in starts:
         behind = bare[start + len(up) :]
-        down = next(k for k, line in enumerate(behind) if re.match(r"(G0|L) X\S+ Y\S+ Z", line))
-        assert not any(re.match(r"G1|L .*[^X]$", line) and "FMAX" not in line for line in behind[:down])
+        down = next(k for k, line in enumerate(behind) if re.match(r"(G43 H\d+ )?(G0|L) X\S+ Y\S+ Z", line))
+        assert not any(re.match(r"(G43 H\d+ )?G1|L .*[^X]$", line) and "FMAX" not in line for line in behind[:down])
         # the axes turn before the tool comes down, and it comes down where it turned
         over, ends = (dict(WORD.findall(behind[k])) for k in (down - 1, down))
-        assert {**over, "Z": ends["Z"]} == ends
+        assert {**over, "Z": ends["Z"]} | {k: ends[k] for k in "H" if k in ends} == ends
     assert problems(program, lines, control, machine, tcp=tcp) == ()
     first = starts[0]
-    stop = next(k for k in range(first, len(bare)) if re.match(r"(G0|L) X\S+ Y\S+ Z", bare[k]))
+    stop = next(k for k in range(first, len(bare)) if re.match(r"(G43 H\d+ )?(G0|L) X\S+ Y\S+ Z", bare[k]))
     wrong = problems(program, [*lines[:first], *lines[stop:]], control, machine, tcp=tcp)
     assert "CS537" in {problem.code for problem in wrong}
 

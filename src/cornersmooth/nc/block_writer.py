@@ -158,9 +158,9 @@ class BlockWriter:
         """Row of ticks so many mm back along the tool axis."""
         return lifted(self.form, self.program.units, self.program.mm_per_unit, ticks, distance)
 
-    def rapid(self, ticks: Ints) -> str:
-        """Rapid block of a row of ticks."""
-        return self._rapid(ticks, slice(None))
+    def rapid(self, ticks: Ints, words: str = "") -> str:
+        """Rapid block of a row of ticks, behind words of other kinds."""
+        return f"{words}{self._blank}" * bool(words) + self._rapid(ticks, slice(None))
 
     def _rapid(self, ticks: Ints, chosen: slice | Bools) -> str:
         """Rapid block of some words of a row."""
@@ -246,12 +246,12 @@ class BlockWriter:
             numbers[:, : 6 if form.orientation == "point" else 3] /= unit
         return numbers
 
-    def text(self, run: Run, dwell: int = 0) -> bytes:
-        """Text of a run that is not empty; `dwell` in milliseconds."""
+    def text(self, run: Run, dwell: int = 0, words: str = "") -> bytes:
+        """Text of a run that is not empty; `dwell` in milliseconds, `words` stand in its first block."""
         run = self._curves.prepare(run)
         if self._share is not None:
             self._share.take(run)
-        prefix, prefix_id, extra = self._prefixes(run)
+        prefix, prefix_id, extra = self._prefixes(run, words)
         left_out = self._left_out(run, prefix, prefix_id) if self._leaves_out else None
         suffix, suffix_id = self._suffixes(run, dwell)
         self.blocks += len(run) + extra
@@ -283,7 +283,7 @@ class BlockWriter:
         ]
         return interleave(which, texts)
 
-    def _prefixes(self, run: Run) -> tuple[list[bytes], Ints, int]:
+    def _prefixes(self, run: Run, words: str) -> tuple[list[bytes], Ints, int]:
         """Table of what stands before the numbers, an entry for each row, and the blocks hidden in the prefixes."""
         motion = self.form.mode.motion
         starts = (motion.line, motion.rapid, motion.clockwise, motion.counterclockwise)
@@ -309,6 +309,8 @@ class BlockWriter:
                 before[int(rows[place])] = before.get(int(rows[place]), b"") + block
             if len(planes):
                 self.statements.plane = int(planes[-1])
+        if words:
+            before[0] = before.get(0, b"") + f"{words}{self._blank}".encode()
         extra = sum(blocks.count(b"\n") for blocks in before.values())
         if (run.curve > 0).any():
             extra += self._curves.add_prefixes(run, table, chosen)

@@ -108,6 +108,9 @@ class Motion:
         ``axis`` (the tool vector as a whole, each rotary word).
     fastest : float, 1/min
         Largest F of inverse time (G93) that the control takes; 0 for none. Such an F has three decimals.
+    with_z : str
+        Block, the last of those that switch the length of the tool on, whose words stand in the first block that moves
+        Z instead, behind the approach: alone it may move the axis. Empty where it never does.
     """
 
     rapid: str = "G0"
@@ -130,6 +133,7 @@ class Motion:
     inch_feed: int = 1
     modal: tuple[str, ...] = ()
     fastest: float = 9999.999
+    with_z: str = ""
 
 
 @dataclass(frozen=True)

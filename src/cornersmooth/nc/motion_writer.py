@@ -433,14 +433,14 @@ class MotionWriter:
             self._warnings.of_turns(run, self.writer.form, self.writer.angles(run.ticks))
         self._position = self._last = run.ticks[-1]
         self._last_writer = self.writer
-        yield self.writer.text(run, dwell)
+        yield self.writer.text(run, dwell, self.operation.take_with_z())
 
     def _approaches(self, first: Ints, above: float) -> list[str]:
         """Blocks that bring the tool over its first position, and to where it comes down along its axis."""
         if not (above and self.operation.can_rewind()):
             return self.writer.approach(first)
         start = self.writer.lifted(first, above)
-        return [*self.writer.approach(start), self.writer.rapid(start)]
+        return [*self.writer.approach(start), self.writer.rapid(start, self.operation.take_with_z())]
 
     def _withdraw(self) -> list[str]:
         """Blocks that bring the tool back along its axis, before a retract."""

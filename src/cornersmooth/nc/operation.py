@@ -54,6 +54,7 @@ class Operation:
     units: Units = "mm"  #: of the text
     plane: Mapping[str, str] = field(default_factory=dict)  #: numbers of the tilted plane at hand
     mode: Mode = field(init=False)  #: what tool tip control is for the tool at hand
+    _with_z: str = ""  # words that wait for the first block that moves Z
     _clamped: bool = True  # nobody knows what was before
     _tip_control: bool = False
     _functions: bool = False
@@ -238,7 +239,15 @@ class Operation:
         self._tip_control = self._functions = True
         rotary = ",".join(self.form.other_words if self.form.rotary else ())
         on = [block.format(offset=self.offset, rotary=rotary, **self.plane) for block in self.mode.on]
-        return [*self._extras("on", outside=True), *on, *self.mode.within_on, *self._extras("on", outside=False)]
+        within = [*self.mode.within_on, *self._extras("on", outside=False)]
+        if self.mode.on[-1:] == (self.mode.motion.with_z,) and not within:  # functions within want it before them
+            self._with_z = on.pop()
+        return [*self._extras("on", outside=True), *on, *within]
+
+    def take_with_z(self) -> str:
+        """Words that stand in the first block that moves Z, once; empty where there are none."""
+        words, self._with_z = self._with_z, ""
+        return words
 
     def _functions_off(self) -> list[str]:
         if not self._functions:
@@ -250,7 +259,7 @@ class Operation:
         self.begun = False
         if not self._tip_control:
             return []
-        self._tip_control = False
+        self._tip_control, self._with_z = False, ""
         return [*self._functions_off(), *self.mode.off, *self._extras("off", outside=True)]
 
     def _extras(self, side: str, *, outside: bool) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any, Final, NoReturn
@@ -118,7 +119,9 @@ class Reader:
 
     def rows(self, table: Table) -> None:
         """Take a run of motion blocks."""
-        if len(table) + len(self.waiting) > FEW_ROWS and (table.closed or self._code in MOTION_CODES[:4]):
+        # the first block that moves Z behind a retract is looked at with what it leads to
+        leads = self.way_back.open and bool(self.waiting) and not isinstance(self.waiting[-1], Table)
+        if not leads and len(table) + len(self.waiting) > FEW_ROWS and (table.closed or self._code in MOTION_CODES[:4]):
             self.flush()
         self.waiting.append(table)
         self.blocks += len(table)
@@ -145,7 +148,7 @@ class Reader:
         if not self.waiting:
             return
         factor = MM_PER_UNIT[self.units]
-        for table in joined_tables(self.waiting, FEW_ROWS):
+        for table in joined_tables(self.waiting, sys.maxsize if self.way_back.open else FEW_ROWS):
             before = self.modal
             if self.memory.get(INCREMENTAL):
                 hint = "write G90 behind a position of the machine"
@@ -359,11 +362,12 @@ class Reader:
     def _event(line: Line, letter: str, value: float, text: str) -> tuple[int, str, float, str]:
         return line.number, letter, value, text
 
-    def move(self, line: Line, row: dict[str, float]) -> None:
-        """Execute a single motion block; one without words of position only changes what holds."""
+    def move(self, line: Line, row: dict[str, float], *, later: bool = False) -> None:
+        """Execute a single motion block, `later` with those behind it; one without position only changes what holds."""
         if set(row) & self.dialect.lexer.places or set(row) & set("XYZIJKUVW"):
             self.waiting.append((line.number, row))
-            self.flush()
+            if not later:
+                self.flush()
         elif row:
             self.modal = self.modal.but(code=row.get("G", self.modal.code), feed=row.get("F", self.modal.feed))
 

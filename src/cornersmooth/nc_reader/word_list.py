@@ -25,7 +25,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     rotary axes must have been sent to zero before: where a parameter says so, the part program turns with the angles of
     that moment. ``turns``: the control turns them, and nobody says where to. ``never``: the control has no such word.
     ``tool``: in a text with a ``cycle`` of the control, or a tilted plane, it may differ from tool to tool. ``high``:
-    only behind a retract; a control with such a word wants the tool high at the end, too.
+    only behind a retract; a control with such a word wants the tool high at the end, too. ``late``: behind a retract it
+    may come as late as in the block that first moves Z.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.
@@ -71,6 +72,7 @@ class WordRule:
     tool: bool = False
     cycle: bool = False
     turns: bool = False
+    late: bool = False
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.word_list import WordList, WordRule, word_list
 from cornersmooth.nc_reader.word_rules import WordRules
 from cornersmooth.nc_reader.words import Line, Table
+from cornersmooth.verify.curve_weights import odd_weights
 
 #: code of words that are not on the list or not in their place, and of what is not established
 NOT_LISTED: Final = "CS571"
@@ -30,16 +31,9 @@ _LINEAR: Final = frozenset("XYZ")
 #: words of rotary axes
 _ROTARY: Final = frozenset("ABC")
 
-#: how far a weight may be from one that is asked for: half of the last decimal that controls keep
-_WEIGHT_ROOM: Final = 5e-4
 
 #: name of the blocks around the motion, among what is left to the user
 FRAME: Final = "program frame"
-
-_WEIGHTS: Final = frozenset(("PW", "R"))
-
-#: weights complained of in one run of blocks
-_MOST_WEIGHTS: Final = 100
 
 _CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
 
@@ -96,6 +90,10 @@ class WordCheck:
         self._then: tuple[WordRule, int] | None = None
         self._retract = 0
         self._high = False
+        #: whether Z stands where a retract has left it, and states that may be said as late as with its next word
+        self._above = False
+        self._late = {rule.state for rule in self.list.words if rule.late}
+        self._deferred: set[str] = set()
         #: states that an approach establishes again
         self._approach = {rule.state for rule in self.list.words if rule.off} | {"work offset", "cutting edge"}
         #: where the rotary axes have been sent, as far as that is said
@@ -145,31 +143,26 @@ class WordCheck:
         self._next_block("", int(table.line[0]))
         codes = table.column("G")
         known = np.flatnonzero(~np.isnan(codes))
-        self._check_weights(table, codes)
+        if self._weights is not None:
+            for line, weight in odd_weights(table, self._weights):
+                self._wrong(NOT_LISTED, line, f"a weight of {weight:g}, which no curve of this text has")
         linear = ~np.all([np.isnan(table.column(name)) for name in sorted(_LINEAR)], axis=0)
         self._positions.leave(table.columns.keys())
-        if (self._changed or self._high or self._retract or self._arc) and linear.any():
+        if (self._changed or self._high or self._retract or self._arc or self._above) and linear.any():
             row = int(np.argmax(linear))
-            given = known[known <= row]
-            self._moved(int(table.line[row]), float(codes[given[-1]]) if len(given) else self._code)
+            down = ~np.isnan(table.column("Z"))
+            rows = [row, row + int(np.argmax(down[row:]))] if self._above and not down[row] and down.any() else [row]
+            for row in rows:
+                given = known[known <= row]
+                self._moved(
+                    int(table.line[row]), float(codes[given[-1]]) if len(given) else self._code, bool(down[row])
+                )
         if len(known):
             self._code = float(codes[known[-1]])
         for name in _ROTARY & table.columns.keys():
             values = table.columns[name][~np.isnan(table.columns[name])]
             if len(values):
                 self._angles[name] = float(values[-1])
-
-    def _check_weights(self, table: Table, codes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
-        """Complain of the first curve with a weight that none has; R of an arc is its radius."""
-        if self._weights is None:
-            return
-        for name in _WEIGHTS & table.columns.keys():
-            column = table.columns[name]
-            rows = np.flatnonzero(~np.isnan(column) & ~np.isin(codes, (2.0, 3.0)))
-            off = np.abs(column[rows, None] - self._weights).min(axis=1) > _WEIGHT_ROOM
-            for row in rows[off][:_MOST_WEIGHTS].tolist():
-                text = f"a weight of {column[row]:g}, which no curve of this text has"
-                self._wrong(NOT_LISTED, int(table.line[row]), text)
 
     def _block(self, line: Line) -> Line:
         """Look at a line on its own; of one that is taken on trust only what is understood goes on to the reader."""
@@ -237,7 +230,7 @@ class WordCheck:
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
         if not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
-            self._moved(line.number, self._code)
+            self._moved(line.number, self._code, any(word.name == "Z" for word in line.words))
 
     # the frame of the program
 
@@ -315,7 +308,7 @@ class WordCheck:
             if rule.turns:
                 self._angles = {}
             if rule.retract:
-                self._retract, self._high = number, True
+                self._retract, self._high, self._above = number, True, True
             if rule.after is not None or word.startswith("TOOL CALL "):
                 self._retract = 0
 
@@ -350,11 +343,16 @@ class WordCheck:
             if rule.before and self._first is not None and word != self._first.get(rule.state):
                 self._arc = (word, number)
 
-    def _moved(self, number: int, code: float) -> None:
-        """Look at what holds where the tool moves."""
-        self._changed = self._high = False
+    def _waiting(self) -> set[str]:
+        return {state for state in self._late & self._state.keys() if self._is_off(state, self._state[state][0])}
+
+    def _moved(self, number: int, code: float, down: bool) -> None:
+        """Look at what holds where the tool moves, Z among its axes or not."""
+        late = self._waiting() if self._above and code == 0.0 and not down else set()
+        self._above &= code == 0.0 and not down
+        self._changed, self._high = bool(late), False
         if self._first is None:
-            self._first = {state: word for state, (word, _) in self._state.items()}
+            self._first, self._deferred = {state: word for state, (word, _) in self._state.items()}, late
             for state, rules in self.list.heads().items():
                 spoken = {word for word in self._said if any(rule.pattern.fullmatch(word) for rule in rules)}
                 if not spoken and state not in self._left:
@@ -362,7 +360,10 @@ class WordCheck:
                     self._unframed(NOT_ESTABLISHED, number, f"{state}: {wanted} must be said before the first motion")
             self._retract, self._arc = 0, None
             return
-        if self._retract:
+        for state in self._deferred - late:
+            self._first[state] = self._state[state][0]
+        self._deferred &= late
+        if self._retract and not late:
             self._wrong(NOT_LISTED, self._retract, GONE_ON)
             self._retract = 0
         if self._arc is not None:
@@ -372,7 +373,7 @@ class WordCheck:
             self._arc = None
         following = {rule.state for rule in self.list.words if rule.follows}
         for state, (word, line) in self._state.items():
-            if state in following or word == self._first.get(state) or (state, line) in self._complained:
+            if state in following | late or word == self._first.get(state) or (state, line) in self._complained:
                 continue
             self._complained.add((state, line))
             before = self._first.get(state, "nothing")

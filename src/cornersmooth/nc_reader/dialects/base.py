@@ -50,8 +50,8 @@ class State(Protocol):
     def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
         """Say a word that stands beside the motion; a late one acts after the motion of its block."""
 
-    def move(self, line: Line, row: dict[str, float]) -> None:
-        """Execute a single motion block."""
+    def move(self, line: Line, row: dict[str, float], *, later: bool = False) -> None:
+        """Execute a single motion block, at once or with those behind it."""
 
     def change(self, line: Line, **modes: Any) -> None:
         """Change what holds from block to block."""

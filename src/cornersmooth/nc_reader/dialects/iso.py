@@ -160,6 +160,7 @@ class Iso(Dialect):
             state.memory.pop(INITIAL_HEIGHT, None)
             state.memory.pop(_RIGID, None)
         motion: dict[str, float] = {}
+        late = any(word.name == "M" and word.value in AFTER_MOTION for word in line.words)
         given = {letter: value for letter, value, *_ in line.words}
         if given.get("G") == 5.0:
             state.memory[HIGH_SPEED] = given.get("P", 0.0) >= 10000.0
@@ -186,7 +187,7 @@ class Iso(Dialect):
                 state.refuse(line, f"{text} is not understood", "see that the control is the one the text is for")
         if self.lexer.odd_vector(motion.keys(), motion.get("G")):
             state.refuse(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
-        state.move(line, motion)
+        state.move(line, motion, later=bool(codes & self.iso.tip_control.keys()) and not late)
 
     def _cycle(self, line: Line, codes: set[float], state: State) -> None:
         """A hole cycle, with G98: all that it takes stands in its block."""
