@@ -27,6 +27,9 @@ from cornersmooth.vectors import angle_between, norm
 #: angles below this are no motion of the axis, rad
 NO_TURN = 1e-9
 
+#: elements of a move: out of the corner behind, straight on, into the corner ahead
+_SLOTS = 3
+
 
 class Kind(IntEnum):
     """Geometry of an element."""
@@ -113,77 +116,23 @@ def build_path(
         A feed move has no usable feed.
     """
     moves, start = _moves(program, settings)
-    n = len(program)
-    entry = np.full(n, -1, np.int64)  # smoothed corner at a pose
-    if corners is not None:
-        rows = np.flatnonzero(corners.smoothed)
-        entry[corners.pose[rows]] = rows
-    leaving = np.where(program.kind[moves] == Move.LINEAR, entry[start], -1)
-    reaching = np.where(program.kind[moves] == Move.LINEAR, entry[moves], -1)
-    trims = np.zeros((4, len(moves)))  # tip out, tip in, axis out, axis in
-    if corners is not None:
-        out, into = leaving >= 0, reaching >= 0
-        trims[0, out], trims[1, into] = corners.trim_out[leaving[out]], corners.trim_in[reaching[into]]
-        trims[2, out], trims[3, into] = corners.axis_trim_out[leaving[out]], corners.axis_trim_in[reaching[into]]
-
-    tip_step = program.tip[moves] - program.tip[start]
-    chord = norm(tip_step)
-    arc = program.kind[moves] == Move.ARC
-    along = chord * np.maximum(1.0 - trims[0] - trims[1], 0.0)
-    ends = (
-        line_axes(program, settings.axis_length, start, moves, tip, axis)
-        for tip, axis in ((trims[0], trims[2]), (1.0 - trims[1], 1.0 - trims[3]))
-    )
-    turned = np.where(trims[2] + trims[3] < 1.0, angle_between(*ends), 0.0)
-    tangents = np.zeros((2, len(moves), 3))
-    tangents[:] = tip_step / np.maximum(chord, STANDSTILL)[:, None]
-    if arc.any():
-        along[arc], tangents[0, arc], tangents[1, arc] = arcs.shape(program, moves[arc])
-    piece = np.full(n, -1, np.int64)
-    if pieces is not None:
-        piece[pieces.move] = np.arange(len(pieces.move))
-    piece = piece[moves]
-    bent = piece >= 0
-    if pieces is not None and bent.any():
-        own = piece[bent]
-        along[bent], turned[bent] = pieces.length[own], pieces.angle[own]
-        tangents[:, bent] = bezier_halves.end_tangents(pieces.tip[own])
-
-    # three slots per move: out of the corner behind, straight on, into the corner ahead
-    m = 3 * len(moves)
-    half_length, half_turn = np.zeros((2, 0)), np.zeros((2, 0))
-    if corners is not None:
-        half_length, half_turn = bezier_halves.half_lengths(program, corners, settings.axis_length)
-    tip_length, axis_angle = np.zeros((len(moves), 3)), np.zeros((len(moves), 3))
-    tip_length[:, 1], axis_angle[:, 1] = along, turned
-    for slot, at, half in ((0, leaving, 1), (2, reaching, 0)):
-        has = at >= 0
-        tip_length[has, slot] = half_length[half, at[has]]
-        axis_angle[has, slot] = half_turn[half, at[has]]
-    lengths, angles = tip_length.reshape(m), axis_angle.reshape(m)
+    rests = _rests(program, corners, settings, moves, start, pieces)
+    lengths, angles = _lengths(program, corners, settings, rests)
+    m = len(lengths)
     present = (lengths > STANDSTILL) | (angles > NO_TURN)
     turning = lengths <= STANDSTILL
-
-    kind = np.tile(np.array([Kind.CURVE, Kind.LINE, Kind.CURVE], np.uint8), len(moves))
-    kind[1::3][arc] = Kind.ARC
-    kind[1::3][bent] = Kind.PIECE
-    corner = np.stack((leaving, piece, reaching), axis=1)
-    span = np.zeros((len(moves), 3, 2))
-    span[:, 0] = (0.5, 1.0)
-    span[:, 2] = (0.0, 0.5)
-    axis_span = span.copy()
-    span[:, 1] = np.stack((trims[0], 1.0 - trims[1]), axis=-1)
-    axis_span[:, 1] = np.stack((trims[2], 1.0 - trims[3]), axis=-1)
+    corner = np.stack((rests.leaving, rests.piece, rests.reaching), axis=1)
+    span, axis_span = _spans(rests.trims)
 
     rapid = (program.kind[moves] == Move.RAPID) | (program.kind[moves] == Move.HOLE)
-    speed = np.repeat(np.where(rapid, limits.rapid_limits[0], 0.0), 3)
-    cutting = np.repeat(~rapid, 3) & present & ~turning
-    owners = np.repeat(moves, 3)
+    speed = np.repeat(np.where(rapid, limits.rapid_limits[0], 0.0), _SLOTS)
+    cutting = np.repeat(~rapid, _SLOTS) & present & ~turning
+    owners = np.repeat(moves, _SLOTS)
     speed[cutting] = _feeds(program, owners[cutting], limits)
     speed[turning] = limits.angular_limits[0]
 
-    junction = np.full((len(moves), 3), np.inf)
-    junction[:, 0] = _junction_speeds(program, corners, moves, start, leaving, tangents, limits, stop_everywhere)
+    junction = np.full((len(moves), _SLOTS), np.inf)
+    junction[:, 0] = _junction_speeds(program, corners, moves, start, rests, limits, stop_everywhere)
     junction_before = junction.reshape(m)
 
     keep = np.flatnonzero(present)
@@ -197,22 +146,22 @@ def build_path(
         program=program,
         corners=corners,
         settings=settings,
-        kind=kind[keep],
+        kind=_kinds(program, moves, rests)[keep],
         turning=changes,
-        start=np.repeat(start, 3)[keep],
+        start=np.repeat(start, _SLOTS)[keep],
         move=owners[keep],
         corner=corner.reshape(m)[keep],
-        span=span.reshape(m, 2)[keep],
-        axis_span=axis_span.reshape(m, 2)[keep],
+        span=span[keep],
+        axis_span=axis_span[keep],
         length=np.where(turning, angles, lengths)[keep],
         speed=speed[keep],
-        rapid=np.repeat(rapid, 3)[keep],
+        rapid=np.repeat(rapid, _SLOTS)[keep],
         junction_speed=np.concatenate((slowest, [0.0])),
         run_pieces=pieces,
     )
     if runs is None or not len(runs):
         return path
-    feeds = np.zeros(n)
+    feeds = np.zeros(len(program))
     inside = moves[np.isin(moves, np.delete(runs.pose, np.cumsum(runs.count) - runs.count))]
     feeds[inside] = _feeds(program, inside, limits)
     return along_runs(path, runs, feeds, limits.angular_limits[0])
@@ -248,6 +197,113 @@ def _moves(program: Program, settings: Settings) -> tuple[Ints, Ints]:
     return moves, start[moves]
 
 
+@dataclass(frozen=True)
+class _Rests:
+    """What is left of k moves between the transitions at their ends.
+
+    Parameters
+    ----------
+    leaving, reaching : (k,) int64
+        Rows of the corners at their ends that are smoothed, or -1.
+    piece : (k,) int64
+        Rows of the curves that stand for whole moves, or -1.
+    trims : (4, k) float64
+        Fractions of the move that the transitions take: of the tip out and in, of the axis point out and in.
+    length : (k,) float64, mm
+    angle : (k,) float64, rad
+    tangents : (2, k, 3) float64
+        At the start and at the end.
+    """
+
+    leaving: Ints
+    reaching: Ints
+    piece: Ints
+    trims: Floats
+    length: Floats
+    angle: Floats
+    tangents: Floats
+
+
+def _rests(
+    program: Program,
+    corners: Corners | None,
+    settings: Settings,
+    moves: Ints,
+    start: Ints,
+    pieces: RunPieces | None,
+) -> _Rests:
+    """What transitions and pieces leave of the moves."""
+    n = len(program)
+    entry = np.full(n, -1, np.int64)  # smoothed corner at a pose
+    trims = np.zeros((4, len(moves)))
+    if corners is not None:
+        rows = np.flatnonzero(corners.smoothed)
+        entry[corners.pose[rows]] = rows
+    leaving = np.where(program.kind[moves] == Move.LINEAR, entry[start], -1)
+    reaching = np.where(program.kind[moves] == Move.LINEAR, entry[moves], -1)
+    if corners is not None:
+        out, into = leaving >= 0, reaching >= 0
+        trims[0, out], trims[1, into] = corners.trim_out[leaving[out]], corners.trim_in[reaching[into]]
+        trims[2, out], trims[3, into] = corners.axis_trim_out[leaving[out]], corners.axis_trim_in[reaching[into]]
+
+    tip_step = program.tip[moves] - program.tip[start]
+    chord = norm(tip_step)
+    arc = program.kind[moves] == Move.ARC
+    along = chord * np.maximum(1.0 - trims[0] - trims[1], 0.0)
+    ends = (
+        line_axes(program, settings.axis_length, start, moves, tip, axis)
+        for tip, axis in ((trims[0], trims[2]), (1.0 - trims[1], 1.0 - trims[3]))
+    )
+    turned = np.where(trims[2] + trims[3] < 1.0, angle_between(*ends), 0.0)
+    tangents = np.zeros((2, len(moves), 3))
+    tangents[:] = tip_step / np.maximum(chord, STANDSTILL)[:, None]
+    if arc.any():
+        along[arc], tangents[0, arc], tangents[1, arc] = arcs.shape(program, moves[arc])
+    piece = np.full(n, -1, np.int64)
+    if pieces is not None:
+        piece[pieces.move] = np.arange(len(pieces.move))
+    piece = piece[moves]
+    bent = piece >= 0
+    if pieces is not None and bent.any():
+        own = piece[bent]
+        along[bent], turned[bent] = pieces.length[own], pieces.angle[own]
+        tangents[:, bent] = bezier_halves.end_tangents(pieces.tip[own])
+    return _Rests(leaving, reaching, piece, trims, along, turned, tangents)
+
+
+def _lengths(program: Program, corners: Corners | None, settings: Settings, rests: _Rests) -> tuple[Floats, Floats]:
+    """(m,) lengths of the tip, mm, and angles of the axis, rad, of all slots."""
+    half_length, half_turn = np.zeros((2, 0)), np.zeros((2, 0))
+    if corners is not None:
+        half_length, half_turn = bezier_halves.half_lengths(program, corners, settings.axis_length)
+    tip_length, axis_angle = np.zeros((2, len(rests.length), _SLOTS))
+    tip_length[:, 1], axis_angle[:, 1] = rests.length, rests.angle
+    for slot, at, half in ((0, rests.leaving, 1), (2, rests.reaching, 0)):
+        has = at >= 0
+        tip_length[has, slot] = half_length[half, at[has]]
+        axis_angle[has, slot] = half_turn[half, at[has]]
+    return tip_length.reshape(-1), axis_angle.reshape(-1)
+
+
+def _spans(trims: Floats) -> tuple[Floats, Floats]:
+    """(m, 2) parts of curves and segments of all slots: of the tip, and of the axis point."""
+    span = np.zeros((trims.shape[1], _SLOTS, 2))
+    span[:, 0] = (0.5, 1.0)
+    span[:, 2] = (0.0, 0.5)
+    axis_span = span.copy()
+    span[:, 1] = np.stack((trims[0], 1.0 - trims[1]), axis=-1)
+    axis_span[:, 1] = np.stack((trims[2], 1.0 - trims[3]), axis=-1)
+    return span.reshape(-1, 2), axis_span.reshape(-1, 2)
+
+
+def _kinds(program: Program, moves: Ints, rests: _Rests) -> NDArray[np.uint8]:
+    """(m,) kinds of all slots."""
+    kind = np.tile(np.array([Kind.CURVE, Kind.LINE, Kind.CURVE], np.uint8), len(moves))
+    kind[1::_SLOTS][program.kind[moves] == Move.ARC] = Kind.ARC
+    kind[1::_SLOTS][rests.piece >= 0] = Kind.PIECE
+    return kind
+
+
 def _feeds(program: Program, moves: Ints, limits: Limits) -> Floats:
     """Feed of the moves into these poses, mm/s."""
     if limits.feed is not None:
@@ -273,8 +329,7 @@ def _junction_speeds(
     corners: Corners | None,
     moves: Ints,
     start: Ints,
-    leaving: Ints,
-    tangents: Floats,
+    rests: _Rests,
     limits: Limits,
     stop_everywhere: bool,
 ) -> Floats:
@@ -291,9 +346,9 @@ def _junction_speeds(
         reversal = np.zeros(len(program), np.bool_)
         reversal[corners.pose[corners.status == Status.REVERSAL]] = True
         joined &= ~reversal[start[1:]]
-    turn = norm(tangents[0, 1:] - tangents[1, :-1])  # 2·sin(α/2)
+    turn = norm(rests.tangents[0, 1:] - rests.tangents[1, :-1])  # 2·sin(α/2)
     with np.errstate(divide="ignore"):
         jump = limits.accel * limits.period / turn
     speeds[1:] = np.where(joined, jump, 0.0)
-    speeds[leaving >= 0] = np.inf
+    speeds[rests.leaving >= 0] = np.inf
     return speeds
