@@ -111,7 +111,8 @@ def _on_other_lines(match: Match, ends: Bools, vertex: Ints, held: Floats) -> Bo
     """(k,) whether vertices follow in order all the same, if some before them belong to other lines of the CL path.
 
     Beside a turn several lines are near, and the nearest is not always the one that is run along. So each may be where
-    it is nearest on any line within the tolerance, from the last place without doubt on.
+    it is nearest on any line within the tolerance, from the last place without doubt on. Those before them that are
+    not in doubt themselves may wait where they are nearly nearest.
     """
     found = np.zeros(len(vertex), np.bool_)
     path, on = match.path, np.flatnonzero(ends)
@@ -129,17 +130,22 @@ def _on_other_lines(match: Match, ends: Bools, vertex: Ints, held: Floats) -> Bo
             break
         reached = float(path.length_at(match.segment[walk[:1]], match.fraction[walk[:1]])[0])
         for here in walk[1:].tolist():
-            reached = max(reached, _first_place(match, here, int(segment[rows[-1]]) + _REACH, reached))
+            mine = rows[vertex[rows] == here]
+            reached = _first_place(match, here, int(segment[rows[-1]]) + _REACH, reached, waits=not len(mine))
             if np.isinf(reached):
                 break
-            found[rows[vertex[rows] == here]] = True
+            found[mine] = True
     return found
 
 
-def _first_place(match: Match, vertex: int, last: int, reached: float) -> float:
-    """Path length of the first place, not clearly before `reached`, where a vertex is nearest to a line; else inf."""
+def _first_place(match: Match, vertex: int, last: int, reached: float, *, waits: bool) -> float:
+    """Path length of the first place, not clearly before `reached`, where a vertex is nearest to a line; else inf.
+
+    With `waits` it may be before it by as much as the vertex is off the line: only within that is its place known.
+    """
     path, own = match.path, match.six[vertex]
-    low = max(int(np.searchsorted(path.length, reached - match.slack, side="right")) - 2, int(match.low[vertex]))
+    room = match.near if waits else match.slack
+    low = max(int(np.searchsorted(path.length, reached - room, side="right")) - 2, int(match.low[vertex]))
     high = max(min(last, int(match.high[vertex])), low)
     start = path.six[low : high + 1]
     way = path.six[low + 1 : high + 2] - start
@@ -152,8 +158,9 @@ def _first_place(match: Match, vertex: int, last: int, reached: float) -> float:
     near = np.maximum(square[:, :3].sum(axis=1), square[:, 3:].sum(axis=1)) <= (match.tolerance + match.margin) ** 2
     begin = path.length[low : high + 1]
     place = begin + share * (path.length[low + 1 : high + 2] - begin)
-    good = place[near & ~leads_on & (place >= reached - match.slack)]
-    return float(good.min(initial=np.inf))
+    room = np.sqrt(square.sum(axis=1)) if waits else np.zeros(len(place))
+    good = place[near & ~leads_on & (place >= reached - match.slack - room)]
+    return max(float(good.min(initial=np.inf)), reached)
 
 
 def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Floats:
