@@ -52,6 +52,9 @@ LONGEST_DETOUR = 40.0
 #: near the pole, so many tolerances at the axis point, the first axis may turn ahead of time
 _POLE = 3.0
 
+#: share of the tolerance at the axis point by which poses may be out of the machine's reach (docs/machines.md)
+_BEYOND = 0.1
+
 
 @dataclass(frozen=True)
 class Rotary:
@@ -134,13 +137,26 @@ class Rotary:
     def pole_room(self, vector: Floats) -> Floats:
         """(n,) by how much the axis may be off though its pose must be exact: by the tolerance near the pole.
 
-        There the first axis hardly moves the tool, and turns ahead of time.
+        There the first axis hardly moves the tool, and turns ahead of time. At the edge of what the machine reaches, and
+        everywhere with one axis, the pose may be a little beyond.
         """
-        if len(self.machine.names) < 2:
-            return np.zeros(len(vector))
         allowed = self.tolerance / self.axis_length
-        sine = np.linalg.norm(np.cross(vector, self.machine.axes[0].unit), axis=1)
-        return np.where(sine <= _POLE * allowed, allowed, 0.0)
+        if len(self.machine.names) < 2:
+            return np.full(len(vector), _BEYOND * allowed if self.machine.names else 0.0)
+        about = self.machine.axes[0].unit
+        least, largest = self._reach
+        cosine, step = vector @ about, np.radians(self.angle_step)
+        edge = (cosine <= least + step**2) | (cosine >= largest - step**2)
+        sine = np.linalg.norm(np.cross(vector, about), axis=1)
+        return np.where(sine <= _POLE * allowed, allowed, np.where(edge, _BEYOND * allowed, 0.0))
+
+    @property
+    def _reach(self) -> tuple[float, float]:
+        """Least and largest cosine of the angle between the first axis and the tool, as the second one turns it."""
+        about, second, tool = self.machine.axes[0].unit, self.machine.axes[1].unit, self.machine.tool
+        middle = float(about @ second) * float(second @ tool)
+        swing = float(np.linalg.norm(np.cross(about, second)) * np.linalg.norm(np.cross(second, tool)))
+        return middle - swing, middle + swing
 
     def steps(self, lever: float) -> tuple[float, float]:
         """Steps of tip and vector that printed digits stand for, `lever` being the longest."""
