@@ -137,8 +137,8 @@ class Rotary:
     def pole_room(self, vector: Floats) -> Floats:
         """(n,) by how much the axis may be off though its pose must be exact: by the tolerance near the pole.
 
-        There the first axis hardly moves the tool, and turns ahead of time. At the edge of what the machine reaches, and
-        everywhere with one axis, the pose may be a little beyond.
+        There the first axis hardly moves the tool, and turns ahead of time. At the edge of what the machine reaches,
+        and everywhere with one axis, the pose may be a little beyond.
         """
         allowed = self.tolerance / self.axis_length
         if len(self.machine.names) < 2:

@@ -11,6 +11,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.distances import Distances, Reached
 from cornersmooth.verify.findings import Findings
+from cornersmooth.verify.in_order import Windows
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, Metric, distance_between, nearest_segments
 from cornersmooth.verify.rapids import ARITHMETIC
@@ -40,7 +41,8 @@ Found = tuple[Floats, Ints, Ints, Floats]
 def check_backtracking(distances: Distances, found: Findings) -> None:
     """The path must be run in order: CS523."""
     match = distances.match
-    for places in (written_backwards(match, distances.written), original_backwards(match, distances.original)):
+    theirs = original_backwards(match, distances.original, distances.windows)
+    for places in (written_backwards(match, distances.written), theirs):
         if places is not None:
             found.violations.add(523, *places)
 
@@ -158,9 +160,10 @@ def _first_place(match: Match, vertex: int, last: int, reached: float, *, waits:
     near = np.maximum(square[:, :3].sum(axis=1), square[:, 3:].sum(axis=1)) <= (match.tolerance + match.margin) ** 2
     begin = path.length[low : high + 1]
     place = begin + share * (path.length[low + 1 : high + 2] - begin)
-    room = np.sqrt(square.sum(axis=1)) if waits else np.zeros(len(place))
-    good = place[near & ~leads_on & (place >= reached - match.slack - room)]
-    return max(float(good.min(initial=np.inf)), reached)
+    before = np.sqrt(square.sum(axis=1)) if waits else np.zeros(len(place))
+    good = place[near & ~leads_on & (place >= reached - match.slack - before)]
+    first = float(good.min(initial=np.inf))
+    return max(first, reached)
 
 
 def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Floats:
@@ -187,8 +190,10 @@ def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Float
     return found
 
 
-def original_backwards(match: Match, theirs: Reached) -> Found | None:
+def original_backwards(match: Match, theirs: Reached, windows: Windows) -> Found | None:
     """Neighbouring original vertices that the text clearly passes in reverse: part of the path, beyond ε, is missing.
+
+    Nothing is, where both are run in order within the tolerance all around.
 
     Returns
     -------
@@ -208,6 +213,8 @@ def original_backwards(match: Match, theirs: Reached) -> Found | None:
     gain = np.minimum(later, earlier)
     wrong = np.flatnonzero((gain > match.slack) & ~comes_back & ~came)
     wrong = wrong[~_waits(match, theirs.vertex[falls[wrong]], here[wrong], before[wrong])]
+    around = [windows.around(vertex) for vertex in before[wrong].astype(np.int64).tolist()]
+    wrong = wrong[np.array([window is None or not window.passed for window in around], np.bool_)]
     if not len(wrong):
         return None
     original, vertex = match.original, theirs.vertex[falls[wrong]]

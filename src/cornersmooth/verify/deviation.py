@@ -28,6 +28,9 @@ _OWN_ROWS, _SOME_OWN_ROWS, _MOST_OWN_ROWS = 16, 256, 2048
 #: rows farther than the tolerance from which on the worst of them tell enough, if most of these are off by themselves
 _MANY_OVER = 1024
 
+#: poses of a batch that are missed where they are looked for, and looked for on other turns of the path, at most
+_MOST_MISSED: Final = 64
+
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 TOGETHER: Final = 2.0
 
@@ -168,6 +171,9 @@ def check_exact_poses(distances: Distances, found: Findings) -> None:
     missed = np.flatnonzero(~exact)
     exact[missed] = passed_nearby(match, theirs.vertex[rows[missed]], tip[missed], axis[missed])
     missed = np.flatnonzero(~exact)
+    for k in missed[:_MOST_MISSED].tolist():
+        exact[k] = _passed_elsewhere(distances, int(rows[k]), tip[k], axis[k])
+    missed = np.flatnonzero(~exact)
     if len(missed):
         found.violations.add(
             524,
@@ -176,3 +182,22 @@ def check_exact_poses(distances: Distances, found: Findings) -> None:
             match.nc.line[nearest[missed]],
             amount[missed],
         )
+
+
+def _passed_elsewhere(distances: Distances, row: int, tip: Floats, axis: Floats) -> bool:
+    """Whether an element that names a pose may stand for it though its place is on another turn of the path."""
+    match, theirs = distances.match, distances.original
+    trail = match.written.trail
+    beside = min(int(theirs.place[row]) + 1, len(trail) - 1)
+    window = distances.windows.around(beside)
+    if window is None:
+        return False
+    ends = trail.last[trail.last >= window.vertex]
+    ends = ends[ends < window.vertex + len(window.low)]
+    pose = theirs.vertex[row : row + 1]
+    away = (match.six[ends] - match.path.six[pose]).reshape(-1, 2, 3)
+    for end in ends[(np.linalg.norm(away, axis=2) <= match.margin).all(axis=1)].tolist():
+        element = trail.owner[end : end + 1]
+        if window.may_be_at(end, pose)[0] and digit_errors(match.nc, element, tip, axis, match.axis_length)[0][0]:
+            return True
+    return False

@@ -15,6 +15,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.nc_reader.elements import Element
+from cornersmooth.verify.in_order import Windows
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import Gap, Metric, climb, distance_between, nearest_segments
 from cornersmooth.verify.polyline import directions, written_at
@@ -74,6 +75,11 @@ class Distances:
     def original(self) -> Reached:
         """Of every vertex of the original in this batch, from the written motion."""
         return from_original(self.match)
+
+    @cached_property
+    def windows(self) -> Windows:
+        """Where vertices may be besides the places that were found for them."""
+        return Windows(self.match)
 
     @cached_property
     def off(self) -> Floats:

@@ -72,6 +72,7 @@ def check_feeds(distances: Distances, found: Findings) -> None:
             continue
         ends = int(start[k]), int(end[k])
         good[k] = fits(k, _alike(match, int(element[k]), *ends)).any() or _near_enough(match, *ends, partial(fits, k))
+        good[k] = good[k] or _elsewhere(distances, *ends, partial(fits, k))
         if good[k]:
             continue
         pair = float(said[k]), float(room[k])
@@ -143,10 +144,25 @@ def _near_enough(match: Match, start: int, end: int, fits: Callable[[Ints], Bool
     """
     owner = match.original.trail.owner
     ranges = [owner[np.array(_within_tolerance(match, vertex)) + 1] for vertex in (start, end)]
-    moves = np.arange(np.min(ranges), np.max(ranges) + 1)
+    return _joined(fits, *(np.arange(first, last + 1) for first, last in ranges))
+
+
+def _elsewhere(distances: Distances, start: int, end: int, fits: Callable[[Ints], Bools]) -> bool:
+    """Whether an element may run along moves that fit on another turn of a path that goes to and fro."""
+    window = distances.windows.around(start)
+    if window is None or not window.inner[0] <= end <= window.inner[1]:
+        return False
+    owner = distances.match.original.trail.owner
+    segments = window.segments(start), window.segments(end)
+    return all(map(len, segments)) and _joined(fits, *(owner[part + 1] for part in segments))
+
+
+def _joined(fits: Callable[[Ints], Bools], first: Ints, last: Ints) -> bool:
+    """Whether a move of the first leads to one of the last along moves that all fit."""
+    moves = np.arange(min(first[0], last[0]), max(first[-1], last[-1]) + 1)
     good = fits(moves)
     run = np.cumsum(np.diff(good, prepend=False))
-    one, other = (set(run[good & (moves >= first) & (moves <= last)].tolist()) for first, last in ranges)
+    one, other = (set(run[good & np.isin(moves, part)].tolist()) for part in (first, last))
     return not one.isdisjoint(other)
 
 

@@ -45,6 +45,8 @@ class Token:
         Tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts.
     habit : bool
         Whether posts write it on their own: an optional stop right before another tool.
+    others : tuple of float, mm
+        Other places that it may have, where the path goes to and fro.
     """
 
     kind: str
@@ -54,6 +56,7 @@ class Token:
     room: float = 0.0
     moment: int = 0
     habit: bool = False
+    others: tuple[float, ...] = ()
 
 
 #: kinds during which a state matters although nothing moves
@@ -245,13 +248,27 @@ def _of_m(value: float, place: float, line: int) -> list[Token]:
     return [Token("auxiliary", value, place, line)]
 
 
-def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float]) -> list[Token]:
-    """What the words of the NC text do; `places` are where they stand, and `rooms` how far that is uncertain, mm."""
+def said(
+    events: Sequence[Event],
+    places: Sequence[float],
+    rooms: Sequence[float],
+    others: Sequence[tuple[float, ...]],
+) -> list[Token]:
+    """What the words of the NC text do.
+
+    Parameters
+    ----------
+    events : sequence of Event
+    places, rooms : sequence of float, mm
+        Where they stand, and how far that is uncertain.
+    others : sequence of tuple of float, mm
+        Where they may stand as well.
+    """
     tokens: list[Token] = []
     chosen: float | None = None
     moment = element = 0
-    speaking = [row for row in zip(events, places, rooms, strict=True) if row[0].letter != "("]
-    for k, (event, place, room) in enumerate(speaking):
+    speaking = [row for row in zip(events, places, rooms, others, strict=True) if row[0].letter != "("]
+    for k, (event, place, room, elsewhere) in enumerate(speaking):
         value, line, before = event.value, event.line, len(tokens)
         moment, element = moment + (event.element != element), event.element
         if event.letter == "T":
@@ -276,18 +293,20 @@ def said(events: Sequence[Event], places: Sequence[float], rooms: Sequence[float
             number = round(value, SPEED_DECIMALS) if event.letter == "S" else value
             tokens.append(Token(_PLAIN[event.letter], number, place, line))
         habit = (event.letter, value) == ("M", 1.0) and _before_a_tool(speaking, k)
-        tokens[before:] = [replace(token, room=room, moment=moment, habit=habit) for token in tokens[before:]]
+        tokens[before:] = [
+            replace(token, room=room, moment=moment, habit=habit, others=elsewhere) for token in tokens[before:]
+        ]
         moment += any(token.kind in _PAUSES and not token.habit for token in tokens[before:])
     return tokens
 
 
-def _before_a_tool(speaking: Sequence[tuple[Event, float, float]], k: int) -> bool:
+def _before_a_tool(speaking: Sequence[tuple[Event, float, float, tuple[float, ...]]], k: int) -> bool:
     """Whether the next word is that of a tool, with no motion between; and there has been one before."""
     event = speaking[k][0]
-    behind = (other for other, _, _ in speaking[k + 1 :] if (other.letter, other.value) != ("G", 40.0))  # R0 of M91
+    behind = (other for other, *_ in speaking[k + 1 :] if (other.letter, other.value) != ("G", 40.0))  # R0 of M91
     following = next(behind, None)
     changes = following is not None and following.letter == "T" and following.element == event.element
-    return changes and any(before.letter == "T" for before, _, _ in speaking[:k])
+    return changes and any(before.letter == "T" for before, *_ in speaking[:k])
 
 
 #: letters whose words are tokens as they stand

@@ -163,7 +163,7 @@ def _without_habits(
 
 def _away(place: float, ours: Token, room: float, apart: Callable[[float, float], float]) -> bool:
     """Whether a token is elsewhere than asked for."""
-    if abs(place - ours.place) <= room + ours.room:
+    if any(abs(place - here) <= room + ours.room for here in (ours.place, *ours.others)):
         return False
     # a pose is a rounding off, and its place as far from it as the room
     return apart(place, ours.place) > 2 * room + ours.room

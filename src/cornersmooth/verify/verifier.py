@@ -247,6 +247,7 @@ class _Measured:
     poses: Poses  #: of the whole CL program
     lengths: dict[int, float]  #: CL path length, mm, at elements that have words behind them, where batches tell
     rooms: dict[int, float]  #: how far that is uncertain, mm
+    others: dict[int, tuple[float, ...]]  #: at other poses that elements may stand for
     events: list[Event]
     words: bool
     margin: float = 0.0
@@ -329,6 +330,7 @@ class _Measured:
             self.rooms[element] = self.rooms.get(element, 0.0) + abs(length_at(behind) - place(element))
         places = [place(event.element - 1) for event in self.events]
         rooms = [self.rooms.get(stands(event.element - 1), 0.0) for event in self.events]
+        others = [self.others.get(stands(event.element - 1), ()) for event in self.events]
         apart: Callable[[float, float], float] = partial(way_apart, self.task.path)
         homes = [place for place, one in zip(before, program.statements, strict=True) if one.word == "GOHOME"]
         at_home = {
@@ -336,14 +338,14 @@ class _Measured:
             for event, here, room in zip(self.events, places, rooms, strict=True)
             if homes and any(abs(here - home) <= self.margin + room for home in homes)
         }
-        return compare(theirs, said(self.events, places, rooms), self.margin, unsaid, apart, self.own), at_home
+        return compare(theirs, said(self.events, places, rooms, others), self.margin, unsaid, apart, self.own), at_home
 
 
 def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measured:
     """Match and measure all that is read."""
     batches = Batches(task)
     program = task.original.program
-    found = _Measured(task, batches, Findings(), Poses.nowhere(len(program)), {}, {}, text.events, words)
+    found = _Measured(task, batches, Findings(), Poses.nowhere(len(program)), {}, {}, {}, text.events, words)
 
     def items() -> Iterator[tuple[Batch, Ints, Largest]]:
         for batch in batches.of(_noted(text, found)):
@@ -360,6 +362,7 @@ def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measur
         found.findings.take(examined.findings)
         for element, length in zip(examined.elements.tolist(), examined.lengths.tolist(), strict=True):
             found.lengths.setdefault(element, length)
+        found.others = examined.others | found.others
     return found
 
 

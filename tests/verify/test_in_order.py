@@ -1,0 +1,85 @@
+"""Where vertices may be if two polylines are run in order within a distance: against a search on a fine grid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cornersmooth.verify.in_order import passage
+from oracle.share import how_many
+
+Floats = NDArray[np.float64]
+
+#: parts of a segment of the path, and of one of the other motion, on the grid
+FINE = 24
+
+
+def fine(points: Floats) -> Floats:
+    """Points on a polyline, `FINE` on each segment, and its end."""
+    share = np.arange(FINE) / FINE
+    inner = points[:-1, None] + share[:, None] * np.diff(points, axis=0)[:, None]
+    return np.vstack((inner.reshape(-1, points.shape[1]), points[-1:]))
+
+
+def reached(near: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What is reached from the first corner of a grid by steps ahead on either motion or on both."""
+    found = np.zeros_like(near)
+    found[0, 0] = near[0, 0]
+    for i in range(near.shape[0]):
+        for j in range(near.shape[1]):
+            before = found[max(i - 1, 0), j] | found[i, max(j - 1, 0)] | found[max(i - 1, 0), max(j - 1, 0)]
+            found[i, j] = near[i, j] & (found[i, j] | before)
+    return found
+
+
+def on_grid(own: Floats, path: Floats, radius: float) -> NDArray[np.bool_]:
+    """(n, m·FINE + 1) whether vertices of the one may be at points of the other."""
+    away = (fine(own)[:, None] - fine(path)[None]).reshape(len(fine(own)), -1, 2, 3)
+    near = np.linalg.norm(away, axis=3).max(axis=2) <= radius
+    both = reached(near) & reached(near[::-1, ::-1])[::-1, ::-1]
+    return both[::FINE]
+
+
+def motions(seed: int) -> tuple[Floats, Floats, float]:
+    """A path that goes to and fro, and one near it that leaves some of it out."""
+    rng = np.random.default_rng(seed)
+    path = np.cumsum(rng.normal(size=(6, 6)) * rng.choice([0.2, 1.0], (6, 1)), axis=0)
+    inner = [k for k in range(1, 5) if rng.random() < 0.6]
+    own = np.vstack((path[:1], path[inner] + 0.2 * rng.normal(size=(len(inner), 6)), path[-1:]))
+    return own, path, float(rng.uniform(0.3, 2.0))
+
+
+@pytest.mark.parametrize("seed", range(how_many(12, 200)))
+def test_places_are_those_of_a_fine_grid(seed: int) -> None:
+    own, path, radius = motions(seed)
+    coarse = max(np.linalg.norm(np.diff(line, axis=0), axis=1).max() for line in (own, path)) / FINE
+    low, high = passage(own, path, (0.0, float(len(path) - 1)), radius)
+    least, most = on_grid(own, path, radius), on_grid(own, path, radius + 2.0 * coarse)
+    for vertex in range(len(own)):
+        place = np.arange(least.shape[1]) / FINE
+        segment = np.minimum(place.astype(int), len(path) - 2)
+        share = place - segment
+        inside = (low[vertex, segment] <= share + 1e-9) & (share <= high[vertex, segment] + 1e-9)
+        assert inside[least[vertex]].all(), "a place of the grid is not found"
+        assert most[vertex][inside].all(), "what is found is not near any place of the grid"
+
+
+def test_nothing_is_found_where_the_path_is_left() -> None:
+    path = np.zeros((3, 6))
+    path[:, 0] = [0.0, 5.0, 10.0]
+    own = path.copy()
+    own[1, 1] = 1.5
+    low, _ = passage(own, path, (0.0, 2.0), 1.0)
+    assert np.isnan(low).all()
+    low, high = passage(own, path, (0.0, 2.0), 2.0)
+    assert low[1].tolist() == pytest.approx([1.0 - np.sqrt(1.75) / 5.0, 0.0])
+    assert high[1].tolist() == pytest.approx([1.0, np.sqrt(1.75) / 5.0])
+
+
+def test_a_turn_may_be_waited_for_but_not_run_backwards() -> None:
+    path = np.zeros((4, 6))
+    path[:, 0] = [0.0, 3.0, 2.0, 6.0]
+    straight = path[[0, 3]]
+    assert not np.isnan(passage(straight, path, (0.0, 3.0), 0.6)[0][1]).all()  # at 2.5 until the path is back there
+    assert np.isnan(passage(straight, path, (0.0, 3.0), 0.4)[0]).all()
