@@ -146,10 +146,10 @@ def moved(line: str, word: str, by: float) -> str:
     return re.sub(rf"(?<=\b{word})[-+]?\d+\.\d*", lambda value: f"{float(value[0]) + by:+.4f}", line)
 
 
-def mutants(lines, control: str) -> dict[str, list[str]]:
+def mutants(lines, control: str, place: int = 0) -> dict[str, list[str]]:
     """What goes wrong around the first rewind."""
     lines = list(lines)
-    out, back = rewinds(lines, control)[0]
+    out, back = rewinds(lines, control)[place]
     up = next(k for k in range(out, back) if bare(lines)[k] == UP[control])
     rapid, feed = ("FMAX", "") if control == "heidenhain" else ("G0", "G1")
     in_rapid = f"{lines[back]} FMAX" if control == "heidenhain" else lines[back].replace(feed, rapid, 1)
@@ -235,7 +235,6 @@ def test_without_being_asked_it_is_an_error() -> None:
     [
         ("fanuc", None, None, 20.0, "no rotary axes"),
         ("generic", None, "table-ac", 20.0, "no retract"),
-        ("fanuc", "g6.2", "table-ac", 20.0, "curves"),
         ("fanuc", None, "table-ac", 0.5, "1 mm or more"),
     ],
 )
@@ -297,3 +296,44 @@ def test_a_cut_is_left_without_a_work_offset() -> None:
     assert result.verification is not None
     assert len(result.verification.rewinds) == 1
     assert b"G54" not in stream.getvalue()
+
+
+@cache
+def three_cuts() -> bytes:
+    """A cut beyond the limits between two that keep them."""
+    lines = program_text().decode().splitlines()
+    first, cut = lines[4], lines[6:-3]
+    up, tail = ["RAPID", "GOTO/-10,0,70,0.5,0,0.8660254", "RAPID", first, lines[5]], lines[-3:]
+    return ("\n".join([*lines[:6], *cut[:5], *up, *cut, *up, *cut[:5], *tail]) + "\n").encode()
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "name", "method"),
+    [
+        ("fanuc", "g6.2", "table-ac", "proportional"),
+        ("siemens", "bspline", "nutated-bc", "proportional"),
+        ("heidenhain", "spl", "table-ac", "proportional"),
+        ("heidenhain", "spl", "table-ac", "global"),
+    ],
+)
+def test_only_cuts_that_are_left_are_lines_among_curves(control: str, form: str, name: str, method: str) -> None:
+    chosen = choose_form(control, form, machine=short(name), rewind=AWAY)
+    program, stream = read(three_cuts()), io.BytesIO()
+    settings = fit_settings(Settings(tolerance=EPS, method=method), chosen, "mm")
+    written = write(smooth(program, settings), stream, form=chosen)
+    assert {one.code: one.count for one in written.findings}["CS381"] == 1
+    lines = bare(stream.getvalue().decode().splitlines())
+    curves = [k for k, line in enumerate(lines) if re.search("G6.2|BSPLINE|SPL |PL=", line)]
+    assert curves
+    checked = verify(program, stream.getvalue(), tolerance=EPS, control=control, machine=short(name))
+    assert checked.problems == ()
+    assert len(checked.rewinds) == 1
+    out, back = checked.rewinds[0]
+    assert any(k < out - 1 for k in curves)
+    assert any(k > back for k in curves)
+    if control != "fanuc":
+        return
+    wrong = mutants(stream.getvalue().decode().splitlines(), control, place=1)
+    for what in ("no retract", "back too deep", "a part of the cut is missing"):
+        text = ("\n".join(wrong[what]) + "\n").encode()
+        assert not verify(program, text, tolerance=EPS, control=control, machine=short(name)).passed, what

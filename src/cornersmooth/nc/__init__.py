@@ -34,6 +34,7 @@ from cornersmooth.nc.own_words import own_words
 from cornersmooth.nc.plane_travel import check_travel_in_planes
 from cornersmooth.nc.planes import Planes, plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
+from cornersmooth.nc.rewound_curve_rows import rewound_curve_rows
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.rotary_run_rows import rotary_run_rows
@@ -224,6 +225,8 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes,
         _check_travel(form.machine, smoothed.program)
     if form.curves and form.rotary:
         write_rows = rotary_curve_rows if smoothed.runs is None else rotary_run_rows
+        if form.rewind:
+            return rewound_curve_rows(smoothed, form, findings, write_rows)
         return write_rows(smoothed, form, findings)
     if form.curves:
         return curve_rows(smoothed, divide=form.curve in _TURNING)

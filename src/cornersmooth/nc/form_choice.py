@@ -145,9 +145,6 @@ def _check_rewind(form: Form) -> None:
         raise SettingsError("CS202", f"rewind is {form.rewind:g} mm", f"give {LEAST_REWIND:g} mm or more")
     if not form.rotary:
         raise SettingsError("CS215", f"{here} has no rotary axes here that could turn back", "leave out --rewind")
-    if form.curves:
-        hint = _use_lines(form.table, "leave out --rewind")
-        raise SettingsError("CS215", f"{here} has curves, which are not left on the way", hint)
     if not form.table.program.retract:
         what = f"the table of {form.control} has no retract above which rotary axes could turn back"
         raise SettingsError("CS215", what, "leave out --rewind")

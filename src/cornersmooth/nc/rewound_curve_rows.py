@@ -1,0 +1,141 @@
+"""Rows of curves in rotary words, in lines where a cut is left so that a rotary axis turns back.
+
+What lies between rapids is written in one way: as curves, or, where its cut is left, as lines. Both choose their own
+rotary angles; where one follows the other there is a rapid, in which they may turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from cornersmooth.model import Arcs, Bools, Corners, Floats, Ints, Move, Program, Runs, SmoothProgram
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.rotary_rows import rotary_rows, whole_rows
+from cornersmooth.rotary import rapid_moves, rewound_angles, still_poses
+from cornersmooth.smoothing.sampling import Rows, dense_rows
+
+#: what writes rows of curves
+CurveRows = Callable[[SmoothProgram, Form, Findings], Iterator[Rows]]
+
+
+def rewound_curve_rows(
+    smoothed: SmoothProgram, form: Form, findings: Findings, write_rows: CurveRows
+) -> Iterator[Rows]:
+    """Rows of curves, and of lines between the rapids around a place where a cut is left.
+
+    Parameters
+    ----------
+    smoothed : SmoothProgram
+    form : Form
+        Of curves in rotary words, with a rewind.
+    findings : Findings
+        Takes CS381 for each stretch in lines, and what the kinematics notice.
+    write_rows : callable
+        Rows of a program in curves.
+
+    Raises
+    ------
+    InputError
+        The machine cannot follow the path.
+    """
+    program = smoothed.program
+    in_lines = _left(smoothed, form)
+    if not in_lines.any():
+        yield from write_rows(smoothed, form, findings)
+        return
+    edges = 1 + np.flatnonzero(in_lines[1:] != in_lines[:-1])
+    for first, stop in pairwise([0, *edges.tolist(), len(program)]):
+        part = _part(smoothed, first, stop)
+        if in_lines[first]:
+            text = "cut between rapids written in lines, not in curves: it is left where a rotary axis turns back"
+            findings.add("CS381", "note", int(program.line[first]), text)
+            rows = rotary_rows(dense_rows(part), part, form, findings)
+        else:
+            rows = write_rows(part, form, findings)
+        for some in rows:
+            spline = np.tile((0.0, 1.0, 0.0), (len(some.move), 1)) if some.spline is None else some.spline
+            yield replace(some, move=some.move + first, spline=spline)
+
+
+def _left(smoothed: SmoothProgram, form: Form) -> Bools:
+    """(n,) poses between rapids, these included, around a place where a cut is left."""
+    program, settings = smoothed.program, smoothed.settings
+    tip, axis, move = whole_rows(dense_rows(smoothed))
+    if not len(move) or form.machine is None:
+        return np.zeros(len(program), np.bool_)
+    _, source, left = rewound_angles(
+        form.machine,
+        tip,
+        axis,
+        tolerance=form.rotary_tolerance(settings.tolerance, settings.axis_scale),
+        rapid=rapid_moves(program.kind)[move],
+        line=program.line[move],
+        file=program.source.name,
+        still=still_poses(program.kind)[move],
+        still_tolerance=form.angle_rounding,
+    )
+    cut = np.cumsum((program.kind != Move.LINEAR) & (program.kind != Move.ARC))
+    in_lines: Bools = np.isin(cut, cut[move[source[left]]])
+    return in_lines
+
+
+def _part(smoothed: SmoothProgram, first: int, stop: int) -> SmoothProgram:
+    """Poses from `first` to before `stop`, both at rapids; statements before the first pose stay before it."""
+    program, corners, runs = smoothed.program, smoothed.corners, smoothed.runs
+    own = (corners.pose >= first) & (corners.pose < stop)
+    columns: dict[str, Any] = {
+        name: column[own] for name, column in vars(corners).items() if isinstance(column, np.ndarray)
+    }
+    columns |= {name: columns[name] - first for name in ("pose", "before", "after")}
+    extra = {name: column[own] for name, column in corners.extra.items()}
+    return replace(
+        smoothed,
+        program=_poses(program, first, stop),
+        corners=Corners(**columns, extra=extra),
+        runs=None if runs is None else _runs(runs, first, stop),
+    )
+
+
+def _poses(program: Program, first: int, stop: int) -> Program:
+    """Those poses of a program."""
+    rows, arcs = slice(first, stop), program.arcs
+    own = (arcs.pose >= first) & (arcs.pose < stop)
+    return replace(
+        program,
+        **{name: getattr(program, name)[rows] for name in ("tip", "axis", "kind", "feed", "line", "feed_mode", "keep")},
+        arcs=Arcs(arcs.pose[own] - first, arcs.centre[own], arcs.normal[own], arcs.sweep[own]),
+        statements=tuple(
+            replace(statement, pose=max(statement.pose - first, 0))
+            for statement in program.statements
+            if statement.pose < stop
+        ),
+    )
+
+
+def _runs(runs: Runs, first: int, stop: int) -> Runs | None:
+    """Those runs that lie between these poses; None where there are none."""
+    begins = runs.pose[np.cumsum(runs.count) - runs.count]
+    own = (begins >= first) & (begins < stop)
+    if not own.any():
+        return None
+
+    def chosen(column: Floats | Ints, count: Ints) -> Any:
+        return column[np.repeat(own, count)]
+
+    return replace(
+        runs,
+        pose=chosen(runs.pose, runs.count) - first,
+        count=runs.count[own],
+        s=chosen(runs.s, runs.count),
+        knot=chosen(runs.knot, runs.knot_count),
+        knot_count=runs.knot_count[own],
+        control=chosen(runs.control, runs.knot_count + 2),
+        tip_bound=runs.tip_bound[own],
+        axis_bound=runs.axis_bound[own],
+    )
