@@ -324,7 +324,7 @@ class MotionWriter:
 
     def _can_thread(self) -> bool:
         """Whether the spindle turns as a thread needs it."""
-        return bool(self.statements.clockwise and self.statements.speed and self.operation.spindle)
+        return bool(self.statements.clockwise and self.statements.speed and self.operation.turning)
 
     def _cycles(self, cycle: Cycle, kind: str, poses: Ints, approach: Ints) -> Iterator[bytes]:
         """Holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
@@ -334,7 +334,7 @@ class MotionWriter:
         if kind == "tap":
             text = "a tap is left to the control's cycle: see that it turns the spindle with the feed"
             self.findings.add("CS348", "warning", line, text, len(poses))
-        self._warnings.of_cut(int(poses[0]), turning=bool(self.operation.spindle))
+        self._warnings.of_cut(int(poses[0]), turning=self.operation.turning)
         feeds, modes = hole_feeds(cycle, program, poses)
         travel, clearance = travel_of(cycle, program, poses, approach[poses])
         speed, table = self.statements.speed or 0.0, writer.form.table.cycles

@@ -94,6 +94,11 @@ class Operation:
         return self.mode in (self.form.upright, self.form.plane)
 
     @property
+    def turning(self) -> bool:
+        """Whether the spindle turns at the next motion: it does, or goes on behind a tool change."""
+        return bool(self.spindle or self._stopped.get("spindle"))
+
+    @property
     def _tool_end(self) -> Blocks:
         """Steps behind the last motion of a tool, or of a tilted plane."""
         return self.form.table.program.tool_end if self.mode.tool_end is None else self.mode.tool_end

@@ -72,6 +72,8 @@ class StatementWriter:
     _direction: str = "clockwise"
     _diameter: float = 0.0
     _last_cycle: Cycle | None = None
+    _cycle_args: tuple[float | str, ...] = ()
+    _in_cycle: bool = False
     _cycle_line: int = 0
     words: Words = field(init=False)
     _toolno_loads: bool = field(init=False)
@@ -213,6 +215,7 @@ class StatementWriter:
             self.operation.turn((direction,))
             return [direction]
         self.speed = self.speed if speed is None else speed
+        self._read_cycle()
         digits = format_number(self.speed or 0.0, self.form.table.digits.speed, trim=True).rstrip(".")
         turning = tuple(block.format(speed=digits, direction=direction) for block in self.words.spindle_speed)
         self.operation.turn(turning)
@@ -321,18 +324,25 @@ class StatementWriter:
         """CYCLE: kept for the holes that follow."""
         words = words_of(statement)
         if words[:1] in (["OFF"], ["NOMORE"]):
-            self.cycle = None
+            self.cycle, self._in_cycle = None, False
             return []
+        self._in_cycle |= words != ["INIT"]
         if words == ["ON"]:
             self.cycle = self._last_cycle
         elif words != ["INIT"]:  # SolidWorks announces a cycle by it
-            self._cycle_line = statement.line
-            self.cycle = self._last_cycle = read_cycle(statement.args, self.program, self.speed)
+            self._cycle_line, self._cycle_args = statement.line, statement.args
+            self._read_cycle()
             self._refuse_tap(words)
         if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
             text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
             self.findings.add("CS321", "warning", statement.line, text)
         return self.comment(statement.text)
+
+    def _read_cycle(self) -> None:
+        """Read the last cycle at the speed of now: a dwell may count in revolutions."""
+        if self._cycle_args:
+            self._last_cycle = read_cycle(self._cycle_args, self.program, self.speed)
+            self.cycle = self._last_cycle if self._in_cycle else None
 
     def _refuse_tap(self, words: list[str]) -> None:
         """A tap cannot be written as moves, and a hole without its thread is nothing to be silent about."""

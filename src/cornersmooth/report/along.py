@@ -97,7 +97,7 @@ def deviation_along(
         length = task.axis_length
         text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=length)
     parts = [np.zeros((0, _COLUMNS))]
-    for batch in Batches(task).of([text]):
+    for batch in Batches(task, text.events).of([text]):
         matched = match(task, batch)
         parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
     rows = np.concatenate(parts)

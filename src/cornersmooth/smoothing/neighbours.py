@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.model import Bools, Ints, Program
+from cornersmooth.model import Bools, Ints, Move, Program
 from cornersmooth.vectors import norm
 
 
@@ -23,7 +23,7 @@ class Neighbours:
     inner : (n,) bool
         Inner poses of chains, repeated ones included: the corners.
     duplicate : (n,) bool
-        Poses that repeat the one before them in the same chain.
+        Poses that repeat the one before them in the same chain; none repeats the hole before it.
     """
 
     previous: Ints
@@ -52,6 +52,7 @@ def find_neighbours(program: Program, axis_length: float, distance: float) -> Ne
     duplicate = np.zeros(n, np.bool_)
     if n > 1:
         duplicate[1:] = reached[1:] & _closer(program, np.arange(1, n), np.arange(n - 1), axis_length, distance)
+        duplicate[1:] &= program.kind[:-1] != Move.HOLE  # the tool has left the hole, and comes back to its pose
     own = np.arange(n)
     representative = np.maximum.accumulate(np.where(duplicate, 0, own)) if n else own
     repeats = np.flatnonzero(duplicate)

@@ -6,7 +6,7 @@ cut where there is no doubt about the place of a vertex (see `guide`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.verify.drilling import Holes
 from cornersmooth.verify.guide import STRIDE, cut, guide
 from cornersmooth.verify.polyline import Polyline, directions
 from cornersmooth.verify.rapids import Rapids, fraction_along, moving_rapids
 from cornersmooth.verify.task import Task
+from cornersmooth.verify.tool_changes import ToolChanges
 
 #: elements in a batch
 BATCH: Final = 1 << 14
@@ -76,10 +77,11 @@ class Batch:
 
 @dataclass
 class Stops:
-    """What is known of stops: elements of the text, and the CL path length where they are."""
+    """What is known of stops: elements of the text, and the CL path length where they are, and where they begin."""
 
     element: list[int] = field(default_factory=list)
     length: list[float] = field(default_factory=list)
+    begin: list[float] = field(default_factory=list)
 
     @property
     def first(self) -> int:
@@ -90,6 +92,10 @@ class Stops:
         """CL path lengths by elements."""
         return dict(zip(self.element, self.length, strict=True))
 
+    def begins(self) -> dict[int, float]:
+        """CL path lengths where elements begin."""
+        return dict(zip(self.element, self.begin, strict=True))
+
 
 class Batches:
     """Makes batches of the elements of a text, as they come.
@@ -97,14 +103,18 @@ class Batches:
     Parameters
     ----------
     task : Task
+    events : sequence of Event
+        Words of the text, which grow as it is read.
     """
 
-    def __init__(self, task: Task) -> None:
-        self.task = task
+    def __init__(self, task: Task, events: Sequence[Event]) -> None:
+        self.task, self._events = task, events
         self.problems: list[Problem] = []
         self.stops = Stops()
         #: move of the hole that an element belongs to
         self.holes: dict[int, int] = {}
+        #: the last move that it may belong to
+        self.latest: dict[int, int] = {}
         #: move behind a run of holes that ends where an element of them does
         self.shared: dict[int, int] = {}
         #: moves of holes at whose bottom the tool waits, and ms
@@ -143,9 +153,9 @@ class Batches:
         if not ahead.has(0):
             self._lacking(0, len(original.pose) - 1)
             return
-        holes = Holes(original, ahead, self.task.axis_length)
+        holes = Holes(original, ahead, self.task.axis_length, ToolChanges(original.program, self._events))
         self.holes, self.shared, self.dwells = holes.element_move, holes.shared, holes.dwells
-        self.taps, self.untapped = holes.taps, holes.untapped
+        self.taps, self.untapped, self.latest = holes.taps, holes.untapped, holes.latest_move
         part: _Part | None = None
         surplus: int | None = None
         for between in holes.between():
@@ -247,6 +257,8 @@ class _Part:
         start = int(last_vertex[move])
         self.batches.stops.element.append(element)
         self.batches.stops.length.append(float(task.path.length[start]))
+        before = last_vertex[max(move - (kind == Move.RAPID), 0)]
+        self.batches.stops.begin.append(float(task.path.length[before]))
         if share == 0:
             self.start, self.fraction = start, 0.0
         else:  # in vertices; the search finds the rest
@@ -370,6 +382,8 @@ class _Part:
         if theirs:
             poses = original.pose[self.move : move_last + 1]
             tip, other, scale = program.tip[poses], program.axis[poses], task.axis_length
+            tip[0] += self.share * (tip[1] - tip[0])
+            other[0] += self.share * (other[1] - other[0])
             text, code = "feed moves of the CL file are missing", "CS535"
         else:
             part = slice(self.element - self.base, element_last + 1 - self.base)
@@ -377,8 +391,6 @@ class _Part:
             scale = task.axis_length if nc.second_is == "vector" else 1.0
             text, code = "feed moves that the CL file does not have", "CS536"
         extent = np.abs(tip - tip[0]).max() + scale * np.abs(other - other[0]).max()
-        if theirs and len(tip) == 2:
-            extent *= 1.0 - self.share
         if extent > task.margin(nc):
             move = min(self.move + 1, len(original.pose) - 1)
             element = min(self.element + 1 - self.base, len(nc) - 1)

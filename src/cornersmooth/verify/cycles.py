@@ -107,7 +107,9 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
 def drillings(program: Program, poses: list[int]) -> list[Drilling]:
     """Cycle in force at each of the hole poses, ascending."""
     found: list[Drilling] = []
-    state = last = Drilling()
+    on = False
+    args: tuple[float | str, ...] = ()
+    last = Drilling()
     asking = Asking(program)
     cycles = [statement for statement in program.statements if statement.word in ("CYCLE", *_TURNING)]
     k = 0
@@ -116,12 +118,11 @@ def drillings(program: Program, poses: list[int]) -> list[Drilling]:
             words = [value for value in cycles[k].args if isinstance(value, str) and value]
             if cycles[k].word != "CYCLE":
                 asking.take(cycles[k], 0.0)
-            elif words[:1] in (["OFF"], ["NOMORE"]):
-                state = Drilling()
-            elif words == ["ON"]:
-                state = last
             elif words != ["INIT"]:
-                state = last = drilling(cycles[k].args, program, asking.speed)
+                on = words[:1] not in (["OFF"], ["NOMORE"])
+                args = cycles[k].args if on and words != ["ON"] else args
+            # a pitch, and a dwell in revolutions, hang on the speed of now
+            last = drilling(args, program, asking.speed) if args else Drilling()
             k += 1
-        found.append(state)
+        found.append(last if on else Drilling())
     return found

@@ -13,30 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints, Move
+from cornersmooth.model import Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Problem
 from cornersmooth.verify.cycles import Drilling, drillings
-from cornersmooth.verify.polyline import Original, directions
-from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
+from cornersmooth.verify.hole_search import HoleSearch
+from cornersmooth.verify.polyline import Original
+from cornersmooth.verify.tool_changes import ToolChanges
 
-#: elements looked through at a time for the beginning of a run
-_WINDOW = 512
-
-#: elements behind the pose before a run in which the run is looked for before the pose is taken for a passing one
-_UNDECIDED = 1 << 16
-
-#: elements in which it is looked for what a cycle asks for, where the text first goes over its hole
-_DOUBTFUL = 1 << 12
-
-#: moves behind a hole in which the next feed move or hole is looked for
-_NEXT = 16
-
-#: elements between runs that are given out together, and those held of what has been given out
-_TOGETHER, _KEPT = 1 << 14, 16
-
-#: last printed digits that a point may be beside its hole
-_STEPS = 1.0
+#: elements held of what has been given out
+_KEPT = 16
 
 
 class Between(NamedTuple):
@@ -67,13 +53,16 @@ class Holes:
     original : Original
     ahead : Ahead
     axis_length : float, mm
+    changes : ToolChanges
     """
 
-    def __init__(self, original: Original, ahead: Ahead, axis_length: float) -> None:
+    def __init__(self, original: Original, ahead: Ahead, axis_length: float, changes: ToolChanges) -> None:
         self._original, self._ahead = original, ahead
-        self._search = _Search(original, ahead, axis_length)
+        self._search = HoleSearch(original, ahead, axis_length, changes)
         #: move of the hole that an element belongs to
         self.element_move: dict[int, int] = {}
+        #: the last move that it may belong to: over holes that are not drilled the tool may be there for the next
+        self.latest_move: dict[int, int] = {}
         #: move as far as which words behind an element may stand: the element leaves the last hole and ends where that
         #: move does, or the holes from it to that move are not drilled
         self.shared: dict[int, int] = {}
@@ -85,6 +74,8 @@ class Holes:
         self.untapped: list[Problem] = []
         #: CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside a hole, CS564 a feed that is not a hole's
         self.problems: list[Problem] = []
+        #: first move behind the last run that leads somewhere
+        self._went_on = 0
 
     def between(self) -> Iterator[Between]:
         """Say what lies before, between and behind the runs of holes, as it is read."""
@@ -109,20 +100,23 @@ class Holes:
             ahead.forget(element - _KEPT)
             # the move out of the last hole starts wherever the tool has been left
             loose = stop < moves and original.program.kind[original.pose[stop]] != Move.RAPID
-            move = stop - 1 if loose else stop
+            move = self._went_on if self._went_on > stop else stop - 1 if loose else stop
         while ahead.has(element):
             yield Between(move, moves - 1, element, ahead.count, False)
             element = ahead.count
             ahead.forget(element - _KEPT)
+        while element == ahead.count and move < moves and self._search.stays(move, element - 1):
+            move += 1  # the tool is there
         yield Between(move, moves - 1, element, element, True)
 
     def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling], *, again: bool) -> int:
         """Check the holes of a run; return the first element behind them."""
         search, ahead = self._search, self._ahead
         groups, element = search.consume(first, stop, start, cycles, again=again)
+        self._went_on = stop
         if stop < len(self._original.pose):
-            groups[-1], element = search.give_back(stop, groups[-1], cycles[-1], element)
-            if ahead.has(element) and search.exact(stop, np.array([element]))[0]:
+            groups[-1], element, self._went_on = search.give_back(stop, groups[-1], cycles[-1], element)
+            if self._went_on == stop and ahead.has(element) and search.exact(stop, np.array([element]))[0]:
                 self.shared[element] = stop
         if all(ahead.nc.kind[k - ahead.base] == Element.RAPID for k in groups[-1]):
             before = [k for group in groups[:-1] for k in group]
@@ -132,7 +126,9 @@ class Holes:
                 last -= 1  # said twice, as behind a tool change
                 self.shared[last] = stop - 1
         for k, group in enumerate(groups):
-            self.element_move.update(dict.fromkeys(group, first + k))
+            for one in group:  # of several in one hole the first: what follows may leave nothing in the text
+                self.element_move.setdefault(one, first + k)
+                self.latest_move.setdefault(one, self._latest(one, first + k, stop, groups[k:]))
             again = search.repeats(first, stop, first + k)
             if not (
                 k and np.isnan(cycles[k].depth) and set(group) & set(groups[k - 1])
@@ -148,277 +144,8 @@ class Holes:
                 self.untapped.append(Problem("CS561", int(search.line[first + k]), near, text))
         return element
 
-
-class _Search:
-    """Looks for holes in the text."""
-
-    def __init__(self, original: Original, ahead: Ahead, axis_length: float) -> None:
-        self.ahead, self.axis_length = ahead, axis_length
-        program = original.program
-        self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]
-        self.line, self.kind = program.line[original.pose], program.kind[original.pose]
-
-    @property
-    def room(self) -> float:
-        """Distance that the printed digits account for, mm."""
-        nc = self.ahead.nc
-        return _STEPS * (nc.tip_step + nc.second_step * (self.axis_length if nc.second_is == "vector" else 1.0))
-
-    def exact(self, move: int, elements: Ints) -> Bools:
-        """(k,) whether elements end exactly at a move's pose."""
-        tip = np.broadcast_to(self.tip[move], (len(elements), 3))
-        axis = np.broadcast_to(self.axis[move], (len(elements), 3))
-        same: Bools = digit_errors(self.ahead.nc, elements - self.ahead.base, tip, axis, self.axis_length)[0]
-        return same
-
-    def heights(self, move: int, elements: Ints) -> Floats:
-        """(k,) mm above the hole's pose at the ends of elements; NaN beside the hole or with another axis."""
-        nc, own = self.ahead.nc, elements - self.ahead.base
-        away = nc.tip[own] - self.tip[move]
-        height = away @ self.axis[move]
-        beside = np.linalg.norm(away - height[:, None] * self.axis[move], axis=1)
-        turned = np.linalg.norm(directions(nc, nc.tip[own], nc.second[own]) - self.axis[move], axis=1)
-        # what the printed angles of a tilted plane leave open
-        lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
-        on = beside <= self.room + lean * np.abs(height)
-        on &= turned * self.axis_length <= 2 * self.room + lean * self.axis_length
-        return np.where(on, height, np.nan)
-
-    def stands(self, move: int, hole: int, element: int) -> bool:
-        """Whether the moves before a hole lead nowhere: the tool is where they end, and goes on over the hole."""
-        if not element or not self.over(hole, element):
-            return False
-        return all(self.exact(k, np.array([element - 1]))[0] for k in range(move, hole))
-
-    def same_hole(self, one: int, other: int) -> bool:
-        """Whether two moves are to the same hole."""
-        return bool(self.near(one, slice(other, other + 1))[0])
-
-    def goes_on(self, move: int) -> bool:
-        """Whether the next move of the CL file that is no rapid, too, is along the line of a hole."""
-        others = np.flatnonzero(self.kind[move + 1 : move + 1 + _NEXT] != Move.RAPID)
-        if not len(others):
-            return False
-        following = move + 1 + int(others[0])
-        away, turned = (values[following] - values[move] for values in (self.tip, self.axis))
-        beside = np.linalg.norm(away - (away @ self.axis[move]) * self.axis[move])
-        return bool(beside <= self.room and np.linalg.norm(turned) * self.axis_length <= 2 * self.room)
-
-    def near(self, move: int, others: slice) -> Bools:
-        """(k,) whether others are to the pose of a move, as far as the digits show."""
-        apart, turned = (np.linalg.norm(values[others] - values[move], axis=1) for values in (self.tip, self.axis))
-        same: Bools = (apart <= self.room) & (turned * self.axis_length <= 2 * self.room)
-        return same
-
-    def over(self, move: int, element: int) -> bool:
-        """Whether there is such an element, and it ends in the line of the hole."""
-        return self.ahead.has(element) and not np.isnan(self.heights(move, np.array([element]))[0])
-
-    def visits(self, move: int, hole: int) -> int:
-        """How often the moves before a hole, from one on, come to the pose before it and must pass it exactly."""
-        here = self.near(hole - 1, slice(move, hole))
-        ends = np.append(self.kind[move + 1 : hole] != Move.LINEAR, True) | (self.kind[move:hole] == Move.RAPID)
-        ends[0] |= move == 0  # the first pose of all
-        begins = here & ~np.append(False, here[:-1])
-        return max(len(np.unique(np.cumsum(begins)[here & ends])), 1)
-
-    def starts(self, move: int, hole: int, element: int, cycle: Drilling) -> Iterator[tuple[int, bool]]:
-        """Look for the first element of a run of holes, and say how far it is not yet met, and where it is.
-
-        It is behind the pose before it, where the text goes over to the first hole. There need be nothing at a hole
-        whose cycle cannot be carried out. A text that never goes over to it has its holes, if any, behind
-        where it has met that pose, or behind what has been given out as before them. Where feed moves run along the
-        hole, too, it is the first time that the text does what the cycle asks for.
-        """
-        reached: int | None = None
-        doubtful: int | None = None
-        visits, seen, before = self.visits(move, hole), 0, -2
-        begin = given = element
-        while self.ahead.has(begin + _WINDOW) or self.ahead.has(begin):
-            window = np.arange(begin, min(begin + _WINDOW, self.ahead.count))
-            for k in window[self.exact(hole - 1, window)].tolist():
-                seen, before = seen + (k > before + 1), k  # the same place twice: as new
-                if seen < visits:
-                    continue
-                reached = k if reached is None or k == reached + 1 else reached
-                left_out = np.isnan(cycle.depth) and (k > reached or not cycle.tap)
-                if left_out or not self.over(hole, k + 1):
-                    continue
-                if cycle.tap or self.drills(hole, k + 1, cycle):
-                    yield k + 1, True
-                    return
-                doubtful = k + 1 if doubtful is None else doubtful
-            begin += len(window)
-            if doubtful is not None and begin - doubtful > _DOUBTFUL:
-                break
-            if reached is not None and np.isnan(cycle.depth):
-                break
-            if reached is not None and begin - reached > _UNDECIDED:
-                reached = None
-            if reached is None and doubtful is None and begin - given >= _TOGETHER:
-                yield begin, False
-                given = begin
-        if doubtful is not None:
-            yield doubtful, True
-            return
-        yield (given if reached is None else reached + 1), True
-
-    def drills(self, move: int, element: int, cycle: Drilling) -> bool:
-        """Whether the text drills a hole from an element on: to its depth, no farther, at the cycle's feeds."""
-        while self.over(move, element):
-            if self.feeds([element]):
-                height = self.heights(move, np.array([element]))[0]
-                if self.wrong_feed(element, cycle) or height < -cycle.depth - self.room:
-                    return False
-                if height <= self.room - cycle.depth:
-                    return True
-            element += 1
-        return False
-
-    def wrong_feed(self, element: int, cycle: Drilling) -> bool:
-        """Whether the feed of an element is not that of a cycle."""
-        nc, own = self.ahead.nc, element - self.ahead.base
-        return bool(
-            not np.isnan(cycle.feed)
-            and (
-                np.isnan(nc.feed[own])
-                or abs(nc.feed[own] - cycle.feed) > 2 * abs(nc.feed_room[own])
-                or (np.isnan(nc.feed_room[own]) and nc.feed[own] > cycle.feed + ARITHMETIC)
-                or nc.per_revolution[own] != cycle.per_revolution
-            )
-        )
-
-    def consume(
-        self, first: int, stop: int, element: int, cycles: list[Drilling], *, again: bool
-    ) -> tuple[list[list[int]], int]:
-        """Elements of each hole, and the element behind them all.
-
-        Where the next cycle is for the same hole, the first rapid out of it behind its depth ends this one.
-
-        A hole that is not tapped as its cycle says becomes one of a cycle that asks for nothing, in `cycles`, too.
-
-        `again`: the next run begins in the last of these holes. Where nothing is drilled in it now, only what stays
-        where the cycle was entered belongs to this run.
-        """
-        groups: list[list[int]] = []
-        asked = tuple(cycles)
-        for move in range(first, stop):
-            group: list[int] = []
-            entered = np.nan
-            repeated = move > first and asked[move - 1 - first] == asked[move - first]
-            if repeated and self.same_hole(move - 1, move):
-                cycles[move - first] = cycles[move - 1 - first]
-            elif cycles[move - first].tap and not self.tapped(move, element, cycles[move - first]):
-                cycles[move - first] = cycles[move - first].if_drilled
-            if again and np.isnan(cycles[-1].depth) and move == stop - 1 and first:
-                entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
-            depth = cycles[move - first].depth
-            other = move + 1 < stop and cycles[move + 1 - first] != cycles[move - first]
-            twice, deep, left = other and self.same_hole(move, move + 1), False, False
-            while self.ahead.has(element):
-                height = self.heights(move, np.array([element]))[0]
-                if np.isnan(height) or abs(height - entered) > self.room:
-                    break
-                fed = bool(self.feeds([element]))
-                down = not group or height < self.heights(move, np.array(group[-1:]))[0] - self.room
-                if (left and (fed or down)) or (fed and np.isnan(depth) and self.goes_on(move)):
-                    break  # what goes on behind a hole, or is fed where nothing is drilled, is not the hole's
-                group.append(element)
-                element += 1
-                deep = deep or height <= self.room - depth
-                left = left or (deep and height > self.room)
-                if twice and deep and height > self.room and not self.feeds(group[-1:]):
-                    break
-            if not group and groups and groups[-1]:  # the same hole again
-                before = np.array(groups[-1])
-                group = before[~np.isnan(self.heights(move, before))].tolist()
-            groups.append(group)
-        return groups, element
-
-    def tapped(self, move: int, element: int, cycle: Drilling) -> bool:
-        """Whether the first feed in a hole, from an element on, is that of its thread."""
-        while self.over(move, element):
-            if self.feeds([element]):
-                nc, own = self.ahead.nc, element - self.ahead.base
-                near = abs(nc.feed[own] - cycle.feed) <= 2 * abs(nc.feed_room[own])
-                return bool(nc.per_revolution[own] and near)
-            element += 1
-        return False
-
-    def feeds(self, group: list[int]) -> list[int]:
-        """Elements of a group that are no rapids."""
-        return [k for k in group if self.ahead.nc.kind[k - self.ahead.base] != Element.RAPID]
-
-    def nc_line(self, element: int) -> int:
-        """NC line of an element."""
-        return int(self.ahead.nc.line[element - self.ahead.base])
-
-    def give_back(self, move: int, group: list[int], cycle: Drilling, end: int) -> tuple[list[int], int]:
-        """Elements of the last hole, and the first of what follows: a move out of the hole may be the CL file's own.
-
-        A rapid may be both, the retreat and the next pose; a feed move is not the hole's then.
-        """
-        feeds = self.feeds(group)
-        deepest = -1
-        if feeds and not np.isnan(cycle.depth):
-            height = self.heights(move - 1, np.array(feeds))
-            # the next cycle may go into the same hole: the first to be deep enough ends this one
-            done = height <= self.room - cycle.depth
-            deepest = feeds[int(np.argmax(done) if done.any() else np.argmin(height))]
-        behind = np.array([k for k in group if k > deepest], np.int64)
-        same = behind[self.exact(move, behind)] if len(behind) else behind
-        if not len(same):
-            return group, end
-        first = int(same[0])
-        keep = first if self.feeds([first]) else first + 1
-        return [k for k in group if k < keep], first
-
-    def repeats(self, first: int, stop: int, move: int) -> bool:
-        """Whether a neighbour in a run of holes is the same hole."""
-        return any(first <= other < stop and self.same_hole(move, other) for other in (move - 1, move + 1))
-
-    def check(self, move: int, group: list[int], cycle: Drilling, *, alone: bool) -> list[Problem]:
-        """Depth, feeds and rapids of one hole; `alone`: it is drilled once."""
-        cl_line, feeds = int(self.line[move]), self.feeds(group)
-        known = not np.isnan(cycle.depth)
-        if not feeds:
-            if known and cycle.depth > self.room:
-                near = self.nc_line(group[0]) if group else 0
-                return [Problem("CS561", cl_line, near, "a hole of the CL file is not drilled")]
-            return []
-        if not known:
-            return [Problem("CS564", cl_line, self.nc_line(feeds[0]), "the cycle does not say what is fed here")]
-        problems = []
-        height = dict(zip(group, self.heights(move, np.array(group)).tolist(), strict=True))
-        before = self.heights(move, np.array([max(group[0] - 1, 0)]))[0]
-        deepest = min(feeds, key=lambda k: height[k])
-        off = height[deepest] + cycle.depth
-        if abs(off) > self.room:
-            text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
-            problems.append(Problem("CS562", cl_line, self.nc_line(deepest), text, abs(off)))
-        behind = [k for k in group if k > deepest][:1]
-        if cycle.feed_out and behind and not self.feeds(behind):
-            text = "a rapid leaves a hole that the tool is to leave at feed"
-            problems.append(Problem("CS563", cl_line, self.nc_line(behind[0]), text))
-        drilled = 0.0
-        for k in group:
-            line = self.nc_line(k)
-            if not self.feeds([k]):
-                if height[k] < -drilled - self.room:
-                    amount = -drilled - height[k]
-                    text = f"a rapid goes {amount:.4f} mm into the uncut hole"
-                    problems.append(Problem("CS563", cl_line, line, text, amount))
-            else:
-                if k == group[0] and np.isnan(before):
-                    problems.append(Problem("CS563", cl_line, line, "a feed move enters a hole from the side"))
-                if self.wrong_feed(k, cycle):
-                    text = f"the feed is {self.ahead.nc.feed[k - self.ahead.base]:g}, the cycle says {cycle.feed:g}"
-                    problems.append(Problem("CS541", cl_line, line, text))
-                down = height.get(k - 1, np.inf) > height[k]
-                if alone and down and drilled > self.room and self.room < -height[k] <= drilled + self.room:
-                    problems.append(Problem("CS562", cl_line, line, "a hole is drilled again"))
-                drilled = max(drilled, -height[k])
-        if height[group[-1]] < -self.room:
-            text = "the tool leaves a hole sideways"
-            problems.append(Problem("CS563", cl_line, self.nc_line(group[-1]), text, -height[group[-1]]))
-        return problems
+    def _latest(self, element: int, move: int, stop: int, groups: list[list[int]]) -> int:
+        """Last move that an element of a hole may belong to; `groups` are those from that hole on."""
+        while move + 1 < stop and not self._search.feeds(groups[0]) and self._search.over(move + 1, element):
+            move, groups = move + 1, groups[1:]
+        return move

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints, Move
+from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram
 from cornersmooth.verify.task import Task
 
@@ -26,17 +26,21 @@ class OwnRapids:
     ----------
     rapids, holes : (k,) int64
         Moves that are.
+    _ranks : tuple of (m,) float64
+        Number of each move among those that lead somewhere: of all, and of those that are no holes.
     """
 
     task: Task
     rapids: Ints = field(init=False)
     holes: Ints = field(init=False)
+    _ranks: tuple[Floats, Floats] = field(init=False)
 
     def __post_init__(self) -> None:
         original = self.task.original
         kind = original.program.kind[original.pose]
         object.__setattr__(self, "rapids", np.flatnonzero(kind == Move.RAPID))
         object.__setattr__(self, "holes", np.flatnonzero(kind == Move.HOLE))
+        object.__setattr__(self, "_ranks", (self._rank(kind >= 0), self._rank(kind != Move.HOLE)))
 
     def added(self, start: Floats, end: Floats, step: float, near: Floats) -> bool:
         """Whether the CL file has a pose at the end of a rapid nearer to the part, and does not ask for the rapid.
@@ -53,15 +57,24 @@ class OwnRapids:
         """
         leaves = np.array_equal(near, start)
         at_near, at_far = self._moves_to(near, step), self._moves_to(end if leaves else start, step)
-        at_far = at_far[np.isin(at_far, self.rapids)]
+        at_far = at_far[np.isin(at_far, self.rapids) | np.isin(at_far, self.holes)]
         one, other = (at_near, at_far) if leaves else (at_far, at_near)
         # at holes that are left out nothing moves
-        asked = _follow(one, other) or _follow(self._without_holes(one), self._without_holes(other))
-        return bool(len(at_near)) and not asked
+        asked = any(_follow(rank[one], rank[other]) for rank in self._ranks)
+        asked = asked or self._over_hole(near, at_far + (-1 if leaves else 1), step)
+        return not (asked or np.isin(at_near, self.holes).all())
+
+    def _over_hole(self, tip: Floats, moves: Ints, step: float) -> bool:
+        """Whether one of some moves is a hole, and a tip (3,) is in its line, up to printed digits."""
+        original = self.task.original
+        pose = original.pose[moves[np.isin(moves, self.holes)]]
+        away, axis = tip - original.program.tip[pose], original.program.axis[pose]
+        height = np.einsum("ij,ij->i", away, axis)
+        return bool((np.linalg.norm(away - height[:, None] * axis, axis=1) <= _STEPS * step).any())
 
     def goes_to(self, tip: Floats, step: float) -> bool:
-        """Whether the CL file goes to a tip in rapid, up to printed digits."""
-        return bool(np.isin(self._moves_to(tip, step), self.rapids).any())
+        """Whether the CL file goes to a tip in rapid, up to printed digits; so it does in and over all of its holes."""
+        return bool(np.isin(self._moves_to(tip, step), self.rapids).any()) or self._over_hole(tip, self.holes, step)
 
     def _moves_to(self, tip: Floats, step: float) -> Ints:
         """Moves of the CL file that end at a tip (3,), up to printed digits."""
@@ -72,10 +85,15 @@ class OwnRapids:
         moves = np.searchsorted(original.pose, poses)
         return moves[np.isin(poses, original.pose[moves[moves < len(original.pose)]])]
 
-    def _without_holes(self, moves: Ints) -> Ints:
-        """The moves that are no holes, counted without holes."""
-        moves = moves[~np.isin(moves, self.holes)]
-        return moves - np.searchsorted(self.holes, moves)
+    def _rank(self, chosen: Bools) -> Floats:
+        """(m,) number of each move among the chosen ones that lead somewhere; NaN for the others."""
+        original = self.task.original
+        moves = np.flatnonzero(chosen)
+        pose = original.pose[moves]
+        moved = np.zeros(len(chosen), np.bool_)
+        for values in (original.program.tip[pose], original.program.axis[pose]):
+            moved[moves[1:]] |= (values[1:] != values[:-1]).any(axis=1)
+        return np.where(chosen, np.cumsum(moved), np.nan)
 
     def left_out(self, nc: NcProgram) -> tuple[Elements, list[Event]]:
         """Elements and events of a text that was read before, where rapids that posts add do not move the tool.
@@ -102,6 +120,6 @@ class OwnRapids:
         return replace(elements, tip=tip, second=second), events
 
 
-def _follow(moves: Ints, others: Ints) -> bool:
-    """Whether one of the others is the next behind one of the moves."""
-    return bool(np.isin(moves + 1, others).any())
+def _follow(ranks: Floats, others: Floats) -> bool:
+    """Whether one of the others is the next behind one of the first."""
+    return bool(np.isin(ranks + 1.0, others).any())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -41,12 +42,18 @@ class Token:
         CL or NC line.
     room : float, mm
         How far the place is uncertain beyond what printed digits account for: rotary words near the pole.
+    reach : float, mm
+        How much farther along it may be, too: what the CL file has there leaves nothing in the text.
     moment : int
         Tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts.
+    element : int
+        Element of the text that it stands before; -1 in the CL file.
     habit : bool
         Whether posts write it on their own: an optional stop right before another tool.
     others : tuple of float, mm
         Other places that it may have, where the path goes to and fro.
+    idle : bool
+        Whether a tool is changed for another, or the program ends, before anything moves.
     """
 
     kind: str
@@ -57,6 +64,9 @@ class Token:
     moment: int = 0
     habit: bool = False
     others: tuple[float, ...] = ()
+    idle: bool = False
+    reach: float = 0.0
+    element: int = -1
 
 
 #: kinds during which a state matters although nothing moves
@@ -252,28 +262,21 @@ def said(
     events: Sequence[Event],
     places: Sequence[float],
     rooms: Sequence[float],
+    reaches: Sequence[float],
     others: Sequence[tuple[float, ...]],
 ) -> list[Token]:
-    """What the words of the NC text do.
-
-    Parameters
-    ----------
-    events : sequence of Event
-    places, rooms : sequence of float, mm
-        Where they stand, and how far that is uncertain.
-    others : sequence of tuple of float, mm
-        Where they may stand as well.
-    """
+    """What the words of the NC text do; the rest, in mm, is what `Token` has as place, room, reach and others."""
     tokens: list[Token] = []
     chosen: float | None = None
     moment = element = 0
-    speaking = [row for row in zip(events, places, rooms, others, strict=True) if row[0].letter != "("]
-    for k, (event, place, room, elsewhere) in enumerate(speaking):
+    speaking = [event for event in events if event.letter != "("]
+    rows = [row for row in zip(events, places, rooms, reaches, others, strict=True) if row[0].letter != "("]
+    for k, (event, place, room, reach, elsewhere) in enumerate(rows):
         value, line, before = event.value, event.line, len(tokens)
         moment, element = moment + (event.element != element), event.element
         if event.letter == "T":
             chosen = value
-            following = speaking[k + 1][0] if k + 1 < len(speaking) else None
+            following = speaking[k + 1] if k + 1 < len(speaking) else None
             if following is None or (following.letter, following.value) != ("M", 6.0):
                 tokens.append(Token("next tool", value, place, line))
         elif event.letter == "M" and value == 6:
@@ -293,20 +296,27 @@ def said(
             number = round(value, SPEED_DECIMALS) if event.letter == "S" else value
             tokens.append(Token(_PLAIN[event.letter], number, place, line))
         habit = (event.letter, value) == ("M", 1.0) and _before_a_tool(speaking, k)
-        tokens[before:] = [
-            replace(token, room=room, moment=moment, habit=habit, others=elsewhere) for token in tokens[before:]
-        ]
+        idle = (event.letter, value) == ("M", 6.0) and _is_idle(speaking, k)
+        place_of = partial(replace, room=room, reach=reach, others=elsewhere, moment=moment, element=event.element)
+        tokens[before:] = [place_of(token, habit=habit, idle=idle) for token in tokens[before:]]
         moment += any(token.kind in _PAUSES and not token.habit for token in tokens[before:])
     return tokens
 
 
-def _before_a_tool(speaking: Sequence[tuple[Event, float, float, tuple[float, ...]]], k: int) -> bool:
+def _before_a_tool(speaking: Sequence[Event], k: int) -> bool:
     """Whether the next word is that of a tool, with no motion between; and there has been one before."""
-    event = speaking[k][0]
-    behind = (other for other, *_ in speaking[k + 1 :] if (other.letter, other.value) != ("G", 40.0))  # R0 of M91
+    event = speaking[k]
+    behind = (other for other in speaking[k + 1 :] if (other.letter, other.value) != ("G", 40.0))  # R0 of M91
     following = next(behind, None)
     changes = following is not None and following.letter == "T" and following.element == event.element
-    return changes and any(before.letter == "T" for before, *_ in speaking[:k])
+    return changes and any(before.letter == "T" for before in speaking[:k])
+
+
+def _is_idle(speaking: Sequence[Event], k: int) -> bool:
+    """Whether the next tool, or the end of the program, comes before any motion."""
+    here = speaking[k].element
+    ends = (other for other in speaking[k + 1 :] if other.letter == "M" and other.value in (2.0, 6.0, 30.0))
+    return next((other.element == here for other in ends), False)
 
 
 #: letters whose words are tokens as they stand

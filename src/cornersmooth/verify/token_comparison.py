@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+from bisect import bisect_left
 from collections.abc import Callable
 
 from cornersmooth.nc_reader.elements import Problem
@@ -100,17 +101,21 @@ def compare(
         """How often a state is ended."""
         return sum(token.value == _ENDED[kind] for token in _effective(tokens, kind))
 
+    changes = [token.line for token in found if token.kind == "tool"]
     for kind in _ENDED:
         mine = found
         if kind in _STOPPED:  # what a tool change stops says nothing of the end
             mine, theirs = (_effective(tokens, kind) for tokens in (found, asked_for))
-            mine = _without_habits(mine, theirs, _ENDED[kind], room, apart)
-        if ended(mine, kind) > ended(asked_for, kind) and not any(tidies(token, kind) for token in asked_for):
+            mine = _without_habits(mine, theirs, changes, room, apart)
+        if ended(mine, kind) > ended(asked_for, kind) and not any(
+            tidies(token, kind) for token in _effective(asked_for, kind)
+        ):
             found = [token for token in found if not tidies(token, kind)]
+    asked_for, found = _without_idle_offsets(asked_for, found)
     for kind, (name, code) in _NAMES.items():
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
         if kind in _STOPPED and _values(theirs) != _values(ours):
-            ours = _effective(_without_habits(ours, theirs, _ENDED[kind], room, apart), kind)
+            ours = _effective(_without_habits(ours, theirs, changes, room, apart), kind)
         if kind in _STOPPED and _values(theirs) != _values(ours):
             theirs, ours = (_effective(_last_of_moments(tokens, kind), kind) for tokens in (asked_for, found))
         matcher = difflib.SequenceMatcher(None, _values(theirs), _values(ours), autojunk=False)
@@ -146,27 +151,59 @@ def _last_line(tokens: list[Token], place: float) -> int:
 
 
 def _without_habits(
-    ours: list[Token], theirs: list[Token], off: float, room: float, apart: Callable[[float, float], float]
+    ours: list[Token], theirs: list[Token], changes: list[int], room: float, apart: Callable[[float, float], float]
 ) -> list[Token]:
     """Tokens without those that end a state which begins again before any motion, if the CL file does not ask for them.
 
-    Posts stop spindle and coolant for a tool change on their own.
+    Posts stop spindle and coolant for a tool change on their own, also where the program waits behind it; `changes` are
+    the lines of those.
     """
-    unasked = [k for k, token in enumerate(ours) if token.value == off]
-    begins_again = {k for k in unasked if k + 1 < len(ours) and ours[k + 1].moment == ours[k].moment}
+    unasked = [k for k, token in enumerate(ours) if token.value == _ENDED[token.kind]]
+    begins_again = {k for k in unasked if k + 1 < len(ours) and _goes_on(ours[k], ours[k + 1], changes)}
     for other in theirs:
-        near = [k for k in unasked if other.value == off and not _away(other.place, ours[k], room, apart)]
+        near = [k for k in unasked if other.value == ours[k].value and not _away(other.place, ours[k], room, apart)]
         if near:
             unasked.remove(min(near, key=lambda k: (k in begins_again, abs(ours[k].place - other.place))))
     return [token for k, token in enumerate(ours) if k not in begins_again or k not in unasked]
 
 
+def _goes_on(off: Token, on: Token, changes: list[int]) -> bool:
+    """Whether a state that is ended begins again before anything moves, dwells or stops, a tool change apart."""
+    if on.moment == off.moment:
+        return True
+    at = bisect_left(changes, off.line)
+    return on.element == off.element and at < len(changes) and changes[at] < on.line
+
+
+def _without_idle_offsets(asked_for: list[Token], found: list[Token]) -> tuple[list[Token], list[Token]]:
+    """Both without the offsets of tools with which nothing moves: those may be said or not."""
+    theirs, ours = _effective(asked_for, "tool"), _effective(found, "tool")
+    if _values(theirs) != _values(ours):
+        return asked_for, found
+    idle = {k for k, tool in enumerate(ours) if tool.idle}
+    if not idle:
+        return asked_for, found
+    return _outside(asked_for, theirs, idle), _outside(found, ours, idle)
+
+
+def _outside(tokens: list[Token], tools: list[Token], idle: set[int]) -> list[Token]:
+    """Tokens without the offsets behind some of the tools."""
+    kept: list[Token] = []
+    at = -1
+    for token in tokens:
+        at += at + 1 < len(tools) and token is tools[at + 1]
+        if token.kind != "offset" or at not in idle:
+            kept.append(token)
+    return kept
+
+
 def _away(place: float, ours: Token, room: float, apart: Callable[[float, float], float]) -> bool:
     """Whether a token is elsewhere than asked for."""
-    if any(abs(place - here) <= room + ours.room for here in (ours.place, *ours.others)):
+    nearest = min(max(place, ours.place), ours.place + ours.reach)
+    if any(abs(place - here) <= room + ours.room for here in (nearest, *ours.others)):
         return False
     # a pose is a rounding off, and its place as far from it as the room
-    return apart(place, ours.place) > 2 * room + ours.room
+    return apart(place, nearest) > 2 * room + ours.room
 
 
 def _last_of_moments(tokens: list[Token], kind: str) -> list[Token]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -312,7 +313,8 @@ class _Measured:
         # clamps of rotary axes stand where the machine wants them, not where AUXFUN has them
         theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in self.clamps]
         known = self.lengths | self.batches.stops.lengths()
-        known |= {element: length_at(move) for element, move in self.batches.holes.items()}
+        holes = self.batches.holes
+        known |= {element: length_at(move) for element, move in holes.items()}
         first = self.batches.stops.first
 
         order = sorted(known)
@@ -328,7 +330,20 @@ class _Measured:
         # the way back from the last hole may be the CL file's next move; at holes that are not drilled nothing moves
         for element, behind in self.batches.shared.items():
             self.rooms[element] = self.rooms.get(element, 0.0) + abs(length_at(behind) - place(element))
-        places = [place(event.element - 1) for event in self.events]
+        begins = {element: length_at(max(move - 1, 0)) for element, move in self.batches.latest.items()}
+        begins |= self.batches.stops.begins()
+        begins[self.batches.elements] = end
+        places = [
+            length_at(holes[event.element])  # that which is fed next
+            if (event.letter, event.value) == ("G", TAP) and event.element in holes
+            else place(event.element - 1)
+            for event in self.events
+        ]
+        # between two elements the text may have passed all that leaves nothing in it
+        reaches = [
+            max(begins.get(event.element, -math.inf) - here, 0.0)
+            for event, here in zip(self.events, places, strict=True)
+        ]
         rooms = [self.rooms.get(stands(event.element - 1), 0.0) for event in self.events]
         others = [self.others.get(stands(event.element - 1), ()) for event in self.events]
         apart: Callable[[float, float], float] = partial(way_apart, self.task.path)
@@ -338,12 +353,13 @@ class _Measured:
             for event, here, room in zip(self.events, places, rooms, strict=True)
             if homes and any(abs(here - home) <= self.margin + room for home in homes)
         }
-        return compare(theirs, said(self.events, places, rooms, others), self.margin, unsaid, apart, self.own), at_home
+        found = said(self.events, places, rooms, reaches, others)
+        return compare(theirs, found, self.margin, unsaid, apart, self.own), at_home
 
 
 def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measured:
     """Match and measure all that is read."""
-    batches = Batches(task)
+    batches = Batches(task, text.events)
     program = task.original.program
     found = _Measured(task, batches, Findings(), Poses.nowhere(len(program)), {}, {}, {}, text.events, words)
 

@@ -1,0 +1,107 @@
+"""What happens around holes is written and verified: each kind of program that was once refused, or written wrongly."""
+
+import io
+
+import pytest
+
+from cornersmooth.cl import read
+from cornersmooth.nc import Frame, choose_form, fit_settings, write
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
+from cornersmooth.verify import verify
+from verify.hole_programs import hole_trial
+from verify.sweep import judged
+
+#: seeds of `hole_trial`, and what they have
+REFUSED_ONCE = {
+    0: "taps that are not drilled before and behind a tool change",
+    34: "a stop between two cycles in one hole, the first of which is not drilled",
+    47: "nothing moves behind the last hole that is not drilled",
+    50: "GOHOME between two cycles in one hole",
+    63: "a tool with which nothing moves",
+    64: "a feed move given twice behind holes in its line",
+    70: "a stop between two tool changes",
+    77: "a hole that is not drilled in the line of the last",
+    95: "another speed at the pose over a hole",
+    125: "a tap kept over a tool change with another speed",
+    137: "the way out of a hole begins at the height of another pose",
+    143: "three cycles in one hole with three tools",
+    171: "rapids in the line of a hole that is not drilled",
+    221: "a feed move that leads nowhere between rapids",
+    305: "taps one above another",
+    309: "a hole ends where another has its pose",
+    388: "rapids over holes that are not drilled, one above another",
+    424: "nothing moves at three holes and behind them",
+    594: "a cycle of the control ends at the height of another pose",
+    616: "a bored hole is left to where the next feed move leads",
+    628: "the same hole is drilled again behind GOHOME",
+    738: "coolant on behind the last motion",
+    919: "holes that are not drilled, the last of them higher",
+    969: "a tap behind a tool change that does not say SPINDL",
+}
+
+
+@pytest.mark.parametrize("seed", REFUSED_ONCE)
+def test_program_passes(seed: int):
+    one = hole_trial(seed)
+    assert judged(one, read(one.cl.encode(), name="holes.cls"), oracle=False) == ("passed", "")
+
+
+HOLE = """UNITS/MM
+LOADTL/1
+SPINDL/2000,RPM,CLW
+RAPID
+GOTO/20,5,30,0,0,1
+CYCLE/DRILL,FEDTO,12,MMPM,150,RAPTO,3,RTRCTO,20
+GOTO/20,5,1,0,0,1
+{}
+GOTO/20,5,1,0,0,1
+GOTO/25,5,1,0,0,1
+GOTO/25,9,1,0,0,1
+RAPID
+GOTO/25,5,40,0,0,1
+FINI
+"""
+
+BETWEEN = {
+    "feed": "CYCLE/OFF\nFEDRAT/300,MMPM",
+    "rapid": "CYCLE/OFF\nFEDRAT/300,MMPM\nRAPID",
+    "tool": "CYCLE/OFF\nLOADTL/2\nFEDRAT/300,MMPM",
+    "stop": "CYCLE/OFF\nSTOP\nFEDRAT/300,MMPM",
+    "home": "CYCLE/OFF\nGOHOME\nFEDRAT/300,MMPM",
+    "twice": "GOTO/20,5,1,0,0,1\nCYCLE/OFF\nFEDRAT/300,MMPM\nGOTO/20,5,1,0,0,1",
+}
+
+
+WRITTEN = [(between, "proportional", cycles) for between in BETWEEN for cycles in ("moves", "native")]
+WRITTEN += [("feed", "global", "moves"), ("feed", "zhang2016", "moves")]
+
+
+@pytest.mark.parametrize(("between", "method", "cycles"), WRITTEN)
+def test_the_tool_comes_back_to_the_pose_of_the_hole(between: str, method: str, cycles: str):
+    program = read(HOLE.format(BETWEEN[between]).encode(), name="hole.cls")
+    form = choose_form("fanuc")
+    settings = fit_settings(Settings(method=method), form, "mm")
+    stream = io.BytesIO()
+    write(smooth(program, settings), stream, form=form, frame=Frame(cycles=cycles))
+    lines = stream.getvalue().decode().splitlines()
+    code = "G0" if between == "rapid" else "G1"
+    there = [k for k, line in enumerate(lines) if f"{code} X20.0000 Y5.0000 Z1.0000" in line]
+    assert len(there) == 1
+    assert not verify(program, stream.getvalue(), tolerance=settings.verified_tolerance).problems
+    without = "\n".join([*lines[: there[0]], *lines[there[0] + 1 :], ""])
+    found = verify(program, without.encode(), tolerance=settings.verified_tolerance).problems
+    assert found, "the move that is not there is found"
+
+
+def test_a_dwell_in_revolutions_follows_the_speed():
+    text = """UNITS/MM\nLOADTL/1\nSPINDL/2000,RPM,CLW\nRAPID\nGOTO/0,0,30,0,0,1
+CYCLE/DRILL,FEDTO,12,MMPM,150,RAPTO,3,RTRCTO,20,DWELL,5,REV\nGOTO/0,0,0\nSPINDL/500,RPM,CLW\nGOTO/9,0,0
+CYCLE/OFF\nRAPID\nGOTO/0,0,40\nFINI\n"""
+    program = read(text.encode(), name="hole.cls")
+    form = choose_form("fanuc")
+    settings = fit_settings(Settings(), form, "mm")
+    stream = io.BytesIO()
+    write(smooth(program, settings), stream, form=form)
+    assert [line for line in stream.getvalue().decode().splitlines() if line[:3] == "G4 "] == ["G4 P150", "G4 P600"]
+    assert not verify(program, stream.getvalue(), tolerance=settings.verified_tolerance).problems
