@@ -7,7 +7,7 @@ import pytest
 
 from cornersmooth.model import Move, Program, Source, Statement
 from cornersmooth.nc_reader import block_tables, reader
-from cornersmooth.verify import drilling, verify
+from cornersmooth.verify import hole_search, verify
 
 from .writing import HEAD, TAIL, encode
 
@@ -223,11 +223,11 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     monkeypatch.setattr(reader, "GIVEN_OUT", 4)
     monkeypatch.setattr(block_tables, "CHUNK", 60)
     for name, value in (("_WINDOW", 2), ("_TOGETHER", 4), ("_UNDECIDED", 8)):
-        monkeypatch.setattr(drilling, name, value)
+        monkeypatch.setattr(hole_search, name, value)
     held = []
-    part = drilling.Ahead.part
+    part = hole_search.Ahead.part
     monkeypatch.setattr(
-        drilling.Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1]
+        hole_search.Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1]
     )
     assert codes(program, text("G43.5 H1", *lines)) == []
     assert max(held) < 200
