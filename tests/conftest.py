@@ -33,6 +33,7 @@ def corpus() -> Path:
 #: none is left with a long one at the end
 FIRST = (
     "test_browser.py",
+    "test_nc_controller.py",
     "test_cli_cluster.py",
     "test_interruptions.py",
     "test_cli_files.py",
