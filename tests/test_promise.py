@@ -237,7 +237,7 @@ ONCE: list[tuple[Form, float, float]] = [(form, 0.04, 10.0) for form in FORMS]
 
 @pytest.mark.parametrize(
     ("name", "form", "tolerance", "axis_length"),
-    [*covering_share(_every(OWN_OTHERS, ONCE), 2), *of_corpus(covering_share(_every(FOUR_OR_LESS, ONCE), 3))],
+    [*covering_share(_every(OWN_OTHERS, ONCE), 2), *of_corpus(covering_share(_every(FOUR_OR_LESS, ONCE), 3, 1))],
 )
 def test_files_with_arcs_holes_and_fixed_axes(name: str, form: Form, tolerance: float, axis_length: float) -> None:
     whole_file(cl_file(name), form, tolerance, axis_length)

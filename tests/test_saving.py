@@ -31,10 +31,14 @@ def fitted(form, **more):
     return fit_settings(cornersmooth.Settings(tolerance=0.02, **more), form, "mm")
 
 
-def test_a_whole_program_is_planned(program):
+@pytest.fixture(scope="module")
+def whole(program):
     form = choose_form()
-    settings = fitted(form)
-    found = estimate_saving(program, settings, form, Limits(), poses=600, stretches=1)
+    return estimate_saving(program, fitted(form), form, Limits(), poses=600, stretches=1)
+
+
+def test_a_whole_program_is_planned(program, whole):
+    settings, found = fitted(choose_form()), whole
     assert found.part == 1.0
     assert found.direct == pytest.approx(direct(program, Limits(), "velocity_jump", settings=settings).total, rel=1e-9)
     ideal = plan(cornersmooth.smooth(program, settings), Limits()).total
@@ -42,10 +46,9 @@ def test_a_whole_program_is_planned(program):
     assert ideal * 0.98 < found.written < found.direct
 
 
-def test_stretches_tell_of_the_whole(program):
+def test_stretches_tell_of_the_whole(program, whole):
     form = choose_form()
     settings = fitted(form)
-    whole = estimate_saving(program, settings, form, Limits(), poses=600, stretches=1)
     found = estimate_saving(program, settings, form, Limits(), poses=240, stretches=6)
     assert found.part == pytest.approx(0.4)
     assert found.direct == pytest.approx(whole.direct, rel=0.03)
@@ -109,7 +112,7 @@ def test_times_at_programmed_feed():
     assert feed_times(program, Limits(feed=300.0, rapid=6000.0)) == pytest.approx([0.0, 0.1, 6.0, 8.0])
 
 
-def test_holes_count_on_neither_side(program):
+def test_holes_count_on_neither_side(program, whole):
     """A hole that takes half a minute to drill makes no text slower than its CL file."""
     form = choose_form()
     settings = fitted(form)
@@ -119,6 +122,5 @@ def test_holes_count_on_neither_side(program):
     kind = np.append(program.kind, [Move.RAPID, Move.HOLE, Move.HOLE])
     words = (Statement(602, 9, "CYCLE", ("DRILL", "DEPTH", 50.0, "MMPM", 100.0, "CLEAR", 2.0)),)
     drilled = Program.from_poses(tip, axis, kind=kind, feed=1500.0, statements=(*program.statements, *words))
-    plain = estimate_saving(program, settings, form, Limits(), poses=700, stretches=1)
     found = estimate_saving(drilled, settings, form, Limits(), poses=700, stretches=1)
-    assert found.direct - found.written == pytest.approx(plain.direct - plain.written, abs=0.1)
+    assert found.direct - found.written == pytest.approx(whole.direct - whole.written, abs=0.1)

@@ -141,7 +141,7 @@ def test_limits_hold_on_the_fan(corpus: FilePath) -> None:
 @pytest.mark.parametrize("name", ["table-ac", "head-ac"])
 def test_limits_hold_on_the_impeller(name: str) -> None:
     """At every period, from the exact derivatives, which the test above holds against the kinematics."""
-    program = read(beginning(IMPELLER, 205), name=IMPELLER.name)
+    program = read(beginning(IMPELLER, 105), name=IMPELLER.name)
     law = plan(smooth(program, Settings()), machine=load_machine(name))
     assert law.machine_axes is not None
     _, *orders = law.axes_at(law.every_period())

@@ -57,7 +57,7 @@ def test_text_of_the_poses_takes_as_long_as_the_direct_path() -> None:
 
 
 def test_text_of_the_poses_keeps_the_limits_of_a_machine() -> None:
-    program, machine = read(beginning(SAMPLE, 205), name="impeller.cls"), load_machine("table-ac")
+    program, machine = read(beginning(SAMPLE, 105), name="impeller.cls"), load_machine("table-ac")
     law = plan_text(read_nc(text_of(kept(program), tolerance=0.01)), LIMITS, machine=machine)
     expected = direct(program, LIMITS, "velocity_jump", machine=machine)
     assert law.total == pytest.approx(expected.total, rel=0.01)

@@ -131,7 +131,7 @@ ONE_BY_ONE = [
     ],
 )
 def test_same_as_the_whole(used, control, form, processes):
-    program = part()
+    program = part(400)
     assert check(program, text_of(program, control, form), used, processes, control=control).passed
 
 

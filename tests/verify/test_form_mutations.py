@@ -51,9 +51,9 @@ def named_in(case: Case, program: Program, lines: list[str]) -> list[tuple[int, 
     return [(problem.nc_line, f"{problem.code} {problem.text}") for problem in found.problems]
 
 
-#: each control and each form: with the one form in which a fold may be lost, all kinds of mutants are among theirs
+#: each control and each form but FANUC's lines, which test_mutations.py has: with the one form in which a fold may be
+#: lost, all kinds of mutants are among theirs
 USUAL = (
-    "fanuc-g1",
     "fanuc-g1-table-ac-axes",
     "generic-g6.2",
     "haas-g1-table-ac",
@@ -71,7 +71,7 @@ def test_every_mutant_that_matters_is_found(case: Case) -> None:
     program = program_of(case)
     lines = text_of(case, program)
     assert named_in(case, program, lines) == []
-    chosen = share_of_kinds(mutants(case, lines), lambda mutant: mutant.kind, 5)
+    chosen = share_of_kinds(mutants(case, lines), lambda mutant: mutant.kind, 6)
     score = judge(program, lines, chosen, partial(text_of, case), partial(named_in, case))
     print(f"\n{case}: {score}")
     assert score.missed == []
