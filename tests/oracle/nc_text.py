@@ -196,9 +196,9 @@ class _Grammar:
             raise BadTextError(f"{number}: {line!r} after M30")
         if line.startswith("G6.2"):
             return self.curve(lines, index, state)
-        if match := re.fullmatch(r"(G43 H\d+) (G0 .*)", line):
+        if match := re.fullmatch(r"(G43 H\d+) (G[01] .*)", line):
             if not state.raised:
-                raise BadTextError(f"{number}: {match[1]} beside a rapid that comes from no retract")
+                raise BadTextError(f"{number}: {match[1]} beside a move that comes from no retract")
             self.code(match[1], number, state)
             line = match[2]
         if state.incremental and line != "G90":
