@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing import nurbs
 from cornersmooth.vectors import angle_between, norm
 
@@ -25,6 +25,9 @@ Excess = Callable[[Floats], Floats]
 
 _GRID = np.linspace(0.0, 1.0, 33)
 _HALVINGS = 36
+
+#: an excess that is none, mm, and parameters that do not differ; secants that are tried before halving
+_NO_EXCESS, _NO_STEP, _SECANTS = 1e-13, 4e-13, 12
 
 
 def matching_parameters(
@@ -99,7 +102,8 @@ def _follow(values: Floats, low_limit: Floats, target: Floats, excess_of: Callab
         distance = np.maximum(at[:, :-1] - target[rows, None], target[rows, None] - at[:, 1:])
         cell = np.argmin(np.where(crossing[rows], np.maximum(distance, 0.0), np.inf), axis=1)
         each = np.arange(len(rows))
-        root = _halved(at[each, cell], at[each, cell + 1], values[rows, cell] <= 0.0, excess_of(rows))
+        ends = (values[rows, cell], values[rows, cell + 1])
+        root = _roots(at[each, cell], at[each, cell + 1], ends, excess_of(rows))
         # an exact root at the limit, as at the two ends of a well synchronised corner, is kept exactly
         limit, wanted = low_limit[rows], target[rows]
         exact = (np.abs(at_limit[rows]) <= 1e-12) & (np.abs(wanted - limit) <= np.abs(wanted - root))
@@ -110,13 +114,25 @@ def _follow(values: Floats, low_limit: Floats, target: Floats, excess_of: Callab
     return found
 
 
-def _halved(low: Floats, high: Floats, negative_low: Bools, excess: Excess) -> Floats:
-    """Roots between pairs of parameters, by bisection."""
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        same = (excess(middle) <= 0.0) == negative_low
+def _roots(low: Floats, high: Floats, ends: tuple[Floats, Floats], excess: Excess) -> Floats:
+    """Roots between pairs of parameters whose excess is known: by secants (Illinois), then by bisection."""
+    (one, other), negative_low = ends, ends[0] <= 0.0
+    root, best = np.where(np.abs(one) < np.abs(other), low, high), np.minimum(np.abs(one), np.abs(other))
+    kept = np.zeros(len(low), np.int8)  # which end the last secant has left where it was: 1 the high one, -1 the low
+    for step in range(_SECANTS + _HALVINGS):
+        part = one / np.where(one == other, -1.0, one - other) if step < _SECANTS else 0.5
+        middle = low + np.clip(part, 0.0, 1.0) * (high - low)
+        value = excess(middle)
+        same = (value <= 0.0) == negative_low
         low, high = np.where(same, middle, low), np.where(same, high, middle)
-    root: Floats = 0.5 * (low + high)
+        # an end that stays twice counts half, so that it does not stay for ever
+        one = np.where(same, value, np.where(kept < 0, one / 2.0, one))
+        other = np.where(same, np.where(kept > 0, other / 2.0, other), value)
+        kept = np.where(same, np.int8(1), np.int8(-1))
+        nearer = np.abs(value) < best
+        root, best = np.where(nearer, middle, root), np.where(nearer, np.abs(value), best)
+        if ((best <= _NO_EXCESS) | (high - low <= _NO_STEP)).all():
+            break
     return root
 
 
