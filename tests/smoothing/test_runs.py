@@ -305,6 +305,20 @@ def test_axis_that_does_not_turn_does_not_tremble() -> None:
     assert curves.axis_bound[0] <= 0.01
 
 
+def test_tip_and_axis_point_deviate_to_opposite_sides_where_that_keeps_the_lever_calm() -> None:
+    count, wobble = 60, 0.018  # of the axis point: more than its tolerance, less than both together
+    points = np.zeros((count, 6))
+    points[:, [0, 3]] = np.arange(count)[:, None]
+    points[:, 5] = H
+    points[2:-2, 4] = wobble * (-1.0) ** np.arange(count - 4)
+    curves = solve_runs(through(points), (0.01, 0.01), H)
+    assert curves.kept.all()
+    assert max(deviation(curves, 0, H)) <= 0.01
+    middle = spline_of(curves, 0)(curves.lines.s[20:40])
+    lever = middle[:, 4] - middle[:, 1]
+    assert np.abs(lever).max() < 0.2 * wobble
+
+
 def test_groups_of_runs_are_solved_as_all_of_them_by_any_number_of_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = random_runs(7, 12, 14, H)
     whole = solve_runs(lines, (0.01, 0.01), H)

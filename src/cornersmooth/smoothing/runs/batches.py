@@ -1,10 +1,11 @@
 """Some windows of runs made smooth: samples, what they may deviate, and the rounds of tip and axis point.
 
 Tip and axis point are solved one after the other: the smoothest tip, then the smoothest lever from tip to axis point,
-for it is the lever that the rotary axes follow. At constant H the axis point of a pose is off by what its curve is off
-across the axis O, and by what the tip is off along it; what the axis point's curve does along the axis does not show.
-So the tip leaves along the axis at least what the fit needs across it, and the axis point may use across the axis what
-the tip has left.
+for it is the lever that the rotary axes follow. Once a lever is known the tip goes out of its way for it: where both
+deviate to opposite sides the lever has twice the room. At constant H the axis point of a pose is off by what its curve
+is off across the axis O, and by what the tip is off along it; what the axis point's curve does along the axis does not
+show. So the tip leaves along the axis at least what the fit needs across it, and the axis point may use across the axis
+what the tip has left.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing.runs.banded import Gather
+from cornersmooth.smoothing.runs.banded import TAPS, Gather
 from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, dot, smoothest
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.ranges import ranges, spread, starts
@@ -33,7 +34,7 @@ ROOM = 0.02
 ALONG = 0.1
 
 #: least and largest share of its tolerance that the tip leaves to the axis point across the axis, wherever it is itself
-LEAST_LEFT, MOST_LEFT = 0.7, 0.9
+LEAST_LEFT, MOST_LEFT = 0.5, 0.9
 
 #: spans on either side that the weight of a span looks at, its power of the mean square of C‴, and the least mean over
 #: the largest of the window
@@ -44,6 +45,9 @@ STILL = 1e-14
 
 #: what the third derivative of the tip counts beside that of the lever: rotary axes have less jerk to give
 TIP_COUNTS = 0.3
+
+#: the same where the tip may go out of its way for the lever, and the tip is much faster than the lever
+OWN_WAY = 0.5
 
 
 @dataclass(frozen=True)
@@ -118,8 +122,12 @@ def solve_windows(
             own = slice(3 * part, 3 * part + 3)
             off = there.deviation(moved, part)
             task = there.axis_task(weight, there.deviation(moved, 0)) if part else there.tip_task(weight)
-            curve = moved[:, own] - moved[:, :3] if part else moved[:, own]
-            jerk = task.smooth.apply(curve) / tolerance
+            jerk = task.smooth.apply(moved[:, own])
+            if part:
+                jerk -= task.smooth.apply(moved[:, :3])
+            elif near:
+                jerk -= followed(problem.splines, windows, moved)[:, None] * task.smooth.apply(moved[:, 3:])
+            jerk /= tolerance
             moved[:, own] += tolerance * smoothest(task, off, jerk, gap, WARM if near else COLD)
         still = problem.still[problem.splines.control_run[windows.control]]
         moved[still, 3:] = moved[still, :3] + problem.first_lever[problem.splines.control_run[windows.control[still]]]
@@ -203,6 +211,21 @@ class _Places:
         )
 
 
+def followed(splines: Splines, windows: Windows, control: Floats) -> Floats:
+    """(spans,) share t of the axis point that the tip follows: |A‴ − t·B‴|² is what the tip makes least.
+
+    With the axis point held that is the quadratic model of (r·|A‴|)³ + |(B − A)‴|³ at the curve known so far: whichever
+    is larger counts more. r is larger where the tip is slow beside the lever, for there its direction turns most.
+    """
+    tip, lever = control[:, :3], control[:, 3:] - control[:, :3]
+    ahead, behind = windows.local + TAPS - 1, windows.local
+    way, turn = (_squares(part[ahead] - part[behind]) for part in (tip, lever))
+    own, others = (np.sqrt(_third_squares(splines, windows, part)) for part in (tip, lever))
+    own *= (OWN_WAY**2 * (1.0 + turn / np.maximum(way, 1e-300))) ** 1.5
+    share: Floats = others / np.maximum(own + others, 1e-300)
+    return share
+
+
 def even_weights(splines: Splines, windows: Windows, control: Floats) -> Floats:
     """(spans,) weights of |C‴|² that give calm and sharp places of the windows their say.
 
@@ -210,23 +233,36 @@ def even_weights(splines: Splines, windows: Windows, control: Floats) -> Floats:
     of its quadratic model at the curve known so far, |C‴|^(-5/3), with the mean over neighbouring spans.
     """
     curve = np.hstack((TIP_COUNTS * control[:, :3], control[:, 3:] - control[:, :3]))
-    third = np.zeros((len(windows.span), 6))
-    for k in range(4):
+    mean = _third_squares(splines, windows, curve)
+    window = np.repeat(np.arange(len(windows.count)), windows.count)
+    largest = np.zeros(len(windows.count))
+    np.maximum.at(largest, window, mean)
+    relative = mean / np.where(largest > 0.0, largest, 1.0)[window]
+    weights: Floats = np.maximum(relative, LEAST_MEAN) ** (-POWER)
+    return weights
+
+
+def _third_squares(splines: Splines, windows: Windows, curve: Floats) -> Floats:
+    """(spans,) mean square of the third derivative over each span and its neighbours, from control points (c, d)."""
+    third = np.zeros((len(windows.span), curve.shape[1]))
+    for k in range(TAPS):
         third += splines.third[windows.span, k, None] * curve[windows.local + k]
     window, width = np.repeat(np.arange(len(windows.count)), windows.count), splines.width[windows.span]
-    own = width * np.square(third).sum(axis=1)
+    own = width * _squares(third)
     total, length = own.copy(), width.copy()
     for shift in range(1, NEIGHBOURS + 1):
         same = np.where(window[shift:] == window[:-shift], 1.0 - shift / (NEIGHBOURS + 1.0), 0.0)
         for sums, values in ((total, own), (length, width)):
             sums[shift:] += same * values[:-shift]
             sums[:-shift] += same * values[shift:]
-    mean = total / length
-    largest = np.zeros(len(windows.count))
-    np.maximum.at(largest, window, mean)
-    relative = mean / np.where(largest > 0.0, largest, 1.0)[window]
-    weights: Floats = np.maximum(relative, LEAST_MEAN) ** (-POWER)
-    return weights
+    means: Floats = total / length
+    return means
+
+
+def _squares(vectors: Floats) -> Floats:
+    """(m,) squared lengths of vectors (m, d)."""
+    squares: Floats = np.square(vectors).sum(axis=1)
+    return squares
 
 
 def _size(axis: Floats, stretch: Floats, off: Floats) -> Floats:
