@@ -6,6 +6,7 @@ Cuts go round farther than an axis turns and are left on the way (`--rewind`), t
 Every text must pass verification, or be refused for a reason; words of rotary axes must be within their limits.
 With `options` as the third word each program is also written with options at random: digits, repeated words left out,
 tilted planes, ways along the tool beside retracts, block numbers, work offsets, inches, functions of the control.
+With `forms` it is written in a form with curves, or for the neutral control.
 """
 
 from __future__ import annotations
@@ -25,6 +26,16 @@ from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 
 CONTROLS = ("fanuc", "mitsubishi", "haas", "siemens", "heidenhain", "linuxcnc")
+
+#: what `forms` draws
+FORMS = (
+    ("generic", "g1"),
+    ("generic", "g1"),
+    ("generic", "g6.2"),
+    ("fanuc", "g6.2"),
+    ("siemens", "bspline"),
+    ("heidenhain", "spl"),
+)
 
 #: what comes of texts
 OUTCOMES = ("passed", "refused", "FALSE ALARM", "BEYOND LIMITS")
@@ -46,11 +57,12 @@ class ShopTrial:
     digits: str = ""
     planes: bool = False
     extras: tuple[str, ...] = ()
+    form_name: str | None = None
 
     def __str__(self) -> str:
         s, kind = self.settings, self.machine.kind or "three axes"
         return (
-            f"seed {self.seed}: {self.control} {kind}{'' if self.tcp else ' no tcp'} rewind {self.rewind:g} "
+            f"seed {self.seed}: {self.control} {self.form_name or ''} {kind}{'' if self.tcp else ' no tcp'} rewind {self.rewind:g} "
             f"eps {s.tolerance:g} H {s.axis_length:g} {s.method} {s.lines}{self._options()}"
         )
 
@@ -65,6 +77,7 @@ class ShopTrial:
         """Form that the text is written in."""
         return choose_form(
             self.control,
+            self.form_name,
             machine=self.machine,
             tcp=self.tcp,
             rewind=self.rewind,
@@ -190,6 +203,18 @@ def with_options(one: ShopTrial) -> ShopTrial:
     return replace(one, frame=frame, digits=digits, planes=planes, extras=chosen, cl=cl)
 
 
+def with_forms(one: ShopTrial) -> ShopTrial:
+    """Return the same program for another control or form at random, the same each time."""
+    rng = np.random.default_rng((one.seed, 9))
+    control, form = FORMS[int(rng.integers(len(FORMS) if len(one.machine.names) == 2 else 1))]
+    method = one.settings.method if form == "g1" else one.settings.method.replace("zhang2016", "proportional")
+    tcp = one.tcp or form != "g1"
+    lines = one.settings.lines if form == "g1" and tcp else None
+    rewind = 0.0 if control == "generic" else one.rewind
+    settings = one.settings.but(lines=lines, method=method)
+    return replace(one, control=control, form_name=form, tcp=tcp, rewind=rewind, settings=settings)
+
+
 def outcome(one: ShopTrial) -> tuple[str, str, int]:
     """Outcome of a trial, what is to be said of it, and how many cuts are left."""
     stream, frame = io.BytesIO(), replace(one.frame, cycles="native" if one.native else "moves")
@@ -221,8 +246,9 @@ def main() -> int:
     first, last = (int(word) for word in sys.argv[1:3])
     count: Counter[str] = Counter()
     rewinds = 0
+    changed = {"options": with_options, "forms": with_forms}
     for seed in range(first, last):
-        one = with_options(shop_trial(seed)) if sys.argv[3:] == ["options"] else shop_trial(seed)
+        one = changed.get(" ".join(sys.argv[3:]), lambda one: one)(shop_trial(seed))
         word, why, left = outcome(one)
         count[word] += 1
         count[f"{len(one.machine.names)} rotary axes"] += 1

@@ -12,7 +12,7 @@ from cornersmooth.nc import choose_form
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from oracle.share import how_many
-from verify.shop_programs import outcome, shop_trial, with_options
+from verify.shop_programs import outcome, shop_trial, with_forms, with_options
 
 
 @pytest.mark.parametrize("seed", range(how_many(5, 120)))
@@ -26,6 +26,13 @@ def test_random_programs_for_these_machines(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(how_many(6, 60)))
 def test_random_programs_with_options_of_all_kinds(seed: int) -> None:
     one = with_options(shop_trial(seed))
+    word, why, _ = outcome(one)
+    assert word in ("passed", "refused"), f"{one}: {why}"
+
+
+@pytest.mark.parametrize("seed", range(how_many(5, 60)))
+def test_random_programs_in_curves_and_neutral_text(seed: int) -> None:
+    one = with_forms(shop_trial(seed))
     word, why, _ = outcome(one)
     assert word in ("passed", "refused"), f"{one}: {why}"
 
