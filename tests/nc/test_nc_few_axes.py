@@ -252,3 +252,18 @@ def test_machine_files_that_say_too_little(text: str, says: str) -> None:
     with pytest.raises(SettingsError) as error:
         parse_machine(text)
     assert says in str(error.value)
+
+
+def test_arcs_go_farther_than_their_ends() -> None:
+    """Half a circle about 30, 0 of radius 30: Y goes to 30, its ends are at 0."""
+    rows = ["GOTO/0,0,0,0,0,1", "MOVARC/30,0,0,0,0,-1,30,ANGLE,180", "GOTO/60,0,0"]
+    program = program_of(rows)
+    assert len(program.arcs) == 1
+    for high, fits in ((29.9, False), (30.1, True)):
+        machine = parse_machine({"axis": [], "travel": {"Y": [-1.0, high]}})
+        form = choose_form("fanuc", machine=machine)
+        if fits:
+            assert text_of(program, form)
+            continue
+        with pytest.raises(InputError, match="Y of machine would have to go to 29"):
+            text_of(program, form)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Callable
 from functools import cache
@@ -12,6 +13,8 @@ from cornersmooth.cl import read
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form
+from cornersmooth.pipeline import postprocess
+from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
 from nc.writing import lines_of
 
@@ -135,3 +138,24 @@ def test_mutants_are_found(name: str) -> None:
     changed = [*lines[:at], *change(lines[at]), *lines[at + 1 :]]
     assert changed != lines
     assert problems(control, changed) != []
+
+
+BETWEEN = {
+    "a stop in the cut": "STOP\nGOTO/40,0,0,0,0,1\n",
+    "the way home": "RAPID\nGOTO/40,0,60\nGOHOME\n",
+    "neither": "",
+}
+
+
+@pytest.mark.parametrize("what", BETWEEN)
+def test_the_operator_may_stop_between_tools_whatever_the_first_has_done(what: str) -> None:
+    cl = "UNITS/MM\nLOADTL/0\nSPINDL/900,RPM,CLW\nRAPID\nGOTO/0,0,50,0,0,1\nFEDRAT/MMPM,300\nGOTO/0,0,0\nGOTO/30,0,0\n"
+    cl += f"{BETWEEN[what]}LOADTL/2\nSPINDL/900,RPM,CLW\nRAPID\nGOTO/0,9,50\nFEDRAT/MMPM,300\nGOTO/0,9,0\nFINI\n"
+    stream = io.BytesIO()
+    result = postprocess(cl.encode(), stream, Settings(tolerance=0.01), form=choose_form("fanuc"), processes=1)
+    lines = stream.getvalue().decode().splitlines()
+    assert lines[lines.index("T2 M6") - 1] == "M1"
+    assert lines.count("M1") == 1
+    assert result.verification is not None
+    assert result.verification.problems == ()
+    assert [finding.code for finding in result.findings].count("CS382") == 1

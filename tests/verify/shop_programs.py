@@ -61,8 +61,9 @@ class ShopTrial:
 
     def __str__(self) -> str:
         s, kind = self.settings, self.machine.kind or "three axes"
+        form = f"{self.control} {self.form_name}" if self.form_name else self.control
         return (
-            f"seed {self.seed}: {self.control} {self.form_name or ''} {kind}{'' if self.tcp else ' no tcp'} rewind {self.rewind:g} "
+            f"seed {self.seed}: {form} {kind}{'' if self.tcp else ' no tcp'} rewind {self.rewind:g} "
             f"eps {s.tolerance:g} H {s.axis_length:g} {s.method} {s.lines}{self._options()}"
         )
 

@@ -7,11 +7,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from cornersmooth.errors import Finding, SettingsError
-from cornersmooth.kinematics import Machine, check_travel
-from cornersmooth.model import Ints, Move, Program, SmoothProgram, Units
+from cornersmooth.model import Ints, SmoothProgram, Units
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.circles import Circles, plan_circles, with_arcs
 from cornersmooth.nc.control import Control
@@ -31,13 +28,11 @@ from cornersmooth.nc.long_rows import coarse_rows, long_rows
 from cornersmooth.nc.motion_writer import MotionWriter
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.own_words import own_words
-from cornersmooth.nc.plane_travel import check_travel_in_planes
+from cornersmooth.nc.plane_travel import check_travel_in_planes, check_travel_without_axes
 from cornersmooth.nc.planes import Planes, plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
-from cornersmooth.nc.rewound_curve_rows import rewound_curve_rows
-from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
+from cornersmooth.nc.rewound_curve_rows import curve_rows_of, rewound_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
-from cornersmooth.nc.rotary_run_rows import rotary_run_rows
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
 from cornersmooth.nc.writers import Writers
@@ -222,12 +217,9 @@ def write(
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes, findings: Findings) -> Iterator[Rows]:
     if form.machine is not None and not form.rotary:
-        _check_travel(form.machine, smoothed.program)
+        check_travel_without_axes(form.machine, smoothed.program)
     if form.curves and form.rotary:
-        write_rows = rotary_curve_rows if smoothed.runs is None else rotary_run_rows
-        if form.rewind:
-            return rewound_curve_rows(smoothed, form, findings, write_rows)
-        return write_rows(smoothed, form, findings)
+        return (rewound_curve_rows if form.rewind else curve_rows_of)(smoothed, form, findings)
     if form.curves:
         return curve_rows(smoothed, divide=form.curve in _TURNING)
     long = smoothed.settings.lines == "long"
@@ -238,13 +230,6 @@ def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes,
             rotary_rows(rows, smoothed, form, findings, long=long, in_planes=inside), smoothed.program, circles
         )
     return long_rows(rows, smoothed, form) if long else rows
-
-
-def _check_travel(machine: Machine, program: Program) -> None:
-    """Refuse poses beyond the travel of a machine without rotary axes: between them it goes no farther."""
-    poses = np.flatnonzero(program.kind != Move.FROM)
-    angles = np.zeros((len(poses), 2))
-    check_travel(machine, program.tip[poses], angles, program.line[poses], program.source.name)
 
 
 def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints]]:

@@ -29,6 +29,7 @@ class MotionWarnings:
     program: Program
     findings: Findings
     _said_tool: bool = False
+    _said_zero: bool = False
     _said_spindle: bool = False
     _said_turns: bool = False
 
@@ -56,11 +57,15 @@ class MotionWarnings:
             self.findings.add("CS358", "warning", int(self.program.line[pose]), text)
 
     def of_tool(self, pose: int, tool: int | None) -> None:
-        """Say that a tool moves that was not loaded."""
+        """Say that a tool moves that was not loaded, or that is none."""
         if tool is None and not self._said_tool:
             self._said_tool = True
             text = "the CL file loads no tool before it moves: the tool in the spindle is taken, with length register 1"
             self.findings.add("CS334", "warning", int(self.program.line[pose]), text)
+        if tool == 0 and not self._said_zero:
+            self._said_zero = True
+            text = "tool 0 moves: controls take T0 for an empty spindle, and H0 for no length; give it a number"
+            self.findings.add("CS382", "warning", int(self.program.line[pose]), text)
 
     def of_cut(self, pose: int, *, turning: bool) -> None:
         """Say that a tool cuts while the spindle stands."""

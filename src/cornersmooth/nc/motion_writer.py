@@ -432,7 +432,7 @@ class MotionWriter:
         if self.writer.form.rotary:
             self._warnings.of_turns(run, self.writer.form, self.writer.angles(run.ticks))
         self._position = self._last = run.ticks[-1]
-        self._last_writer = self.writer
+        self._last_writer, self.operation.halted = self.writer, False
         yield self.writer.text(run, dwell, self.operation.take_with_z())
 
     def _approaches(self, first: Ints, above: float) -> list[str]:

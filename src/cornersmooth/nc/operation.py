@@ -58,7 +58,8 @@ class Operation:
     _clamped: bool = True  # nobody knows what was before
     _tip_control: bool = False
     _functions: bool = False
-    _moved: bool = False  # the tool has been used
+    _moved: bool = False  # the tool has been used since it was up
+    _used: bool = False  # the tool has been used
     _stopped: dict[str, Blocks] = field(default_factory=dict)  # what a tool change has switched off, as it was on
     _stopped_line: int = 0
 
@@ -73,8 +74,7 @@ class Operation:
 
     def begin(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks before the next motion of a tool; what a tool change stopped goes on again."""
-        self._moved = self.begun = True
-        self.halted = False
+        self._moved = self._used = self.begun = True
         own = self.mode.begin
         blocks = [block for was_on in self._stopped.values() for block in was_on]
         if self._stopped:
@@ -127,9 +127,9 @@ class Operation:
         steps = self._tool_end
         if not self._moved:  # a program begins with a tool change, as a rule
             steps = tuple(step for step in steps if step in _STEPS)
-        elif another and not self.halted:
+        if self._used and another and not self.halted:
             steps = (*steps, *self.form.table.program.between_tools)
-        self._moved = False
+        self._moved = self._used = False
         return [*self._back(), *self._expand(steps)]
 
     def go_home(self, *, along: bool = True) -> list[str]:

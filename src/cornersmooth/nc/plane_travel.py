@@ -1,4 +1,8 @@
-"""Travel of the linear axes in tilted planes, where the control chooses between two positions of the rotary axes."""
+"""Travel of the linear axes where rotary axes stand: in tilted planes, and on machines without any.
+
+In a plane the control chooses between two positions of the rotary axes. Lines, and curves within the corners of lines,
+go no farther than the poses; arcs do.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,16 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
-from cornersmooth.model import Floats, Move, Program
+from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane, Planes
 from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
+from cornersmooth.smoothing.arcs import arc_points, divided
 from cornersmooth.vectors import norm
+
+#: turn on an arc from one place that is looked at to the next, rad: between them it goes 1e-5 of its radius farther
+_STEP = 0.009
 
 #: by how much a tool axis may be off that of the rotary axes at zero
 _SAME = 1e-7
@@ -39,14 +47,15 @@ def check_travel_in_planes(planes: Planes, program: Program, form: Form, finding
         return
     tools = tools_of_poses(program) if machine.tool_lengths else None
     for number, plane in enumerate(planes.planes):
-        poses = np.flatnonzero((planes.of == number) & (program.kind != Move.FROM))
+        places = np.flatnonzero((planes.of == number) & (program.kind != Move.FROM))
+        tip, poses = _on_the_way(program, places)
         fit, refused = [], None
         for angles in _angles(machine, plane):
             try:
                 for chosen, one in machines_of_rows(machine, tools, poses):
                     own = poses[chosen]
                     turned = np.tile(angles, (len(own), 1))
-                    check_travel(one, program.tip[own], turned, program.line[own], program.source.name)
+                    check_travel(one, tip[chosen], turned, program.line[own], program.source.name)
                 fit.append(angles)
             except InputError as error:
                 refused = refused or error
@@ -56,6 +65,20 @@ def check_travel_in_planes(planes: Planes, program: Program, form: Form, finding
             said = " ".join(f"{name}{angle:.3f}" for name, angle in zip(machine.names, fit[0].tolist(), strict=True))
             text = f"a tilted plane stays within the travel with {said} only; see that the control takes these angles"
             findings.add("CS379", "warning", int(program.line[poses[0]]), text)
+
+
+def check_travel_without_axes(machine: Machine, program: Program) -> None:
+    """Refuse a program beyond the travel of a machine without rotary axes (CS374)."""
+    tip, poses = _on_the_way(program, np.flatnonzero(program.kind != Move.FROM))
+    check_travel(machine, tip, np.zeros((len(tip), 2)), program.line[poses], program.source.name)
+
+
+def _on_the_way(program: Program, poses: Ints) -> tuple[Floats, Ints]:
+    """Tips of poses and of places on the arcs that lead to them, (k, 3) mm, and the pose of each."""
+    arcs = np.flatnonzero(np.isin(program.arcs.pose, poses))
+    rows, share = divided(np.ceil(program.arcs.sweep[arcs] / _STEP).astype(np.int64))
+    between, _ = arc_points(program, arcs[rows], share)
+    return np.concatenate((program.tip[poses], between)), np.concatenate((poses, program.arcs.pose[arcs[rows]]))
 
 
 def _angles(machine: Machine, plane: Plane) -> list[Floats]:

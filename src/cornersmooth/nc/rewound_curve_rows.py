@@ -6,7 +6,7 @@ rotary angles; where one follows the other there is a rapid, in which they may t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -16,17 +16,19 @@ import numpy as np
 from cornersmooth.model import Arcs, Bools, Corners, Floats, Ints, Move, Program, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows, whole_rows
+from cornersmooth.nc.rotary_run_rows import rotary_run_rows
 from cornersmooth.rotary import rapid_moves, rewound_angles, still_poses
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 
-#: what writes rows of curves
-CurveRows = Callable[[SmoothProgram, Form, Findings], Iterator[Rows]]
+
+def curve_rows_of(smoothed: SmoothProgram, form: Form, findings: Findings) -> Iterator[Rows]:
+    """Rows of corners or of whole runs in curves, as the method has made them."""
+    return (rotary_curve_rows if smoothed.runs is None else rotary_run_rows)(smoothed, form, findings)
 
 
-def rewound_curve_rows(
-    smoothed: SmoothProgram, form: Form, findings: Findings, write_rows: CurveRows
-) -> Iterator[Rows]:
+def rewound_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> Iterator[Rows]:
     """Rows of curves, and of lines between the rapids around a place where a cut is left.
 
     Parameters
@@ -36,8 +38,6 @@ def rewound_curve_rows(
         Of curves in rotary words, with a rewind.
     findings : Findings
         Takes CS381 for each stretch in lines, and what the kinematics notice.
-    write_rows : callable
-        Rows of a program in curves.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def rewound_curve_rows(
     program = smoothed.program
     in_lines = _left(smoothed, form)
     if not in_lines.any():
-        yield from write_rows(smoothed, form, findings)
+        yield from curve_rows_of(smoothed, form, findings)
         return
     edges = 1 + np.flatnonzero(in_lines[1:] != in_lines[:-1])
     for first, stop in pairwise([0, *edges.tolist(), len(program)]):
@@ -57,7 +57,7 @@ def rewound_curve_rows(
             findings.add("CS381", "note", int(program.line[first]), text)
             rows = rotary_rows(dense_rows(part), part, form, findings)
         else:
-            rows = write_rows(part, form, findings)
+            rows = curve_rows_of(part, form, findings)
         for some in rows:
             spline = np.tile((0.0, 1.0, 0.0), (len(some.move), 1)) if some.spline is None else some.spline
             yield replace(some, move=some.move + first, spline=spline)
