@@ -128,9 +128,9 @@ def test_positions_are_those_in_the_text(machine: str, tcp: bool, units: str, tm
     assert len(ours) == len(theirs) > 200
     columns = ["XYZABC".index(letter) for letter in letters]
     scale = np.array([1.0 if units == "mm" else 25.4] * 3 + [1.0] * 2)
-    for (code, numbers), (kind, found) in zip(ours, theirs, strict=True):
-        assert (code == "G0") == (kind == "rapid")
-        np.testing.assert_allclose(found[columns], scale * numbers, rtol=1e-12, atol=1e-9)
+    assert [code == "G0" for code, _ in ours] == [kind == "rapid" for kind, _ in theirs]
+    found = np.array([place for _, place in theirs])[:, columns]
+    np.testing.assert_allclose(found, scale * [numbers for _, numbers in ours], rtol=1e-12, atol=1e-9)
 
 
 @pytest.mark.parametrize(("machine", "tcp", "units"), covering_share(WAYS, 5, 1))

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,11 +17,9 @@ from cornersmooth.settings import Settings
 from nc.cases import CHOSEN, Case
 from nc.promise import random_verdict, runs_of, verdict, without_holes
 from oracle.chains import Chain, cl_text
-from oracle.files import cl_file, of_corpus
+from oracle.files import cl_file, of_corpus, sample
 from oracle.motion import Original, unit
 from oracle.share import covering_share, how_many, share
-
-SAMPLES = Path(__file__).parents[2] / "samples"
 
 #: every case has one of them
 LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
@@ -40,9 +37,9 @@ def test_random_chains_keep_the_tolerance(case: Case, tolerance: float, axis_len
     assert found.deviation.worst <= tolerance, found
 
 
-def keeps_the_tolerance(path: Path, case: Case, tolerance: float = 0.02, axis_length: float = 20.0) -> bool:
+def keeps_the_tolerance(name: str, data: bytes, case: Case, tolerance: float = 0.02, axis_length: float = 20.0) -> bool:
     """Whether the case could be tried: the tool need not be upright, nor the machine reach that far."""
-    program = without_holes(read(path.read_bytes(), name=path.name))
+    program = without_holes(read(data, name=name))
     if case.control == "linuxcnc":  # it moves at a feed or not at all
         program = replace(program, feed=np.where(np.isnan(program.feed), 500.0, program.feed))
     settings = Settings(tolerance=tolerance, axis_length=axis_length)
@@ -52,13 +49,13 @@ def keeps_the_tolerance(path: Path, case: Case, tolerance: float = 0.02, axis_le
         if refusal.code not in ("CS219", "CS336", "CS361", "CS362"):  # not upright; no compensation; out of reach
             raise
         return False
-    assert found.deviation.worst <= tolerance, (path.name, found)
+    assert found.deviation.worst <= tolerance, (name, found)
     return True
 
 
 @pytest.mark.parametrize("case", covering_share(CHOSEN, 3, 1), ids=str)
 def test_samples_keep_the_tolerance(case: Case) -> None:
-    tried = [keeps_the_tolerance(SAMPLES / name, case) for name in ("impeller.cls", "paper_table1.csv")]
+    tried = [keeps_the_tolerance(name, sample(name), case) for name in ("impeller.cls", "paper_table1.csv")]
     upright = case in (Case("heidenhain", "spl"), Case("mitsubishi", "g6.2"))
     assert any(tried) is not upright
 
@@ -89,7 +86,7 @@ def test_files_keep_the_tolerance(name: str, part: int) -> None:
     small = path.stat().st_size < 12_000 and name not in OWN
     cases = [case for case in CHOSEN if case.tcp or small]
     cases = share(cases, 8, part)
-    assert 2 * sum(keeps_the_tolerance(path, case) for case in cases) > len(cases)
+    assert 2 * sum(keeps_the_tolerance(name, path.read_bytes(), case) for case in cases) > len(cases)
 
 
 @pytest.mark.parametrize("control", ["haas", "fanuc"])

@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from oracle.share import THOROUGH
+
+SAMPLES = Path(__file__).resolve().parents[2] / "samples"
 OWN = Path(__file__).resolve().parents[1] / "cl" / "own"
 NO_CORPUS = "CORNERSMOOTH_CORPUS does not name a folder of CL files"
 
@@ -35,6 +38,12 @@ def beginning(path: Path, poses: int) -> bytes:
     lines = path.read_bytes().splitlines(keepends=True)
     goto = [number for number, line in enumerate(lines) if line.startswith(b"GOTO")]
     return b"".join([*lines[: goto[poses - 1] + 1], lines[-1]])
+
+
+def sample(name: str) -> bytes:
+    """A sample; of the blade, passes of one kind one beside the other, the first third unless all is asked for."""
+    path = SAMPLES / name
+    return beginning(path, 205) if name == "impeller.cls" and not THOROUGH else path.read_bytes()
 
 
 def cl_file(name: str) -> Path:

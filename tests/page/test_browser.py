@@ -42,7 +42,7 @@ def browser() -> Iterator[object]:
 class Looked:
     """A page that is open."""
 
-    def __init__(self, browser, path, *, width=1400, height=950, scheme="light"):
+    def __init__(self, browser, path, *, width=1000, height=700, scheme="light"):
         self.errors = []
         size = {"width": width, "height": height}
         self.context = browser.new_context(

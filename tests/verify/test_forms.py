@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,10 +22,9 @@ from nc.cases import CHOSEN, Case
 from nc.grammars import reader
 from nc.promise import tame, upright, written
 from oracle.chains import cl_text, random_chains
-from oracle.files import cl_file, of_corpus
+from oracle.files import cl_file, of_corpus, sample
 from oracle.share import covering_share, how_many, share
 
-SAMPLES = Path(__file__).parents[2] / "samples"
 LIMITS = ((0.001, 10.0), (0.04, 50.0), (0.15, 10.0), (0.04, 10.0))
 
 
@@ -106,7 +104,7 @@ def _distance(nc: NcProgram, block: np.ndarray, wanted: np.ndarray) -> float:
 
 @pytest.mark.parametrize("case", covering_share([case for case in CHOSEN if case.control != "linuxcnc"], 3), ids=str)
 def test_no_false_alarm_on_the_sample(case: Case) -> None:
-    _passes_on(case, SAMPLES / "impeller.cls", 0.04)
+    _passes_on(case, "impeller.cls", sample("impeller.cls"), 0.04)
 
 
 FILES = ["swcam_shimemcunha.apt", "creo11_3x_inch_multiop.ncl", "hecc_flank_nx.cls", "cnclite_tulsyan_altintas.apt"]
@@ -122,12 +120,12 @@ OWN = ["nx_blade.cls", "nx_holes.cls", "nx_pocket.cls", "creo_plate.ncl", "solid
 def test_no_false_alarm_on_files(name: str, number: int, third: int) -> None:
     """Each file in each control and form at one of three tolerances, in turn: `verify.sweep` does all."""
     tolerance = (0.001, 0.04, 0.15)[(number + third) % 3]
-    for case in share(CHOSEN[third::3], 9, number):
-        _passes_on(case, cl_file(name), tolerance)
+    for case in share(CHOSEN[third::3], 12, number):
+        _passes_on(case, name, cl_file(name).read_bytes(), tolerance)
 
 
-def _passes_on(case: Case, path: Path, tolerance: float) -> None:
-    program = read(path.read_bytes(), name=path.name)
+def _passes_on(case: Case, name: str, data: bytes, tolerance: float) -> None:
+    program = read(data, name=name)
     form = case.choose(endless=True)
     settings = Settings(tolerance=tolerance)
     try:
