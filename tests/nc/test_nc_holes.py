@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from itertools import chain
 
@@ -10,7 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError
+from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Frame, choose_form
+from cornersmooth.pipeline import postprocess
+from cornersmooth.settings import Settings
 from nc.writing import codes, lines_of, text_of_cl
 
 NX = "TOOL PATH/A,TOOL,B\nTLDATA/DRILL,MILL,8.0,0.0,80.0,118.0,35.0\nMSYS/0,0,0,1,0,0,0,1,0\n"
@@ -186,3 +190,17 @@ def test_a_tap_is_an_error_unless_it_may_be_left_out() -> None:
     with pytest.raises(InputError, match="a tap, which is not written") as refused:
         lines_of(form, cl, frame=Frame(skip_taps=False))
     assert refused.value.line == 1 + cl[: cl.index("CYCLE/TAP")].count("\n")
+
+
+@pytest.mark.parametrize("cycles", ["moves", "native"])
+def test_holes_that_return_to_the_controls_own_height_are_verified(cycles: str) -> None:
+    """NX: RTRCTO,AUTO; in the second hole the last of seven pecks ends at the bottom but for arithmetic."""
+    cl = NX + "UNITS/INCHES\nLOADTL/1\nSPINDL/RPM,900,CLW\nRAPID\nGOTO/0,0,3,0,0,1\n"
+    cl += "CYCLE/DRILL,DEEP,STEP,0.1,RAPTO,0.1,FEDTO,-0.7,RTRCTO,AUTO,IPM,10\nGOTO/2,0,0\nGOTO/2,1,-0.2\nCYCLE/OFF\n"
+    cl += "CYCLE/DRILL,RAPTO,0.1,FEDTO,-0.5,RTRCTO,AUTO,IPR,0.004\nGOTO/3,1,0\nCYCLE/OFF\nRAPID\nGOTO/2,1,3\nFINI\n"
+    form = choose_form("fanuc", machine=load_machine("table-bc"))
+    result = postprocess(
+        cl.encode(), io.BytesIO(), Settings(tolerance=0.01), form=form, frame=Frame(cycles=cycles), processes=1
+    )
+    assert result.verification is not None
+    assert result.verification.problems == ()

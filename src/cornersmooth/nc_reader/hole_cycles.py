@@ -92,7 +92,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> Non
         state.change(line, per_revolution=True)
     feed = {} if cycle.feed is None else {"F": cycle.feed}
     done = cycle.clearance if cycle.from_clearance else cycle.top
-    while cycle.step and done - cycle.step > cycle.bottom:
+    while cycle.step and done - cycle.step > cycle.bottom + _ROUNDING:
         done -= cycle.step
         state.move(line, {"G": 1.0, "Z": done, **feed})
         above = done + _ABOVE * cycle.step

@@ -13,7 +13,8 @@ _PLAIN = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BR
 _AT_FEED = {"REAM", "BORE"}
 _DEPTH = ("FEDTO", "DEPTH")
 _FEEDS = {"MMPM": (1.0, False), "IPM": (25.4, False), "MMPR": (1.0, True), "IPR": (25.4, True)}
-_OTHER = {"RAPTO", "CLEAR", "RTRCTO", "RETURN", "STEP", "INCR", "1STPECK", "SUBPECK", "DWELL"}
+_RETURNS = ("RTRCTO", "RETURN")
+_OTHER = {"RAPTO", "CLEAR", *_RETURNS, "STEP", "INCR", "1STPECK", "SUBPECK", "DWELL"}
 
 
 #: statements that say how fast the spindle turns
@@ -64,6 +65,8 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
     for value in args:
         if value == "REV" and word == "DWELL":
             in_turns = True
+        elif value == "AUTO" and word in _RETURNS and word not in values:  # NX: to the control's own height
+            word = ""
         elif isinstance(value, str):
             if word and word not in values:
                 return Drilling()
