@@ -159,3 +159,14 @@ def test_the_operator_may_stop_between_tools_whatever_the_first_has_done(what: s
     assert result.verification is not None
     assert result.verification.problems == ()
     assert [finding.code for finding in result.findings].count("CS382") == 1
+
+
+def test_the_first_tool_that_is_loaded_asks_for_no_stop() -> None:
+    """What has moved before is in the spindle, and nobody has named it."""
+    cl = "UNITS/MM\nFEDRAT/100,MMPM\nRAPID\nGOTO/0,0,80,0,0,1\nGOTO/0,0,0\nGOTO/5,0,0\nLOADTL/3\n"
+    cl += "SPINDL/1000,CLW\nGOTO/5,0,0\nGOTO/25,0,0\nFINI\n"
+    stream = io.BytesIO()
+    result = postprocess(cl.encode(), stream, Settings(tolerance=0.01), form=choose_form("fanuc"), processes=1)
+    assert "M1" not in stream.getvalue().decode().splitlines()
+    assert result.verification is not None
+    assert result.verification.problems == ()

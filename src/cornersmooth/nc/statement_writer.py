@@ -139,7 +139,7 @@ class StatementWriter:
         number, offset = loaded
         if (number, offset) == (self.tool, self.operation.offset):  # CATIA loads a tool twice
             return self.comment(statement.text)
-        blocks = self.operation.end_tool(statement.line, another=number != self.tool)
+        blocks = self.operation.end_tool(statement.line, another=self.tool not in (None, number))
         if number != self.tool:
             blocks += self.operation.change_position()
             blocks += [block.format(tool=number) for block in self.words.tool_change]
