@@ -11,11 +11,9 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.distances import Distances, Reached
 from cornersmooth.verify.findings import Findings
-from cornersmooth.verify.in_order import Windows
+from cornersmooth.verify.in_order import Windows, passage
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import COLUMNS, Metric, distance_between, nearest_segments
-from cornersmooth.verify.rapids import ARITHMETIC
-from cornersmooth.verify.wide_search import nearest_alone
+from cornersmooth.verify.nearest import distance_between, nearest_places, nearest_segments
 
 #: segments looked at on either side
 _REACH = 3
@@ -23,17 +21,14 @@ _REACH = 3
 #: a stretch whose length is more than so many times the distance of its ends turns
 _STRAIGHT = 1.2
 
-#: part of what counts as nearer by which tip or axis point must be nearer ahead to be taken as going on
-_CLEARLY = 0.25
-
-#: vertices of a batch that are followed one by one, and how far before a doubtful place one is sure, in `near`
-_MOST_VERTICES, _SURE = 4096, 2.0
-
 #: how many times `Match.near` a vertex is from its path that is on it nowhere, in six dimensions
 _OFF = 2.0
 
-#: times that a segment is cut to two thirds
-_HALVINGS = 40
+#: pairs of a written and an original segment that are looked at for a vertex, at most
+_MOST_PAIRS = 100_000
+
+#: vertices of a batch that run backwards after which all that seem to are taken to
+_MOST_WRONG = 512
 
 Found = tuple[Floats, Ints, Ints, Floats]
 
@@ -42,15 +37,18 @@ def check_backtracking(distances: Distances, found: Findings) -> None:
     """The path must be run in order: CS523."""
     match = distances.match
     theirs = original_backwards(match, distances.original, distances.windows)
-    for places in (written_backwards(match, distances.written), theirs):
+    for places in (written_backwards(match, distances.written, distances.windows), theirs):
         if places is not None:
             found.violations.add(523, *places)
 
 
-def written_backwards(match: Match, written: Reached) -> Found | None:
+def written_backwards(match: Match, written: Reached, windows: Windows) -> Found | None:
     """Written vertices that would fit clearly better before the one in front of them.
 
-    Blocks in rotary words may bend: how far the tool has come the ends of blocks tell, not what lies between them.
+    Around each text and path must be in order within what they are off each other there anyway: a piece that is run
+    twice is off by nothing and yet out of order, while what is off its path by so much tells only within that how far
+    along it it is. Where the path turns back nearby, the tolerance is what counts. Blocks in rotary words may bend: how
+    far the tool has come the ends of blocks tell, not what lies between them.
 
     Returns
     -------
@@ -60,35 +58,73 @@ def written_backwards(match: Match, written: Reached) -> Found | None:
     vertex = written.vertex[match.backward[written.vertex]]
     if not len(vertex):
         return None
-    own, six, length = match.six[vertex], match.path.six, match.path.length
-    segment, at = nearest_segments(own, six, match.segment[vertex], _REACH, match.low[vertex], match.high[vertex])
+    own, path = match.six[vertex], match.path
+    segment, at = nearest_segments(own, path.six, match.segment[vertex], _REACH, match.low[vertex], match.high[vertex])
     free, held = segment + at, match.place[vertex]
-    ends = match.on
-    if match.nc.rotary:
-        ends = match.on & _ends_blocks(match)
-        held = _held_by_ends(match, ends, vertex, free, held)
-        rows = np.flatnonzero(ends[vertex] & (free < held))
-        vertex, own, free, held = vertex[rows], own[rows], free[rows], held[rows]
-        if not len(vertex):
-            return None
-    off = distance_between(own, _on(six, free))
-    gain = distance_between(own, _on(six, held)) - off
+    off = distance_between(own, _on(path.six, free))
+    gain = distance_between(own, _on(path.six, held)) - off
     # what is off the path is told by its distance: where along the path it would be nearest says nothing
     wrong = (gain > match.slack) & (free < held) & (off <= _OFF * match.near)
-    way = _way(length, free, held)
-    wrong &= way <= _STRAIGHT * distance_between(_on(six, held), _on(six, free)) + match.slack
-    wrong &= way > off  # what is off the path by so much tells only within that how far along it it is
-    rows = np.flatnonzero(wrong)
-    wrong[rows] = _gain_alone(match, vertex[rows], held[rows], free[rows]) > match.slack
-    rows = np.flatnonzero(wrong)
-    if len(rows):
-        wrong[rows] = ~_on_other_lines(match, ends, vertex[rows], held[rows])
-    if not wrong.any():
+    straight = _way(path.length, free, held) <= _STRAIGHT * distance_between(_on(path.six, held), _on(path.six, free))
+    rows = np.flatnonzero(wrong & straight)
+    ends = np.flatnonzero(match.on & _ends_blocks(match) if match.nc.rotary else match.on)
+    rows = rows[np.isin(vertex[rows], ends)]
+    length = path.length_at(match.segment[ends], match.fraction[ends])
+    begin = path.length_at(segment[rows], at[rows])
+    stop = path.length_at(match.segment[vertex[rows]], match.fraction[vertex[rows]])
+    found: list[int] = []
+    for row, low, high in zip(rows.tolist(), begin.tolist(), stop.tolist(), strict=True):
+        if found and (vertex[row] == vertex[found[-1]] + 1 or len(found) > _MOST_WRONG):
+            found.append(row)  # one problem with the vertex before it, or the text is off everywhere
+            continue
+        mine = np.searchsorted(match.stretch[ends], match.stretch[vertex[row]] + np.arange(2))
+        around = 2.0 * max(float(off[row]), match.slack)
+        first, last = np.searchsorted(length, [low - around, high + around])
+        first, last = max(int(first) - 1, int(mine[0])), min(int(last), int(mine[1]) - 1)
+        if _in_order(match, ends[first : last + 1]):
+            continue
+        window = windows.around(int(vertex[row])) if _turns_back(match, low, high) else None
+        if window is None or not window.passed:
+            found.append(row)
+    if not found:
         return None
     original = match.original
-    move = original.trail.owner[match.segment[vertex[wrong]] + 1]
-    nc_line = match.nc.line[match.written.trail.owner[vertex[wrong]]]
-    return held[wrong], original.program.line[original.pose[move]], nc_line, gain[wrong]
+    move = original.trail.owner[match.segment[vertex[found]] + 1]
+    nc_line = match.nc.line[match.written.trail.owner[vertex[found]]]
+    return held[found], original.program.line[original.pose[move]], nc_line, gain[found]
+
+
+def _in_order(match: Match, vertex: Ints) -> bool:
+    """Whether vertices are in order within what they and the path between them are off each other."""
+    place = match.place[vertex[[0, -1]]]
+    ends = _on(match.path.six, place)
+    inner = slice(int(place[0]) + 1, int(np.ceil(place[1])))
+    own, path = match.six[vertex], np.vstack((ends[:1], match.path.six[inner], ends[1:]))
+    if len(own) * len(path) > _MOST_PAIRS:
+        return False
+    around = match.path.six[max(inner.start - 1 - _REACH, 0) : inner.stop + 1 + _REACH]
+    radius = max(_off(own, around), _off(path, own)) + match.slack / 2.0
+    low, _ = passage(own, path, (0.0, len(path) - 1.0), radius)
+    return bool((~np.isnan(low)).any(axis=1).all())
+
+
+def _turns_back(match: Match, low: float, high: float) -> bool:
+    """Whether the path turns back near two places (path lengths): which of its turns is meant nobody can tell then."""
+    path = match.path
+    first, last = np.searchsorted(path.length, [low - 2.0 * match.near, high + 2.0 * match.near])
+    way = np.diff(path.six[max(int(first) - 1, 0) : int(last) + 1], axis=0)
+    return bool((np.einsum("ij,ij->i", way[1:], way[:-1]) < 0.0).any())
+
+
+def _off(points: Floats, path: Floats) -> float:
+    """Largest distance of points (k, 6) from a path (m + 1, 6)."""
+    start, way = path[:-1], path[1:] - path[:-1]
+    size = np.einsum("ij,ij->i", way, way)
+    rest = points[:, None] - start
+    share = np.einsum("kmi,mi->km", rest, way)
+    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+    away = (rest - share[..., None] * way) ** 2
+    return float(np.sqrt(np.maximum(away[..., :3].sum(axis=2), away[..., 3:].sum(axis=2)).min(axis=1).max()))
 
 
 def _ends_blocks(match: Match) -> Bools:
@@ -98,96 +134,6 @@ def _ends_blocks(match: Match) -> Bools:
     goes_on = (nc.line[following] == nc.line[owner]) & (following > owner)
     ends: Bools = ~(goes_on & match.written.straight[owner - match.written.first])
     return ends
-
-
-def _held_by_ends(match: Match, ends: Bools, vertex: Ints, free: Floats, held: Floats) -> Floats:
-    """Places (k,) that vertices must not go back behind, where only the ends of blocks have reached any."""
-    place = np.where(ends, match.place, -np.inf)
-    place[vertex] = np.where(ends[vertex], free, -np.inf)
-    reached = np.append(-np.inf, np.maximum.accumulate(place)[:-1])[vertex]
-    behind: Floats = np.minimum(held, np.maximum(reached, free))
-    return behind
-
-
-def _on_other_lines(match: Match, ends: Bools, vertex: Ints, held: Floats) -> Bools:
-    """(k,) whether vertices follow in order all the same, if some before them belong to other lines of the CL path.
-
-    Beside a turn several lines are near, and the nearest is not always the one that is run along. So each may be where
-    it is nearest on any line within the tolerance, from the last place without doubt on. Those before them that are
-    not in doubt themselves may wait where they are nearly nearest.
-    """
-    found = np.zeros(len(vertex), np.bool_)
-    path, on = match.path, np.flatnonzero(ends)
-    segment = np.minimum(held.astype(np.int64), len(path.length) - 2)
-    last = np.searchsorted(on, vertex)
-    sure = path.length[segment] - _SURE * match.near
-    first = np.searchsorted(path.length_at(match.segment[on], match.fraction[on]), sure) - 1
-    first = np.maximum(first, np.searchsorted(match.stretch[on], match.stretch[vertex]))
-    groups = np.split(np.arange(len(vertex)), np.flatnonzero(first[1:] > last[:-1]) + 1)
-    left = _MOST_VERTICES
-    for rows in groups:
-        walk = on[first[rows[0]] : last[rows[-1]] + 1]
-        left -= len(walk)
-        if left < 0:
-            break
-        reached = float(path.length_at(match.segment[walk[:1]], match.fraction[walk[:1]])[0])
-        for here in walk[1:].tolist():
-            mine = rows[vertex[rows] == here]
-            reached = _first_place(match, here, int(segment[rows[-1]]) + _REACH, reached, waits=not len(mine))
-            if np.isinf(reached):
-                break
-            found[mine] = True
-    return found
-
-
-def _first_place(match: Match, vertex: int, last: int, reached: float, *, waits: bool) -> float:
-    """Path length of the first place, not clearly before `reached`, where a vertex is nearest to a line; else inf.
-
-    With `waits` it may be before it by as much as the vertex is off the line: only within that is its place known.
-    """
-    path, own = match.path, match.six[vertex]
-    room = match.near if waits else match.slack
-    low = max(int(np.searchsorted(path.length, reached - room, side="right")) - 2, int(match.low[vertex]))
-    high = max(min(last, int(match.high[vertex])), low)
-    start = path.six[low : high + 1]
-    way = path.six[low + 1 : high + 2] - start
-    size = np.einsum("ij,ij->i", way, way)
-    share = np.einsum("ij,ij->i", own - start, way)
-    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
-    # not the end of a line that leads on to a nearer place
-    leads_on = (share >= 1.0) & (np.append(share[1:], 1.0) > 0.0) | (share <= 0.0) & (np.append(0.0, share[:-1]) < 1.0)
-    square = (own - start - share[:, None] * way) ** 2
-    near = np.maximum(square[:, :3].sum(axis=1), square[:, 3:].sum(axis=1)) <= (match.tolerance + match.margin) ** 2
-    begin = path.length[low : high + 1]
-    place = begin + share * (path.length[low + 1 : high + 2] - begin)
-    before = np.sqrt(square.sum(axis=1)) if waits else np.zeros(len(place))
-    good = place[near & ~leads_on & (place >= reached - match.slack - before)]
-    first = float(good.min(initial=np.inf))
-    return max(first, reached)
-
-
-def _gain_alone(match: Match, vertex: Ints, held: Floats, free: Floats) -> Floats:
-    """By how much tip or axis point alone would be nearer at a place before the one that it must not go back behind.
-
-    Where the tip turns round while its axis turns, a rounding that has turned already is nearest to the way before the
-    turn, though tip and axis point each are near the way behind it. And a path that is run backwards takes both back:
-    where one of them goes on, a curve only turns the tool a little less than it has done, within the tolerance.
-    """
-    own, six = match.six[vertex], match.path.six
-    here, there = _on(six, held), _on(six, free)
-    high = match.high[vertex]
-    ahead = np.minimum(held.astype(np.int64) + 1, high)
-    gains = np.zeros((2, len(vertex)))
-    ways: tuple[Metric, ...] = ("tip", "axis point")
-    for gain, metric in zip(gains, ways, strict=True):
-        column = COLUMNS[metric]
-        off = distance_between(own[:, column], here[:, column])
-        beyond = nearest_alone(own, six, ahead, ahead, high, match.near, metric)[2]
-        off = np.where(ahead > held, np.minimum(off, beyond), off)
-        gain[:] = off - distance_between(own[:, column], there[:, column])
-    one_goes_on = gains.min(axis=0) < -_CLEARLY * match.slack
-    found: Floats = np.where(one_goes_on, 0.0, gains.max(axis=0))
-    return found
 
 
 def original_backwards(match: Match, theirs: Reached, windows: Windows) -> Found | None:
@@ -208,11 +154,10 @@ def original_backwards(match: Match, theirs: Reached, windows: Windows) -> Found
     way = _way(length, here, before)
     straight = way <= _STRAIGHT * distance_between(_on(six, before), _on(six, here)) + match.slack
     falls, before, here = falls[straight], before[straight], here[straight]
-    later, comes_back = _cost(match, theirs.vertex[falls], here, before, forward=True)
-    earlier, came = _cost(match, theirs.vertex[falls - 1], before, here, forward=False)
+    later = _cost(match, theirs.vertex[falls], here, before, forward=True)
+    earlier = _cost(match, theirs.vertex[falls - 1], before, here, forward=False)
     gain = np.minimum(later, earlier)
-    wrong = np.flatnonzero((gain > match.slack) & ~comes_back & ~came)
-    wrong = wrong[~_waits(match, theirs.vertex[falls[wrong]], here[wrong], before[wrong])]
+    wrong = np.flatnonzero(gain > match.slack)
     around = [windows.around(vertex) for vertex in before[wrong].astype(np.int64).tolist()]
     wrong = wrong[np.array([window is None or not window.passed for window in around], np.bool_)]
     if not len(wrong):
@@ -223,42 +168,8 @@ def original_backwards(match: Match, theirs: Reached, windows: Windows) -> Found
     return vertex.astype(np.float64), cl_line, nc_line, gain[wrong]
 
 
-def _waits(match: Match, vertex: Ints, low: Floats, high: Floats) -> Bools:
-    """(k,) whether the text is within the tolerance of original vertices, and of those before them, at one place.
-
-    It waits there while the original goes from one to the other: both are passed in order then. The places are looked
-    for between `low` and `high`. On a segment the largest of the distances has one minimum only.
-    """
-    found = np.zeros(len(vertex), np.bool_)
-    for k in range(min(len(vertex), _MOST_VERTICES)):
-        first, last = int(low[k]), min(int(np.ceil(high[k])), len(match.six) - 1)
-        if last - first > _MOST_VERTICES:
-            continue
-        start = match.six[first:last]
-        way = match.six[first + 1 : last + 1] - start
-        theirs = match.path.six[vertex[k] - 1 : vertex[k] + 1]
-
-        def off(share: Floats, start: Floats = start, way: Floats = way, theirs: Floats = theirs) -> Floats:
-            away = (start + share[:, None] * way)[:, None] - theirs
-            largest: Floats = np.linalg.norm(away.reshape(len(share), 4, 3), axis=2).max(axis=1)
-            return largest
-
-        begin, end = np.zeros(len(start)), np.ones(len(start))
-        begin[0], end[-1] = low[k] - first, high[k] - (last - 1)
-        for _ in range(_HALVINGS):
-            left, right = (2.0 * begin + end) / 3.0, (begin + 2.0 * end) / 3.0
-            falls = off(right) < off(left)
-            begin, end = np.where(falls, left, begin), np.where(falls, end, right)
-        found[k] = off((begin + end) / 2.0).min() <= match.tolerance + ARITHMETIC
-    return found
-
-
-def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: bool) -> tuple[Floats, Bools]:
-    """Look at original vertices as if the text may not pass them before, or behind, `bound`.
-
-    Returns how much farther it is from them then, mm, and whether it is within the tolerance of them there all the
-    same: what it leaves out is no more than a rounding.
-    """
+def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: bool) -> Floats:
+    """How much farther (k,) the text is from original vertices if it may not pass them before, or behind, `bound`."""
     own, six = match.path.six[vertex], match.six
     middle = np.minimum(bound.astype(np.int64), len(six) - 2)
     ends = np.flatnonzero(np.append(np.diff(match.stretch) != 0, True))
@@ -266,24 +177,15 @@ def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: b
     first = np.concatenate(([0], ends[:-1] + 1))[stretch]
     last = np.maximum(ends[stretch] - 1, middle)
     # the segment that the bound lies on counts in part, those beyond it whole
-    segment, at = nearest_segments(own, six, middle, 0, middle, middle)
+    _, at = nearest_segments(own, six, middle, 0, middle, middle)
     limited = np.maximum(at, bound - middle) if forward else np.minimum(at, bound - middle)
-    reached = _on(six, middle + limited)
-    best = distance_between(own, reached)
+    best = distance_between(own, _on(six, middle + limited))
     beyond = middle + (1 if forward else -1)
-    there = (beyond <= last) & (beyond >= first)
     low, high = (beyond, np.maximum(last, beyond)) if forward else (np.minimum(first, beyond), beyond)
-    rows = np.flatnonzero(there)
-    segment, at = nearest_segments(own[rows], six, beyond[rows], _REACH, low[rows], high[rows])
-    other = _on(six, segment + at)
-    away = distance_between(own[rows], other)
-    nearer = away < best[rows]
-    reached[rows[nearer]] = other[nearer]
-    best[rows] = np.minimum(best[rows], away)
-    off = own - reached
-    own_way = np.maximum(distance_between(off[:, :3], 0.0), distance_between(off[:, 3:], 0.0))
-    comes = own_way <= match.tolerance
-    return best - distance_between(own, _on(six, free)), comes
+    rows = np.flatnonzero((beyond <= last) & (beyond >= first))
+    _, _, square = nearest_places(own[rows], six, beyond[rows], _REACH, low[rows], high[rows])
+    best[rows] = np.minimum(best[rows], np.sqrt(square))
+    return best - distance_between(own, _on(six, free))
 
 
 def _on(six: Floats, place: Floats) -> Floats:

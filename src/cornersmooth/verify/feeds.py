@@ -27,9 +27,6 @@ _CREEPING = (SHORT_STEPS + 2) / 2
 #: an element shorter than this may have the feed of any move so near, mm: ten steps of what CL files are written in
 _TINY = 1e-3
 
-#: poses looked at together
-_STRIDE = 64
-
 #: elements that are looked at one by one in a run of wrong ones; none of those behind them is better
 _MOST_SINGLE = 50
 
@@ -71,8 +68,7 @@ def check_feeds(distances: Distances, found: Findings) -> None:
         if in_a_row >= _MOST_SINGLE:
             continue
         ends = int(start[k]), int(end[k])
-        good[k] = fits(k, _alike(match, int(element[k]), *ends)).any() or _near_enough(match, *ends, partial(fits, k))
-        good[k] = good[k] or _elsewhere(distances, *ends, partial(fits, k))
+        good[k] = fits(k, _alike(match, int(element[k]), *ends)).any() or _elsewhere(distances, *ends, partial(fits, k))
         if good[k]:
             continue
         pair = float(said[k]), float(room[k])
@@ -136,19 +132,11 @@ def _alike(match: Match, element: int, start: int, end: int) -> Ints:
     return np.unique(match.original.trail.owner[found[0] + 1 : found[1] + 2])
 
 
-def _near_enough(match: Match, start: int, end: int, fits: Callable[[Ints], Bools]) -> bool:
-    """Whether an element may run along moves that fit, as both of its ends are within the tolerance of such moves.
-
-    Which of the poses within the tolerance a written one stands for nobody can tell. What is so near to a straight move
-    at both ends is as near in between.
-    """
-    owner = match.original.trail.owner
-    ranges = [owner[np.array(_within_tolerance(match, vertex)) + 1] for vertex in (start, end)]
-    return _joined(fits, *(np.arange(first, last + 1) for first, last in ranges))
-
-
 def _elsewhere(distances: Distances, start: int, end: int, fits: Callable[[Ints], Bools]) -> bool:
-    """Whether an element may run along moves that fit on another turn of a path that goes to and fro."""
+    """Whether an element may run along moves that fit beside its place, or on another turn of a path to and fro.
+
+    Which of the poses within the tolerance a written one stands for nobody can tell.
+    """
     window = distances.windows.around(start)
     if window is None or not window.inner[0] <= end <= window.inner[1]:
         return False
@@ -164,24 +152,6 @@ def _joined(fits: Callable[[Ints], Bools], first: Ints, last: Ints) -> bool:
     run = np.cumsum(np.diff(good, prepend=False))
     one, other = (set(run[good & np.isin(moves, part)].tolist()) for part in (first, last))
     return not one.isdisjoint(other)
-
-
-def _within_tolerance(match: Match, vertex: int) -> tuple[int, int]:
-    """First and last segment of the CL path with poses within the tolerance of a written one, and all between."""
-    own, six = match.six[vertex], match.path.six
-    segment, low, high = (int(column[vertex]) for column in (match.segment, match.low, match.high))
-
-    def reach(poses: range) -> int:
-        """Count the first of some poses that are near."""
-        for begin in range(0, len(poses), _STRIDE):
-            away = six[np.array(poses[begin : begin + _STRIDE])] - own
-            square = np.maximum((away[:, :3] ** 2).sum(axis=1), (away[:, 3:] ** 2).sum(axis=1))
-            far = np.flatnonzero(square > (match.tolerance + match.margin) ** 2)
-            if len(far):
-                return begin + int(far[0])
-        return len(poses)
-
-    return segment - reach(range(segment, low, -1)), segment + reach(range(segment + 1, high + 1))
 
 
 def _inside_rounding(

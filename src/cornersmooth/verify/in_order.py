@@ -27,8 +27,8 @@ _ANCHORS: Final = 32
 #: pairs of a written and an original segment that are looked at, at most
 _MOST_PAIRS: Final = 100_000
 
-#: windows that are followed for a batch, at most
-_MOST_WINDOWS: Final = 8
+#: windows of a batch that may be out of order before no more are looked at: the text is off then
+_MOST_FAILED: Final = 8
 
 
 @dataclass(frozen=True)
@@ -76,24 +76,25 @@ class Windows:
 
     def __init__(self, match: Match) -> None:
         self.match = match
-        self.known: list[Window | None] = []
+        self.known: list[Window] = []
+        self.failed = 0
         self.length = match.path.length_at(match.segment, match.fraction)
 
     def around(self, vertex: int) -> Window | None:
-        """Return the piece around a vertex; None where it belongs to none, or too many were asked for."""
+        """Return the piece around a vertex; None where it belongs to none, or too many have failed."""
         for window in self.known:
-            if window is not None and window.inner[0] <= vertex <= window.inner[1]:
+            if window.inner[0] <= vertex <= window.inner[1]:
                 return window
-        if len(self.known) >= _MOST_WINDOWS or not self.match.on[vertex]:
+        if self.failed >= _MOST_FAILED or not self.match.on[vertex]:
             return None
-        window = self._of(vertex)
-        self.known.append(window)
-        return window
+        found = self._of(vertex)
+        self.failed += found is None or not found.passed
+        self.known += [] if found is None else [found]
+        return found
 
     def _of(self, vertex: int) -> Window | None:
         match, length = self.match, self.length
-        begin = int(np.searchsorted(match.stretch, match.stretch[vertex]))
-        end = int(np.searchsorted(match.stretch, match.stretch[vertex], side="right")) - 1
+        begin, end = np.flatnonzero(match.stretch == match.stretch[vertex])[[0, -1]].tolist()
         own = length[begin : end + 1]
         around = AROUND * match.near
         for _ in range(_HALVED):
