@@ -37,6 +37,12 @@ REFUSED_ONCE = {
     628: "the same hole is drilled again behind GOHOME",
     738: "coolant on behind the last motion",
     919: "holes that are not drilled, the last of them higher",
+    876: "a hole ends where a rapid leads to",
+    1145: "no pose before the holes",
+    2458: "GOHOME out of a hole at the height of another pose",
+    3525: "a stop behind holes that are not drilled, where the tool stands over them all",
+    3591: "OPSTOP between two tool changes",
+    3608: "a feed move to the pose of a hole that is not drilled, where the tool is",
     969: "a tap behind a tool change that does not say SPINDL",
 }
 

@@ -83,11 +83,6 @@ class Stops:
     length: list[float] = field(default_factory=list)
     begin: list[float] = field(default_factory=list)
 
-    @property
-    def first(self) -> int:
-        """The first of them; 0 where there is none."""
-        return self.element[0] if self.element else 0
-
     def lengths(self) -> dict[int, float]:
         """CL path lengths by elements."""
         return dict(zip(self.element, self.length, strict=True))
@@ -115,8 +110,6 @@ class Batches:
         self.holes: dict[int, int] = {}
         #: the last move that it may belong to
         self.latest: dict[int, int] = {}
-        #: move behind a run of holes that ends where an element of them does
-        self.shared: dict[int, int] = {}
         #: moves of holes at whose bottom the tool waits, and ms
         self.dwells: list[tuple[int, float]] = []
         self.taps: list[int] = []
@@ -154,7 +147,7 @@ class Batches:
             self._lacking(0, len(original.pose) - 1)
             return
         holes = Holes(original, ahead, self.task.axis_length, ToolChanges(original.program, self._events))
-        self.holes, self.shared, self.dwells = holes.element_move, holes.shared, holes.dwells
+        self.holes, self.dwells = holes.element_move, holes.dwells
         self.taps, self.untapped, self.latest = holes.taps, holes.untapped, holes.latest_move
         part: _Part | None = None
         surplus: int | None = None
@@ -256,9 +249,11 @@ class _Part:
         last_vertex = original.trail.last
         start = int(last_vertex[move])
         self.batches.stops.element.append(element)
-        self.batches.stops.length.append(float(task.path.length[start]))
+        length = task.path.length
+        there = length[start] + share * (length[last_vertex[move + 1]] - length[start]) if share else length[start]
+        self.batches.stops.length.append(float(there))
         before = last_vertex[max(move - (kind == Move.RAPID), 0)]
-        self.batches.stops.begin.append(float(task.path.length[before]))
+        self.batches.stops.begin.append(float(length[before]))
         if share == 0:
             self.start, self.fraction = start, 0.0
         else:  # in vertices; the search finds the rest

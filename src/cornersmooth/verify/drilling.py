@@ -15,7 +15,7 @@ import numpy as np
 
 from cornersmooth.model import Move
 from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Element, Problem
+from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.verify.cycles import Drilling, drillings
 from cornersmooth.verify.hole_search import HoleSearch
 from cornersmooth.verify.polyline import Original
@@ -63,9 +63,6 @@ class Holes:
         self.element_move: dict[int, int] = {}
         #: the last move that it may belong to: over holes that are not drilled the tool may be there for the next
         self.latest_move: dict[int, int] = {}
-        #: move as far as which words behind an element may stand: the element leaves the last hole and ends where that
-        #: move does, or the holes from it to that move are not drilled
-        self.shared: dict[int, int] = {}
         #: moves of the holes at whose bottom the tool waits, and for how many ms
         self.dwells: list[tuple[int, float]] = []
         #: moves of the holes to be tapped in which something is fed
@@ -111,24 +108,16 @@ class Holes:
 
     def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling], *, again: bool) -> int:
         """Check the holes of a run; return the first element behind them."""
-        search, ahead = self._search, self._ahead
+        search = self._search
         groups, element = search.consume(first, stop, start, cycles, again=again)
         self._went_on = stop
         if stop < len(self._original.pose):
             groups[-1], element, self._went_on = search.give_back(stop, groups[-1], cycles[-1], element)
-            if self._went_on == stop and ahead.has(element) and search.exact(stop, np.array([element]))[0]:
-                self.shared[element] = stop
-        if all(ahead.nc.kind[k - ahead.base] == Element.RAPID for k in groups[-1]):
-            before = [k for group in groups[:-1] for k in group]
-            last = max(before, default=max(start - 1, 0))
-            self.shared[last] = stop - 1
-            while first and not before and last > ahead.base and search.exact(first - 1, np.array([last - 1]))[0]:
-                last -= 1  # said twice, as behind a tool change
-                self.shared[last] = stop - 1
         for k, group in enumerate(groups):
             for one in group:  # of several in one hole the first: what follows may leave nothing in the text
-                self.element_move.setdefault(one, first + k)
-                self.latest_move.setdefault(one, self._latest(one, first + k, stop, groups[k:]))
+                if not search.stands_still(one):
+                    self.element_move.setdefault(one, first + k)
+                    self.latest_move.setdefault(one, self._latest(one, first + k, stop, groups[k:]))
             again = search.repeats(first, stop, first + k)
             if not (
                 k and np.isnan(cycles[k].depth) and set(group) & set(groups[k - 1])

@@ -172,7 +172,7 @@ class HoleSearch:
                     continue
                 reached = k if reached is None or k == reached + 1 else reached
                 left_out = np.isnan(cycle.depth) and (k > reached or not cycle.tap)
-                if left_out or not self.over(hole, k + 1) or self.exact(hole - 1, np.array([k + 1]))[0]:
+                if left_out or not self.over(hole, k + 1):
                     continue
                 if cycle.tap or self.drills(hole, k + 1, cycle):
                     yield k + 1, True
@@ -311,7 +311,7 @@ class HoleSearch:
         """First move from one on that leads somewhere, if the rapids of a group are just these moves, one by one."""
         first: int | None = None
         for element in group:
-            while move < len(self.tip) and self.kind[move] == Move.RAPID and self.stays(move, element - 1):
+            while move < len(self.tip) and self.kind[move] != Move.HOLE and self.stays(move, element - 1):
                 move += 1
             if move == len(self.tip) or self.kind[move] != Move.RAPID or not self.exact(move, np.array([element]))[0]:
                 return None

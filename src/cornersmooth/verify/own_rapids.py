@@ -62,15 +62,17 @@ class OwnRapids:
         # at holes that are left out nothing moves
         asked = any(_follow(rank[one], rank[other]) for rank in self._ranks)
         asked = asked or self._over_hole(near, at_far + (-1 if leaves else 1), step)
+        asked = asked or (leaves and self._over_hole(near, self.holes, step, below=True))
         return not (asked or np.isin(at_near, self.holes).all())
 
-    def _over_hole(self, tip: Floats, moves: Ints, step: float) -> bool:
-        """Whether one of some moves is a hole, and a tip (3,) is in its line, up to printed digits."""
+    def _over_hole(self, tip: Floats, moves: Ints, step: float, *, below: bool = False) -> bool:
+        """Whether one of some moves is a hole, and a tip (3,) in its line, up to digits; `below`: under its pose."""
         original = self.task.original
         pose = original.pose[moves[np.isin(moves, self.holes)]]
         away, axis = tip - original.program.tip[pose], original.program.axis[pose]
         height = np.einsum("ij,ij->i", away, axis)
-        return bool((np.linalg.norm(away - height[:, None] * axis, axis=1) <= _STEPS * step).any())
+        inside = height < (-_STEPS * step if below else np.inf)
+        return bool(((np.linalg.norm(away - height[:, None] * axis, axis=1) <= _STEPS * step) & inside).any())
 
     def goes_to(self, tip: Floats, step: float) -> bool:
         """Whether the CL file goes to a tip in rapid, up to printed digits; so it does in and over all of its holes."""

@@ -79,17 +79,13 @@ def compare(
     unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & (unsaid | own)]
     found = [token for token in found if token.kind not in unsaid | (own & _LOOSE)]
-    plain = [token for token in found if token.kind == "stop" and token.value == 1.0 and not token.habit]
-    stops = [
-        token
-        for token in asked_for
-        if token.kind == "stop"
-        and token.value == 1.0
-        and all(_away(token.place, ours, room, apart) for ours in plain)  # else it is there anyway
-    ]
-    found = [
-        token for token in found if not token.habit or any(not _away(stop.place, token, room, apart) for stop in stops)
-    ]
+    optional = [token for token in found if (token.kind, token.value) == ("stop", 1.0) and not token.habit]
+    kept: list[Token] = []
+    habits = [token for token in found if token.habit]
+    for stop in asked_for:  # of stops that posts write on their own each may be one that is asked for
+        if (stop.kind, stop.value) == ("stop", 1.0) and all(_away(stop.place, one, room, apart) for one in optional):
+            kept += [one for one in habits if one not in kept and not _away(stop.place, one, room, apart)][:1]
+    found = [token for token in found if not token.habit or token in kept]
 
     def tidies(token: Token, kind: str) -> bool:
         """Whether a token only ends what ends with the program anyway."""

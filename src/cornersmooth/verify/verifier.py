@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from inspect import signature
+from itertools import count
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, ParamSpec, Self, TypeVar, cast
 
@@ -18,7 +19,7 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Ints, Program, Units
 from cornersmooth.nc_reader.block_tables import read_lines
-from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
+from cornersmooth.nc_reader.elements import Element, Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
@@ -249,6 +250,7 @@ class _Measured:
     lengths: dict[int, float]  #: CL path length, mm, at elements that have words behind them, where batches tell
     rooms: dict[int, float]  #: how far that is uncertain, mm
     others: dict[int, tuple[float, ...]]  #: at other poses that elements may stand for
+    still: set[int]  #: rapids that lead nowhere
     events: list[Event]
     words: bool
     margin: float = 0.0
@@ -315,9 +317,8 @@ class _Measured:
         known = self.lengths | self.batches.stops.lengths()
         holes = self.batches.holes
         known |= {element: length_at(move) for element, move in holes.items()}
-        first = self.batches.stops.first
-
         order = sorted(known)
+        first = order[0] if order else 0
 
         def stands(element: int) -> int:
             """The element at whose end one leaves the tool that leads nowhere, as a second rapid to the same place."""
@@ -327,10 +328,8 @@ class _Measured:
         def place(element: int) -> float:
             return known.get(stands(element), _BEFORE if element < first else 0.0)
 
-        # the way back from the last hole may be the CL file's next move; at holes that are not drilled nothing moves
-        for element, behind in self.batches.shared.items():
-            self.rooms[element] = self.rooms.get(element, 0.0) + abs(length_at(behind) - place(element))
         begins = {element: length_at(max(move - 1, 0)) for element, move in self.batches.latest.items()}
+        begins = {element + 1: place for element, place in self.batches.stops.lengths().items()} | begins
         begins |= self.batches.stops.begins()
         begins[self.batches.elements] = end
         places = [
@@ -339,9 +338,13 @@ class _Measured:
             else place(event.element - 1)
             for event in self.events
         ]
+
+        def next_of(element: int) -> int:
+            return next(k for k in count(element) if k not in self.still)
+
         # between two elements the text may have passed all that leaves nothing in it
         reaches = [
-            max(begins.get(event.element, -math.inf) - here, 0.0)
+            max(begins.get(next_of(event.element), -math.inf) - here, 0.0)
             for event, here in zip(self.events, places, strict=True)
         ]
         rooms = [self.rooms.get(stands(event.element - 1), 0.0) for event in self.events]
@@ -361,7 +364,7 @@ def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measur
     """Match and measure all that is read."""
     batches = Batches(task, text.events)
     program = task.original.program
-    found = _Measured(task, batches, Findings(), Poses.nowhere(len(program)), {}, {}, {}, text.events, words)
+    found = _Measured(task, batches, Findings(), Poses.nowhere(len(program)), {}, {}, {}, set(), text.events, words)
 
     def items() -> Iterator[tuple[Batch, Ints, Largest]]:
         for batch in batches.of(_noted(text, found)):
@@ -392,8 +395,13 @@ def _elements(events: list[Event], first: int, last: int) -> Ints:
 def _noted(text: _Text, found: _Measured) -> Iterable[Elements]:
     """Give out the elements of a text, and take down what is to be known of those with words behind them."""
     offset = 0
+    before = np.full((1, 6), np.nan)
     for nc in text.chunks:
         found.margin = found.task.margin(nc)
+        six = np.concatenate((before, np.hstack((nc.tip, nc.second))))
+        rapid = np.flatnonzero(nc.kind == Element.RAPID)
+        found.still.update((offset + rapid[(six[rapid] == six[rapid + 1]).all(axis=1)]).tolist())
+        before = six[-1:]
         if len(nc) and (nc.rotary or nc.tip_room.any()):
             last = offset + len(nc) - 1
             for element in {*_elements(text.events, offset, last).tolist(), last}:  # words behind it are still to come
