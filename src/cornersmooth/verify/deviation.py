@@ -18,8 +18,8 @@ from cornersmooth.verify.distances import (
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses
 from cornersmooth.verify.hull_bounds import hull_gaps
 from cornersmooth.verify.match import Match
+from cornersmooth.verify.nearest import distance_between
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
-from cornersmooth.verify.wide_search import passed_nearby
 
 #: rows of a batch for which tip and axis point are looked at each on its own: at a time, those that are farther than
 #: the tolerance from a common pose at a time, and at most
@@ -28,8 +28,8 @@ _OWN_ROWS, _SOME_OWN_ROWS, _MOST_OWN_ROWS = 16, 256, 2048
 #: rows farther than the tolerance from which on the worst of them tell enough, if most of these are off by themselves
 _MANY_OVER = 1024
 
-#: poses of a batch that are missed where they are looked for, and looked for on other turns of the path, at most
-_MOST_MISSED: Final = 64
+#: poses of a batch that are missed where they are looked for, and looked for at other places, at most
+_MOST_MISSED: Final = 1024
 
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 TOGETHER: Final = 2.0
@@ -169,8 +169,6 @@ def check_exact_poses(distances: Distances, found: Findings) -> None:
         nearest = np.where(off < amount, element, nearest)
         amount = np.minimum(amount, off)
     missed = np.flatnonzero(~exact)
-    exact[missed] = passed_nearby(match, theirs.vertex[rows[missed]], tip[missed], axis[missed])
-    missed = np.flatnonzero(~exact)
     for k in missed[:_MOST_MISSED].tolist():
         exact[k] = _passed_elsewhere(distances, int(rows[k]), tip[k], axis[k])
     missed = np.flatnonzero(~exact)
@@ -185,7 +183,7 @@ def check_exact_poses(distances: Distances, found: Findings) -> None:
 
 
 def _passed_elsewhere(distances: Distances, row: int, tip: Floats, axis: Floats) -> bool:
-    """Whether an element that names a pose may stand for it though its place is on another turn of the path."""
+    """Whether an element that names a pose may stand for it though its place is another, near it or on another turn."""
     match, theirs = distances.match, distances.original
     trail = match.written.trail
     beside = min(int(theirs.place[row]) + 1, len(trail) - 1)
@@ -195,9 +193,7 @@ def _passed_elsewhere(distances: Distances, row: int, tip: Floats, axis: Floats)
     ends = trail.last[trail.last >= window.vertex]
     ends = ends[ends < window.vertex + len(window.low)]
     pose = theirs.vertex[row : row + 1]
-    away = (match.six[ends] - match.path.six[pose]).reshape(-1, 2, 3)
-    for end in ends[(np.linalg.norm(away, axis=2) <= match.margin).all(axis=1)].tolist():
-        element = trail.owner[end : end + 1]
-        if window.may_be_at(end, pose)[0] and digit_errors(match.nc, element, tip, axis, match.axis_length)[0][0]:
-            return True
-    return False
+    ends = ends[distance_between(match.six[ends], match.path.six[pose]) <= match.near]
+    ends = ends[[window.may_be_at(end, pose)[0] for end in ends.tolist()]]
+    element = trail.owner[ends]
+    return bool(digit_errors(match.nc, element, tip, axis, match.axis_length)[0].any())

@@ -12,7 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, Metric, nearest_places
 from cornersmooth.verify.polyline import Polyline
-from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
+from cornersmooth.verify.rapids import ARITHMETIC
 
 #: original vertices of a batch that are looked at once more, and written segments looked at for each
 _MOST_ROWS, _MOST_SEGMENTS = 2048, 1 << 14
@@ -155,29 +155,6 @@ def _connected(
     best = np.argmin(off, axis=1)
     here = np.arange(len(point))
     return whole, near, middle + offset[best], share[here, best], off[here, best]
-
-
-def passed_nearby(match: Match, vertex: Ints, tip: Floats, axis: Floats) -> Bools:
-    """(k,) whether poses are named exactly by any element whose place is within `Matcher.near` of theirs.
-
-    Poses a digit apart are not told apart by their distance, nor are those between which the path goes to and fro.
-
-    Parameters
-    ----------
-    match : Match
-    vertex : (k,) int64
-        The poses as vertices of the original.
-    tip, axis : (k, 3) float64
-    """
-    found = np.zeros(len(vertex), np.bool_)
-    if not len(vertex):
-        return found
-    firsts, lasts = _Around(match).vertices(vertex[:_MOST_ROWS])
-    for k, (first, last) in enumerate(zip(firsts.tolist(), lasts.tolist(), strict=True)):
-        element = np.unique(match.written.trail.owner[first : min(last, first + _MOST_SEGMENTS) + 1])
-        same, _ = digit_errors(match.nc, element, tip[k], axis[k], match.axis_length)
-        found[k] = same.any()
-    return found
 
 
 class _Around:
