@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -240,3 +241,13 @@ def test_wrong_travel_is_said(text: str, message: str):
     whole = f"{begin}\n{text}\n[[axis]]{axes}" if "=" in text.split("\n")[0] else f"{PLAIN}\n{text}"
     with pytest.raises(SettingsError, match=message):
         parse_machine(whole)
+
+
+@pytest.mark.parametrize("name", machine_names())
+def test_every_key_that_a_table_only_shows_stands_where_it_belongs(name: str) -> None:
+    table = machine_table(name)
+    for key in re.finditer(r"^# (\w+ = .*)$", table, re.MULTILINE):
+        before, behind = table[: key.start()], table[key.end() :]
+        if key[1].startswith("modulo"):
+            behind = re.sub(r"\nlimits = .*", "", behind, count=1)
+        parse_machine(before + key[1] + behind)
