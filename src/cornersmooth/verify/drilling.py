@@ -16,7 +16,7 @@ import numpy as np
 from cornersmooth.model import Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.verify.cycles import Drilling, drillings
+from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.verify.hole_search import HoleSearch
 from cornersmooth.verify.polyline import Original
 from cornersmooth.verify.tool_changes import ToolChanges

@@ -9,7 +9,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Problem
-from cornersmooth.verify.cycles import Drilling
+from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.polyline import Original, directions
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 from cornersmooth.verify.tool_changes import NEVER, ToolChanges

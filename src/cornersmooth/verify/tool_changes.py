@@ -8,7 +8,7 @@ from typing import Final
 
 from cornersmooth.model import Program
 from cornersmooth.nc_reader.elements import Event
-from cornersmooth.verify.statements import Asking
+from cornersmooth.statements.asked import Asking
 
 #: an element that no text has
 NEVER: Final = 1 << 62

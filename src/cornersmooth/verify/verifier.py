@@ -28,15 +28,17 @@ from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
+from cornersmooth.statements.asked import asked
+from cornersmooth.statements.comparison import KINDS, compare
+from cornersmooth.statements.said import said
+from cornersmooth.statements.tokens import TAP, Token
 from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.checks import Examined, examine
 from cornersmooth.verify.findings import Findings, Largest, Poses
 from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.own_rapids import OwnRapids
 from cornersmooth.verify.result import Verification
-from cornersmooth.verify.statements import TAP, Token, asked, said
 from cornersmooth.verify.task import Task, length_of
-from cornersmooth.verify.token_comparison import KINDS, compare
 from cornersmooth.verify.wide_search import way_apart
 from cornersmooth.verify.word_check import GONE_ON, WordCheck
 

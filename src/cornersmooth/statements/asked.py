@@ -1,22 +1,14 @@
-"""Statements: tool changes, spindle, coolant, stops, dwells and compensation, as the CL file and the text say them."""
+"""What the CL file asks for: tool changes, spindle, coolant, stops, dwells and compensation as tokens."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from cornersmooth.model import Move, Program, Statement
-from cornersmooth.nc_reader.elements import Event
-
-#: decimals of a spindle speed that count: FANUC's S takes whole numbers only
-SPEED_DECIMALS = 0
-
-#: value of a tap, whatever the control calls it
-TAP = 84.0
+from cornersmooth.statements.tokens import PAUSES, SPEED_DECIMALS, Token, of_m
 
 #: cutting speeds in mm per minute
 _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}
@@ -24,53 +16,6 @@ _MM_PER_MINUTE = {"SMM": 1000.0, "SFM": 304.8}
 _COOLANT = {"ON": 8.0, "FLOOD": 8.0, "MIST": 7.0, "THRU": 88.0, "OFF": 9.0, "NOMORE": 9.0}
 
 _COMPENSATION = {"LEFT": 41.0, "RIGHT": 42.0, "OFF": 40.0, "NOMORE": 40.0}
-
-
-@dataclass(frozen=True, slots=True)
-class Token:
-    """One change of state, or one action.
-
-    Parameters
-    ----------
-    kind : str
-        ``"tool"``, ``"spindle"``, ``"speed"``, ``"coolant"``, ``"compensation"``, ``"stop"``, ``"dwell"``, ``"tap"``,
-        ``"end"``.
-    value : float
-    place : float, mm
-        Path length from the start of the original motion.
-    line : int
-        CL or NC line.
-    room : float, mm
-        How far the place is uncertain beyond what printed digits account for: rotary words near the pole.
-    reach : float, mm
-        How much farther along it may be, too: what the CL file has there leaves nothing in the text.
-    moment : int
-        Tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts.
-    element : int
-        Element of the text that it stands before; -1 in the CL file.
-    habit : bool
-        Whether posts write it on their own: an optional stop right before another tool.
-    others : tuple of float, mm
-        Other places that it may have, where the path goes to and fro.
-    idle : bool
-        Whether a tool is changed for another, or the program ends, before anything moves.
-    """
-
-    kind: str
-    value: float
-    place: float
-    line: int
-    room: float = 0.0
-    moment: int = 0
-    habit: bool = False
-    others: tuple[float, ...] = ()
-    idle: bool = False
-    reach: float = 0.0
-    element: int = -1
-
-
-#: kinds during which a state matters although nothing moves
-_PAUSES = ("stop", "dwell")
 
 
 class Asking:
@@ -117,7 +62,7 @@ class Asking:
     def say(self, kind: str, value: float) -> None:
         """Note a token."""
         self.tokens.append(Token(kind, value, self.place, self.line, moment=self.moment))
-        self.moment += kind in _PAUSES
+        self.moment += kind in PAUSES
 
     def load(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """Change the tool; ADJUST or OSETNO names another length register."""
@@ -205,7 +150,7 @@ class Asking:
     def auxiliary(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """An M word by its number, unless it would end or change more than a word may."""
         if len(numbers) == 1 and not words and _whole(numbers[0]) and numbers[0] not in (2, 6, 30, 98, 99):
-            for token in _of_m(numbers[0], self.place, self.line):
+            for token in of_m(numbers[0], self.place, self.line):
                 self.say(token.kind, token.value)
 
     def end(self, words: list[str], numbers: list[float], statement: Statement) -> None:
@@ -245,79 +190,3 @@ def _behind(statement: Statement, word: str) -> float | None:
 
 def _whole(number: float) -> bool:
     return 0 <= number < 1e9 and number == int(number)
-
-
-def _of_m(value: float, place: float, line: int) -> list[Token]:
-    """Token of an M word other than M6."""
-    if value in (3, 4, 5, 19):
-        return [Token("spindle", value, place, line)]
-    if value in (7, 8, 9, 88):
-        return [Token("coolant", value, place, line)]
-    if value in (0, 1):
-        return [Token("stop", value, place, line)]
-    return [Token("auxiliary", value, place, line)]
-
-
-def said(
-    events: Sequence[Event],
-    places: Sequence[float],
-    rooms: Sequence[float],
-    reaches: Sequence[float],
-    others: Sequence[tuple[float, ...]],
-) -> list[Token]:
-    """What the words of the NC text do; the rest, in mm, is what `Token` has as place, room, reach and others."""
-    tokens: list[Token] = []
-    chosen: float | None = None
-    moment = element = 0
-    speaking = [event for event in events if event.letter != "("]
-    rows = [row for row in zip(events, places, rooms, reaches, others, strict=True) if row[0].letter != "("]
-    for k, (event, place, room, reach, elsewhere) in enumerate(rows):
-        value, line, before = event.value, event.line, len(tokens)
-        moment, element = moment + (event.element != element), event.element
-        if event.letter == "T":
-            chosen = value
-            following = speaking[k + 1] if k + 1 < len(speaking) else None
-            if following is None or (following.letter, following.value) != ("M", 6.0):
-                tokens.append(Token("next tool", value, place, line))
-        elif event.letter == "M" and value == 6:
-            if chosen is not None:
-                tokens.append(Token("tool", chosen, place, line))
-        elif event.letter == "M" and value in (2, 30):
-            tokens.append(Token("end", 30.0, place, line))
-        elif event.letter == "M":
-            tokens += _of_m(value, place, line)
-        elif event.letter == "G" and value == 4:
-            tokens.append(Token("dwell", round(float(event.text)), place, line))
-        elif event.letter == "G" and value == TAP:
-            tokens.append(Token("tap", value, place, line))
-        elif event.letter == "G" and value in (40, 41, 42):
-            tokens.append(Token("compensation", value, place, line))
-        elif event.letter in _PLAIN:
-            number = round(value, SPEED_DECIMALS) if event.letter == "S" else value
-            tokens.append(Token(_PLAIN[event.letter], number, place, line))
-        habit = (event.letter, value) == ("M", 1.0) and _before_a_tool(speaking, k)
-        idle = (event.letter, value) == ("M", 6.0) and _is_idle(speaking, k)
-        place_of = partial(replace, room=room, reach=reach, others=elsewhere, moment=moment, element=event.element)
-        tokens[before:] = [place_of(token, habit=habit, idle=idle) for token in tokens[before:]]
-        moment += any(token.kind in _PAUSES and not token.habit for token in tokens[before:])
-    return tokens
-
-
-def _before_a_tool(speaking: Sequence[Event], k: int) -> bool:
-    """Whether the next word is that of a tool, with no motion between; and there has been one before."""
-    event = speaking[k]
-    behind = (other for other in speaking[k + 1 :] if (other.letter, other.value) != ("G", 40.0))  # R0 of M91
-    following = next(behind, None)
-    changes = following is not None and following.letter == "T" and following.element == event.element
-    return changes and any(before.letter == "T" for before in speaking[:k])
-
-
-def _is_idle(speaking: Sequence[Event], k: int) -> bool:
-    """Whether the next tool, or the end of the program, comes before any motion."""
-    here = speaking[k].element
-    ends = (other for other in speaking[k + 1 :] if other.letter == "M" and other.value in (2.0, 6.0, 30.0))
-    return next((other.element == here for other in ends), False)
-
-
-#: letters whose words are tokens as they stand
-_PLAIN = {"S": "speed", "H": "offset", "D": "register"}

@@ -8,7 +8,7 @@ from bisect import bisect_left
 from collections.abc import Callable
 
 from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.verify.statements import Token
+from cornersmooth.statements.tokens import Token
 
 #: names and codes of kinds
 _NAMES = {

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from cornersmooth.model import Program
-from cornersmooth.verify.statements import Asking
+from cornersmooth.statements.asked import Asking
 
 #: words of CYCLE: plain drilling, depths, feeds, and those that say nothing of either
 _PLAIN = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}

@@ -1,0 +1,69 @@
+"""Tokens: what the CL file asks for beside the motion, and what the words of a text do, in one form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: decimals of a spindle speed that count: FANUC's S takes whole numbers only
+SPEED_DECIMALS = 0
+
+#: value of a tap, whatever the control calls it
+TAP = 84.0
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """One change of state, or one action.
+
+    Parameters
+    ----------
+    kind : str
+        ``"tool"``, ``"spindle"``, ``"speed"``, ``"coolant"``, ``"compensation"``, ``"stop"``, ``"dwell"``, ``"tap"``,
+        ``"end"``.
+    value : float
+    place : float, mm
+        Path length from the start of the original motion.
+    line : int
+        CL or NC line.
+    room : float, mm
+        How far the place is uncertain beyond what printed digits account for: rotary words near the pole.
+    reach : float, mm
+        How much farther along it may be, too: what the CL file has there leaves nothing in the text.
+    moment : int
+        Tokens of one moment have no motion, stop or dwell between them: of a state only the last one counts.
+    element : int
+        Element of the text that it stands before; -1 in the CL file.
+    habit : bool
+        Whether posts write it on their own: an optional stop right before another tool.
+    others : tuple of float, mm
+        Other places that it may have, where the path goes to and fro.
+    idle : bool
+        Whether a tool is changed for another, or the program ends, before anything moves.
+    """
+
+    kind: str
+    value: float
+    place: float
+    line: int
+    room: float = 0.0
+    moment: int = 0
+    habit: bool = False
+    others: tuple[float, ...] = ()
+    idle: bool = False
+    reach: float = 0.0
+    element: int = -1
+
+
+#: kinds during which a state matters although nothing moves
+PAUSES = ("stop", "dwell")
+
+
+def of_m(value: float, place: float, line: int) -> list[Token]:
+    """Token of an M word other than M6."""
+    if value in (3, 4, 5, 19):
+        return [Token("spindle", value, place, line)]
+    if value in (7, 8, 9, 88):
+        return [Token("coolant", value, place, line)]
+    if value in (0, 1):
+        return [Token("stop", value, place, line)]
+    return [Token("auxiliary", value, place, line)]
