@@ -125,7 +125,8 @@ class _Places:
         part = np.tile((_HAIR, 0.5, 1.0 - _HAIR), len(grid.start))
         here = grid.start[own] + part * grid.width[own]
         interval = np.clip(np.searchsorted(edge, here, side="right") - 1, 0, len(width) - 1)
-        share = (here - edge[interval]) / np.maximum(width[interval], 1e-300)
+        # the last may end a last digit behind an interval without any length
+        share = np.clip((here - edge[interval]) / np.maximum(width[interval], 1e-300), 0.0, 1.0)
         value = samples.value[:, :, interval].astype(np.float64)
         factors = parabola(share, samples.middle[interval])
         between: Floats = np.zeros(value.shape[:-1])
