@@ -123,37 +123,21 @@ def rotary_rows(
     program, settings, machine = smoothed.program, smoothed.settings, form.machine
     if machine is None:
         raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
-    tip, axis, move = whole_rows(rows)
-    if not len(move):
+    poses = whole_rows(rows)
+    if not len(poses[2]):
         return
     tools = tools_of_poses(program) if machine.tool_lengths else None
     own_machine, machine = machine, machine.with_longest_tool()
-    rapid, line, file = rapid_moves(program.kind)[move], program.line[move], program.source.name
     tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
-    _check_reach(machine, program, axis, move, tolerance)
-    how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": line, "file": file}
-    how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
-    left = np.zeros(len(move), np.bool_)
-    if form.rewind:
-        path, source, left = rewound_angles(machine, tip, axis, **how)
-        if left.any():
-            tip, axis, move = tip[source], axis[source], move[source]
-            rapid = rapid[source] | left
-            _tell_rewinds(machine, path.angles, left, program.line[move], findings)
-        del source
-    else:
-        path = rotary_angles(machine, tip, axis, **how)
-    del how
-    for finding in path.findings:
-        findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
-    angles = path.angles
-    del path, line  # all that is still held as long as rows are written counts
+    way = _way(poses, program, machine, form, tolerance, findings)
+    del poses  # all that is still held as long as rows are written counts
     return_free_memory()
+    tip, axis, move, angles, rapid, left = way.tip, way.axis, way.move, way.angles, way.rapid, way.left
+    file = program.source.name
     largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
     limits = line_limits(settings, form, largest_turn)
     timed = _timed_cuts(angles, move, program) if form.orientation == "machine" else None
-    inserted = InsertedPoints()
-    merged, slowed, first_slowed = 0, 0, 0
+    inserted, times = InsertedPoints(), _BlockTimes(smoothed, form, machine, limits)
     for begin in range(0, max(len(move) - 1, 1), CHUNK):
         here = slice(begin, begin + CHUNK + 1)  # the last row of a chunk is the start of the next
         line = program.line[move[here]]
@@ -183,22 +167,8 @@ def rotary_rows(
             filled = filled.only(kept)
             blend = corner_blends(found, kept, rapid[here][filled.pose], limits, settings, form)
         own = slice(1 if begin else 0, None)
-        of_timed, fastest = None if timed is None else timed[here], form.mode.motion.fastest
-        rate = _rates(filled, move[here], left[here], of_timed, program, settings, form)
-        if rate is not None and fastest:
-            if form.orientation == "machine" and (rate > fastest).any():
-                before = len(filled.pose)
-                filled = _merged(smoothed, machine, filled, (move[here], start, at_pose, held), rate, limits, fastest)
-                merged += before - len(filled.pose)
-                rate = _rates(filled, move[here], left[here], of_timed, program, settings, form)
-            assert rate is not None
-            beyond = np.flatnonzero(rate[own] > fastest)
-            if len(beyond) and not slowed:
-                first_slowed = int(line[filled.pose[own][beyond[0]]])
-            slowed += len(beyond)
-            rate = np.minimum(rate, fastest)
-        if rate is not None:
-            rate = np.round(rate, INVERSE_TIME_DECIMALS)
+        of_timed = None if timed is None else timed[here]
+        filled, rate = times.of(filled, (move[here], start, at_pose, held), left[here], of_timed, own)
         seen = np.arange(len(filled.pose))[own]
         if in_planes is not None:
             seen = seen[~in_planes[move[here][filled.pose[seen]]]]
@@ -218,13 +188,103 @@ def rotary_rows(
             left=(left[here][filled.pose] & ~filled.inserted)[own] if left.any() else None,
         )
     inserted.warn(findings)
-    if slowed:
-        text = f"block slowed down: it is shorter than F{form.mode.motion.fastest:.10g} of inverse time (G93) can say"
-        findings.add("CS371", "warning", first_slowed, text, slowed)
-    if merged:
-        text = "block merged with its neighbour: shorter than inverse time (G93) can say"
-        findings.add("CS372", "note", 0, text, merged)
+    times.tell(findings)
     inserted.tell(machine, findings)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Rows with their angles, n of them: more than were given where cuts are left.
+
+    Parameters
+    ----------
+    tip, axis : (n, 3) float64
+    move : (n,) int64
+    angles : (n, 2) float64, degrees
+    rapid, left : (n,) bool
+        Whether the way to the row cuts nothing; whether the tool comes back there into a cut that it has left.
+    """
+
+    tip: Floats
+    axis: Floats
+    move: Ints
+    angles: Floats
+    rapid: Bools
+    left: Bools
+
+
+def _way(
+    poses: tuple[Floats, Floats, Ints],
+    program: Program,
+    machine: Machine,
+    form: Form,
+    tolerance: float,
+    findings: Findings,
+) -> _Way:
+    """Choose the angles of all rows, given as tip, axis and move."""
+    tip, axis, move = poses
+    rapid, file = rapid_moves(program.kind)[move], program.source.name
+    _check_reach(machine, program, axis, move, tolerance)
+    how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": program.line[move], "file": file}
+    how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
+    left = np.zeros(len(move), np.bool_)
+    if form.rewind:
+        path, source, left = rewound_angles(machine, tip, axis, **how)
+        if left.any():
+            tip, axis, move = tip[source], axis[source], move[source]
+            rapid = rapid[source] | left
+            _tell_rewinds(machine, path.angles, left, program.line[move], findings)
+    else:
+        path = rotary_angles(machine, tip, axis, **how)
+    for finding in path.findings:
+        findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
+    return _Way(tip, axis, move, path.angles, rapid, left)
+
+
+@dataclass
+class _BlockTimes:
+    """Moves per minute of blocks that we time, within what the control can say; counts what became of short ones."""
+
+    smoothed: SmoothProgram
+    form: Form
+    machine: Machine
+    limits: LineLimits
+    merged: int = 0
+    slowed: int = 0
+    first_slowed: int = 0
+
+    def of(
+        self, filled: FilledPath, rows: tuple[Ints, Ints, Bools, Bools], left: Bools, timed: Bools | None, own: slice
+    ) -> tuple[FilledPath, Floats | None]:
+        """The path without rows that are too short, and their rates; `rows` as in `_merged`, `own` count."""
+        program, settings, fastest = self.smoothed.program, self.smoothed.settings, self.form.mode.motion.fastest
+        move = rows[0]
+        rate = _rates(filled, move, left, timed, program, settings, self.form)
+        if rate is None:
+            return filled, None
+        if fastest:
+            if self.form.orientation == "machine" and (rate > fastest).any():
+                before = len(filled.pose)
+                filled = _merged(self.smoothed, self.machine, filled, rows, rate, self.limits, fastest)
+                self.merged += before - len(filled.pose)
+                rate = _rates(filled, move, left, timed, program, settings, self.form)
+            assert rate is not None
+            beyond = np.flatnonzero(rate[own] > fastest)
+            if len(beyond) and not self.slowed:
+                self.first_slowed = int(program.line[move[filled.pose[own][beyond[0]]]])
+            self.slowed += len(beyond)
+            rate = np.minimum(rate, fastest)
+        return filled, np.round(rate, INVERSE_TIME_DECIMALS)
+
+    def tell(self, findings: Findings) -> None:
+        """Say what became of short blocks."""
+        if self.slowed:
+            fastest = self.form.mode.motion.fastest
+            text = f"block slowed down: it is shorter than F{fastest:.10g} of inverse time (G93) can say"
+            findings.add("CS371", "warning", self.first_slowed, text, self.slowed)
+        if self.merged:
+            text = "block merged with its neighbour: shorter than inverse time (G93) can say"
+            findings.add("CS372", "note", 0, text, self.merged)
 
 
 def _merged(
