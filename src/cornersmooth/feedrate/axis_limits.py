@@ -101,7 +101,7 @@ class AxisSamples:
 
 @dataclass(frozen=True)
 class LimitCoefficients:
-    """Coefficients over intervals of the path coordinate, in the names of `interior_point.Batch`.
+    """Coefficients over intervals of the path coordinate, in the names of `speed_problem.Batch`.
 
     Parameters
     ----------

@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.feedrate.grid import Grid
-from cornersmooth.feedrate.interior_point import GAP, MAX_STEPS, Batch, solve
+from cornersmooth.feedrate.interior_point import GAP, MAX_STEPS, solve
 from cornersmooth.feedrate.scurve import stopping_distance
+from cornersmooth.feedrate.speed_problem import Batch
 from cornersmooth.model import Floats, Ints
 
 #: cells solved together: the arrays of one window stay in the processor's cache

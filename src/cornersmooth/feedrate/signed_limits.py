@@ -18,9 +18,10 @@ import numpy as np
 
 from cornersmooth.feedrate.axis_limits import LimitCoefficients, parabola
 from cornersmooth.feedrate.grid import Grid, cell_intervals
-from cornersmooth.feedrate.interior_point import GAP, Batch, Signed
+from cornersmooth.feedrate.interior_point import GAP
 from cornersmooth.feedrate.lookahead import batch_of, run_of_cells, solve_runs
 from cornersmooth.feedrate.speed_limits import SpeedLimits
+from cornersmooth.feedrate.speed_problem import Batch, Signed
 from cornersmooth.model import Bools, Floats, Ints
 
 #: axes that have their limits with signs in each cell, and rounds
@@ -35,8 +36,8 @@ _SLOWER = 0.97
 #: remaining duality gap over the time of plans that only show where limits are met
 ROUGH = 1e-2
 
-#: Newton steps of one round: most take 20 to 40; where terms are huge and cancel, hundreds gain next to nothing
-_STEPS = 80
+#: Newton steps of one round: most take 15 to 35; where terms are huge and cancel, hundreds gain next to nothing
+_STEPS = 50
 
 #: share of the limits of acceleration and jerk that is used: the rest is for what lies between samples
 _USED = 0.997

@@ -1,0 +1,146 @@
+"""The normal equations of an interior-point step: five diagonals for many speed profiles at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.feedrate.speed_problem import Batch, ahead, behind, weight_of_z
+from cornersmooth.lapack import dpbsv
+from cornersmooth.model import Floats, Ints
+
+#: what is added to the main diagonal of the normal equations, relative to it, where they cannot be solved without
+_RIDGES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The normal equations of the barrier problem for the change of the coefficients.
+
+    Parameters
+    ----------
+    batch : Batch
+    by_z : tuple of (n,) float64
+        Of each row the derivative of left minus right side by z.
+    downhill : (n,) float64
+        Derivative of the time by the coefficients.
+    bands : (3, n) float64
+        The matrix, its main diagonal last.
+    """
+
+    batch: Batch
+    by_z: tuple[Floats, ...]
+    downhill: Floats
+    bands: Floats
+
+    @classmethod
+    def of(cls, batch: Batch, c: Floats, stiffness: Floats, bites: list[Floats]) -> Equations:
+        """Gather the stiffness (rows, n) of all limits."""
+        n = len(c)
+        # stiffness of z and z′ at the nodes and coefficients by `Row.at`, and of z″/2
+        zz, zs, ss, bb = np.zeros((4, n)), np.zeros((2, n)), np.zeros((2, n)), np.zeros(n)
+        zb, sb = np.zeros((4, n)), np.zeros((2, n))
+        weights = tuple(weight_of_z(row, bites) for row in batch.rows)
+        for row, by_z, w in zip(batch.rows, weights, stiffness, strict=True):
+            wz = w * by_z
+            zz[row.at] += wz * by_z
+            if row.slope is not None:
+                ws = w * row.slope
+                ss[row.at] += ws * row.slope
+                if row.level is not None or row.right is None:
+                    zs[row.at] += wz * row.slope
+                if row.bend is not None:
+                    sb[row.at] += ws * row.bend
+            if row.bend is not None:
+                bb += w * row.bend**2
+                zb[row.at] += wz * row.bend
+        near, far, s = batch.near, batch.far, batch.slope
+        r0, r1, r2 = batch.bend
+        w_z, w_zs, w_s = (at[0] + behind(at[1]) for at in (zz, zs, ss))
+        w_zs, w_s = s * w_zs, s * s * w_s
+        # z″/2 times z and z′ at both nodes and times the middle coefficient, over the cell's three coefficients
+        k0 = zb[0] * near - sb[0] * s
+        k1 = zb[0] * far + sb[0] * s + zb[1] * ahead(near) - sb[1] * ahead(s) + zb[3]
+        k2 = zb[1] * ahead(far) + sb[1] * ahead(s)
+        bands = np.zeros((3, n))
+        diagonal, beside, beyond = bands[2], bands[1], bands[0]
+        diagonal += 0.75 * batch.weight * c**-2.5 + zz[2]
+        diagonal += w_z * near**2 - 2.0 * w_zs * near + w_s + r0 * (bb * r0 + 2.0 * k0)
+        diagonal += behind(w_z * far**2 + 2.0 * w_zs * far + w_s + r1 * (bb * r1 + 2.0 * k1) + zz[3])
+        diagonal += behind(behind(r2 * (bb * r2 + 2.0 * k2)))
+        beside += behind(w_z * near * far + w_zs * (near - far) - w_s + bb * r0 * r1 + r0 * k1 + r1 * k0)
+        beside += behind(behind(bb * r1 * r2 + r1 * k2 + r2 * k1))
+        beyond += behind(behind(bb * r0 * r2 + r0 * k2 + r2 * k0))
+        _eliminate(batch, bands)
+        return cls(batch, weights, -0.5 * batch.weight * c**-1.5, bands)
+
+    def step(self, pressure: Floats) -> Floats:
+        """Change of the coefficients (n,) under the forces (rows, n) of the limits."""
+        batch, n = self.batch, len(self.downhill)
+        on_z, on_slope, on_bend = np.zeros((4, n)), np.zeros((2, n)), np.zeros(n)
+        for row, by_z, force in zip(batch.rows, self.by_z, pressure, strict=True):
+            on_z[row.at] += force * by_z
+            if row.slope is not None:
+                on_slope[row.at] += force * row.slope
+            if row.bend is not None:
+                on_bend += force * row.bend
+        near, far, s = batch.near, batch.far, batch.slope
+        r0, r1, r2 = batch.bend
+        node_z, node_s = on_z[0] + behind(on_z[1]), s * (on_slope[0] + behind(on_slope[1]))
+        gradient = on_z[2] + self.downhill + near * node_z - node_s + r0 * on_bend
+        gradient += behind(far * node_z + node_s + r1 * on_bend + on_z[3]) + behind(behind(r2 * on_bend))
+        _fold(batch, gradient)
+        step = _solved(self.bands, -gradient)
+        batch.follow(step)
+        return step
+
+
+def _solved(bands: Floats, right: Floats) -> Floats:
+    """Solve the normal equations; where rounding leaves no positive pivot they are stiffened.
+
+    A stiffened step is shorter or points a little aside: it costs rounds, never a limit.
+    """
+    for ridge in _RIDGES:
+        matrix = np.array(bands, order="F")
+        matrix[-1] *= 1.0 + ridge
+        _, step, info = dpbsv(matrix, right, overwrite_ab=1)
+        if info == 0 and np.isfinite(step).all():
+            return np.asarray(step, np.float64)
+    return np.zeros_like(right)
+
+
+def _eliminate(batch: Batch, bands: Floats) -> None:
+    """Take coefficients that follow others, or stay, out of the matrix; their rows become identities."""
+    beyond, beside, diagonal = bands
+    for at, part, inward in _followers(batch):
+        to = at + inward
+        pair = np.maximum(at, to)  # column of the entry that joins both
+        diagonal[to] += part * (part * diagonal[at] + 2.0 * beside[pair])
+        beside[np.maximum(to, to + inward)] += part * beyond[np.maximum(at, at + 2 * inward)]
+        _isolate(bands, at)
+    _isolate(bands, np.flatnonzero(batch.frozen))
+
+
+def _fold(batch: Batch, gradient: Floats) -> None:
+    """The same for a right side."""
+    for at, part, inward in _followers(batch):
+        gradient[at + inward] += part * gradient[at]
+        gradient[at] = 0.0
+    gradient[batch.frozen] = 0.0
+
+
+def _followers(batch: Batch) -> tuple[tuple[Ints, Floats, int], ...]:
+    """Coefficients next to a rest, their ratio to the neighbour, and on which side that is: at starts, at ends."""
+    sides = ((batch.first, batch.first_ratio, 1), (batch.last, batch.last_ratio, -1))
+    return tuple((end[~np.isnan(ratio)], ratio[~np.isnan(ratio)], inward) for end, ratio, inward in sides)
+
+
+def _isolate(bands: Floats, rows: Ints) -> None:
+    beyond, beside, diagonal = bands
+    diagonal[rows] = 1.0
+    beside[rows] = 0.0
+    beyond[rows] = 0.0
+    n = len(diagonal)
+    beside[rows[rows + 1 < n] + 1] = 0.0
+    beyond[rows[rows + 2 < n] + 2] = 0.0
