@@ -218,36 +218,27 @@ class HoleSearch:
             )
         )
 
-    def consume(
-        self, first: int, stop: int, element: int, cycles: list[Drilling], *, again: bool
-    ) -> tuple[list[list[int]], int]:
+    def consume(self, first: int, stop: int, element: int, cycles: list[Drilling]) -> tuple[list[list[int]], int]:
         """Elements of each hole, and the element behind them all.
 
         Where the next cycle is for the same hole, the first rapid out of it behind its depth ends this one.
 
         A hole that is not tapped as its cycle says becomes one of a cycle that asks for nothing, in `cycles`, too.
-
-        `again`: the next run begins in the last of these holes. Where nothing is drilled in it now, only what stays
-        where the cycle was entered belongs to this run.
         """
         groups: list[list[int]] = []
         asked = tuple(cycles)
         for move in range(first, stop):
             group: list[int] = []
-            entered = np.nan
             repeated = move > first and asked[move - 1 - first] == asked[move - first]
             if repeated and self.same_hole(move - 1, move):
                 cycles[move - first] = cycles[move - 1 - first]
             elif cycles[move - first].tap and not self.tapped(move, element, cycles[move - first]):
                 cycles[move - first] = cycles[move - first].if_drilled
-            if again and np.isnan(cycles[-1].depth) and move == stop - 1 and first:
-                entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
             depth = cycles[move - first].depth
-            other = move + 1 < stop and cycles[move + 1 - first] != cycles[move - first]
-            twice, deep, left = other and self.same_hole(move, move + 1), False, False
+            deep = left = False
             while self.has(move, element):
                 height = self.heights(move, np.array([element]))[0]
-                if np.isnan(height) or abs(height - entered) > self.room:
+                if np.isnan(height):
                     break
                 fed = bool(self.feeds([element]))
                 down = not group or height < self.heights(move, np.array(group[-1:]))[0] - self.room
@@ -257,8 +248,6 @@ class HoleSearch:
                 element += 1
                 deep = deep or height <= self.room - depth
                 left = left or (deep and height > self.room)
-                if twice and deep and height > self.room and not self.feeds(group[-1:]):
-                    break
             if not group and groups and groups[-1]:  # the same hole again
                 before = np.array(groups[-1])
                 group = before[~np.isnan(self.heights(move, before))].tolist()
