@@ -286,7 +286,8 @@ class HoleSearch:
             # the next cycle may go into the same hole: the first to be deep enough ends this one
             done = height <= self.room - cycle.depth
             deepest = feeds[int(np.argmax(done) if done.any() else np.argmin(height))]
-        behind = np.array([k for k in group if k > deepest], np.int64)
+        low = self.of_its_tool(move)[0]
+        behind = np.array([k for k in group if k > deepest and k >= low], np.int64)
         same = behind[self.exact(move, behind)] if len(behind) else behind
         if not len(same):
             return group, end, move
@@ -302,7 +303,9 @@ class HoleSearch:
         for element in group:
             while move < len(self.tip) and self.kind[move] != Move.HOLE and self.stays(move, element - 1):
                 move += 1
-            if move == len(self.tip) or self.kind[move] != Move.RAPID or not self.exact(move, np.array([element]))[0]:
+            if move == len(self.tip) or element < self.of_its_tool(move)[0]:
+                return None
+            if self.kind[move] != Move.RAPID or not self.exact(move, np.array([element]))[0]:
                 return None
             first = move if first is None else first
             move += 1
