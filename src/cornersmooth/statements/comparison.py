@@ -159,7 +159,9 @@ def _without_habits(
     for other in theirs:
         near = [k for k in unasked if other.value == ours[k].value and not _away(other.place, ours[k], room, apart)]
         if near:
-            unasked.remove(min(near, key=lambda k: (k in begins_again, abs(ours[k].place - other.place))))
+            unasked.remove(
+                min(near, key=lambda k: (ours[k].reach > room, k in begins_again, abs(ours[k].place - other.place)))
+            )
     return [token for k, token in enumerate(ours) if k not in begins_again or k not in unasked]
 
 

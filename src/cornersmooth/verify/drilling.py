@@ -83,7 +83,7 @@ class Holes:
         all_cycles = drillings(original.program, original.pose[hole].tolist())
         move = element = used = 0
         runs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-        for first, stop in runs:
+        for number, (first, stop) in enumerate(runs):
             cycles = all_cycles[used : used + stop - first]
             used += stop - first
             if first > move and not self._search.stands(move, first, element):
@@ -91,7 +91,9 @@ class Holes:
                     yield Between(move, first - 1, element, begin, found)
                     element = begin
                     ahead.forget(element - _KEPT)
-            element = self._drilled(first, stop, element, cycles)
+            above = runs[number + 1][0] if number + 1 < len(runs) else None
+            again = above is not None and self._search.same_hole(stop - 1, above)
+            element = self._drilled(first, stop, element, cycles, again=again)
             ahead.forget(element - _KEPT)
             # the move out of the last hole starts wherever the tool has been left
             loose = stop < moves and original.program.kind[original.pose[stop]] != Move.RAPID
@@ -104,10 +106,10 @@ class Holes:
             move += 1  # the tool is there
         yield Between(move, moves - 1, element, element, True)
 
-    def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling]) -> int:
+    def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling], *, again: bool) -> int:
         """Check the holes of a run; return the first element behind them."""
         search = self._search
-        groups, element = search.consume(first, stop, start, cycles)
+        groups, element = search.consume(first, stop, start, cycles, again=again)
         self._went_on = stop
         if stop < len(self._original.pose):
             groups[-1], element, self._went_on = search.give_back(stop, groups[-1], cycles[-1], element)

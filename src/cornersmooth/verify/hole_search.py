@@ -218,12 +218,17 @@ class HoleSearch:
             )
         )
 
-    def consume(self, first: int, stop: int, element: int, cycles: list[Drilling]) -> tuple[list[list[int]], int]:
+    def consume(
+        self, first: int, stop: int, element: int, cycles: list[Drilling], *, again: bool
+    ) -> tuple[list[list[int]], int]:
         """Elements of each hole, and the element behind them all.
 
         Where the next cycle is for the same hole, the first rapid out of it behind its depth ends this one.
 
         A hole that is not tapped as its cycle says becomes one of a cycle that asks for nothing, in `cycles`, too.
+
+        `again`: the next run begins in the last of these holes. Where nothing is drilled in it now, only what stays
+        where the cycle was entered belongs to this run.
         """
         groups: list[list[int]] = []
         asked = tuple(cycles)
@@ -236,9 +241,12 @@ class HoleSearch:
                 cycles[move - first] = cycles[move - first].if_drilled
             depth = cycles[move - first].depth
             deep = left = False
+            entered = np.nan
+            if again and np.isnan(cycles[-1].depth) and move == stop - 1 and first:
+                entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
             while self.has(move, element):
                 height = self.heights(move, np.array([element]))[0]
-                if np.isnan(height):
+                if np.isnan(height) or abs(height - entered) > self.room:
                     break
                 fed = bool(self.feeds([element]))
                 down = not group or height < self.heights(move, np.array(group[-1:]))[0] - self.room
@@ -279,7 +287,7 @@ class HoleSearch:
         """
         feeds = self.feeds(group)
         if group and not feeds and (going_on := self._goes_on_as(move, group)) is not None:
-            return [], group[0], going_on
+            return group[:1], group[0], going_on  # the first may be both
         deepest = -1
         if feeds and not np.isnan(cycle.depth):
             height = self.heights(move - 1, np.array(feeds))
@@ -295,6 +303,8 @@ class HoleSearch:
         if cycle.feed_out and first == deepest + 1 and self.ahead.has(end) and self.stays(move, end):
             return group, end, move  # the cycle's own way out, and then the CL file's to the same place
         keep = first if self.feeds([first]) else first + 1
+        while not feeds and keep in same:  # where the tool stands it is still over a hole that is not drilled
+            keep += 1
         return [k for k in group if k < keep], first, move
 
     def _goes_on_as(self, move: int, group: list[int]) -> int | None:
