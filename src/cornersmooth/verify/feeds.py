@@ -138,7 +138,7 @@ def _elsewhere(distances: Distances, start: int, end: int, fits: Callable[[Ints]
     Which of the poses within the tolerance a written one stands for nobody can tell.
     """
     window = distances.windows.around(start)
-    if window is None or not window.inner[0] <= end <= window.inner[1]:
+    if window is None or end >= window.vertex + len(window.low):
         return False
     owner = distances.match.original.trail.owner
     segments = window.segments(start), window.segments(end)
