@@ -100,8 +100,8 @@ def hole_trial(seed: int) -> Trial:
 
 
 def main() -> int:
-    """Judge the programs of a range of seeds."""
-    first, last = (int(word) for word in sys.argv[1:3])
+    """Judge the programs of a range of seeds: FROM TO FOLDER, where the refused are kept; 0 to 400 without them."""
+    first, last = (int(word) for word in sys.argv[1:3] or ("0", "400"))
     keep = Path(sys.argv[3]) if sys.argv[3:] else None
     warnings.simplefilter("error")
     count: Counter[str] = Counter()

@@ -6,9 +6,13 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from cornersmooth.nc_reader.block_texts import any_of, shown, text_of
+from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.word_list import WordList, WordRule
 from cornersmooth.nc_reader.words import Line
+
+#: code of words that are not on the list or not in their place
+NOT_LISTED: Final = "CS571"
 
 #: words of which a block may have one
 _MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "BSPLINE", "POLY"))
@@ -64,54 +68,57 @@ class WordRules:
             return True
         return any(rule.alone and any_of(rule.pattern, words) for rule in self.words)
 
-    def complaints(self, line: Line, words: list[str], rules: list[WordRule | None]) -> Iterator[str]:
+    def problems(self, line: Line, words: list[str], rules: list[WordRule | None]) -> Iterator[Problem]:
         """What is wrong with a block by itself: words off the list, twice, without others or beside others."""
+        number = line.number
         if len(rules) == len(words):  # else the block is on the list as a whole
-            yield from self._unlisted(words, rules)
+            yield from self._unlisted(number, words, rules)
         yield from self._spelling(line, words)
         states = [rule.state for rule in rules if rule is not None and rule.state]
         if len(set(states)) < len(states):
-            yield "two words of one group in one block"
+            yield Problem(NOT_LISTED, 0, number, "two words of one group in one block")
         for k in range(len(rules)):
-            yield from self._company(k, words, rules)
+            yield from self._company(number, k, words, rules)
 
-    def _unlisted(self, words: list[str], rules: list[WordRule | None]) -> Iterator[str]:
+    def _unlisted(self, number: int, words: list[str], rules: list[WordRule | None]) -> Iterator[Problem]:
         for word, rule in zip(words, rules, strict=True):
             if rule is None:
                 fitting = self._fitting(word)
                 if fitting and not fitting[0].never:
-                    yield f"{word} stands beside nothing that it belongs to"
+                    yield Problem(NOT_LISTED, 0, number, f"{word} stands beside nothing that it belongs to")
                 else:
-                    yield f"{word} is not on the list of words for this control"
+                    yield Problem(NOT_LISTED, 0, number, f"{word} is not on the list of words for this control")
 
-    def _spelling(self, line: Line, words: list[str]) -> Iterator[str]:
+    def _spelling(self, line: Line, words: list[str]) -> Iterator[Problem]:
+        number = line.number
         for spelt in filter(self._lexer.without_point, line.words):
-            yield f"{spelt.text} without a decimal point: the control may count it in its least increment"
+            text = f"{spelt.text} without a decimal point: the control may count it in its least increment"
+            yield Problem(NOT_LISTED, 0, number, text)
         names = [word.name for word in line.words if word.name not in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
-            yield f"{name} stands twice in one block"
+            yield Problem(NOT_LISTED, 0, number, f"{name} stands twice in one block")
         if sum(word.name == "M" for word in line.words) > 1:
-            yield "two M words in one block"
+            yield Problem(NOT_LISTED, 0, number, "two M words in one block")
         if sum(word in _MOTION for word in words) > 1:
-            yield "two motions in one block"
+            yield Problem(NOT_LISTED, 0, number, "two motions in one block")
 
-    def _company(self, k: int, words: list[str], rules: list[WordRule | None]) -> Iterator[str]:
+    def _company(self, number: int, k: int, words: list[str], rules: list[WordRule | None]) -> Iterator[Problem]:
         """What a word misses beside it, or may not have there; and whether it takes too much of the tolerance."""
         rule = rules[k]
         if rule is None:
             return
         word, others = words[k] if len(rules) == len(words) else text_of(words), _others(words, k)
         if rule.must is not None and not any_of(rule.must, others):
-            yield f"{word} without {shown(rule.must)}"
+            yield Problem(NOT_LISTED, 0, number, f"{word} without {shown(rule.must)}")
         if rule.alone:
             own = [bool(theirs and theirs.needs and theirs.needs.fullmatch(word)) for theirs in rules]
             for other, belongs in zip(words, own, strict=True):
                 if other != word and (not belongs or sum(own) > 1):
-                    yield f"{other} in the block of {word}"
+                    yield Problem(NOT_LISTED, 0, number, f"{other} in the block of {word}")
         if rule.share is not None:
             match = rule.pattern.fullmatch(word)
             if match and float(match[1]) > rule.share * self._tolerance * (1 + 1e-9) + 1e-5:
-                yield f"{word} is more than {rule.share:g} of the tolerance"
+                yield Problem(NOT_LISTED, 0, number, f"{word} is more than {rule.share:g} of the tolerance")
 
 
 def _others(words: list[str], k: int) -> list[str]:

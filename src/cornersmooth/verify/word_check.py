@@ -15,14 +15,14 @@ from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.word_list import WordList, WordRule, word_list
-from cornersmooth.nc_reader.word_rules import WordRules
+from cornersmooth.nc_reader.word_rules import NOT_LISTED, WordRules
 from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.verify.curve_weights import odd_weights
 
-#: code of words that are not on the list or not in their place, and of what is not established
-NOT_LISTED: Final = "CS571"
 #: what is said of a retract with the same tool, which only GOHOME of the CL file asks for
 GONE_ON: Final = "a retract that another motion of the same tool follows"
+
+#: code of states that the program never establishes
 NOT_ESTABLISHED: Final = "CS572"
 
 #: words of positions along the linear axes: with them a block is a motion that the states count for
@@ -197,8 +197,7 @@ class WordCheck:
         rules = self._rules.of(words, text)
         before = self._next_block(text, line.number)
         self._said |= set(words)
-        for complaint in self._rules.complaints(line, words, rules):
-            self._wrong(NOT_LISTED, line.number, complaint)
+        self.problems += self._rules.problems(line, words, rules)
         self._places(line.number, words, rules, before)
         self._states(line.number, words, rules)
 
