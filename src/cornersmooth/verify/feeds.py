@@ -53,7 +53,9 @@ def check_feeds(distances: Distances, found: Findings) -> None:
         """(m,) whether row k carries the feed of moves."""
         return _same(said[k], per_revolution[k], room[k], feed, mode, moves)
 
-    good = _same(said, per_revolution, room, feed, mode, low) | rapid
+    # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
+    still = np.isnan(room) & (np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC)
+    good = _same(said, per_revolution, room, feed, mode, low) | rapid | still
     other = np.flatnonzero(~good)
     if len(other):
         good[other] = _same(said[other], per_revolution[other], room[other], feed, mode, high[other])
