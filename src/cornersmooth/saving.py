@@ -13,8 +13,9 @@ from cornersmooth.errors import CornersmoothError
 from cornersmooth.feedrate import Limits, direct, plan_text
 from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine, endless, with_dynamics
-from cornersmooth.model import Arcs, Floats, Ints, Move, Program
+from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
+from cornersmooth.parts import some_poses
 from cornersmooth.pipeline import read_back
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import Settings
@@ -102,28 +103,12 @@ def _stretches(count: int, poses: int, stretches: int) -> Iterator[tuple[int, in
 
 def _part(program: Program, first: int, last: int) -> Program:
     """Poses from `first` up to `last`, and what is said between them."""
-    rows = slice(first, last)
-    arcs = program.arcs
-    own = np.flatnonzero((arcs.pose > first) & (arcs.pose < last))
-    kind = program.kind[rows].copy()
-    if first:
-        kind[:1] = Move.RAPID  # whatever led there is no part of it
-    return replace(
-        program,
-        tip=program.tip[rows],
-        axis=program.axis[rows],
-        kind=kind,
-        feed=program.feed[rows],
-        line=program.line[rows],
-        feed_mode=program.feed_mode[rows],
-        keep=program.keep[rows],
-        arcs=Arcs(arcs.pose[own] - first, arcs.centre[own], arcs.normal[own], arcs.sweep[own]),
-        statements=tuple(
-            replace(statement, pose=statement.pose - first)
-            for statement in program.statements
-            if first < statement.pose < last
-        ),
-    )
+    part = some_poses(program, first, last, earlier=False)
+    if not first:
+        return part
+    kind = part.kind.copy()
+    kind[:1] = Move.RAPID  # whatever led there is no part of it
+    return replace(part, kind=kind)
 
 
 def _written_time(program: Program, settings: Settings, form: Form, limits: Limits, machine: Machine | None) -> float:

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.model import Arcs, Bools, Corners, Floats, Ints, Move, Program, Runs, SmoothProgram
+from cornersmooth.model import Bools, Corners, Move, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows, whole_rows
 from cornersmooth.nc.rotary_run_rows import rotary_run_rows
+from cornersmooth.parts import some_poses, some_runs
 from cornersmooth.rotary import rapid_moves, rewound_angles, still_poses
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 
@@ -96,25 +97,9 @@ def _part(smoothed: SmoothProgram, first: int, stop: int) -> SmoothProgram:
     extra = {name: column[own] for name, column in corners.extra.items()}
     return replace(
         smoothed,
-        program=_poses(program, first, stop),
+        program=some_poses(program, first, stop, earlier=True),
         corners=Corners(**columns, extra=extra),
         runs=None if runs is None else _runs(runs, first, stop),
-    )
-
-
-def _poses(program: Program, first: int, stop: int) -> Program:
-    """Those poses of a program."""
-    rows, arcs = slice(first, stop), program.arcs
-    own = (arcs.pose >= first) & (arcs.pose < stop)
-    return replace(
-        program,
-        **{name: getattr(program, name)[rows] for name in ("tip", "axis", "kind", "feed", "line", "feed_mode", "keep")},
-        arcs=Arcs(arcs.pose[own] - first, arcs.centre[own], arcs.normal[own], arcs.sweep[own]),
-        statements=tuple(
-            replace(statement, pose=max(statement.pose - first, 0))
-            for statement in program.statements
-            if statement.pose < stop
-        ),
     )
 
 
@@ -124,18 +109,5 @@ def _runs(runs: Runs, first: int, stop: int) -> Runs | None:
     own = (begins >= first) & (begins < stop)
     if not own.any():
         return None
-
-    def chosen(column: Floats | Ints, count: Ints) -> Any:
-        return column[np.repeat(own, count)]
-
-    return replace(
-        runs,
-        pose=chosen(runs.pose, runs.count) - first,
-        count=runs.count[own],
-        s=chosen(runs.s, runs.count),
-        knot=chosen(runs.knot, runs.knot_count),
-        knot_count=runs.knot_count[own],
-        control=chosen(runs.control, runs.knot_count + 2),
-        tip_bound=runs.tip_bound[own],
-        axis_bound=runs.axis_bound[own],
-    )
+    found = some_runs(runs, own)
+    return replace(found, pose=found.pose - first)

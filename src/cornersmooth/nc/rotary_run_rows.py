@@ -19,6 +19,7 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_curve_rows import warn_of_curves
 from cornersmooth.nc.rotary_rows import CHUNK, LARGEST_TURN, InsertedPoints, whole_rows
+from cornersmooth.parts import some_runs
 from cornersmooth.rotary import fill, insertions, rapid_moves, rotary_angles, still_poses
 from cornersmooth.rotary.run_angles import Guide, RunAngles, lever_at, run_angles
 from cornersmooth.smoothing.runs.lines import line_places, polylines_of
@@ -163,19 +164,7 @@ def _followed(smoothed: SmoothProgram, runs: Runs, path: _Path) -> tuple[Runs, _
     run, place = spread(np.diff(begins)[kept] + 1)
     at = np.maximum(begins[:-1][kept][run] + place - 1, 0)
     rows = _RunRows(run, np.where(place > 0, row[at], before[kept][run]), np.where(place > 0, places.s[at], 0.0))
-    poses, knots = np.repeat(kept, runs.count), np.repeat(kept, runs.knot_count)
-    chosen = replace(
-        runs,
-        pose=runs.pose[poses],
-        count=runs.count[kept],
-        s=runs.s[poses],
-        knot=runs.knot[knots],
-        knot_count=runs.knot_count[kept],
-        control=runs.control[kept[splines.control_run]],
-        tip_bound=runs.tip_bound[kept],
-        axis_bound=runs.axis_bound[kept],
-    )
-    return chosen, rows
+    return some_runs(runs, kept), rows
 
 
 def _sections(fitted: RunAngles, smoothed: SmoothProgram, machine: Machine, tolerance: float) -> _Sections:

@@ -1,0 +1,56 @@
+"""Parts of what travels: some poses of a program, some of its runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cornersmooth.model import Arcs, Bools, Program, Runs
+
+
+def some_poses(program: Program, first: int, stop: int, *, earlier: bool) -> Program:
+    """Poses from `first` to before `stop`, with the arcs and statements between them.
+
+    Parameters
+    ----------
+    program : Program
+    first, stop : int
+        An arc that ends at the first pose is left out: it begins outside.
+    earlier : bool
+        Whether statements before the first pose stay before it; else they are left out.
+    """
+    rows, arcs = slice(first, stop), program.arcs
+    own = (arcs.pose > first) & (arcs.pose < stop)
+    return replace(
+        program,
+        tip=program.tip[rows],
+        axis=program.axis[rows],
+        kind=program.kind[rows],
+        feed=program.feed[rows],
+        line=program.line[rows],
+        feed_mode=program.feed_mode[rows],
+        keep=program.keep[rows],
+        arcs=Arcs(arcs.pose[own] - first, arcs.centre[own], arcs.normal[own], arcs.sweep[own]),
+        statements=tuple(
+            replace(statement, pose=max(statement.pose - first, 0))
+            for statement in program.statements
+            if statement.pose < stop and (earlier or statement.pose > first)
+        ),
+    )
+
+
+def some_runs(runs: Runs, kept: Bools) -> Runs:
+    """The runs (r,) that are kept, at the poses they have."""
+    poses, knots = np.repeat(kept, runs.count), np.repeat(kept, runs.knot_count)
+    return replace(
+        runs,
+        pose=runs.pose[poses],
+        count=runs.count[kept],
+        s=runs.s[poses],
+        knot=runs.knot[knots],
+        knot_count=runs.knot_count[kept],
+        control=runs.control[np.repeat(kept, runs.knot_count + 2)],
+        tip_bound=runs.tip_bound[kept],
+        axis_bound=runs.axis_bound[kept],
+    )
