@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 BETWEEN = ("PPRINT/MARK", "$$ MARK", "INSERT/MARK", "REMARK MARK", "DISPLY/ON")
 #: what acts on the machine between two poses
 ACTING = ("COOLNT/ON", "COOLNT/OFF", "COOLNT/MIST", "OPSTOP", "STOP", "SPINDL/9000,RPM,CLW", "DELAY/0.5")
+#: share of programs whose feeds are planned, if they are short: a plan may take seconds
+PLANNED, PLANNED_LINES = 0.05, 25
 
 
 @dataclass(frozen=True)
@@ -262,7 +264,7 @@ def trial(seed: int, *, flips: bool = True, only: str = "") -> Trial:
     digits = str(own.choice(["", "", "3", "4", "5", "6"]))
     if int(digits or 0) > form.table.digits.most:
         digits = ""
-    planned = bool(own.random() < 0.25)
+    planned = bool(own.random() < PLANNED) and sum(line.startswith("GOTO") for line in text.lines) <= PLANNED_LINES
     more = np.random.default_rng((seed, 3))
     native = "holes" in parts and bool(more.random() < 0.4)
     if form.long_lines and not settings.lines and more.random() < 0.25:
