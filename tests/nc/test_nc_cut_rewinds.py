@@ -299,11 +299,11 @@ def test_a_cut_is_left_without_a_work_offset() -> None:
 
 
 @cache
-def three_cuts() -> bytes:
-    """A cut beyond the limits between two that keep them."""
+def three_cuts(above: str = "GOTO/-10,0,70,0.5,0,0.8660254") -> bytes:
+    """A cut beyond the limits between two that keep them; empty `above`: the upper rapids go to the first pose."""
     lines = program_text().decode().splitlines()
     first, cut = lines[4], lines[6:-3]
-    up, tail = ["RAPID", "GOTO/-10,0,70,0.5,0,0.8660254", "RAPID", first, lines[5]], lines[-3:]
+    up, tail = ["RAPID", above or first, "RAPID", first, lines[5]], lines[-3:]
     return ("\n".join([*lines[:6], *cut[:5], *up, *cut, *up, *cut[:5], *tail]) + "\n").encode()
 
 
@@ -337,3 +337,26 @@ def test_only_cuts_that_are_left_are_lines_among_curves(control: str, form: str,
     for what in ("no retract", "back too deep", "a part of the cut is missing"):
         text = ("\n".join(wrong[what]) + "\n").encode()
         assert not verify(program, text, tolerance=EPS, control=control, machine=short(name)).passed, what
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "name", "tcp"),
+    [
+        ("fanuc", "g6.2", "table-ac", True),
+        ("siemens", "bspline", "nutated-bc", True),
+        ("fanuc", "g1", "nutated-bc", False),
+    ],
+)
+def test_a_rapid_said_twice_may_turn_axes_that_hold_the_tool_alike(
+    control: str, form: str, name: str, tcp: bool
+) -> None:
+    """The same cut follows: nothing but their ends tells the two rapids from one that the CL file lacks."""
+    chosen = choose_form(control, form, machine=short(name), rewind=AWAY, tcp=tcp)
+    program, stream = read(three_cuts("")), io.BytesIO()
+    write(smooth(program, fit_settings(Settings(tolerance=EPS), chosen, "mm")), stream, form=chosen)
+    how = {"tolerance": EPS, "control": control, "machine": short(name), "tcp": tcp}
+    assert verify(program, stream.getvalue(), **how).problems == ()
+    lines = bare(stream.getvalue().decode().splitlines())
+    third = [k for k, line in enumerate(lines) if line.startswith("G0 X")][-1]
+    without = "\n".join(lines[:third] + lines[third + 1 :]) + "\n"
+    assert not verify(program, without.encode(), **how).passed

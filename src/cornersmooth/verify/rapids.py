@@ -223,9 +223,26 @@ def stops_of_original(original: Original, axis_length: float, step: float, first
 def moving_rapids(nc: Elements, first: int, stop: int) -> Ints:
     """Elements from `first` (at least 1) to `stop` (excluded) that are rapid and move the tool."""
     index = np.flatnonzero(nc.kind[first:stop] == Element.RAPID) + first
-    moved = (nc.tip[index] != nc.tip[index - 1]).any(axis=1) | (nc.second[index] != nc.second[index - 1]).any(axis=1)
-    found: Ints = index[moved]
+    ways = (values[index] - values[index - 1] for values in (nc.tip, nc.second))
+    found: Ints = index[leads_somewhere(nc, *ways)]
     return found
+
+
+def leads_somewhere(nc: Elements, way: Floats, turn: Floats) -> Bools:
+    """Whether motions (k, 3) of the tip and of the second point or vector are any.
+
+    Two pairs of rotary angles that hold the tool alike do so up to the digits that are printed.
+    """
+    turned: Bools = np.abs(turn).max(axis=1) > (nc.second_step if nc.rotary else 0.0)
+    moved: Bools = _beyond_digits(way, nc) if nc.rotary else np.abs(way).max(axis=1) > 0.0
+    return moved | turned
+
+
+def _beyond_digits(way: Floats, nc: Elements) -> Bools:
+    """Whether ways (k, 3) of the tip are longer than printed digits show, which may be those of turned axes."""
+    large = np.linalg.norm(way, axis=1) / np.sqrt(3) if nc.rotary else np.abs(way).max(axis=1)
+    beyond: Bools = large > 1.01 * nc.tip_step
+    return beyond
 
 
 def _opcodes(theirs: Floats, nc: Elements, element: Ints) -> list[tuple[str, int, int, int, int]]:
@@ -244,10 +261,8 @@ def _opcodes(theirs: Floats, nc: Elements, element: Ints) -> list[tuple[str, int
 
 
 def _negligible(tip: Floats, index: int, nc: Elements) -> bool:
-    """Whether a stop moves the tip by no more than the printed digits show, which may be those of turned axes."""
-    way = np.abs(tip[index] - tip[index - 1])
-    large = np.linalg.norm(way) / np.sqrt(3) if nc.rotary else way.max()
-    return bool(index > 0 and large <= 1.01 * nc.tip_step)
+    """Whether a stop moves the tip by no more than printed digits show."""
+    return bool(index > 0 and not _beyond_digits((tip[index] - tip[index - 1])[None], nc)[0])
 
 
 def _problem(

@@ -37,6 +37,7 @@ from cornersmooth.verify.checks import Examined, examine
 from cornersmooth.verify.findings import Findings, Largest, Poses
 from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.own_rapids import OwnRapids
+from cornersmooth.verify.rapids import leads_somewhere
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
 from cornersmooth.verify.wide_search import way_apart
@@ -397,12 +398,13 @@ def _elements(events: list[Event], first: int, last: int) -> Ints:
 def _noted(text: _Text, found: _Measured) -> Iterable[Elements]:
     """Give out the elements of a text, and take down what is to be known of those with words behind them."""
     offset = 0
-    before = np.full((1, 6), np.nan)
+    before = np.full((1, 6), np.inf)
     for nc in text.chunks:
         found.margin = found.task.margin(nc)
         six = np.concatenate((before, np.hstack((nc.tip, nc.second))))
         rapid = np.flatnonzero(nc.kind == Element.RAPID)
-        found.still.update((offset + rapid[(six[rapid] == six[rapid + 1]).all(axis=1)]).tolist())
+        ways = np.hsplit(six[rapid + 1] - six[rapid], 2)
+        found.still.update((offset + rapid[~leads_somewhere(nc, *ways)]).tolist())
         before = six[-1:]
         if len(nc) and (nc.rotary or nc.tip_room.any()):
             last = offset + len(nc) - 1
