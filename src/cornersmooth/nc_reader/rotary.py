@@ -28,6 +28,15 @@ LINE_SHARE, LEAST = 5e-3, 1e-7
 #: lines that one block becomes at most
 _MOST_LINES = 4096
 
+#: radians that the tool turns in a line at most, where it turns by more than a right angle
+_WIDEST = 0.2
+
+#: degrees from which on only the first and the last turn of a block are looked at: a mistake, and no limit to its size
+_MANY_TURNS = 1080.0
+
+#: lines that a turn becomes there
+_LINES_A_TURN = 64
+
 #: order of the curves that stand for curves in angles, and how often their spans are halved
 _ORDER, _HALVINGS = 8, 6
 
@@ -193,15 +202,16 @@ class Rotary:
         feed, room = run.feed, run.feed_room
         if inverse_time:
             feed, room = self._timed(feed, position, tip, vector, angles)
-        count = self._counts(run, position, angles, tip, vector)
+        turn = np.abs(np.diff(angles, axis=0)).sum(axis=1)
+        count = self._counts(run, position, turn, angles, tip, vector)
         if not len(count) or count.max() == 1:
             return replace(run, tip=tip[1:], second=vector[1:], curves=curves, feed=feed, feed_room=room)
         last = np.cumsum(count) - 1
         owner = np.repeat(np.arange(len(count)), count)
-        part = np.arange(len(owner)) - last[owner] + count[owner] - 1
-        share = ((part + 1) / count[owner])[:, None]
-        inner = np.flatnonzero(part < count[owner] - 1)
-        own, at = owner[inner], share[inner]
+        left = last[owner] - np.arange(len(owner))
+        inner = np.flatnonzero(left)
+        own = owner[inner]
+        at = _shares(count[own], left[inner], turn[own])[:, None]
         fine_tip, fine_vector = tip[1:][owner], vector[1:][owner]
         words = [start[own] + at * (start[own + 1] - start[own]) for start in (position, angles)]
         fine_tip[inner], fine_vector[inner] = self.tips(*words), self.directions(words[1])
@@ -241,10 +251,12 @@ class Rotary:
     def _fine(self) -> float:
         return max(LINE_SHARE * self.tolerance, LEAST)
 
-    def _counts(self, run: Executed, position: Floats, angles: Floats, tip: Floats, vector: Floats) -> Ints:
-        """Number of lines that each element becomes."""
+    def _counts(
+        self, run: Executed, position: Floats, degrees: Floats, angles: Floats, tip: Floats, vector: Floats
+    ) -> Ints:
+        """Number of lines that each element becomes; `degrees` are what both axes turn in it."""
         count = np.ones(len(run.kind), np.int64)
-        turn = np.radians(np.abs(np.diff(angles, axis=0)).sum(axis=1))
+        turn = np.radians(degrees)
         bound = self.axis_length * turn**2
         if not self.tip_control:
             way = np.linalg.norm(np.diff(position, axis=0), axis=1)
@@ -263,8 +275,8 @@ class Rotary:
         # 4/3: the quarters of a parabola are as far from its chord as three quarters of the middle
         count[rows] = np.clip(np.ceil(np.sqrt(off * 4 / 3 / self._fine)), 1, _MOST_LINES)
         # a turn of the tool by more than a right angle has no chord to be compared with
-        wide = np.ceil(turn[rows] / 0.2).astype(np.int64)
-        count[rows] = np.maximum(count[rows], wide)
+        wide = np.ceil(np.minimum(turn[rows], np.radians(_MANY_TURNS)) / _WIDEST).astype(np.int64)
+        count[rows] = np.where(degrees[rows] > _MANY_TURNS, 2 * _LINES_A_TURN + 1, np.maximum(count[rows], wide))
         return count
 
     def _timed(
@@ -373,6 +385,19 @@ class Rotary:
         good = off.max(axis=(1, 2)) * self.axis_length <= self._fine / 10
         joined = np.concatenate((bezier[:, :, :-1].reshape(len(points), -1, 7), bezier[:, -1, -1:]), axis=1)
         return joined[:, :, :6] / joined[:, :, 6:], joined[:, :, 6], good
+
+
+def _shares(count: Ints, left: Ints, turn: Floats) -> Floats:
+    """Shares of blocks at which lines end that have `left` others behind them in their block.
+
+    They are even but where a block turns more often than makes sense: there they are in its first and its last turn.
+    """
+    even = 1.0 - left / count
+    whole = np.minimum(360.0 / np.maximum(turn, 360.0), 0.5)
+    behind, before = whole * left / _LINES_A_TURN, whole * (count - left) / _LINES_A_TURN
+    many = np.where(left <= _LINES_A_TURN, 1.0 - behind, before)
+    shares: Floats = np.where(turn > _MANY_TURNS, many, even)
+    return shares
 
 
 def _apart(a: Floats, b: Floats) -> Floats:
