@@ -102,8 +102,9 @@ class Holes:
             yield Between(move, moves - 1, element, ahead.count, False)
             element = ahead.count
             ahead.forget(element - _KEPT)
-        while element == ahead.count and move < moves and self._search.stays(move, element - 1):
-            move += 1  # the tool is there
+        there = move + 1 if move < moves and hole[move] else move  # out of a hole the way begins anywhere
+        while element == ahead.count and there < moves and self._search.stays(there, element - 1):
+            move = there = there + 1  # the tool is there
         yield Between(move, moves - 1, element, element, True)
 
     def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling], *, again: bool) -> int:

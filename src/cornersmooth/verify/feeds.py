@@ -213,7 +213,9 @@ def _inside_rounding(
             walker += step
         if 0 <= walker < len(off):
             largest = max(largest, float(off[walker]))
-        if far <= _BEYOND_VISIBLE * reach + match.margin or 0 < largest <= 8 * visible:
+        # the tip tells no more than that, and the axis of a rounding that ends where it stands may be far beyond
+        stands = np.linalg.norm(match.six[vertex, :3] - match.path.six[pose_vertex, :3]) <= match.margin
+        if far <= _BEYOND_VISIBLE * reach + match.margin or 0 < largest <= (np.inf if stands else 8 * visible):
             return True
     return False
 

@@ -101,8 +101,13 @@ class HoleSearch:
         return np.where(on, height, np.nan)
 
     def stands(self, move: int, hole: int, element: int) -> bool:
-        """Whether the moves before a hole lead nowhere: the tool is where they end, and goes on over the hole."""
-        if not element or not self.over(hole, element) or element < self.of_its_tool(hole)[0]:
+        """Whether the moves before a hole lead nowhere: the tool is there, and goes on over the hole if it goes on.
+
+        Behind it may come the end of the text or another tool, where the hole is not drilled.
+        """
+        if not element or element < self.of_its_tool(hole)[0]:
+            return False
+        if self.has(hole, element) and not self.over(hole, element):
             return False
         return all(self.exact(k, np.array([element - 1]))[0] for k in range(move, hole))
 
