@@ -37,6 +37,9 @@ _SMALL, _SMALL_PAIRS, _SMALL_WINDOWS = 0.1, 4096, 64
 #: once more for so many vertices that stay in doubt
 _MOST_FUTILE, _MANY_DOUBTS = 8, 32
 
+#: pairs of vertices and segments of a stretch that is assigned anew as a whole before that is given up, at most
+_ALL_PAIRS = 1_000_000
+
 #: slack of arithmetic on lengths, mm
 _ARITHMETIC = 1e-9
 
@@ -241,7 +244,13 @@ class Search:
                 left = self._doubts(part)
                 futile = 0 if 2 * left < before else futile + bool(before) + left // _MANY_DOUBTS
                 if futile > _MOST_FUTILE:
+                    self._assign_all(first, doubtful)
                     return  # nor here
+
+    def _assign_all(self, vertex: int, doubtful: Bools) -> None:
+        """Assign the stretch of a vertex anew, if it is short: its places may be lost where nothing is in doubt yet."""
+        own = np.flatnonzero(self.number == self.number[vertex])
+        self._assign(int(own[0]), int(own[-1]), _ALL_PAIRS, doubtful, wide=False)
 
     def _settle_small(self) -> None:
         """Assign anew where the path goes to and fro by far less than the tolerance, which would drown that."""
