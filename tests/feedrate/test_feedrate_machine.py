@@ -12,7 +12,7 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.feedrate import Limits, direct, plan, signed_limits
+from cornersmooth.feedrate import Limits, direct, plan, planner, signed_limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.timelaw import TimeLaw, poses, shares_at
@@ -242,6 +242,34 @@ def test_jumps_at_corners_keep_the_axes(chain: Callable[[int], Program]) -> None
     assert jumps.max() <= 1.001
     assert jumps.max() > 0.5
     assert law.total > direct(tilted(chain(3)), limits, "velocity_jump").total
+
+
+def test_parts_between_stops_are_planned_as_the_whole(
+    chain: Callable[[int], Program], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each part by itself, so that memory does not grow with the number of parts."""
+    one = tilted(chain(0))
+    tip = np.concatenate([one.tip + (0.0, 0.0, 7.0 * number) for number in range(3)])
+    kind = np.tile(np.where(np.arange(len(one)) == 0, Move.RAPID, Move.LINEAR), 3)
+    program = Program.from_poses(tip, np.tile(one.axis, (3, 1)), kind=kind, feed=1800.0)
+    smoothed, machine = smooth(program, Settings()), load_machine("table-ac")
+    whole = plan(smoothed, Limits(), machine=machine)
+    monkeypatch.setattr(planner, "PORTION", 2)
+    done: list[float] = []
+    law = plan(smoothed, Limits(), machine=machine, progress=lambda part, of: done.append(part / of))
+    assert law.total == pytest.approx(whole.total, rel=1e-3)
+    assert law.way[-1] == pytest.approx(whole.way[-1], rel=1e-12)
+    assert len(law.edge) == len(whole.edge)
+    t = np.linspace(0.0, law.total, 20_001)[1:-1]
+    _, *rates = law.axes_at(t)
+    assert law.machine_axes is not None
+    for rate, most in zip(rates, law.machine_axes.limits, strict=True):
+        assert (np.abs(rate) <= most).all()
+    states = law.at(t)
+    assert np.abs(np.diff(states.tip, axis=0)).max() <= law.path.speed.max() * (t[1] - t[0]) * 1.001
+    assert done == sorted(done)
+    assert len(set(done)) > 3
+    assert done[-1] == 1.0
 
 
 def test_refusals() -> None:

@@ -8,7 +8,7 @@ the angle of the axis in rad where the tip stands still.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -92,6 +92,24 @@ class Path:
 
     def __len__(self) -> int:
         return len(self.length)
+
+    def part(self, begin: int, end: int) -> Path:
+        """Elements `begin` to before `end` on their own."""
+        own = slice(begin, end)
+        return replace(
+            self,
+            kind=self.kind[own],
+            turning=self.turning[own],
+            start=self.start[own],
+            move=self.move[own],
+            corner=self.corner[own],
+            span=self.span[own],
+            axis_span=self.axis_span[own],
+            length=self.length[own],
+            speed=self.speed[own],
+            rapid=self.rapid[own],
+            junction_speed=self.junction_speed[begin : end + 1],
+        )
 
 
 def build_path(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -12,7 +14,7 @@ from cornersmooth.feedrate import lookahead, scurve
 from cornersmooth.feedrate.axis_limits import AxisLimits, LimitCoefficients, find_limit_coefficients
 from cornersmooth.feedrate.grid import Resolution, make_grid
 from cornersmooth.feedrate.limits import Limits
-from cornersmooth.feedrate.machine_axes import follow
+from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.signed_limits import ROUGH, Given, faster
 from cornersmooth.feedrate.speed_limits import SpeedLimits, find_speed_limits
@@ -23,6 +25,10 @@ from cornersmooth.settings import Settings
 
 Baseline = Literal["exact_stop", "velocity_jump"]
 Progress = Callable[[int, int], None]
+
+#: elements of a path planned together where axes are looked at closely, which takes 0.1 MB an element; more where no
+#: stop is in between
+PORTION = 4096
 
 
 def plan(
@@ -130,6 +136,57 @@ def plan_path(
 ) -> TimeLaw:
     """Plan the motion along any path."""
     machine_axes = None if machine is None else follow(machine, path)
+    borders = [0, len(path)] if machine_axes is None else _portions(path)
+    start = np.concatenate(([0.0], np.cumsum(path.length)))
+    phases, junctions, end = [], [path.junction_speed[:1]], 0.0
+    for begin, stop in pairwise(borders):
+        own = path.part(begin, stop)
+        own_axes = None if machine_axes is None else replace(machine_axes, path=own)
+        report = None if progress is None else partial(_report, progress, len(path), begin, stop)
+        own, found, length = _plan_part(own, limits, axes, own_axes, resolution, report)
+        found[1] = found[1] + start[begin]
+        phases.append(found)
+        junctions.append(own.junction_speed[1:])
+        end = start[begin] + length
+    duration, way, speed, rising, rate, constant = (np.concatenate(parts) for parts in zip(*phases, strict=True))
+    return TimeLaw(
+        time=np.concatenate(([0.0], np.cumsum(duration))),
+        way=np.append(way, end),
+        speed=speed,
+        accel=rising,
+        jerk=constant,
+        rate=rate,
+        path=replace(path, junction_speed=np.concatenate(junctions)),
+        limits=limits,
+        edge=start,
+        machine_axes=machine_axes,
+    )
+
+
+def _portions(path: Path) -> list[int]:
+    """Elements at which parts of about `PORTION` elements begin and end, all of them stops."""
+    stops, borders = np.flatnonzero(path.junction_speed == 0.0), [0]
+    while len(path) - borders[-1] > PORTION:
+        farthest = np.searchsorted(stops, borders[-1] + PORTION, side="right") - 1
+        following = np.searchsorted(stops, borders[-1], side="right")
+        borders.append(int(stops[max(farthest, following)]))
+    return borders if borders[-1] == len(path) > 0 else [*borders, len(path)]
+
+
+def _report(progress: Progress, elements: int, begin: int, end: int, done: int, of: int) -> None:
+    """Pass on what is done of some elements."""
+    progress(begin * of + (end - begin) * done, elements * of)
+
+
+def _plan_part(
+    path: Path,
+    limits: Limits,
+    axes: Sequence[AxisLimits],
+    machine_axes: MachineAxes | None,
+    resolution: Resolution | None,
+    progress: Progress | None,
+) -> tuple[Path, list[Floats], float]:
+    """Plan from a stop to a stop: the path with its speeds at junctions, phases of the law, and the length."""
     if machine_axes is not None:
         path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
     path = replace(path, junction_speed=_not_crowded(path, limits.period))
@@ -154,23 +211,10 @@ def plan_path(
     uneven = np.flatnonzero(~level)
     if len(uneven):
         parts.append(_uneven_runs(speed_limits, coefficients, uneven, accel, jerk, resolution, progress))
-
-    run, duration, way, speed, begin, rate, constant = (np.concatenate([part[i] for part in parts]) for i in range(7))
+    run, *phases = (np.concatenate([part[i] for part in parts]) for i in range(7))
     order = np.argsort(run, kind="stable")
-    order = order[duration[order] > 0.0]
-    end = speed_limits.edge[-1]
-    return TimeLaw(
-        time=np.concatenate(([0.0], np.cumsum(duration[order]))),
-        way=np.append(way[order], end),
-        speed=speed[order],
-        accel=begin[order],
-        jerk=constant[order],
-        rate=rate[order],
-        path=path,
-        limits=limits,
-        edge=np.concatenate(([0.0], np.cumsum(path.length))),
-        machine_axes=machine_axes,
-    )
+    order = order[phases[0][order] > 0.0]
+    return path, [phase[order] for phase in phases], float(speed_limits.edge[-1])
 
 
 def _level_runs(speed_limits: SpeedLimits, runs: Ints, accel: Floats, jerk: Floats) -> tuple[Floats | Ints, ...]:

@@ -30,6 +30,9 @@ AXES, ROUNDS = 2, 9
 #: rounds whose plans are so far from the last that what they leave free is forgotten again
 _TRIALS = 2
 
+#: slots on either side of a limit that rounds do not mend, in which sums of amounts are kept
+_BESIDE = 4
+
 #: how much slower than the plan before the next one begins, so that it keeps its limits with room to spare
 _SLOWER = 0.97
 
@@ -296,6 +299,7 @@ def faster(given: Given, grid: Grid, batch: Batch, best: Floats) -> Floats:
     asked = places.rows(bare)
     run = np.repeat(np.arange(len(batch.first)), batch.last - batch.first + 1)
     summed, going = given.unknown(grid), np.ones(len(batch.first), np.bool_)
+    slower, stuck = np.zeros(len(batch.first)), np.zeros(len(batch.first), np.bool_)
     inside: list[Worst] = []
     c, taken, highest = best.copy(), *([np.zeros_like(part[0]) for part in asked[0]] for _ in range(2))
     held = [np.zeros(part[0].shape, np.bool_) for part in asked[0]]
@@ -310,6 +314,8 @@ def faster(given: Given, grid: Grid, batch: Batch, best: Floats) -> Floats:
                 beyond = asks & (used > 1.0)
                 own += np.where(beyond, used - 1.0 + _ROOM, 0.0)
                 summed |= (beyond & (own > _MOST)).any(axis=0)  # signs do not help there
+                # where nothing is gained, what is mended in one cell comes up again in the next
+                summed |= _near((used > 1.0 + _ROOM).any(axis=0) & stuck[run])
             np.maximum(high, used, out=high)
             asks[:] = False
             np.put_along_axis(asks, np.argpartition(-high, AXES - 1, axis=0)[:AXES], True, axis=0)
@@ -317,7 +323,8 @@ def faster(given: Given, grid: Grid, batch: Batch, best: Floats) -> Floats:
         start, gap = _within(problem, best, run), GAP if number else ROUGH
         c[going[run]] = solve_runs(problem.of(going), grid.of(going), start=start[going[run]], gap=gap, most=_STEPS)
         # sums of amounts keep limits by themselves, with less room for what lies between samples than is measured here
-        slower = _slower([np.where(summed, 0.0, used) for used in places.uses(bare, c)[0]], batch)
+        found = _slower([np.where(summed, 0.0, used) for used in places.uses(bare, c)[0]], batch)
+        slower, stuck = found, stuck | (found <= slower + _ROOM)
         kept = c * slower[run]
         time, before = (np.bincount(run, batch.weight / np.sqrt(values)) for values in (kept, best))
         best = np.where((time < before)[run], kept, best)
@@ -361,6 +368,14 @@ def _signed(
         share = np.where(summed, 0.0, 1.0 / (1.0 - np.minimum(own, _MOST)))
         found.append(Signed(0, *(share * worst.rows)))
     return tuple(found)
+
+
+def _near(where: Bools) -> Bools:
+    """Slots, and the `_BESIDE` next to them on either side."""
+    total = np.concatenate(([0], np.cumsum(where)))
+    at = np.arange(len(where))
+    near: Bools = total[np.minimum(at + _BESIDE + 1, len(where))] > total[np.maximum(at - _BESIDE, 0)]
+    return near
 
 
 def _summed(bare: Batch, batch: Batch, where: Bools) -> Batch:
