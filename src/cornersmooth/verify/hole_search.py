@@ -180,8 +180,10 @@ class HoleSearch:
                 left_out = np.isnan(cycle.depth) and (k > reached or not cycle.tap)
                 if left_out or not self.over(hole, k + 1):
                     continue
+                if cycle.tap and self.feeds_above(hole, k + 1):
+                    continue
                 if cycle.tap or self.drills(hole, k + 1, cycle):
-                    yield k + 1, True
+                    yield self.last_above(hole, k) + 1, True
                     return
                 doubtful = k + 1 if doubtful is None else doubtful
             begin += len(window)
@@ -198,6 +200,23 @@ class HoleSearch:
             yield doubtful, True
             return
         yield (max(given, self.of_its_tool(hole)[0]) if reached is None else reached + 1), True
+
+    def feeds_above(self, move: int, element: int) -> bool:
+        """Whether the first feed along a hole, from an element on, stays above its pose, as no cycle does."""
+        while self.over(move, element):
+            if self.feeds([element]):
+                return bool(self.heights(move, np.array([element]))[0] >= -self.room)
+            element += 1
+        return False
+
+    def last_above(self, hole: int, element: int) -> int:
+        """Last feed, from an element on, to the pose before a hole, if any, before the text goes into it."""
+        found = element
+        while self.over(hole, element) and self.heights(hole, np.array([element]))[0] >= -self.room:
+            if self.kind[hole - 1] != Move.RAPID and self.feeds([element]):
+                found = element if self.exact(hole - 1, np.array([element]))[0] else found
+            element += 1
+        return found
 
     def drills(self, move: int, element: int, cycle: Drilling) -> bool:
         """Whether the text drills a hole from an element on: to its depth, no farther, at the cycle's feeds."""
@@ -305,6 +324,8 @@ class HoleSearch:
         same = behind[self.exact(move, behind)] if len(behind) else behind
         if not len(same):
             return group, end, move
+        if self.kind[move] == Move.RAPID and len(rapid := same[~np.isin(same, self.feeds(same.tolist()))]):
+            same = rapid
         first = int(same[0])
         if cycle.feed_out and first == deepest + 1 and self.ahead.has(end) and self.stays(move, end):
             return group, end, move  # the cycle's own way out, and then the CL file's to the same place

@@ -356,8 +356,8 @@ class _Measured:
         homes = [place for place, one in zip(before, program.statements, strict=True) if one.word == "GOHOME"]
         at_home = {
             event.line
-            for event, here, room in zip(self.events, places, rooms, strict=True)
-            if homes and any(abs(here - home) <= self.margin + room for home in homes)
+            for event, here, room, reach in zip(self.events, places, rooms, reaches, strict=True)
+            if any(-self.margin - room <= home - here <= reach + self.margin + room for home in homes)
         }
         found = said(self.events, places, rooms, reaches, others)
         return compare(theirs, found, self.margin, unsaid, apart, self.own), at_home
