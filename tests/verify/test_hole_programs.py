@@ -44,6 +44,13 @@ REFUSED_ONCE = {
     3591: "OPSTOP between two tool changes",
     3608: "a feed move to the pose of a hole that is not drilled, where the tool is",
     969: "a tap behind a tool change that does not say SPINDL",
+    2195: "a feed move to where a rapid goes before a hole that is not drilled",
+    3848: "a rapid to where a bored hole was left at feed",
+    4292: "GOHOME between holes that are not drilled",
+    4946: "feed moves from a hole to its own pose",
+    5005: "a feed move said again behind GOHOME, over a tap that is not drilled",
+    5336: "the same tap again behind GOHOME, where the spindle stands, and a feed into it",
+    10006: "a feed to and fro above a hole, as fast as the hole's",
 }
 
 

@@ -137,11 +137,24 @@ class HoleSearch:
 
     def visits(self, move: int, hole: int) -> int:
         """How often the moves before a hole, from one on, come to the pose before it and must pass it exactly."""
-        here = self.near(hole - 1, slice(move, hole))
+        here = self.near(hole - 1, slice(move, hole)) & (self.kind[move:hole] != Move.HOLE)
+        if self.comes_in_rapid(hole - 1):
+            here &= self.kind[move:hole] == Move.RAPID
         ends = np.append(self.kind[move + 1 : hole] != Move.LINEAR, True) | (self.kind[move:hole] == Move.RAPID)
         ends[0] |= move == 0  # the first pose of all
         begins = here & ~np.append(False, here[:-1])
         return max(len(np.unique(np.cumsum(begins)[here & ends])), 1)
+
+    def comes_in_rapid(self, move: int) -> bool:
+        """Whether a move is a rapid that leads somewhere, from a pose that the text knows."""
+        if move < 1 or self.kind[move] != Move.RAPID or self.kind[move - 1] == Move.HOLE:
+            return False
+        return not self.near(move - 1, slice(move, move + 1))[0]
+
+    def passes(self, move: int, elements: Ints) -> list[int]:
+        """Elements among some that may be a move: they end exactly at its pose, in rapid where it comes so."""
+        found = elements[self.exact(move, elements)].tolist()
+        return [k for k in found if not self.feeds([k])] if self.comes_in_rapid(move) else found
 
     def starts(self, move: int, hole: int, element: int, cycle: Drilling) -> Iterator[tuple[int, bool]]:
         """Look for the first element of a run of holes, and say how far it is not yet met, and where it is.
@@ -172,7 +185,7 @@ class HoleSearch:
             window = np.arange(begin, min(begin + _WINDOW, self.ahead.count, self.of_its_tool(hole)[1]))
             if not len(window):
                 break
-            for k in window[self.exact(hole - 1, window)].tolist():
+            for k in self.passes(hole - 1, window):
                 seen, before = seen + (k > before + 1), k  # the same place twice: as new
                 if seen < visits:
                     continue
@@ -201,13 +214,18 @@ class HoleSearch:
             return
         yield (max(given, self.of_its_tool(hole)[0]) if reached is None else reached + 1), True
 
-    def feeds_above(self, move: int, element: int) -> bool:
-        """Whether the first feed along a hole, from an element on, stays above its pose, as no cycle does."""
+    def first_feed(self, move: int, element: int) -> int | None:
+        """The first feed along a hole, from an element on; None where the text leaves it before."""
         while self.over(move, element):
             if self.feeds([element]):
-                return bool(self.heights(move, np.array([element]))[0] >= -self.room)
+                return element
             element += 1
-        return False
+        return None
+
+    def feeds_above(self, move: int, element: int) -> bool:
+        """Whether the first feed along a hole, from an element on, stays above its pose, as no cycle does."""
+        fed = self.first_feed(move, element)
+        return fed is not None and bool(self.heights(move, np.array([fed]))[0] >= -self.room)
 
     def last_above(self, hole: int, element: int) -> int:
         """Last feed, from an element on, to the pose before a hole, if any, before the text goes into it."""
@@ -260,10 +278,13 @@ class HoleSearch:
         for move in range(first, stop):
             group: list[int] = []
             repeated = move > first and asked[move - 1 - first] == asked[move - first]
-            if repeated and self.same_hole(move - 1, move):
+            cycle = cycles[move - first]
+            untapped = cycle.tap and not self.tapped(move, element, cycle)
+            fed = untapped and self.first_feed(move, element) is not None
+            if repeated and self.same_hole(move - 1, move) and not fed:
                 cycles[move - first] = cycles[move - 1 - first]
-            elif cycles[move - first].tap and not self.tapped(move, element, cycles[move - first]):
-                cycles[move - first] = cycles[move - first].if_drilled
+            elif untapped:
+                cycles[move - first] = cycle.if_drilled
             depth = cycles[move - first].depth
             deep = left = False
             entered = np.nan
@@ -289,13 +310,12 @@ class HoleSearch:
 
     def tapped(self, move: int, element: int, cycle: Drilling) -> bool:
         """Whether the first feed in a hole, from an element on, is that of its thread."""
-        while self.over(move, element):
-            if self.feeds([element]):
-                nc, own = self.ahead.nc, element - self.ahead.base
-                near = abs(nc.feed[own] - cycle.feed) <= 2 * abs(nc.feed_room[own])
-                return bool(nc.per_revolution[own] and near)
-            element += 1
-        return False
+        fed = self.first_feed(move, element)
+        if fed is None:
+            return False
+        nc, own = self.ahead.nc, fed - self.ahead.base
+        near = abs(nc.feed[own] - cycle.feed) <= 2 * abs(nc.feed_room[own])
+        return bool(nc.per_revolution[own] and near)
 
     def feeds(self, group: list[int]) -> list[int]:
         """Elements of a group that are no rapids."""
