@@ -33,6 +33,9 @@ _LOST = 8
 #: to and fro below this part of the tolerance is settled by itself, and pairs and windows that are looked at for it
 _SMALL, _SMALL_PAIRS, _SMALL_WINDOWS = 0.1, 4096, 64
 
+#: digits that are worth more than this part of the tolerance may hide a place that is lost
+_COARSE = 0.5
+
 #: windows that are assigned anew, one after another, without much gain: the text itself is off then; a window counts
 #: once more for so many vertices that stay in doubt
 _MOST_FUTILE, _MANY_DOUBTS = 8, 32
@@ -216,6 +219,21 @@ class Search:
     def look_again(self) -> None:
         """Assign anew, and with more care, what is too far away or in the wrong order."""
         self._settle_small()
+        self._settle_doubts()
+        if self.margin > _COARSE * self.task.tolerance:
+            self._settle_within_digits()
+
+    def _settle_within_digits(self) -> None:
+        """Assign anew what is off by less than digits are worth, where these are worth as much as the tolerance."""
+        rows = np.flatnonzero(np.isfinite(self.distance) & (self.distance > self.task.tolerance) & (self.number >= 0))
+        doubtful = np.zeros(len(self.six), np.bool_)
+        doubtful[rows] = ~self._near_alone(rows, self.task.tolerance)
+        around, most_pairs, most_windows = ROUNDS[1]
+        for first, last in doubtful_windows(doubtful, self.number, around, most_windows):
+            self._assign(first, last, most_pairs, doubtful, wide=False)
+
+    def _settle_doubts(self) -> None:
+        """Assign anew what is too far away or in the wrong order, with more care round by round."""
         known = np.isfinite(self.distance)
         limit = self.task.tolerance + self.margin
         apart, futile = self.apart, 0
