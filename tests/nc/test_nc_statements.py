@@ -247,6 +247,19 @@ def test_fragments_say_what_is_missing() -> None:
     assert codes(written, fragment=False) == {"CS333": 1, "CS334": 1, "CS335": 1}
 
 
+@pytest.mark.parametrize("tools", [1, 2])
+def test_first_motions_are_said_where_the_control_has_no_retract(tools: int) -> None:
+    """`generic` has nothing around the motion: each tool's first feed, and its tilt, are counted all the same."""
+    tool = "LOADTL/{}\nSPINDL/900,CLW\nFEDRAT/100,MMPM\nGOTO/0,0,{},0.6,0,0.8\nGOTO/1,0,0\n"
+    cl = "UNITS/MM\nMULTAX\n" + "".join(tool.format(number + 1, number) for number in range(tools)) + "FINI\n"
+    program = read(cl.encode(), name="part.cls")
+    form = choose_form("generic")
+    written = write(smooth(program, fit_settings(Settings(), form, program.units)), io.BytesIO(), form=form)
+    assert codes(written, fragment=False) == {"CS333": tools, "CS337": tools}
+    said = next(finding for finding in written.findings if finding.code == "CS333")
+    assert said.text.endswith("it feeds from where the machine is; put a RAPID before it")
+
+
 def test_compensation_without_words_for_it_is_refused() -> None:
     cl = "UNITS/MM\nLOADTL/1\nRAPID\nGOTO/0,0,9\nCUTCOM/LEFT\nFEDRAT/100,MMPM\nGOTO/9,0,0\nFINI\n"
     with pytest.raises(InputError, match=r"part\.cls:5: error: heidenhain is given no cutter compensation"):

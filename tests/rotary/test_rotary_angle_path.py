@@ -263,7 +263,8 @@ def test_no_rewind_within_a_cut():
         rotary_angles(machine, line_of(801), axis, tolerance=TOLERANCE, line=np.arange(801) + 11, file="part.cls")
     assert re.fullmatch(
         r"part\.cls:\d+: error: C would have to go to 36\d\.\d{3} deg, its limit is 360 deg, in a cut from line 11 on; "
-        r"interrupt the cut with a retract in rapid before, so that the axis can turn back, or give --rewind",
+        r"interrupt the cut with a retract in rapid before, so that the axis can turn back, or give --rewind, "
+        r"for a control that has a retract",
         str(caught.value),
     )
     assert caught.value.code == "CS362"

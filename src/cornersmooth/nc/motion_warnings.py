@@ -38,13 +38,14 @@ class MotionWarnings:
         self._said_spindle = False
 
     def of_first(self, pose: int, form: Form, *, rapid: bool) -> None:
-        """Say that the control turns the tool on its own behind a retract, or feeds down from there."""
+        """Say that the control turns the tool on its own before its first position, or feeds to it."""
         line = int(self.program.line[pose])
         if form.orientation in ("vector", "point") and self.program.axis[pose][2] < _UPRIGHT:
             text = "the first motion of a tool turns it to a tilted axis; see that it is free to, or name the machine"
             self.findings.add("CS337", "warning", line, text)
         if not rapid:
-            text = "the first motion of a tool is a feed move: it feeds down from the height of the retract"
+            where = "down from the height of the retract" if form.table.program.retract else "from where the machine is"
+            text = f"the first motion of a tool is a feed move: it feeds {where}; put a RAPID before it"
             self.findings.add("CS333", "warning", line, text)
 
     def behind_plane(self, pose: int, form: Form) -> None:

@@ -419,12 +419,12 @@ class MotionWriter:
         if not len(run):
             return
         first = run.ticks[0]
+        if self.operation.comes_first and not above:
+            self._warnings.of_first(int(run.move[0]), self.writer.form, rapid=bool(run.rapid[0]))
         if not self.operation.begun:
             yield from self._blocks(self.operation.begin(self._rotary_blocks(first)))
         if self.operation.retracted:
             self.operation.retracted = False
-            if not above:
-                self._warnings.of_first(int(run.move[0]), self.writer.form, rapid=bool(run.rapid[0]))
             yield from self._blocks(self._approaches(first, above or self.approach * bool(run.rapid[0])))
         self._warnings.of_tool(int(run.move[0]), self.statements.tool)
         if not run.rapid.all():

@@ -150,6 +150,11 @@ class Operation:
         """Blocks along the tool, where it is not high up anyway."""
         return self.withdraw() if self._tip_control and not self.retracted else []
 
+    @property
+    def comes_first(self) -> bool:
+        """Whether the next motion is the first behind a retract, or of a tool where there is none."""
+        return self.retracted or not (self.begun or self.can_rewind())
+
     def can_rewind(self) -> bool:
         """Whether there is a retract, above which rotary axes may turn as they like."""
         return bool(self.form.table.program.retract)

@@ -73,7 +73,10 @@ def limit_error(
         hint = "turn the part or use a machine with more travel"
     else:
         text += f", in a cut from line {since} on" if since else ", in one cut"
-        hint = "interrupt the cut with a retract in rapid before, so that the axis can turn back, or give --rewind"
+        hint = (
+            "interrupt the cut with a retract in rapid before, so that the axis can turn back, or give --rewind, "
+            "for a control that has a retract"
+        )
     return InputError("CS362", text, hint, file=file, line=line or None)
 
 
