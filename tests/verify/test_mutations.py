@@ -24,7 +24,7 @@ def several(form, program, lines, runs):
     calm = [rapid(tip[0], axis[0], H, form), *chain_lines(tip[:3], axis[:3], EPS, H, form, CALM_FEED)]
     calm += [rapid(tip[i], axis[i], H, form) for i in range(3, len(tip))]
     body = lines[len(HEAD) : -len(TAIL)]
-    return [*HEAD, *body, *(runs - 1) * [*calm, *RETRACT, *body], *TAIL]
+    return [*HEAD, *body, *(runs - 1) * [*calm, *RETRACT, "G49", *body], *TAIL]
 
 
 @pytest.mark.parametrize(("form", "seed"), [("g1", 0), ("g6.2", 0)])

@@ -185,7 +185,7 @@ def test_statement_between_holes():
     [
         (["M1", "T8 M6"], []),  # posts write it on their own
         (["T8 M6", "M1"], ["CS555"]),
-        (["M1", "M3", "T8 M6"], ["CS552", "CS555"]),
+        (["M1", "M3", "T8 M6"], ["CS552", "CS555", "CS571"]),
         (["M0", "T8 M6"], ["CS555"]),
         (["M1", "M1", "T8 M6"], ["CS555"]),
     ],
@@ -193,13 +193,13 @@ def test_statement_between_holes():
 def test_an_optional_stop_right_before_another_tool_is_nobodys_fault(stop, wanted):
     program = said(Statement(0, 1, "LOADTL", (7.0,)), Statement(2, 2, "LOADTL", (8.0,)))
     before, behind = ["T7 M6", "G43.5 H7", *PATH[:2]], ["G43.5 H8", ("G0", 10, 0, 5), *PATH[2:]]
-    assert codes(program, text(*before, "G91 G28 Z0.", "G90", *stop, *behind)) == wanted
+    assert codes(program, text(*before, "G91 G28 Z0.", "G90", "G49", *stop, *behind)) == wanted
 
 
 def test_an_optional_stop_that_is_asked_for_before_a_tool_must_be_there():
     program = said(Statement(0, 1, "LOADTL", (7.0,)), Statement(2, 2, "OPSTOP", ()), Statement(2, 3, "LOADTL", (8.0,)))
     before, behind = ["T7 M6", "G43.5 H7", *PATH[:2]], ["T8 M6", "G43.5 H8", ("G0", 10, 0, 5), *PATH[2:]]
-    up = ["G91 G28 Z0.", "G90"]
+    up = ["G91 G28 Z0.", "G90", "G49"]
     assert codes(program, text(*before, *up, "M1", *behind)) == []
     assert codes(program, text(*before, *up, *behind)) == ["CS555"]
 

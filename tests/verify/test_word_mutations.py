@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import importlib.util
 import io
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.nc import fit_settings, write
+from cornersmooth.nc import Frame, fit_settings, write
 from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
-from cornersmooth.verify.word_check import WordCheck
+from cornersmooth.verify.word_check import GONE_ON, WordCheck
 from nc.cases import CHOSEN, Case
 from oracle.share import how_many
 
@@ -66,6 +68,106 @@ def test_going_home_and_coming_back_is_no_mistake(control: str) -> None:
     lines = list(check.watch(read_lines(stream.getvalue(), None, check.lexer)))
     assert len(lines) > 5
     assert check.problems == []
+
+
+TWO_TOOLS = b"""LOADTL/2
+SPINDL/RPM,3000,CLW
+FEDRAT/MMPM,500.
+RAPID
+GOTO/0,0,9,0,0,1
+GOTO/0,0,0
+GOTO/10,0,0,0.6,0,0.8
+RAPID
+GOTO/10,0,30
+LOADTL/3
+SPINDL/RPM,4000,CLW
+RAPID
+GOTO/0,20,9,0,0,1
+GOTO/0,20,0
+GOTO/10,20,0
+FINI
+"""
+
+
+def _said_of(control: str, machine: str, change: Callable[[list[str]], list[str]]) -> list[str]:
+    """What the check of words says of the text of two tools, changed behind its first tool change."""
+    case = next(case for case in CHOSEN if (case.control, case.form, case.machine) == (control, "g1", machine))
+    form, program = case.choose(endless=True), read(TWO_TOOLS, name="two.cls")
+    stream = io.BytesIO()
+    write(smooth(program, fit_settings(Settings(), form, "mm")), stream, form=form)
+    check = WordCheck(control, options_of(case).dialect.lexer, 0.01)
+    lines = stream.getvalue().decode().splitlines()
+    text = "\n".join(change(lines)) + "\n"
+    assert text.splitlines() != lines
+    list(check.watch(read_lines(text.encode(), None, check.lexer)))
+    return [problem.text for problem in check.problems]
+
+
+def _without(lines: list[str], start: str) -> list[str]:
+    """All but the last block that begins so and has others like it before it."""
+    own = [k for k, line in enumerate(lines) if re.sub(r"^\d+ ", "", line).startswith(start)]
+    return [line for k, line in enumerate(lines) if k != own[-2]]
+
+
+@pytest.mark.parametrize(
+    ("control", "machine", "start", "wanted"),
+    [
+        ("fanuc", "", "G49", "M6 under G43.5"),
+        ("mitsubishi", "", "G49", "M6 under G43.5"),
+        ("haas", "table-bc", "G49", "M6 under G234"),
+        ("siemens", "", "TRAFOOF", "M6 under TRAORI"),
+        ("heidenhain", "", "FUNCTION RESET TCPM", "TOOL CALL 3 Z under FUNCTION TCPM"),
+    ],
+)
+def test_tool_tip_control_ends_before_a_tool_change(control: str, machine: str, start: str, wanted: str) -> None:
+    said = _said_of(control, machine, lambda lines: _without(lines, start))
+    assert any(text.startswith(wanted) for text in said), said
+
+
+@pytest.mark.parametrize("control", ["fanuc", "siemens", "heidenhain"])
+def test_a_spindle_that_starts_before_the_tool_change_stands_still(control: str) -> None:
+    def change(lines: list[str]) -> list[str]:
+        start = [k for k, line in enumerate(lines) if line.endswith("M3")][-1]
+        tool = [k for k, line in enumerate(lines) if re.search(r"T3\b|TOOL CALL 3", line)][-1]
+        return [*lines[:tool], lines[start], *lines[tool:start], *lines[start + 1 :]]
+
+    assert any("stops the spindle that was started before it" in text for text in _said_of(control, "", change))
+
+
+def test_a_transformation_makes_the_work_offset_forgotten() -> None:
+    def change(lines: list[str]) -> list[str]:
+        on, own = lines.index("TRAORI"), lines.index("G54")
+        return [*lines[:on], "G54", *lines[on:own], *lines[own + 1 :]]
+
+    assert _said_of("siemens", "", change) == ["work offset: it must be said behind TRAORI, which deselects it"]
+
+
+def test_no_work_offset_under_tool_tip_control() -> None:
+    def change(lines: list[str]) -> list[str]:
+        on = lines.index("G43.5 H2")
+        return [*lines[: on + 3], "G54", *lines[on + 3 :]]
+
+    assert _said_of("fanuc", "", change) == ["G54 under G43.5"]
+
+
+def test_a_cycle_is_a_motion_of_the_tool() -> None:
+    """Behind the last retract, which takes the length of the tool off, too."""
+    cl = b"LOADTL/2\nSPINDL/RPM,900,CLW\nRAPID\nGOTO/0,0,30,0,0,1\nCYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,2\n"
+    case = next(case for case in CHOSEN if case.control == "siemens" and not case.tcp)
+    form, program = case.choose(endless=True), read(cl + b"GOTO/0,0,0\nGOTO/9,0,0\nCYCLE/OFF\nFINI\n", name="holes.cls")
+    stream = io.BytesIO()
+    frame = Frame(cycles="native")
+    write(smooth(program, fit_settings(Settings(), form, "mm")), stream, form=form, frame=frame)
+    lines = stream.getvalue().decode().splitlines()
+    last = max(k for k, line in enumerate(lines) if line.startswith("CYCLE81"))
+    up = next(k for k in range(last, len(lines)) if lines[k].startswith("SUPA"))
+    for text, wanted in (
+        (lines, []),
+        ([*lines[:last], *lines[last + 1 : up + 1], lines[last], *lines[up + 1 :]], [GONE_ON]),
+    ):
+        check = WordCheck("siemens", options_of(case).dialect.lexer, 0.01)
+        list(check.watch(read_lines(("\n".join(text) + "\n").encode(), None, check.lexer)))
+        assert [problem.text for problem in check.problems if problem.code == "CS571"] == wanted
 
 
 def test_the_tables_in_the_docs_are_those_of_the_lists() -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from cornersmooth.nc_reader.dialects.base import BY_WORD, CLAMPED, HIGH_SPEED, SPLINE_AXES, Dialect
-from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.elements import Element, Problem
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, Table
 
 if TYPE_CHECKING:
@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 
 #: code of words that want another state of the control
 CONTROL_WORDS: Final = "CS506"
+
+#: code of moves in which the tool axis turns too far
+TURNS: Final = "CS526"
+
+#: degrees that a rotary axis turns at most in one feed move: a mistake beyond
+MOST_TURN: Final = 360.0
 
 #: what words of each kind are
 _KINDS = {
@@ -99,6 +105,34 @@ def limit_problems(table: Table, run: Executed, machine: Machine, step: float) -
         if len(beyond):
             text = f"{axis.name} goes to {values[beyond[0]]:g} deg, its limits are {axis.low:g} and {axis.high:g}"
             problems.append(Problem("CS581", 0, int(line[beyond[0]]), text))
+    return problems
+
+
+def turn_problems(run: Executed, before: Sequence[float], machine: Machine) -> list[Problem]:
+    """Return which rotary axes turn more than once round in one feed move, which nobody asks for.
+
+    Parameters
+    ----------
+    run : Executed
+        With its rotary words.
+    before : sequence of float
+        Those before it, NaN where they are not known.
+    machine : Machine
+    """
+    problems = []
+    curves = run.curves
+    of_points = np.repeat(run.line[run.kind == Element.CURVE], curves.points)
+    next_curve = np.cumsum(curves.points)[:-1] - 1
+    for column, axis in enumerate(machine.axes):
+        turn = np.abs(np.diff(run.second[:, column], prepend=before[column]))
+        turn[run.kind != Element.LINE] = 0.0
+        between = np.abs(np.diff(curves.control[:, 3 + column]))
+        between[next_curve] = 0.0
+        for amount, line in ((turn, run.line), (between, of_points[1:])):
+            found = np.flatnonzero(amount > MOST_TURN)
+            if len(found):
+                text = f"{axis.name} turns by {amount[found[0]]:.0f} deg in one feed move"
+                problems.append(Problem(TURNS, 0, int(line[found[0]]), text))
     return problems
 
 

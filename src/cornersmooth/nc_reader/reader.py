@@ -25,6 +25,7 @@ from cornersmooth.nc_reader.needed_states import (
     modulo_problems,
     spline_problem,
     take_clamp,
+    turn_problems,
     unclamped_problems,
 )
 from cornersmooth.nc_reader.path_elements import in_mm, path_elements
@@ -178,6 +179,7 @@ class Reader:
                 self.problems += modulo_problems(table, rotary.machine, self.dialect.shorter_way, self.memory)
                 self.problems += limit_problems(table, run, rotary.machine, rotary.angle_step)
                 run = replace(run, second=rotary.unwrapped(run.second, before.second))
+                self.problems += turn_problems(run, before.second, rotary.machine)
                 if self.dialect.retracts:
                     self._check_swings(rotary.swung(run, start), run)
                 run = rotary.resolve(run, start, inverse_time=before.inverse_time)

@@ -17,6 +17,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import basis, groups
 from cornersmooth.nc_reader.elements import Curves, Element
 from cornersmooth.nc_reader.execution import Executed, Modal
+from cornersmooth.nc_reader.needed_states import MOST_TURN
 from cornersmooth.nc_reader.splines import CurveTable
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ _MOST_LINES = 4096
 #: radians that the tool turns in a line at most, where it turns by more than a right angle
 _WIDEST = 0.2
 
-#: degrees from which on only the first and the last turn of a block are looked at: a mistake, and no limit to its size
+#: degrees from which on only the first and the last turn of a block are looked at: no limit to the size of mistakes
 _MANY_TURNS = 1080.0
 
 #: lines that a turn becomes there
@@ -333,7 +334,8 @@ class Rotary:
                     breaks = np.sort(np.append(breaks, (breaks[1:] + breaks[:-1]) / 2))
                 own = group.only(rows)
                 control, weight, good = self._elevated(own.knot, own.order, own.points, own.weight, breaks)
-                keep = good if halving < _HALVINGS else np.ones_like(good)
+                wild = np.abs(np.diff(own.points[:, :, 3:5], axis=1)).max(axis=(1, 2), initial=0.0) > MOST_TURN
+                keep = good | wild if halving < _HALVINGS else np.ones_like(good)
                 points = control.shape[1]
                 inner = np.repeat(breaks[1:-1], _ORDER - 1)
                 knot = np.concatenate(([breaks[0]] * _ORDER, inner, [breaks[-1]] * _ORDER))

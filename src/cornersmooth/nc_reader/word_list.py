@@ -26,7 +26,9 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     that moment. ``turns``: the control turns them, and nobody says where to. ``never``: the control has no such word.
     ``tool``: in a text with a ``cycle`` of the control, or a tilted plane, it may differ from tool to tool. ``high``:
     only behind a retract; a control with such a word wants the tool high at the end, too. ``late``: behind a retract it
-    may come as late as in the block that first moves Z.
+    may come as late as in the block that first moves Z. ``ends``: it must be switched off before the tool is changed.
+    ``outside``: it may not be said while a word that ``ends`` holds. ``drops``: a state that the control forgets with
+    it, and that must be said behind it. ``moves``: the tool moves, though the block names no axis.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.
@@ -73,6 +75,10 @@ class WordRule:
     cycle: bool = False
     turns: bool = False
     late: bool = False
+    ends: bool = False
+    outside: bool = False
+    drops: str = ""
+    moves: bool = False
 
 
 @dataclass(frozen=True)

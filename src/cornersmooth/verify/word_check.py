@@ -35,6 +35,10 @@ _ROTARY: Final = frozenset("ABC")
 #: name of the blocks around the motion, among what is left to the user
 FRAME: Final = "program frame"
 
+#: a block that takes another tool, and words that start and stop the spindle
+_TOOL_CALL: Final = re.compile(r"TOOL CALL \d")
+_SPINDLE: Final = re.compile(r"M[345]")
+
 _CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
 
 
@@ -99,6 +103,10 @@ class WordCheck:
         #: where the rotary axes have been sent, as far as that is said
         self._angles: dict[str, float] = {}
         self._arc: tuple[str, int] | None = None
+        #: states that a word has made the control forget, with that word
+        self._dropped: dict[str, str] = {}
+        #: whether the spindle has been started since the tool last moved
+        self._started = False
         #: complaints that count only where the text has no hole cycles; None where it has
         self._by_tool: list[Problem] | None = []
         self._code = -1.0
@@ -147,6 +155,7 @@ class WordCheck:
             for line, weight in odd_weights(table, self._weights):
                 self._wrong(NOT_LISTED, line, f"a weight of {weight:g}, which no curve of this text has")
         linear = ~np.all([np.isnan(table.column(name)) for name in sorted(_LINEAR)], axis=0)
+        self._started &= not linear.any()
         self._positions.leave(table.columns.keys())
         if (self._changed or self._high or self._retract or self._arc or self._above) and linear.any():
             row = int(np.argmax(linear))
@@ -228,7 +237,10 @@ class WordCheck:
         self._angles |= {word.name: word.value for word in line.words if word.name in _ROTARY}
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
-        if not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
+        rules = self._rules.of(words, text_of(words))
+        if any(rule is not None and rule.moves for rule in rules):
+            self._moved(line.number, 1.0, True)
+        elif not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
             self._moved(line.number, self._code, any(word.name == "Z" for word in line.words))
 
     # the frame of the program
@@ -310,6 +322,29 @@ class WordCheck:
                 self._retract, self._high, self._above = number, True, True
             if rule.after is not None or word.startswith("TOOL CALL "):
                 self._retract = 0
+            if rule.after is not None or _TOOL_CALL.match(word):
+                self._change_tool(number, word)
+            if _SPINDLE.fullmatch(word):
+                self._started = word != "M5"
+            if rule.outside and (holding := self._holding()):
+                self._wrong(NOT_LISTED, number, f"{word} under {holding}")
+
+    def _change_tool(self, number: int, word: str) -> None:
+        """Look at what must not be where another tool is taken."""
+        if holding := self._holding():
+            self._unframed(NOT_LISTED, number, f"{word} under {holding}")
+        if self._started:
+            self._wrong(NOT_LISTED, number, f"{word} stops the spindle that was started before it")
+            self._started = False
+
+    def _holding(self) -> str:
+        """Word in force that must be switched off before the tool is changed; empty for none."""
+        ending = [rule for rule in self.list.words if rule.ends]
+        for rule in ending:
+            said_last = self._state.get(rule.state, ("", 0))[0]
+            if rule.pattern.fullmatch(said_last) or (said_last and rule.pattern.fullmatch(said_last.split()[0])):
+                return said_last
+        return ""
 
     def _next_block(self, text: str, number: int) -> str:
         """Look at whether the block before wanted this one; return it."""
@@ -337,6 +372,9 @@ class WordCheck:
             ]
             self._state[rule.state] = (" ".join([word, *beside]), number)
             self._changed = True
+            self._dropped.pop(rule.state, None)
+            if rule.drops in self._state:
+                self._dropped[rule.drops] = word
             if not rule.off and rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
                 self._retract = 0
             if rule.before and self._first is not None and word != self._first.get(rule.state):
@@ -347,9 +385,14 @@ class WordCheck:
 
     def _moved(self, number: int, code: float, down: bool) -> None:
         """Look at what holds where the tool moves, Z among its axes or not."""
+        self._started = False
         late = self._waiting() if self._above and code == 0.0 and not down else set()
         self._above &= code == 0.0 and not down
         self._changed, self._high = bool(late), False
+        for state, word in self._dropped.items():
+            if state not in self._left:
+                self._unframed(NOT_ESTABLISHED, number, f"{state}: it must be said behind {word}, which deselects it")
+        self._dropped = {}
         if self._first is None:
             self._first, self._deferred = {state: word for state, (word, _) in self._state.items()}, late
             for state, rules in self.list.heads().items():
