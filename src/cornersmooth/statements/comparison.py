@@ -83,7 +83,12 @@ def compare(
     kept: list[Token] = []
     habits = [token for token in found if token.habit]
     for stop in asked_for:  # of stops that posts write on their own each may be one that is asked for
-        if (stop.kind, stop.value) == ("stop", 1.0) and all(_away(stop.place, one, room, apart) for one in optional):
+        if (stop.kind, stop.value) != ("stop", 1.0):
+            continue
+        near = next((k for k, one in enumerate(optional) if not _away(stop.place, one, room, apart)), None)
+        if near is not None:
+            del optional[near]  # each is one of those that are asked for
+        else:
             kept += [one for one in habits if one not in kept and not _away(stop.place, one, room, apart)][:1]
     found = [token for token in found if not token.habit or token in kept]
 
