@@ -6,6 +6,7 @@ import io
 import itertools
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from nc.rotations import machine_letters, tool_direction
 from oracle.motion import unit
 from oracle.share import covering_share, how_many
 
+SAMPLES = Path(__file__).parents[2] / "samples"
 FORMS = {"fanuc": "g6.2", "siemens": "bspline", "heidenhain": "spl"}
 CASES = [Case(control, form, machine) for machine in MACHINES for control, form in FORMS.items()]
 
@@ -78,7 +80,7 @@ def off_the_lever(found: Runs, angles: np.ndarray, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", covering_share(MACHINES, 3))
-@pytest.mark.parametrize("tolerance", [0.04, 2e-6])
+@pytest.mark.parametrize("tolerance", [0.04, 2e-7])
 def test_bounds_hold_and_knots_are_put_in_until_the_tolerance_is_kept(name: str, tolerance: float) -> None:
     program, machine = waves(), load_machine(name)
     smoothed, runs = smoothed_runs(program, form_of("fanuc", name))
@@ -87,7 +89,7 @@ def test_bounds_hold_and_knots_are_put_in_until_the_tolerance_is_kept(name: str,
     assert (found.error <= tolerance).all()
     off = off_the_lever(found.runs, found.angles, name).max(axis=1)
     assert (off <= found.error).all()
-    assert off.max() > 1e-3 * tolerance  # something has been measured
+    assert off.max() > 1e-8  # something has been measured
     more = len(found.runs.knot) - len(runs.knot)
     assert (more == 0) == (tolerance == 0.04), more
     # the curves have stayed what they were
@@ -143,6 +145,15 @@ def test_a_calm_run_is_curves_alone_with_fewer_blocks_than_poses(control: str) -
     curved = [line for line in text.splitlines() if " PL=" in line or re.search(r"K[\d.]+ X", line)]
     assert all(re.search(rf" {letter}-?[\d.]+", line) for line in curved for letter in letters)
     assert any(finding.code == "CS370" for finding in result.written.findings)
+
+
+def test_blocks_in_rotary_words_are_hardly_more_than_with_second_points() -> None:
+    program, blocks = cornersmooth.read(SAMPLES / "impeller.cls"), []
+    for machine in (load_machine("table-ac"), None):
+        form, settings = choose_form("fanuc", "g6.2", machine=machine), cornersmooth.Settings(method="global")
+        blocks.append(cornersmooth.postprocess(program, io.BytesIO(), settings, form=form, verify=False).written.blocks)
+    assert blocks[0] <= 1.35 * len(program)
+    assert blocks[0] <= 1.04 * blocks[1]
 
 
 def test_sections_of_angles_meet_with_their_first_two_derivatives() -> None:
@@ -240,9 +251,14 @@ def test_faults_in_control_points_of_angles_are_found(control: str) -> None:
     letter = {"fanuc": "A", "siemens": "C"}[control]
     words = [float(re.search(rf" {letter}(-?[\d.]+)", lines[k])[1]) for k in curved]  # type: ignore[index]
     steep = int(np.argmax(np.abs(np.diff(words[2:-3])))) + 3  # where leaving the word out is most
+    points = np.array([[float(re.search(rf"{x}(-?[\d.]+)", lines[k])[1]) for x in "XYZ"] for k in curved])  # type: ignore[index]
+    bend = np.linalg.norm(np.diff(points, 2, axis=0), axis=1)
+    sharp = int(np.argmax(bend[2:-3])) + 3  # on a straight line a knot may stand anywhere
+    at_corner = mutants(lines, curved[sharp], letter)
     for name, text in mutants(lines, curved[steep], letter).items():
-        assert text != lines, name
-        assert not passes(text), (name, lines[curved[steep]])
+        wrong = at_corner[name] if name == "a knot that is off" else text
+        assert wrong != lines, name
+        assert not passes(wrong), (name, lines[curved[steep]], lines[curved[sharp]])
     if control == "siemens":
         assert not passes([line for line in lines if not line.startswith("SPLINEPATH")])
         assert not passes([line.replace("SPLINEPATH(1,X,Y,Z,A,C)", "SPLINEPATH(1,X,Y,Z)") for line in lines])

@@ -3,7 +3,8 @@
 The tip of a run is a cubic B-spline, and its tool axis the direction of another one, the lever (docs/global.md). On the
 same knots both angles get control points of their own. Each is the blossom of the cubic that meets the angles at four
 places between the knots it hangs on (T. Lyche, L. L. Schumaker, "Local spline approximation methods", J. Approx. Theory
-15, 1975): cubics stay what they are, the joints of all spans are C², and what the angles do at a pole stays there.
+15, 1975): cubics stay what they are, the joints of all spans are C², and what the angles do at a pole stays near it.
+What is left over is fitted in the same way twice more.
 
 Where the tool axis that they give leaves the lever by more than the tolerance, knots are put into the middle of spans,
 which leaves tip and lever what they are. What is not within the tolerance then is for lines to follow.
@@ -24,6 +25,8 @@ from cornersmooth.vectors import dot, norm, unit
 
 #: rounds in which spans are halved, and steps below which one is not
 ROUNDS, NARROWEST = 5, 8.0
+#: fits of what those before have left over
+FITS = 3
 #: share of the tolerance that a proof leaves to what lies between its samples, and the most stretches of a span
 PROOF, MOST_SAMPLES = 0.1, 64
 #: places of a cubic, as shares of the way between the outer ones of three knots
@@ -114,10 +117,14 @@ def run_angles(runs: Runs, machine: Machine, guide: Guide, *, tolerance: float, 
 
 def lever_at(splines: Splines, control: Floats, run: Ints, s: Floats) -> Floats:
     """(m, 3) mm from the tip to the axis point at places of runs; `control` (c, 6)."""
+    return _at(splines, control[:, 3:] - control[:, :3], run, s)
+
+
+def _at(splines: Splines, control: Floats, run: Ints, s: Floats) -> Floats:
+    """(m, d) points at places of runs, from control points (c, d)."""
     span = _span_at(splines, run, s)
-    lever = control[:, 3:] - control[:, :3]
     points: Floats = np.einsum(
-        "mk,mkd->md", splines.basis(span, s), lever[splines.span_control[span][:, None] + np.arange(4)]
+        "mk,mkd->md", splines.basis(span, s), control[splines.span_control[span][:, None] + np.arange(4)]
     )
     return points
 
@@ -143,26 +150,41 @@ def _inner_knots(splines: Splines) -> Floats:
 def _fitted(machine: Machine, splines: Splines, control: Floats, guide: Guide, cone: float) -> Floats:
     """(c, 2) control points of the angles."""
     knots, run = _inner_knots(splines), splines.control_run
-    points = np.empty((len(knots), 2))
-    for begin in range(0, len(knots), CHUNK):
-        own = knots[begin : begin + CHUNK]
-        low, width = own[:, 0], own[:, 2] - own[:, 0]
-        s = (low[:, None] + width[:, None] * SHARES).ravel()
-        of = np.repeat(run[begin : begin + CHUNK], len(SHARES))
+    count = len(knots)
+    wanted, points, change = np.empty((count, len(SHARES), 2)), np.zeros((count, 2)), np.empty((count, 2))
+    parts = [slice(begin, begin + CHUNK) for begin in range(0, count, CHUNK)]
+    for part in parts:
+        s, of = _places(knots[part], run[part])
         guess, branch = guide.between(of, s)
         angles, _ = continued(machine, unit(lever_at(splines, control, of, s)), guess, branch, cone)
-        values = angles.reshape(-1, len(SHARES), 2)
-        middle = np.divide(own[:, 1] - low, width, out=np.zeros_like(width), where=width > 0)[:, None]
-        # the blossom of a + b u + c u² + d u³ at 0, m and 1
-        slope, bend = np.einsum("k,mkd->md", LINEAR, values), np.einsum("k,mkd->md", SQUARE, values)
-        points[begin : begin + CHUNK] = values[:, 0] + (1.0 + middle) / 3.0 * slope + middle / 3.0 * bend
-        ends = np.flatnonzero(width == 0.0)
-        points[begin + ends] = values[ends, 0]
+        wanted[part] = angles.reshape(-1, len(SHARES), 2)
     first = splines.control_first
     ends = np.concatenate((first[:-1], first[1:] - 1))  # passed exactly
     at = starts(np.bincount(guide.run))
-    points[ends] = guide.angles[np.concatenate((at[:-1], at[1:] - 1))]
+    for _ in range(FITS):
+        for part in parts:
+            s, of = _places(knots[part], run[part])
+            off = wanted[part] - _at(splines, points, of, s).reshape(-1, len(SHARES), 2)
+            change[part] = _blossoms(knots[part], off)
+        points += change
+        points[ends] = guide.angles[np.concatenate((at[:-1], at[1:] - 1))]
     return points
+
+
+def _places(knots: Floats, run: Ints) -> tuple[Floats, Ints]:
+    """Where control points between these knots (c, 3) look at the angles, and the runs of these places."""
+    s = knots[:, :1] + (knots[:, 2:] - knots[:, :1]) * SHARES
+    return s.ravel(), np.repeat(run, len(SHARES))
+
+
+def _blossoms(knots: Floats, values: Floats) -> Floats:
+    """(c, 2) blossoms at the knots (c, 3) of the cubics through four values (c, 4, 2) between the outer ones."""
+    low, width = knots[:, 0], knots[:, 2] - knots[:, 0]
+    middle = np.divide(knots[:, 1] - low, width, out=np.zeros_like(width), where=width > 0)[:, None]
+    # the blossom of a + b u + c u² + d u³ at 0, m and 1
+    slope, bend = np.einsum("k,mkd->md", LINEAR, values), np.einsum("k,mkd->md", SQUARE, values)
+    found: Floats = values[:, 0] + (1.0 + middle) / 3.0 * slope + middle / 3.0 * bend
+    return np.where(width[:, None] > 0.0, found, values[:, 0])
 
 
 def _bounds(machine: Machine, splines: Splines, control: Floats, angles: Floats, tolerance: float) -> Floats:
