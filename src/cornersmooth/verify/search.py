@@ -230,7 +230,10 @@ class Search:
         doubtful[rows] = ~self._near_alone(rows, self.task.tolerance)
         around, most_pairs, most_windows = ROUNDS[1]
         for first, last in doubtful_windows(doubtful, self.number, around, most_windows):
+            before = self.distance[first : last + 1].copy()
             self._assign(first, last, most_pairs, doubtful, wide=False)
+            if (self.distance[first : last + 1] == before).all():
+                return  # the text itself is off
 
     def _settle_doubts(self) -> None:
         """Assign anew what is too far away or in the wrong order, with more care round by round."""
