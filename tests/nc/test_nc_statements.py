@@ -260,6 +260,23 @@ def test_first_motions_are_said_where_the_control_has_no_retract(tools: int) -> 
     assert said.text.endswith("it feeds from where the machine is; put a RAPID before it")
 
 
+@pytest.mark.parametrize(
+    ("control", "machine", "axis", "count"),
+    [("fanuc", "", "0.6,0,0.8", 2), ("mitsubishi", "", "0.6,0,0.8", 2), ("fanuc", "", "0,0,1", 0)]
+    + [("siemens", "", "0.6,0,0.8", 0), ("fanuc", "table-ac", "0.6,0,0.8", 0)],
+)
+def test_tip_control_where_a_tilted_tool_has_left_the_table(control: str, machine: str, axis: str, count: int) -> None:
+    """Vectors cannot bring the table back to zero before G43.5 comes on again: for the second and the third tool."""
+    tool = (
+        "LOADTL/{}\nSPINDL/900,CLW\nRAPID\nGOTO/0,0,9,0,0,1\nFEDRAT/100,MMPM\nGOTO/9,0,0,{}\nRAPID\nGOTO/9,0,9,0,0,1\n"
+    )
+    cl = f"UNITS/MM\nMULTAX\n{tool.format(1, axis)}{tool.format(2, '0,0,1')}{tool.format(3, '0,0,1')}FINI\n"
+    program = read(cl.encode(), name="part.cls")
+    form = choose_form(control, machine=load_machine(machine) if machine else None)
+    written = write(smooth(program, fit_settings(Settings(), form, program.units)), io.BytesIO(), form=form)
+    assert codes(written, fragment=False).get("CS358", 0) == count
+
+
 def test_compensation_without_words_for_it_is_refused() -> None:
     cl = "UNITS/MM\nLOADTL/1\nRAPID\nGOTO/0,0,9\nCUTCOM/LEFT\nFEDRAT/100,MMPM\nGOTO/9,0,0\nFINI\n"
     with pytest.raises(InputError, match=r"part\.cls:5: error: heidenhain is given no cutter compensation"):

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Floats, Program
+from cornersmooth.model import Floats, Move, Program
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
@@ -32,6 +32,8 @@ class MotionWarnings:
     _said_zero: bool = False
     _said_spindle: bool = False
     _said_turns: bool = False
+    _tilted: bool = False
+    _looked_until: int = 0
 
     def another_tool(self) -> None:
         """Begin anew with what is said for each tool."""
@@ -48,12 +50,21 @@ class MotionWarnings:
             text = f"the first motion of a tool is a feed move: it feeds {where}; put a RAPID before it"
             self.findings.add("CS333", "warning", line, text)
 
-    def behind_plane(self, pose: int, form: Form) -> None:
-        """Say that the rotary axes stand where a tilted plane has left them, and no words bring them back."""
-        if not form.rotary and "{rotary_zero}" in form.table.program.begin:
+    def of_tip_control(self, pose: int, form: Form) -> None:
+        """Say that a tilted tool has left the rotary axes anywhere, and no words bring them back.
+
+        An upright tool may stand at any angle of the table, too, once a tool has been tilted.
+        """
+        if form.rotary or "{rotary_zero}" not in form.table.program.begin:
+            return
+        since = slice(self._looked_until, pose)
+        moved = self.program.kind[since] != Move.FROM
+        self._tilted |= bool((moved & (self.program.axis[since, 2] < _UPRIGHT)).any())
+        self._looked_until = pose
+        if self._tilted:
             text = (
-                "tool tip control behind a tilted plane: the rotary axes stand where the plane has left them, and the "
-                "part program may turn with them; name the machine, so that they go to zero before"
+                "tool tip control behind a tilted tool: the rotary axes stand where it has left them, and the part "
+                "program may turn with them (WKP); name the machine, so that they go to zero before"
             )
             self.findings.add("CS358", "warning", int(self.program.line[pose]), text)
 

@@ -150,8 +150,6 @@ class MotionWriter:
         if self.operation.begun and self.writers.plane_of(pose) == self._plane:
             return
         writer = self.writers.of(pose, self.statements.tool)
-        if self._plane >= 0 and writer is self.writers.tilting:
-            self._warnings.behind_plane(pose, writer.form)
         beside, self._plane = self._plane != self.writers.plane_of(pose), self.writers.plane_of(pose)
         if self.operation.begun or (beside and not self.operation.retracted):
             yield from self._blocks(self.operation.go_home())
@@ -422,6 +420,8 @@ class MotionWriter:
         if self.operation.comes_first and not above:
             self._warnings.of_first(int(run.move[0]), self.writer.form, rapid=bool(run.rapid[0]))
         if not self.operation.begun:
+            if self.writer is self.writers.tilting:
+                self._warnings.of_tip_control(int(run.move[0]), self.writer.form)
             yield from self._blocks(self.operation.begin(self._rotary_blocks(first)))
         if self.operation.retracted:
             self.operation.retracted = False
