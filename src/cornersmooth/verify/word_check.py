@@ -107,6 +107,8 @@ class WordCheck:
         self._dropped: dict[str, str] = {}
         #: whether the spindle has been started since the tool last moved
         self._started = False
+        #: the tool change that has stopped it since, with its line, if it is not started again
+        self._stopped: tuple[str, int] | None = None
         #: complaints that count only where the text has no hole cycles; None where it has
         self._by_tool: list[Problem] | None = []
         self._code = -1.0
@@ -155,7 +157,8 @@ class WordCheck:
             for line, weight in odd_weights(table, self._weights):
                 self._wrong(NOT_LISTED, line, f"a weight of {weight:g}, which no curve of this text has")
         linear = ~np.all([np.isnan(table.column(name)) for name in sorted(_LINEAR)], axis=0)
-        self._started &= not linear.any()
+        if linear.any():
+            self._spindle_at_motion()
         self._positions.leave(table.columns.keys())
         if (self._changed or self._high or self._retract or self._arc or self._above) and linear.any():
             row = int(np.argmax(linear))
@@ -325,7 +328,7 @@ class WordCheck:
             if rule.after is not None or _TOOL_CALL.match(word):
                 self._change_tool(number, word)
             if _SPINDLE.fullmatch(word):
-                self._started = word != "M5"
+                self._started, self._stopped = word != "M5", None
             if rule.outside and (holding := self._holding()):
                 self._wrong(NOT_LISTED, number, f"{word} under {holding}")
 
@@ -334,8 +337,14 @@ class WordCheck:
         if holding := self._holding():
             self._unframed(NOT_LISTED, number, f"{word} under {holding}")
         if self._started:
+            self._started, self._stopped = False, (word, number)
+
+    def _spindle_at_motion(self) -> None:
+        """Look whether the spindle that was started still turns where the tool moves."""
+        if self._stopped is not None:
+            word, number = self._stopped
             self._wrong(NOT_LISTED, number, f"{word} stops the spindle that was started before it")
-            self._started = False
+        self._started, self._stopped = False, None
 
     def _holding(self) -> str:
         """Word in force that must be switched off before the tool is changed; empty for none."""
@@ -385,7 +394,7 @@ class WordCheck:
 
     def _moved(self, number: int, code: float, down: bool) -> None:
         """Look at what holds where the tool moves, Z among its axes or not."""
-        self._started = False
+        self._spindle_at_motion()
         late = self._waiting() if self._above and code == 0.0 and not down else set()
         self._above &= code == 0.0 and not down
         self._changed, self._high = bool(late), False
