@@ -53,6 +53,21 @@ RUNS = (
     ("generic", "table-ac", False),
 )
 
+#: the same where a control has its own reason: control, line, why
+_OWN_REASONS = (
+    ("siemens", r"G54", "work offset; behind TRAORI, which deselects it"),
+    (
+        "siemens",
+        r"TRAFOOF",
+        "no transformation: none of the program before, none in the retract, which is in coordinates of the machine",
+    ),
+    (
+        "fanuc|mitsubishi",
+        r"G0 A0\.0+ C0\.0+",
+        "rotary axes to zero, high up: tool tip control counts from where the table stands (WKP); at the end, too",
+    ),
+)
+
 #: why a line stands where it stands; the first that fits
 _REASONS = (
     (r"%", "begin and end of the tape"),
@@ -76,22 +91,17 @@ _REASONS = (
     (r"M9", "coolant off, before the tool goes up"),
     (r"M5", "spindle off, behind the retract, or where the CL file says so"),
     (r"M1", "optional stop: the operator may look at the part and at the next tool"),
-    (r"G54|CYCL DEF 247 .*", "work offset; behind TRAORI, which deselects it"),
+    (r"G54|CYCL DEF 247 .*", "work offset"),
     (r"D1", "length of the tool"),
     (r"M126", "rotary axes go the shorter way"),
-    (
-        r"(G0|L) [AB]\S+ C\S+( FMAX)?",
-        "rotary axes, high up: to zero before tool tip control that counts from where the "
-        "table stands, else to the first angles; to zero at the end",
-    ),
+    (r"(G0|L) [AB]\+?0\.0+ C\+?0\.0+( FMAX)?", "rotary axes to zero, high up"),
+    (r"(G0|L) [AB]\S+ C\S+( FMAX)?", "rotary axes to the next angles, high up, where nothing meets the part"),
     (r"G43\.[45] H\d+|G234 H\d+|TRAORI|FUNCTION TCPM .*", "tool tip control on"),
     (r"G43 H\d+", "length of the tool"),
     (r"G43 H\d+ .*", "down to it, with the length of the tool: alone it may move the axis (parameter TOS)"),
     (r"ORI.*", "what the words of the tool axis mean, and how it turns between blocks"),
-    (
-        r"G49|TRAFOOF|FUNCTION RESET TCPM",
-        "tool tip control off; G49, which may move by the length of the tool, behind the retract",
-    ),
+    (r"G49", "tool tip control and length of the tool off, behind the retract: alone it may move by that length"),
+    (r"TRAFOOF|FUNCTION RESET TCPM", "tool tip control off: the retract is in coordinates of the machine"),
     (r"G9[345]|M13[67]", "feed mode of the blocks that follow"),
     (r"G4 .*|CYCL DEF 9\..*", "dwell"),
     (r"M30|M2", "end"),
@@ -174,7 +184,8 @@ def text_of(control: str, machine: str, *, tcp: bool) -> tuple[Form, list[str]]:
 def reason(line: str, form: Form) -> str:
     """Why a line is there; what the list of words says of it where nothing more is to be said."""
     bare = re.sub(r"^\d+ ", "", line) if form.control == "heidenhain" else line
-    for pattern, why in _REASONS:
+    reasons = [(pattern, why) for control, pattern, why in _OWN_REASONS if re.fullmatch(control, form.control)]
+    for pattern, why in (*reasons, *_REASONS):
         if re.fullmatch(pattern, bare):
             return why
     options = ReadingOptions.of(
