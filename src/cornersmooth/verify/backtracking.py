@@ -36,8 +36,10 @@ Found = tuple[Floats, Ints, Ints, Floats]
 def check_backtracking(distances: Distances, found: Findings) -> None:
     """The path must be run in order: CS523."""
     match = distances.match
+    mine = written_backwards(match, distances.written, distances.windows)
+    mine = mine or written_elsewhere(match, distances.written, distances.windows)
     theirs = original_backwards(match, distances.original, distances.windows)
-    for places in (written_backwards(match, distances.written, distances.windows), theirs):
+    for places in (mine, theirs):
         if places is not None:
             found.violations.add(523, *places)
 
@@ -92,6 +94,35 @@ def written_backwards(match: Match, written: Reached, windows: Windows) -> Found
     move = original.trail.owner[match.segment[vertex[found]] + 1]
     nc_line = match.nc.line[match.written.trail.owner[vertex[found]]]
     return held[found], original.program.line[original.pose[move]], nc_line, gain[found]
+
+
+def written_elsewhere(match: Match, written: Reached, windows: Windows) -> Found | None:
+    """Written vertices far from their places in order, but near the path at another: some are run in a wrong order.
+
+    Unless both motions are in order around them, be it tips and axis points each on their own.
+
+    Returns
+    -------
+    As `written_backwards`; the amount is how far vertices are from their places.
+    """
+    away = match.distance[written.vertex]
+    lost = np.isfinite(away) & (away > np.sqrt(2.0) * match.near) & (written.gap.larger <= match.near)
+    rows = np.flatnonzero(lost)
+    found: list[int] = []
+    for row in rows.tolist():
+        if found and (written.vertex[row] == written.vertex[found[-1]] + 1 or len(found) > _MOST_WRONG):
+            found.append(row)
+            continue
+        window = windows.around(int(written.vertex[row]))
+        if window is not None and not window.passed and not windows.alone(window):
+            found.append(row)
+    if not found:
+        return None
+    vertex = written.vertex[found]
+    original = match.original
+    move = original.trail.owner[match.segment[vertex] + 1]
+    nc_line = match.nc.line[match.written.trail.owner[vertex]]
+    return match.place[vertex], original.program.line[original.pose[move]], nc_line, away[found]
 
 
 def _in_order(match: Match, vertex: Ints) -> bool:

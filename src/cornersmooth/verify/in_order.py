@@ -41,6 +41,8 @@ class Window:
         The first of each.
     inner : (int, int)
         First and last vertex that are far enough from the ends, where places are taken to be known.
+    places : (float, float)
+        Of the first and the last vertex, in segments from the first.
     low, high : (n, m) float64
         First and last fraction of a segment at which a vertex may be; NaN where it may not be on it.
     """
@@ -48,6 +50,7 @@ class Window:
     vertex: int
     segment: int
     inner: tuple[int, int]
+    places: tuple[float, float]
     low: Floats
     high: Floats
 
@@ -113,14 +116,21 @@ class Windows:
         inner = begin + np.searchsorted(own, [length[vertex] - around / 2.0, length[vertex] + around / 2.0])
         inner[0] = begin if first == begin else max(inner[0], first)
         inner[1] = end if last == end else min(inner[1], last)
-        places = match.fraction[first], match.segment[last] + match.fraction[last] - segment
-        found = passage(
-            match.six[first : last + 1],
-            match.path.six[segment : stop + 1],
-            (float(places[0]), float(places[1])),
-            match.tolerance + match.slack,
-        )
-        return Window(first, segment, (int(inner[0]), int(inner[1])), *found)
+        places = float(match.fraction[first]), float(match.segment[last] + match.fraction[last] - segment)
+        own, path = match.six[first : last + 1], match.path.six[segment : stop + 1]
+        found = passage(own, path, places, match.tolerance + match.slack)
+        return Window(first, segment, (int(inner[0]), int(inner[1])), places, *found)
+
+    def alone(self, window: Window) -> bool:
+        """Whether tips and axis points of a piece are each run in order within the tolerance, on their own."""
+        match = self.match
+        own = match.six[window.vertex : window.vertex + len(window.low)]
+        path = match.path.six[window.segment : window.segment + window.low.shape[1] + 1]
+        for column in ((0, 1, 2, 0, 1, 2), (3, 4, 5, 3, 4, 5)):
+            low, _ = passage(own[:, column], path[:, column], window.places, match.tolerance + match.slack)
+            if np.isnan(low).all(axis=1).any():
+                return False
+        return True
 
     def _anchor(self, first: int, low: int, high: int) -> int:
         """Vertex from `first` on, from `low` to `high`, that is nearest to its place; an end where that is reached."""
