@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from cornersmooth.cl import read
+from cornersmooth.verify import verify
 from cornersmooth.verify.in_order import passage
 from oracle.share import how_many
+from verify.writing import simple_text
 
 Floats = NDArray[np.float64]
 
@@ -83,3 +86,19 @@ def test_a_turn_may_be_waited_for_but_not_run_backwards() -> None:
     straight = path[[0, 3]]
     assert not np.isnan(passage(straight, path, (0.0, 3.0), 0.6)[0][1]).all()  # at 2.5 until the path is back there
     assert np.isnan(passage(straight, path, (0.0, 3.0), 0.4)[0]).all()
+
+
+def test_a_long_way_run_in_a_wrong_order_is_found() -> None:
+    """Every vertex is on the path, but between one turn and the next they are run backwards."""
+    cl = [0.0, 0.94, 1.0, -3.0, -4.0, -3.94]
+    goto = [f"GOTO/{x:.4f},0,0,0,0,1" for x in cl]
+    program = read("\n".join(["UNITS/MM", "RAPID", goto[0], "FEDRAT/500,MMPM", *goto[1:], "FINI"]).encode())
+
+    def passed(order: list[float]) -> bool:
+        tip = np.array([[x, 0.0, 0.0] for x in order])
+        axis = np.tile([0.0, 0.0, 1.0], (len(order), 1))
+        text = simple_text(tip, axis, 0.2, 10.0, "g1", feed=500.0, sharp=range(1, len(order) - 1))
+        return all(one.code != "CS523" for one in verify(program, text, tolerance=0.2, axis_length=10.0).problems)
+
+    assert passed([0.0, 1.0, -4.0, -3.94])
+    assert not passed([0.0, 0.94, -4.0, -3.0, 1.0, -3.94])
