@@ -48,6 +48,8 @@ RUN_BY = {
     "python docs/make_savings.py FOLDER": "test_savings_are_printed_as_a_table",
     "python tests/batch_runs.py": "test_batch_runs_times_a_batch",
     "python -m nc.sweep": "test_sweeps_find_nothing",
+    "python -m nc.run_chains": "test_sweeps_find_nothing",
+    "python -m nc.run_chains 200 450": "test_sweeps_find_nothing",
     "python -m verify.sweep": "test_sweeps_find_nothing",
     "python -m verify.hole_programs": "test_sweeps_find_nothing",
     "python -m verify.word_mutations 2": "tests/verify/test_word_mutations.py",
@@ -204,6 +206,7 @@ def test_batch_runs_times_a_batch(tmp_path: Path, capsys: pytest.CaptureFixture[
         ("nc.sweep", ("--only", "fanuc-g6.2-nutated", "--seeds", "1", "--chains", "1")),
         ("verify.sweep", ("--only", "fanuc-g1", "--seeds", "0", "1")),
         ("verify.hole_programs", ("0", "2")),
+        ("nc.run_chains", ("0", "1", "--chains", "1")),
     ],
 )
 def test_sweeps_find_nothing(
@@ -211,7 +214,7 @@ def test_sweeps_find_nothing(
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["sweep", *words])
     assert not importlib.import_module(name).main()
-    assert re.search(r"'judged': \d|(: |^)passed \d", capsys.readouterr().out)
+    assert re.search(r"'(judged|chains)': \d|(: |^)passed \d", capsys.readouterr().out)
 
 
 def test_hole_mutations_are_scored(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
