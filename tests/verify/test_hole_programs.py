@@ -50,6 +50,7 @@ REFUSED_ONCE = {
     4946: "feed moves from a hole to its own pose",
     5005: "a feed move said again behind GOHOME, over a tap that is not drilled",
     5336: "the same tap again behind GOHOME, where the spindle stands, and a feed into it",
+    11319: "rapids by a digit over holes that are not drilled, without tip control",
     10857: "OPSTOP before GOHOME and OPSTOP between two tool changes, where nothing moves between",
     10006: "a feed to and fro above a hole, as fast as the hole's",
 }

@@ -11,7 +11,7 @@ from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Problem
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.polyline import Original, directions
-from cornersmooth.verify.rapids import ARITHMETIC, digit_errors, leads_somewhere
+from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 from cornersmooth.verify.tool_changes import NEVER, ToolChanges
 
 #: elements looked through at a time for the beginning of a run
@@ -77,8 +77,7 @@ class HoleSearch:
         nc, at = self.ahead.nc, element - self.ahead.base
         if at < 1 or nc.kind[at] != Element.RAPID:
             return False
-        ways = (values[at : at + 1] - values[at - 1] for values in (nc.tip, nc.second))
-        return not leads_somewhere(nc, *ways)[0]
+        return bool((nc.tip[at] == nc.tip[at - 1]).all() and (nc.second[at] == nc.second[at - 1]).all())
 
     def exact(self, move: int, elements: Ints) -> Bools:
         """(k,) whether elements end exactly at a move's pose."""
