@@ -9,7 +9,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import load_machine
-from cornersmooth.nc import choose_form, fit_settings, write
+from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from nc.writing import codes, lines_of, text_of_cl
@@ -245,6 +245,23 @@ def test_fragments_say_what_is_missing() -> None:
     """No tool, no spindle, a first move at feed: each is counted."""
     _, written = text_of_cl("UNITS/MM\nFEDRAT/100,MMPM\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
     assert codes(written, fragment=False) == {"CS333": 1, "CS334": 1, "CS335": 1}
+
+
+def test_a_spindle_without_a_speed_is_said() -> None:
+    cl = "UNITS/MM\nLOADTL/1\n{}RAPID\nGOTO/0,0,9\nFEDRAT/100,MMPM\nGOTO/0,0,0\nFINI\n"
+    lines, written = text_of_cl(cl.format("SPINDL/ON\n"))
+    assert "M3" in lines
+    assert codes(written, fragment=False) == {"CS335": 1}
+    _, written = text_of_cl(cl.format("SPINDL/900,CLW\nSPINDL/OFF\nSPINDL/ON\n"))
+    assert codes(written, fragment=False) == {}
+
+
+@pytest.mark.parametrize("way", ["approach", "retract"])
+def test_a_control_without_a_retract_takes_no_way_to_it(way: str) -> None:
+    program = read(b"UNITS/MM\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n", name="part.cls")
+    form = choose_form("generic")
+    with pytest.raises(SettingsError, match="generic has no retract"):
+        write(smooth(program, Settings()), io.BytesIO(), form=form, frame=Frame(**{way: 20.0}))
 
 
 @pytest.mark.parametrize("tools", [1, 2])

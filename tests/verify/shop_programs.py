@@ -177,10 +177,11 @@ def with_options(one: ShopTrial) -> ShopTrial:
     rng = np.random.default_rng((one.seed, 8))
     table = load_control(one.control)
     offsets = [None, None, "", table.program.work_offset[:-1] + "5"]
+    high = bool(table.program.retract)
     frame = Frame(
         modal=bool(rng.random() < 0.5),
-        approach=float(rng.choice([0.0, 0.0, 15.0])),
-        retract=float(rng.choice([0.0, 0.0, 20.0])),
+        approach=high * float(rng.choice([0.0, 0.0, 15.0])),
+        retract=high * float(rng.choice([0.0, 0.0, 20.0])),
         block_numbers=bool(rng.random() < 0.3),
         comments=bool(rng.random() < 0.8),
         header=("(MINE {units})",) if rng.random() < 0.2 and table.layout.comment[0] == "(" else (),

@@ -113,10 +113,13 @@ class Frame:
         Raises
         ------
         SettingsError
-            The control has no such work offset, or has no step for header or footer; or a line of these has unknown
-            braces or characters that NC text cannot hold.
+            The control has no such work offset, no retract to go to or come from along the tool, or no step for header
+            or footer; or a line of these has unknown braces or characters that NC text cannot hold.
         """
         table = form.table.program
+        if (self.approach or self.retract) and not table.retract:
+            what = f"{form.control} has no retract that the tool could come from or go to along its axis"
+            raise SettingsError("CS216", what, "leave out --approach and --retract")
         offset = table.work_offset if self.work_offset is None else self.work_offset
         if self.work_offset and not (
             table.work_offset_block and re.fullmatch(table.work_offset_pattern, self.work_offset)

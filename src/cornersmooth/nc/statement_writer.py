@@ -212,6 +212,8 @@ class StatementWriter:
             self._direction = "counterclockwise" if "CCLW" in words else "clockwise"
         direction = getattr(self.words, self._direction)
         if speed is None and self.speed is None:
+            text = "the spindle is started without a speed: a control takes the one that holds from before"
+            self.findings.add("CS335", "warning", statement.line, text)
             self.operation.turn((direction,))
             return [direction]
         self.speed = self.speed if speed is None else speed
