@@ -260,8 +260,9 @@ def test_a_spindle_without_a_speed_is_said() -> None:
 def test_a_control_without_a_retract_takes_no_way_to_it(way: str) -> None:
     program = read(b"UNITS/MM\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n", name="part.cls")
     form = choose_form("generic")
+    smoothed = smooth(program, fit_settings(Settings(), form, program.units))
     with pytest.raises(SettingsError, match="generic has no retract"):
-        write(smooth(program, Settings()), io.BytesIO(), form=form, frame=Frame(**{way: 20.0}))
+        write(smoothed, io.BytesIO(), form=form, frame=Frame(**{way: 20.0}))
 
 
 @pytest.mark.parametrize("tools", [1, 2])
