@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -155,16 +155,28 @@ class Module:
 
 
 @cache
+def text_of(path: Path) -> str:
+    """Text of a source file."""
+    return path.read_text(encoding="utf-8")
+
+
+@cache
 def parsed(path: Path) -> ast.Module:
     """A source file."""
-    return ast.parse(path.read_text(encoding="utf-8"))
+    return ast.parse(text_of(path))
+
+
+def with_codes(names: Iterable[str]) -> list[Path]:
+    """Source files with a code in them, or with one of the names."""
+    told = re.compile("|".join((r'"CS\d{3}"', *(rf"\b{re.escape(name)}\b" for name in names))))
+    return [path for path in SOURCE.rglob("*.py") if told.search(text_of(path))]
 
 
 @cache
 def names_of_codes() -> dict[str, frozenset[str]]:
     """Names of the source that stand for codes: constants, and arguments by name."""
     found: dict[str, set[str]] = {}
-    for path in SOURCE.rglob("*.py"):
+    for path in with_codes(()):
         for node in ast.walk(parsed(path)):
             if not isinstance(node, (ast.keyword, ast.Assign, ast.AnnAssign)):
                 continue
@@ -181,12 +193,12 @@ def names_of_codes() -> dict[str, frozenset[str]]:
 def entries() -> list[Entry]:
     """Every code of the source with its texts, sorted."""
     names = names_of_codes()
-    return sorted({entry for path in SOURCE.rglob("*.py") for entry in Module(path, names).entries()})
+    return sorted({entry for path in with_codes(names) for entry in Module(path, names).entries()})
 
 
 def codes_in_source() -> set[str]:
     """Every code that is written anywhere in the source, but in running text."""
-    return {code for path in SOURCE.rglob("*.py") for code in re.findall(r'"(CS\d{3})"', path.read_text("utf-8"))}
+    return {code for path in SOURCE.rglob("*.py") for code in re.findall(r'"(CS\d{3})"', text_of(path))}
 
 
 def page() -> str:

@@ -232,7 +232,7 @@ def test_distribution_of_real_paths_agrees_with_brute_force(name, tolerance, req
     assert told["overcut"]["points"] + told["undercut"]["points"] <= told["points"] == len(found)
     assert sum(told["histogram"]["counts"]) == len(found)
     original, written = original_cuts(program), written_cuts(read_nc(text))
-    chosen = np.random.default_rng(17).choice(len(found), 100, replace=False)
+    chosen = np.random.default_rng(17).choice(len(found), how_many(40, 100), replace=False)
     for row in chosen:
         point = found.points.point[row]
         expected = brute_force(point, written, tool, height) - brute_force(point, original, tool, height)
