@@ -15,7 +15,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from typing import BinaryIO
+from typing import BinaryIO, NoReturn
 
 from cornersmooth.cli.ending import SIGNALS
 from cornersmooth.cli.files import STANDARD
@@ -116,15 +116,23 @@ def serve() -> None:
             outcome = run_job(job)
         except ClosedPipe:
             outcome = Outcome(job, 4, f"{job.source}: error: the reader of an output has gone; run it again")
-        pickle.dump(outcome, answers)
-        answers.flush()
+        try:
+            pickle.dump(outcome, answers)
+            answers.flush()
+        except OSError:
+            _leave()
+
+
+def _leave() -> NoReturn:
+    """End where the parent has gone, whatever the other thread is at."""
+    remove_unfinished()
+    os._exit(0)
 
 
 def _receive(jobs: BinaryIO, coming: queue.SimpleQueue[Job]) -> None:
-    """Hand the jobs on; leave where the parent has gone, whatever the other thread is at."""
+    """Hand the jobs on until the parent has gone."""
     try:
         while True:
             coming.put(pickle.load(jobs))
     finally:
-        remove_unfinished()
-        os._exit(0)
+        _leave()
