@@ -13,6 +13,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.nc import Frame, fit_settings, write
 from cornersmooth.nc_reader.block_tables import read_lines
+from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
@@ -89,18 +90,23 @@ FINI
 """
 
 
+def _problems(case: Case, lines: list[str]) -> list[Problem]:
+    """What the check of words finds in a text."""
+    check = WordCheck(case.control, options_of(case).dialect.lexer, 0.01)
+    list(check.watch(read_lines(("\n".join(lines) + "\n").encode(), None, check.lexer)))
+    return check.problems
+
+
 def _said_of(control: str, machine: str, change: Callable[[list[str]], list[str]]) -> list[str]:
     """What the check of words says of the text of two tools, changed behind its first tool change."""
     case = next(case for case in CHOSEN if (case.control, case.form, case.machine) == (control, "g1", machine))
     form, program = case.choose(endless=True), read(TWO_TOOLS, name="two.cls")
     stream = io.BytesIO()
     write(smooth(program, fit_settings(Settings(), form, "mm")), stream, form=form)
-    check = WordCheck(control, options_of(case).dialect.lexer, 0.01)
     lines = stream.getvalue().decode().splitlines()
-    text = "\n".join(change(lines)) + "\n"
-    assert text.splitlines() != lines
-    list(check.watch(read_lines(text.encode(), None, check.lexer)))
-    return [problem.text for problem in check.problems]
+    changed = change(lines)
+    assert changed != lines
+    return [problem.text for problem in _problems(case, changed)]
 
 
 def _without(lines: list[str], start: str) -> list[str]:
@@ -165,9 +171,7 @@ def test_a_cycle_is_a_motion_of_the_tool() -> None:
         (lines, []),
         ([*lines[:last], *lines[last + 1 : up + 1], lines[last], *lines[up + 1 :]], [GONE_ON]),
     ):
-        check = WordCheck("siemens", options_of(case).dialect.lexer, 0.01)
-        list(check.watch(read_lines(("\n".join(text) + "\n").encode(), None, check.lexer)))
-        assert [problem.text for problem in check.problems if problem.code == "CS571"] == wanted
+        assert [problem.text for problem in _problems(case, text) if problem.code == "CS571"] == wanted
 
 
 def test_the_tables_in_the_docs_are_those_of_the_lists() -> None:

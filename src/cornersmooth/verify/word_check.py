@@ -348,12 +348,8 @@ class WordCheck:
 
     def _holding(self) -> str:
         """Word in force that must be switched off before the tool is changed; empty for none."""
-        ending = [rule for rule in self.list.words if rule.ends]
-        for rule in ending:
-            said_last = self._state.get(rule.state, ("", 0))[0]
-            if rule.pattern.fullmatch(said_last) or (said_last and rule.pattern.fullmatch(said_last.split()[0])):
-                return said_last
-        return ""
+        held = ((rule, self._state.get(rule.state, ("", 0))[0]) for rule in self.list.words if rule.ends)
+        return next((word for rule, word in held if rule.pattern.fullmatch(word)), "")
 
     def _next_block(self, text: str, number: int) -> str:
         """Look at whether the block before wanted this one; return it."""
