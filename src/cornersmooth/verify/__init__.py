@@ -29,7 +29,8 @@ Where is what:
 - where everything is: `match`, found by `search` with `nearest` and `assignment`
 - checks (`checks` lists them): `deviation`, `backtracking`, `feeds`, `continuity`; they share `distances`, with
   `wide_search`, `hull_bounds`; what they find is in `findings`
-- words: `word_check` against `nc_reader.word_list`; what they say beside the motion is in the package `statements`
+- words: `word_check` against `nc_reader.word_list`; `word_places`: where those beside the motion stand, for the package
+  `statements`, which compares what they say
 - all of it: `verifier`, `result`
 """
 

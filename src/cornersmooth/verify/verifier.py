@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import os
-from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from inspect import signature
-from itertools import count
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, ParamSpec, Self, TypeVar, cast
-
-import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Ints, Program, Units
 from cornersmooth.nc_reader.block_tables import read_lines
-from cornersmooth.nc_reader.elements import Element, Elements, Event, NcProgram, Problem
+from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
 from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
@@ -28,20 +22,16 @@ from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
-from cornersmooth.statements.asked import asked
-from cornersmooth.statements.comparison import KINDS, compare
-from cornersmooth.statements.said import said
-from cornersmooth.statements.tokens import TAP, Token
+from cornersmooth.statements.comparison import KINDS
 from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.checks import Examined, examine
 from cornersmooth.verify.findings import Findings, Largest, Poses
 from cornersmooth.verify.half_turns import half_turns
 from cornersmooth.verify.own_rapids import OwnRapids
-from cornersmooth.verify.rapids import leads_somewhere
 from cornersmooth.verify.result import Verification
 from cornersmooth.verify.task import Task, length_of
-from cornersmooth.verify.wide_search import way_apart
 from cornersmooth.verify.word_check import GONE_ON, WordCheck
+from cornersmooth.verify.word_places import WordPlaces
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
@@ -51,9 +41,6 @@ _Found = TypeVar("_Found")
 
 #: poses from which on it is worth while to let other processes work
 _LONG: Final = 30_000
-
-#: CL path length of what stands before the first motion, mm
-_BEFORE: Final = -1.0
 
 
 class Verifier:
@@ -250,13 +237,8 @@ class _Measured:
     batches: Batches
     findings: Findings
     poses: Poses  #: of the whole CL program
-    lengths: dict[int, float]  #: CL path length, mm, at elements that have words behind them, where batches tell
-    rooms: dict[int, float]  #: how far that is uncertain, mm
-    others: dict[int, tuple[float, ...]]  #: at other poses that elements may stand for
-    still: set[int]  #: rapids that lead nowhere
-    events: list[Event]
+    places: WordPlaces
     words: bool
-    margin: float = 0.0
     own: frozenset[str] = frozenset()  #: kinds of statements that the user says in words of his own
     clamps: frozenset[float] = frozenset()  #: M words that clamp a rotary axis or let it turn
 
@@ -277,11 +259,11 @@ class _Measured:
             problems.append(Problem("CS505", 0, 1, text))
         problems += self.batches.problems + self.findings.feeds.problems + self.findings.violations.problems()
         problems += half_turns(program)
-        left_out = sum(event.letter == "(" and event.text.startswith(NOT_DRILLED) for event in self.events)
+        left_out = sum(event.letter == "(" and event.text.startswith(NOT_DRILLED) for event in self.places.events)
         if left_out < len(self.batches.untapped):
             problems += self.batches.untapped
         if self.words and self.batches.elements:  # without any motion nothing has a place
-            of_statements, at_home = self._statement_problems(unsaid)
+            of_statements, at_home = self.places.problems(self.batches, unsaid, self.own, self.clamps)
             problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
         return Verification.of(
             self.findings,
@@ -294,85 +276,17 @@ class _Measured:
             curves=curves,
         )
 
-    def _statement_problems(self, unsaid: frozenset[str | tuple[str, float]]) -> tuple[list[Problem], set[int]]:
-        """What words beside the motion say wrongly, and the NC lines of those where the CL file has GOHOME."""
-        original, length = self.task.original, self.task.path.length
-        program = original.program
-        move = np.searchsorted(original.pose, [statement.pose for statement in program.statements]) - 1
-        moves = len(original.pose)
-        end = float(length[-1]) if moves else 0.0
-        there = length[original.trail.last[np.clip(move, 0, None)]] if moves else 0.0
-
-        def length_at(move: int) -> float:
-            return float(length[original.trail.last[move]])
-
-        dwells = [
-            Token("dwell", time, length_at(move), int(program.line[original.pose[move]]))
-            for move, time in self.batches.dwells
-        ]
-        dwells += [
-            Token("tap", TAP, length_at(move), int(program.line[original.pose[move]])) for move in self.batches.taps
-        ]
-        before = np.where(move >= 0, there, _BEFORE).tolist()
-        theirs = asked(program, before, end, dwells)
-        # clamps of rotary axes stand where the machine wants them, not where AUXFUN has them
-        theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in self.clamps]
-        known = self.lengths | self.batches.stops.lengths()
-        holes = self.batches.holes
-        known |= {element: length_at(move) for element, move in holes.items()}
-        order = sorted(known)
-        first = order[0] if order else 0
-
-        def stands(element: int) -> int:
-            """The element at whose end one leaves the tool that leads nowhere, as a second rapid to the same place."""
-            at = bisect_right(order, element) - 1
-            return order[at] if element >= first and at >= 0 else element
-
-        def place(element: int) -> float:
-            return known.get(stands(element), _BEFORE if element < first else 0.0)
-
-        begins = {element: length_at(max(move - 1, 0)) for element, move in self.batches.latest.items()}
-        begins = {element + 1: place for element, place in self.batches.stops.lengths().items()} | begins
-        begins |= self.batches.stops.begins()
-        begins[self.batches.elements] = end
-        places = [
-            length_at(holes[event.element])  # that which is fed next
-            if (event.letter, event.value) == ("G", TAP) and event.element in holes
-            else place(event.element - 1)
-            for event in self.events
-        ]
-
-        def next_of(element: int) -> int:
-            return next(k for k in count(element) if k not in self.still)
-
-        # between two elements the text may have passed all that leaves nothing in it
-        reaches = [
-            max(begins.get(next_of(event.element), -math.inf) - here, 0.0)
-            for event, here in zip(self.events, places, strict=True)
-        ]
-        rooms = [self.rooms.get(stands(event.element - 1), 0.0) for event in self.events]
-        others = [self.others.get(stands(event.element - 1), ()) for event in self.events]
-        apart: Callable[[float, float], float] = partial(way_apart, self.task.path)
-        homes = [place for place, one in zip(before, program.statements, strict=True) if one.word == "GOHOME"]
-        at_home = {
-            event.line
-            for event, here, room, reach in zip(self.events, places, rooms, reaches, strict=True)
-            if any(-self.margin - room <= home - here <= reach + self.margin + room for home in homes)
-        }
-        found = said(self.events, places, rooms, reaches, others)
-        return compare(theirs, found, self.margin, unsaid, apart, self.own), at_home
-
 
 def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measured:
     """Match and measure all that is read."""
     batches = Batches(task, text.events)
-    program = task.original.program
-    found = _Measured(task, batches, Findings(), Poses.nowhere(len(program)), {}, {}, {}, set(), text.events, words)
+    places = WordPlaces(task, text.events)
+    found = _Measured(task, batches, Findings(), Poses.nowhere(len(task.original.program)), places, words)
 
     def items() -> Iterator[tuple[Batch, Ints, Largest]]:
-        for batch in batches.of(_noted(text, found)):
-            own = _elements(text.events, batch.offset, batch.offset + batch.last)
-            yield batch, np.unique(own), found.findings.largest.copy()
+        for batch in batches.of(places.watch(text.chunks)):
+            with_words = places.elements(batch.offset, batch.offset + batch.last)
+            yield batch, with_words, found.findings.largest.copy()
 
     def work(item: tuple[Batch, Ints, Largest]) -> Examined:
         return examine(task, *item)
@@ -382,37 +296,8 @@ def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measur
             found.poses.put(poses)
         examined.findings.poses = []
         found.findings.take(examined.findings)
-        for element, length in zip(examined.elements.tolist(), examined.lengths.tolist(), strict=True):
-            found.lengths.setdefault(element, length)
-        found.others = examined.others | found.others
+        places.take(examined)
     return found
-
-
-def _elements(events: list[Event], first: int, last: int) -> Ints:
-    """Elements from `first` to `last` with words behind them, ascending."""
-    low = bisect_left(events, first + 1, key=lambda event: event.element)
-    high = bisect_right(events, last + 1, key=lambda event: event.element)
-    return np.array([event.element - 1 for event in events[low:high]], np.int64)
-
-
-def _noted(text: _Text, found: _Measured) -> Iterable[Elements]:
-    """Give out the elements of a text, and take down what is to be known of those with words behind them."""
-    offset = 0
-    before = np.full((1, 6), np.inf)
-    for nc in text.chunks:
-        found.margin = found.task.margin(nc)
-        six = np.concatenate((before, np.hstack((nc.tip, nc.second))))
-        rapid = np.flatnonzero(nc.kind == Element.RAPID)
-        ways = np.hsplit(six[rapid + 1] - six[rapid], 2)
-        found.still.update((offset + rapid[~leads_somewhere(nc, *ways)]).tolist())
-        before = six[-1:]
-        if len(nc) and (nc.rotary or nc.tip_room.any()):
-            last = offset + len(nc) - 1
-            for element in {*_elements(text.events, offset, last).tolist(), last}:  # words behind it are still to come
-                row = element - offset
-                found.rooms[element] = found.task.axis_length * float(nc.second_room[row]) + float(nc.tip_room[row])
-        offset += len(nc)
-        yield nc
 
 
 def _check_bounds(**values: float) -> None:

@@ -1,0 +1,186 @@
+"""Where on the CL path the words beside the motion stand, and whether they say there what the CL file asks for.
+
+A word stands between two elements of the text: behind the end of one, and before the next one begins.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import count
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.model import Ints, Program
+from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
+from cornersmooth.statements.asked import asked
+from cornersmooth.statements.comparison import compare
+from cornersmooth.statements.said import said
+from cornersmooth.statements.tokens import TAP, Token
+from cornersmooth.verify.batches import Batches
+from cornersmooth.verify.checks import Examined
+from cornersmooth.verify.rapids import leads_somewhere
+from cornersmooth.verify.task import Task
+from cornersmooth.verify.wide_search import way_apart
+
+#: CL path length of what stands before the first motion, mm
+_BEFORE: Final = -1.0
+
+
+@dataclass
+class WordPlaces:
+    """Takes down what is known of the elements that have words behind them, while they are read and measured.
+
+    Parameters
+    ----------
+    task : Task
+    events : list of Event
+        Words of the text, which grow as it is read.
+    """
+
+    task: Task
+    events: list[Event]
+    margin: float = 0.0  #: what printed digits account for, mm
+    _lengths: dict[int, float] = field(default_factory=dict)  #: CL path length, mm, at the ends of elements
+    _rooms: dict[int, float] = field(default_factory=dict)  #: how far that is uncertain, mm
+    _others: dict[int, tuple[float, ...]] = field(default_factory=dict)  #: at other poses that elements may stand for
+    _still: set[int] = field(default_factory=set)  #: rapids that lead nowhere
+
+    def watch(self, chunks: Iterable[Elements]) -> Iterable[Elements]:
+        """Give out the elements of a text, and take down how sure those with words behind them are."""
+        offset = 0
+        before = np.full((1, 6), np.inf)
+        for nc in chunks:
+            self.margin = self.task.margin(nc)
+            six = np.concatenate((before, np.hstack((nc.tip, nc.second))))
+            rapid = np.flatnonzero(nc.kind == Element.RAPID)
+            ways = np.hsplit(six[rapid + 1] - six[rapid], 2)
+            self._still.update((offset + rapid[~leads_somewhere(nc, *ways)]).tolist())
+            before = six[-1:]
+            if len(nc) and (nc.rotary or nc.tip_room.any()):
+                last = offset + len(nc) - 1
+                for element in {*self.elements(offset, last).tolist(), last}:  # words behind it are still to come
+                    row = element - offset
+                    self._rooms[element] = self.task.axis_length * float(nc.second_room[row]) + float(nc.tip_room[row])
+            offset += len(nc)
+            yield nc
+
+    def elements(self, first: int, last: int) -> Ints:
+        """Elements from `first` to `last` with words behind them, ascending, each once."""
+        low = bisect_left(self.events, first + 1, key=lambda event: event.element)
+        high = bisect_right(self.events, last + 1, key=lambda event: event.element)
+        return np.unique(np.array([event.element - 1 for event in self.events[low:high]], np.int64))
+
+    def take(self, examined: Examined) -> None:
+        """Take down where the elements of a batch are."""
+        for element, length in zip(examined.elements.tolist(), examined.lengths.tolist(), strict=True):
+            self._lengths.setdefault(element, length)
+        self._others = examined.others | self._others
+
+    def problems(
+        self,
+        batches: Batches,
+        unsaid: frozenset[str | tuple[str, float]],
+        own: frozenset[str],
+        clamps: frozenset[float],
+    ) -> tuple[list[Problem], set[int]]:
+        """What words say wrongly, and the NC lines of those where the CL file has GOHOME.
+
+        Parameters
+        ----------
+        batches : Batches
+            All given out.
+        unsaid : frozenset
+            As of `NcProgram`.
+        own : frozenset of str
+            Kinds of statements that the user says in words of his own.
+        clamps : frozenset of float
+            M words that clamp a rotary axis or let it turn: they stand where the machine wants them, not where AUXFUN
+            has them.
+        """
+        places = _Places(self, batches)
+        statements = _statement_lengths(self.task)
+        theirs = asked(self.task.original.program, statements, places.end, _of_holes(batches, places))
+        theirs = [token for token in theirs if token.kind != "auxiliary" or token.value not in clamps]
+        here = [places.behind(event) for event in self.events]
+        reaches = [max(places.next_begin(event) - at, 0.0) for event, at in zip(self.events, here, strict=True)]
+        standing = [places.standing(event.element - 1) for event in self.events]
+        rooms = [self._rooms.get(element, 0.0) for element in standing]
+        ours = said(self.events, here, rooms, reaches, [self._others.get(element, ()) for element in standing])
+        found = compare(theirs, ours, self.margin, unsaid, partial(way_apart, self.task.path), own)
+        homes = _lengths_of("GOHOME", self.task.original.program, statements)
+        at_home = {
+            event.line
+            for event, at, room, reach in zip(self.events, here, rooms, reaches, strict=True)
+            if any(-self.margin - room <= home - at <= reach + self.margin + room for home in homes)
+        }
+        return found, at_home
+
+
+class _Places:
+    """CL path lengths, mm, where elements of the text end and begin, as far as they are known."""
+
+    def __init__(self, words: WordPlaces, batches: Batches) -> None:
+        self._task, self._still, self._holes = words.task, words._still, batches.holes
+        length = self._task.path.length
+        self.end = float(length[-1]) if len(self._task.original.pose) else 0.0
+        self._ends = words._lengths | batches.stops.lengths()
+        self._ends |= {element: self.of_move(move) for element, move in batches.holes.items()}
+        self._known = sorted(self._ends)
+        self._begins = {element + 1: place for element, place in batches.stops.lengths().items()}
+        self._begins |= {element: self.of_move(max(move - 1, 0)) for element, move in batches.latest.items()}
+        self._begins |= batches.stops.begins()
+        self._begins[batches.elements] = self.end
+
+    def of_move(self, move: int) -> float:
+        """Where a move of the CL file ends."""
+        return float(self._task.path.length[self._task.original.trail.last[move]])
+
+    def standing(self, element: int) -> int:
+        """The element at whose end one leaves the tool that leads nowhere, as a second rapid to the same place does."""
+        at = bisect_right(self._known, element) - 1
+        return self._known[at] if at >= 0 else element
+
+    def behind(self, event: Event) -> float:
+        """Where a word stands: at the end of the element before it; that of a tap at the hole that is fed next."""
+        if (event.letter, event.value) == ("G", TAP) and event.element in self._holes:
+            return self._ends[event.element]
+        before = event.element - 1
+        first = self._known[0] if self._known else 0
+        return self._ends.get(self.standing(before), _BEFORE if before < first else 0.0)
+
+    def next_begin(self, event: Event) -> float:
+        """Where the next element that leads somewhere begins at the latest; -inf where that is not known.
+
+        Between the two the text may have passed all that leaves nothing in it.
+        """
+        following = next(k for k in count(event.element) if k not in self._still)
+        return self._begins.get(following, -math.inf)
+
+
+def _statement_lengths(task: Task) -> list[float]:
+    """CL path length, mm, where every statement of the CL file stands."""
+    original = task.original
+    move = np.searchsorted(original.pose, [statement.pose for statement in original.program.statements]) - 1
+    if not len(original.pose):
+        return [_BEFORE] * len(move)
+    there = task.path.length[original.trail.last[np.clip(move, 0, None)]]
+    lengths: list[float] = np.where(move >= 0, there, _BEFORE).tolist()
+    return lengths
+
+
+def _lengths_of(word: str, program: Program, lengths: list[float]) -> list[float]:
+    return [length for length, one in zip(lengths, program.statements, strict=True) if one.word == word]
+
+
+def _of_holes(batches: Batches, places: _Places) -> list[Token]:
+    """What the cycles of holes ask for: to wait at the bottom, and to tap."""
+    original = batches.task.original
+    asked_for = [("dwell", float(time), move) for move, time in batches.dwells]
+    asked_for += [("tap", TAP, move) for move in batches.taps]
+    line = original.program.line
+    return [Token(kind, value, places.of_move(move), int(line[original.pose[move]])) for kind, value, move in asked_for]
