@@ -6,6 +6,7 @@ import difflib
 import math
 from bisect import bisect_left
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.tokens import Token
@@ -51,6 +52,22 @@ def way_between(here: float, there: float) -> float:
     return abs(there - here)
 
 
+@dataclass(frozen=True)
+class _Nearness:
+    """What is near along the path; `room` and `apart` are those of `compare`."""
+
+    room: float
+    apart: Callable[[float, float], float]
+
+    def away(self, place: float, ours: Token) -> bool:
+        """Whether a token of the text is elsewhere than asked for."""
+        nearest = min(max(place, ours.place), ours.place + ours.reach)
+        if any(abs(place - here) <= self.room + ours.room for here in (nearest, *ours.others)):
+            return False
+        # a pose is a rounding off, and its place as far from it as the room
+        return self.apart(place, nearest) > 2 * self.room + ours.room
+
+
 def compare(
     asked_for: list[Token],
     found: list[Token],
@@ -73,73 +90,90 @@ def compare(
     own : frozenset of str
         Kinds that the user says in words of his own, which are no tokens; of most there must be no others.
     """
-    problems: list[Problem] = []
     end = max((token.place for token in asked_for if token.kind == "end"), default=math.inf)
     # what shifts the path counts wherever it is said
     unsaid = unsaid - {token.kind for token in found if token.kind == "compensation" and token.value != 40.0}
     asked_for = [token for token in asked_for if not {token.kind, (token.kind, token.value)} & (unsaid | own)]
     found = [token for token in found if token.kind not in unsaid | (own & _LOOSE)]
-    optional = [token for token in found if (token.kind, token.value) == ("stop", 1.0) and not token.habit]
-    kept: list[Token] = []
-    habits = [token for token in found if token.habit]
-    for stop in asked_for:  # of stops that posts write on their own each may be one that is asked for
-        if (stop.kind, stop.value) != ("stop", 1.0):
-            continue
-        near = next((k for k, one in enumerate(optional) if not _away(stop.place, one, room, apart)), None)
-        if near is not None:
-            del optional[near]  # each is one of those that are asked for
-        else:
-            kept += [one for one in habits if one not in kept and not _away(stop.place, one, room, apart)][:1]
-    found = [token for token in found if not token.habit or token in kept]
-
-    def tidies(token: Token, kind: str) -> bool:
-        """Whether a token only ends what ends with the program anyway."""
-        if token.kind != kind or token.value != _ENDED[kind]:
-            return False
-        return token.place >= end or not _away(end, token, room, apart)
-
-    def ended(tokens: list[Token], kind: str) -> int:
-        """How often a state is ended."""
-        return sum(token.value == _ENDED[kind] for token in _effective(tokens, kind))
-
-    changes = [token.line for token in found if token.kind == "tool"]
-    for kind in _ENDED:
-        mine = found
-        if kind in _STOPPED:  # what a tool change stops says nothing of the end
-            mine, theirs = (_effective(tokens, kind) for tokens in (found, asked_for))
-            mine = _without_habits(mine, theirs, changes, room, apart)
-        if ended(mine, kind) > ended(asked_for, kind) and not any(
-            tidies(token, kind) for token in _effective(asked_for, kind)
-        ):
-            found = [token for token in found if not tidies(token, kind)]
+    near = _Nearness(room, apart)
+    found = _without_idle_stops(asked_for, found, near)
+    found = _without_tidying(asked_for, found, end, near)
     asked_for, found = _without_idle_offsets(asked_for, found)
-    for kind, (name, code) in _NAMES.items():
+    problems: list[Problem] = []
+    for kind in _NAMES:
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
         if kind in _STOPPED and _values(theirs) != _values(ours):
-            ours = _effective(_without_habits(ours, theirs, changes, room, apart), kind)
+            ours = _effective(_without_habits(ours, theirs, _tool_lines(found), near), kind)
         if kind in _STOPPED and _values(theirs) != _values(ours):
             theirs, ours = (_effective(_last_of_moments(tokens, kind), kind) for tokens in (asked_for, found))
-        matcher = difflib.SequenceMatcher(None, _values(theirs), _values(ours), autojunk=False)
-        for tag, i0, i1, j0, j1 in matcher.get_opcodes():
-            both = min(i1 - i0, j1 - j0)
-            for i, j in zip(range(i0, i0 + both), range(j0, j0 + both), strict=True):
-                label = name.format(theirs[i].value)
-                if tag != "equal":
-                    text = f"{name.format(ours[j].value)} where the CL file asks for {label}"
-                elif _away(theirs[i].place, ours[j], room, apart):
-                    text = f"{label} is {ours[j].place - theirs[i].place:+.3f} mm of path away from its place"
-                else:
-                    continue
-                problems.append(Problem(f"CS{code}", theirs[i].line, ours[j].line, text))
-            for i in range(i0 + both, i1):
-                near = ours[min(j1, len(ours) - 1)].line if ours else _last_line(found, theirs[i].place + room)
-                problems.append(
-                    Problem(f"CS{code}", theirs[i].line, near, f"{name.format(theirs[i].value)} is missing")
-                )
-            for j in range(j0 + both, j1):
-                text = f"{name.format(ours[j].value)} is nothing that the CL file asks for"
-                problems.append(Problem(f"CS{code}", 0, ours[j].line, text))
+        problems += _differences(theirs, ours, found, near)
     return problems
+
+
+def _differences(theirs: list[Token], ours: list[Token], found: list[Token], near: _Nearness) -> list[Problem]:
+    """What of one kind is wrong, in another place, missing or too much; `found` are all tokens of the text."""
+    problems = []
+
+    def add(cl_line: int, nc_line: int, kind: str, text: str) -> None:
+        problems.append(Problem(f"CS{_NAMES[kind][1]}", cl_line, nc_line, text))
+
+    matcher = difflib.SequenceMatcher(None, _values(theirs), _values(ours), autojunk=False)
+    for tag, i0, i1, j0, j1 in matcher.get_opcodes():
+        for wanted, token in zip(theirs[i0:i1], ours[j0:j1], strict=False):
+            if tag != "equal":
+                text = f"{_label(token)} where the CL file asks for {_label(wanted)}"
+                add(wanted.line, token.line, wanted.kind, text)
+            elif near.away(wanted.place, token):
+                text = f"{_label(wanted)} is {token.place - wanted.place:+.3f} mm of path away from its place"
+                add(wanted.line, token.line, wanted.kind, text)
+        both = min(i1 - i0, j1 - j0)
+        for wanted in theirs[i0 + both : i1]:
+            line = ours[min(j1, len(ours) - 1)].line if ours else _last_line(found, wanted.place + near.room)
+            add(wanted.line, line, wanted.kind, f"{_label(wanted)} is missing")
+        for token in ours[j0 + both : j1]:
+            add(0, token.line, token.kind, f"{_label(token)} is nothing that the CL file asks for")
+    return problems
+
+
+def _label(token: Token) -> str:
+    return _NAMES[token.kind][0].format(token.value)
+
+
+def _without_idle_stops(asked_for: list[Token], found: list[Token], near: _Nearness) -> list[Token]:
+    """Tokens of the text without the optional stops that posts write on their own, but for those that are asked for."""
+    habits = [token for token in found if token.habit]
+    others = [token for token in found if (token.kind, token.value) == ("stop", 1.0) and not token.habit]
+    kept: list[Token] = []
+    for stop in asked_for:
+        if (stop.kind, stop.value) != ("stop", 1.0):
+            continue
+        other = next((k for k, one in enumerate(others) if not near.away(stop.place, one)), None)
+        if other is not None:
+            del others[other]  # each is one of those that are asked for
+        else:
+            kept += [one for one in habits if one not in kept and not near.away(stop.place, one)][:1]
+    return [token for token in found if not token.habit or token in kept]
+
+
+def _without_tidying(asked_for: list[Token], found: list[Token], end: float, near: _Nearness) -> list[Token]:
+    """Tokens of the text without those that only end what ends with the program anyway, unless that is asked for."""
+    lines = _tool_lines(found)
+    for kind, off in _ENDED.items():
+
+        def tidies(token: Token, kind: str = kind, off: float = off) -> bool:
+            return token.kind == kind and token.value == off and (token.place >= end or not near.away(end, token))
+
+        theirs, ours = _effective(asked_for, kind), _effective(found, kind)
+        if kind in _STOPPED:  # what a tool change stops says nothing of the end
+            ours = _effective(_without_habits(ours, theirs, lines, near), kind)
+        more = sum(token.value == off for token in ours) > sum(token.value == off for token in theirs)
+        if more and not any(map(tidies, theirs)):
+            found = [token for token in found if not tidies(token)]
+    return found
+
+
+def _tool_lines(found: list[Token]) -> list[int]:
+    return [token.line for token in found if token.kind == "tool"]
 
 
 def _values(tokens: list[Token]) -> list[float]:
@@ -151,9 +185,7 @@ def _last_line(tokens: list[Token], place: float) -> int:
     return next((token.line for token in reversed(tokens) if token.place <= place), 0)
 
 
-def _without_habits(
-    ours: list[Token], theirs: list[Token], changes: list[int], room: float, apart: Callable[[float, float], float]
-) -> list[Token]:
+def _without_habits(ours: list[Token], theirs: list[Token], changes: list[int], near: _Nearness) -> list[Token]:
     """Tokens without those that end a state which begins again before any motion, if the CL file does not ask for them.
 
     Posts stop spindle and coolant for a tool change on their own, also where the program waits behind it; `changes` are
@@ -162,11 +194,10 @@ def _without_habits(
     unasked = [k for k, token in enumerate(ours) if token.value == _ENDED[token.kind]]
     begins_again = {k for k in unasked if k + 1 < len(ours) and _goes_on(ours[k], ours[k + 1], changes)}
     for other in theirs:
-        near = [k for k in unasked if other.value == ours[k].value and not _away(other.place, ours[k], room, apart)]
-        if near:
-            unasked.remove(
-                min(near, key=lambda k: (ours[k].reach > room, k in begins_again, abs(ours[k].place - other.place)))
-            )
+        alike = [k for k in unasked if other.value == ours[k].value and not near.away(other.place, ours[k])]
+        ranks = [(ours[k].reach > near.room, k in begins_again, abs(ours[k].place - other.place)) for k in alike]
+        if alike:
+            unasked.remove(alike[ranks.index(min(ranks))])
     return [token for k, token in enumerate(ours) if k not in begins_again or k not in unasked]
 
 
@@ -198,15 +229,6 @@ def _outside(tokens: list[Token], tools: list[Token], idle: set[int]) -> list[To
         if token.kind != "offset" or at not in idle:
             kept.append(token)
     return kept
-
-
-def _away(place: float, ours: Token, room: float, apart: Callable[[float, float], float]) -> bool:
-    """Whether a token is elsewhere than asked for."""
-    nearest = min(max(place, ours.place), ours.place + ours.reach)
-    if any(abs(place - here) <= room + ours.room for here in (nearest, *ours.others)):
-        return False
-    # a pose is a rounding off, and its place as far from it as the room
-    return apart(place, nearest) > 2 * room + ours.room
 
 
 def _last_of_moments(tokens: list[Token], kind: str) -> list[Token]:
