@@ -120,3 +120,19 @@ CYCLE/OFF\nRAPID\nGOTO/0,0,40\nFINI\n"""
     write(smooth(program, settings), stream, form=form)
     assert [line for line in stream.getvalue().decode().splitlines() if line[:3] == "G4 "] == ["G4 P150", "G4 P600"]
     assert not verify(program, stream.getvalue(), tolerance=settings.verified_tolerance).problems
+
+
+@pytest.mark.parametrize("cycles", ["moves", "native"])
+def test_a_hole_of_no_depth_is_fed_to_where_the_tool_came_from(cycles: str):
+    text = """UNITS/MM\nLOADTL/1\nSPINDL/2000,RPM,CLW\nRAPID\nGOTO/-50,0,240,0,0,1\nFEDRAT/250,MMPM\nGOTO/66,0,240
+CYCLE/DRILL,RAPTO,3,FEDTO,0,MMPM,250\nGOTO/66,0,240\nGOTO/-50,0,240\nCYCLE/OFF\nFINI\n"""
+    program = read(text.encode(), name="hole.cls", dialect="nx")
+    form = choose_form("fanuc")
+    settings = fit_settings(Settings(), form, "mm")
+    stream = io.BytesIO()
+    write(smooth(program, settings), stream, form=form, frame=Frame(cycles=cycles))
+    lines = stream.getvalue().decode().splitlines()
+    assert not verify(program, stream.getvalue(), tolerance=settings.verified_tolerance).problems
+    there = next(k for k, line in enumerate(lines) if " X66.0000" in line)
+    without = "\n".join([*lines[:there], *lines[there + 1 :], ""])
+    assert verify(program, without.encode(), tolerance=settings.verified_tolerance).problems

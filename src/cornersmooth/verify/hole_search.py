@@ -194,8 +194,8 @@ class HoleSearch:
                     continue
                 if cycle.tap and self.feeds_above(hole, k + 1):
                     continue
-                if cycle.tap or self.drills(hole, k + 1, cycle):
-                    yield self.last_above(hole, k) + 1, True
+                if self.may_drill(hole, k + 1, cycle):
+                    yield self.last_above(hole, k, cycle) + 1, True
                     return
                 doubtful = k + 1 if doubtful is None else doubtful
             begin += len(window)
@@ -226,14 +226,19 @@ class HoleSearch:
         fed = self.first_feed(move, element)
         return fed is not None and bool(self.heights(move, np.array([fed]))[0] >= -self.room)
 
-    def last_above(self, hole: int, element: int) -> int:
-        """Last feed, from an element on, to the pose before a hole, if any, before the text goes into it."""
+    def last_above(self, hole: int, element: int, cycle: Drilling) -> int:
+        """Last feed, from an element on, to the pose before a hole, if any, before the text drills it."""
         found = element
         while self.over(hole, element) and self.heights(hole, np.array([element]))[0] >= -self.room:
-            if self.kind[hole - 1] != Move.RAPID and self.feeds([element]):
-                found = element if self.exact(hole - 1, np.array([element]))[0] else found
+            comes = self.kind[hole - 1] != Move.RAPID and bool(self.feeds([element]))
+            if comes and self.exact(hole - 1, np.array([element]))[0] and self.may_drill(hole, element + 1, cycle):
+                found = element
             element += 1
         return found
+
+    def may_drill(self, move: int, element: int, cycle: Drilling) -> bool:
+        """Whether the text may drill a hole from an element on; taps are looked at elsewhere."""
+        return cycle.tap or self.drills(move, element, cycle)
 
     def drills(self, move: int, element: int, cycle: Drilling) -> bool:
         """Whether the text drills a hole from an element on: to its depth, no farther, at the cycle's feeds."""
@@ -329,9 +334,12 @@ class HoleSearch:
 
         A rapid may be both, the retreat and the next pose; a feed move is not the hole's then.
         """
+        if not group:
+            return group, end, self._leads_away(move, end)
         feeds = self.feeds(group)
-        if group and not feeds and (going_on := self._goes_on_as(move, group)) is not None:
-            return group[:1], group[0], going_on  # the first may be both
+        for k in range(len(group) if not feeds else 0):
+            if (going_on := self._goes_on_as(move, group[k:])) is not None:
+                return group[: k + 1], group[k], going_on  # the first may be both
         deepest = -1
         if feeds and not np.isnan(cycle.depth):
             height = self.heights(move - 1, np.array(feeds))
@@ -366,6 +374,14 @@ class HoleSearch:
             first = move if first is None else first
             move += 1
         return first
+
+    def _leads_away(self, move: int, element: int) -> int:
+        """First move from one on that leaves something in a text that goes on with an element: the tool may be there."""
+        while move < len(self.tip) and self.kind[move] != Move.HOLE and self.stays(move, element - 1):
+            if self.has(move, element) and self.stays(move, element):
+                return move
+            move += 1
+        return move
 
     def stays(self, move: int, element: int) -> bool:
         """Whether a move ends where an element has left the tool."""
