@@ -259,7 +259,7 @@ class MotionWriter:
         """Go to the pose behind a tool change even if it repeats the last one before, and so is no row."""
         begin, self._return_to = self._return_to, _NOWHERE
         passed = begin + np.flatnonzero(self.program.kind[begin:move] != Move.FROM)
-        if self._last is None or not len(passed):
+        if self._last is None or not len(passed) or self.program.kind[begin - 1] == Move.HOLE:  # which none repeats
             return
         again = self._last[None]
         if self._last_writer is not self.writer:

@@ -7,6 +7,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import takewhile
 
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.tokens import Token
@@ -158,17 +159,21 @@ def _without_idle_stops(asked_for: list[Token], found: list[Token], near: _Nearn
 def _without_tidying(asked_for: list[Token], found: list[Token], end: float, near: _Nearness) -> list[Token]:
     """Tokens of the text without those that only end what ends with the program anyway, unless that is asked for."""
     lines = _tool_lines(found)
+
+    def tidying(tokens: list[Token], kind: str) -> list[Token]:
+        """Tokens that end a state for good, where everything ends."""
+        mine = [token for token in tokens if token.kind == kind]
+        last = list(takewhile(lambda token: token.value == _ENDED[kind], reversed(mine)))
+        return [token for token in last if token.place >= end or not near.away(end, token)]
+
     for kind, off in _ENDED.items():
-
-        def tidies(token: Token, kind: str = kind, off: float = off) -> bool:
-            return token.kind == kind and token.value == off and (token.place >= end or not near.away(end, token))
-
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
         if kind in _STOPPED:  # what a tool change stops says nothing of the end
             ours = _effective(_without_habits(ours, theirs, lines, near), kind)
         more = sum(token.value == off for token in ours) > sum(token.value == off for token in theirs)
-        if more and not any(map(tidies, theirs)):
-            found = [token for token in found if not tidies(token)]
+        if more and not tidying(theirs, kind):
+            last = tidying(found, kind)
+            found = [token for token in found if not any(token is one for one in last)]
     return found
 
 

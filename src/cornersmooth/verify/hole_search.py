@@ -354,8 +354,11 @@ class HoleSearch:
         if self.kind[move] == Move.RAPID and len(rapid := same[~np.isin(same, self.feeds(same.tolist()))]):
             same = rapid
         first = int(same[0])
-        if cycle.feed_out and first == deepest + 1 and self.ahead.has(end) and self.stays(move, end):
-            return group, end, move  # the cycle's own way out, and then the CL file's to the same place
+        if self.ahead.has(end) and self.stays(move, end):
+            bored = cycle.feed_out and first == deepest + 1
+            fed = self.kind[move] != Move.RAPID and bool(self.feeds([end])) and not self.feeds([first])
+            if bored or fed:
+                return group, end, move  # the cycle's own way out, and then the CL file's to the same place
         keep = first if self.feeds([first]) else first + 1
         while not feeds and keep in same:  # where the tool stands it is still over a hole that is not drilled
             keep += 1
@@ -376,7 +379,7 @@ class HoleSearch:
         return first
 
     def _leads_away(self, move: int, element: int) -> int:
-        """First move from one on that leaves something in a text that goes on with an element: the tool may be there."""
+        """First move from one on that leads away from where the tool is, before an element."""
         while move < len(self.tip) and self.kind[move] != Move.HOLE and self.stays(move, element - 1):
             if self.has(move, element) and self.stays(move, element):
                 return move
