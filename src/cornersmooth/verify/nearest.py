@@ -16,8 +16,8 @@ Metric = Literal["both", "tip", "axis point"]
 #: columns of a row of both that count for each
 COLUMNS: Final[dict[Metric, slice]] = {"both": slice(0, 6), "tip": slice(0, 3), "axis point": slice(3, 6)}
 
-#: segments that the nearest place may be away from where it is looked for
-_MOST_STEPS = 200
+#: segments that the nearest place may be away from where it is looked for, and looked at together at first
+_MOST_STEPS, _AHEAD = 200, 2
 
 #: segments looked at on either side of a repeated pose
 _BEYOND_REPEATED = 4
@@ -115,22 +115,10 @@ def nearest_places(
     for begin in range(0, len(point), _BLOCK):
         part = slice(begin, begin + _BLOCK)
         own = point[part, columns]
-        whole = columns == slice(0, 6)
         best = square[part]
         for step in (0, *(sign * k for k in range(1, reach + 1) for sign in (-1, 1))):
             j = np.clip(middle[part] + step, low[part], high[part])
-            start, difference = vertices.take(j, axis=0), vertices.take(j + 1, axis=0)
-            if not whole:
-                start, difference = start[:, columns], difference[:, columns]
-            difference -= start
-            away = own - start
-            size = np.einsum("ij,ij->i", difference, difference)
-            t = np.einsum("ij,ij->i", away, difference)
-            np.divide(t, size, out=t, where=size > 0)
-            np.clip(t, 0.0, 1.0, out=t)
-            difference *= t[:, None]
-            away -= difference
-            d = np.einsum("ij,ij->i", away, away)
+            t, d = _on_segments(own, vertices, j, columns)
             if step == 0:
                 square[part], segment[part], fraction[part] = d, j, t
             else:
@@ -139,6 +127,22 @@ def nearest_places(
                 np.copyto(segment[part], j, where=nearer)
                 np.copyto(fraction[part], t, where=nearer)
     return segment, fraction, square
+
+
+def _on_segments(own: Floats, vertices: Floats, segment: Ints, columns: slice) -> tuple[Floats, Floats]:
+    """Fractions of the nearest places of (k, 6 or 3) points on a segment each, and the squared distances."""
+    start, difference = vertices.take(segment, axis=0), vertices.take(segment + 1, axis=0)
+    if columns != slice(0, 6):
+        start, difference = start[:, columns], difference[:, columns]
+    difference -= start
+    away = own - start
+    size = np.einsum("ij,ij->i", difference, difference)
+    t = np.einsum("ij,ij->i", away, difference)
+    np.divide(t, size, out=t, where=size > 0)
+    np.clip(t, 0.0, 1.0, out=t)
+    difference *= t[:, None]
+    away -= difference
+    return t, np.einsum("ij,ij->i", away, away)
 
 
 def nearest_from(point: Floats, path: Polyline, about: Floats, low: Ints, high: Ints) -> tuple[Ints, Floats, Floats]:
@@ -188,11 +192,23 @@ def climb(
 
     Blocks in rotary words may have become many short lines, and the nearest is then not next door.
     """
+    columns = COLUMNS[metric]
     moved = rows = np.flatnonzero(segment != middle)
-    for _ in range(_MOST_STEPS):
-        if not len(rows):
-            break
-        before = segment[rows]
-        segment[rows], at[rows] = nearest_segments(point[rows], vertices, before, 1, low[rows], high[rows], metric)
-        rows = rows[segment[rows] != before]
+    ahead, left = _AHEAD, _MOST_STEPS
+    while len(rows) and left:
+        ahead = min(ahead, left)
+        heading = np.sign(segment[rows] - middle[rows])
+        ways = segment[rows, None] + heading[:, None] * np.arange(ahead + 1)
+        j = np.clip(ways, low[rows, None], high[rows, None])
+        t, d = (
+            values.reshape(j.shape)
+            for values in _on_segments(np.repeat(point[rows, columns], ahead + 1, axis=0), vertices, j.ravel(), columns)
+        )
+        nearer = np.column_stack((d[:, 1:] < d[:, :-1], np.zeros(len(rows), np.bool_)))
+        steps = np.argmin(nearer, axis=1)
+        each = np.arange(len(rows))
+        segment[rows], at[rows] = j[each, steps], t[each, steps]
+        rows = rows[steps == ahead]
+        left -= ahead
+        ahead *= 2
     return moved
