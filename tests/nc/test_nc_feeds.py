@@ -95,3 +95,36 @@ def test_a_block_at_the_limit_may_be_slower_but_not_faster() -> None:
     assert first is not None
     spoilt = text.replace(first[0], " F9999.999", 1)
     assert {problem.code for problem in verify(slow, spoilt.encode(), **how).problems} == {"CS541"}
+
+
+DOWN = """UNITS/MM
+LOADTL/1
+SPINDL/2000,RPM,CLW
+RAPID
+GOTO/0,0,10,0,0.0995037,0.9950372
+FEDRAT/400,MMPM
+GOTO/5,0,0,0.2,0,0.9797959
+GOTO/9,0,0,0,0.3,0.9539392
+LOADTL/2
+GOTO/0,9,10,0,0.0995037,0.9950372
+GOTO/5,9,0,0.2,0,0.9797959
+FINI
+"""
+
+
+@pytest.mark.parametrize("control", ["fanuc", "siemens", "linuxcnc"])
+def test_a_feed_down_from_the_retract_is_no_matter_of_time(control: str) -> None:
+    program = read(DOWN.encode(), name="part.cls")
+    machine = load_machine("xyzac-trt")
+    form = choose_form(control, machine=machine, tcp=False)
+    text, _ = written(program, form, Settings(tolerance=0.04))
+    blocks = text.splitlines()
+    change = next(k for k, block in enumerate(blocks) if re.fullmatch("T2 ?(M6)?", block))
+    first = next(k for k in range(change, len(blocks)) if re.search(r"\bG1\b", blocks[k]))
+    assert blocks[first].endswith(" F400.")
+    assert blocks[first - 1] == "G94"
+    assert blocks[first + 1] == "G93"
+    # the time of the way from the pose before is nothing that this block may have
+    wrong = [*blocks[: first - 1], "G93", blocks[first].replace("F400.", "F348."), *blocks[first + 2 :], ""]
+    how = {"control": control, "machine": machine, "tcp": False, "tolerance": 0.04}
+    assert "CS542" in {problem.code for problem in verify(program, "\n".join(wrong).encode(), **how).problems}

@@ -426,6 +426,7 @@ class MotionWriter:
         if self.operation.retracted:
             self.operation.retracted = False
             yield from self._blocks(self._approaches(first, above or self.approach * bool(run.rapid[0])))
+            run = run if above else self._coming_down(run)
         self._warnings.of_tool(int(run.move[0]), self.statements.tool)
         if not run.rapid.all():
             self._warnings.of_cut(int(run.move[np.argmin(run.rapid)]), turning=bool(self.operation.spindle))
@@ -434,6 +435,14 @@ class MotionWriter:
         self._position = self._last = run.ticks[-1]
         self._last_writer, self.operation.halted = self.writer, False
         yield self.writer.text(run, dwell, self.operation.take_with_z())
+
+    def _coming_down(self, run: Run) -> Run:
+        """Give the first move behind a retract its feed in mm/min: a time counts the way from the pose before it."""
+        if run.mode[0] != INVERSE_TIME:
+            return run
+        feed, mode = run.feed.copy(), run.mode.copy()
+        feed[0], mode[0] = self.program.feed[run.move[0]], self.program.feed_mode[run.move[0]]
+        return replace(run, feed=feed, mode=mode)
 
     def _approaches(self, first: Ints, above: float) -> list[str]:
         """Blocks that bring the tool over its first position, and to where it comes down along its axis."""

@@ -226,7 +226,12 @@ def _problem(program: Program, nc: Elements, pose: Ints, element: Ints, low: Int
     unit = "rev" if program.feed_mode[move] == FeedMode.PER_REVOLUTION else "min"
     said = "rev" if nc.per_revolution[own] else "min"
     if np.isnan(nc.feed[own]):
-        return Problem("CS542", cl_line, nc_line, "a feed move before any F")
+        return Problem(
+            "CS542",
+            cl_line,
+            nc_line,
+            "a feed move before any F, or at inverse time (G93) from a place that is not known",
+        )
     if unit != said:
         return Problem("CS543", cl_line, nc_line, f"the feed is per {said}, the CL file says per {unit}")
     text = f"the feed is {nc.feed[own]:g} mm/{said}, the CL file says {program.feed[move]:g}"

@@ -194,7 +194,7 @@ class HoleSearch:
                     continue
                 if cycle.tap and self.feeds_above(hole, k + 1):
                     continue
-                if self.may_drill(hole, k + 1, cycle):
+                if cycle.tap or self.drills(hole, k + 1, cycle):
                     yield self.last_above(hole, k, cycle) + 1, True
                     return
                 doubtful = k + 1 if doubtful is None else doubtful
@@ -227,18 +227,16 @@ class HoleSearch:
         return fed is not None and bool(self.heights(move, np.array([fed]))[0] >= -self.room)
 
     def last_above(self, hole: int, element: int, cycle: Drilling) -> int:
-        """Last feed, from an element on, to the pose before a hole, if any, before the text drills it."""
+        """Last feed, from an element on, to the pose before a hole, if any, before the text goes into it.
+
+        What is fed to the pose of a hole of no depth may drill that.
+        """
         found = element
         while self.over(hole, element) and self.heights(hole, np.array([element]))[0] >= -self.room:
-            comes = self.kind[hole - 1] != Move.RAPID and bool(self.feeds([element]))
-            if comes and self.exact(hole - 1, np.array([element]))[0] and self.may_drill(hole, element + 1, cycle):
-                found = element
+            if self.kind[hole - 1] != Move.RAPID and self.feeds([element]) and not cycle.depth <= self.room:
+                found = element if self.exact(hole - 1, np.array([element]))[0] else found
             element += 1
         return found
-
-    def may_drill(self, move: int, element: int, cycle: Drilling) -> bool:
-        """Whether the text may drill a hole from an element on; taps are looked at elsewhere."""
-        return cycle.tap or self.drills(move, element, cycle)
 
     def drills(self, move: int, element: int, cycle: Drilling) -> bool:
         """Whether the text drills a hole from an element on: to its depth, no farther, at the cycle's feeds."""
