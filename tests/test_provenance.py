@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -23,10 +24,13 @@ def part(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("marks", [("(", ")"), ("; ", ""), ("12 ; ", "")])
 def test_what_is_written_is_read(marks: tuple[str, str]) -> None:
-    for made in (MADE, Provenance("0.1.0", 0.01, 10.0, "zhang2016", "fanuc", "g6.2", sha256="0123456789abcdef" * 4)):
+    sha256 = "0123456789abcdef" * 4
+    whole = replace(MADE, weights=None, planned_feeds=True, axis_tolerance=0.25, work_offset="G54.1_P3", sha256=sha256)
+    for made in (MADE, Provenance("0.1.0", 0.01, 10.0, "zhang2016", "fanuc", "g6.2", sha256=sha256), whole):
         text = "\n".join(marks[0] + line + marks[1] for line in made.lines())
 
         assert read_provenance(b"%\nO0001\n" + text.encode()) == made
+        assert all(len(line) <= 120 for line in made.lines())  # each stays one comment
 
 
 @pytest.mark.parametrize(

@@ -217,9 +217,13 @@ def postprocess(
         told = _stage(progress, "smoothing")
         smoothed = smooth(program, settings, form=form, progress=told, processes=processes)
     return_free_memory()  # before processes share what there is
-    provenance = _provenance(source, program, smoothed.settings, form)
-    provenance = replace(provenance, planned_feeds=plan_feeds is not None)
-    frame = replace(frame or Frame(), provenance=provenance.lines())
+    frame = frame or Frame()
+    provenance = replace(
+        _provenance(source, program, smoothed.settings, form),
+        planned_feeds=plan_feeds is not None,
+        work_offset=frame.named_offset(form.table),
+    )
+    frame = replace(frame, provenance=provenance.lines())
     with (
         open_output(target, hold=not unverified or require_verified, replace=may_replace) as output,
         ExitStack() as stack,

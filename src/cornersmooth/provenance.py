@@ -8,6 +8,9 @@ from dataclasses import dataclass
 #: how much of a text may hold its head
 HEAD = 1 << 13
 
+#: characters of a line that stays one comment
+_LONGEST = 120
+
 _WORDS = re.compile(r"CORNERSMOOTH (?P<version>\S+): (?P<words>[^\r\n)]*)", re.IGNORECASE)
 _HASH = re.compile(r"\bSHA256=([0-9a-f]{64})\b", re.IGNORECASE)
 
@@ -37,6 +40,8 @@ class Provenance:
         Whether feeds are those of a plan, at most the programmed ones.
     axis_tolerance : float or None, degrees
         What the tool axis may be off, in place of ε at the axis point.
+    work_offset : str
+        With ``_`` for blanks; ``"none"`` where the text says none, empty for that of the control's own table.
     """
 
     version: str
@@ -52,6 +57,7 @@ class Provenance:
     weights: tuple[float, ...] | None = (1.0,)
     planned_feeds: bool = False
     axis_tolerance: float | None = None
+    work_offset: str = ""
 
     def lines(self) -> tuple[str, ...]:
         """Texts of the comments."""
@@ -66,10 +72,16 @@ class Provenance:
             **({} if self.tcp else {"TCP": "no"}),
             **({"WEIGHTS": self._weights_word} if self._weights_word else {}),
             **({"FEEDS": "plan"} if self.planned_feeds else {}),
+            **({"OFFSET": self.work_offset} if self.work_offset else {}),
         }
-        first = f"CORNERSMOOTH {self.version}: " + " ".join(f"{key}={_word(value)}" for key, value in words.items())
-        second = " ".join(([f"SHA256={self.sha256}"] if self.sha256 else []) + [f"CL={self.source}"])
-        return first, second
+        mark = f"CORNERSMOOTH {self.version}:"
+        lines = [mark]
+        for word in (f"{key}={_word(value)}" for key, value in words.items()):
+            if len(f"{lines[-1]} {word}") > _LONGEST and lines[-1] != mark:
+                lines.append(mark)
+            lines[-1] += f" {word}"
+        lines.append(" ".join(([f"SHA256={self.sha256}"] if self.sha256 else []) + [f"CL={self.source}"]))
+        return tuple(lines)
 
     @property
     def _weights_word(self) -> str:
@@ -92,7 +104,10 @@ def read_provenance(text: bytes) -> Provenance | None:
     found = _WORDS.search(head)
     if found is None:
         return None
-    words = dict(word.partition("=")[::2] for word in found["words"].split())
+    words: dict[str, str] = {}
+    for line in _WORDS.finditer(head):  # a long one is several comments
+        if line["version"] == found["version"]:
+            words = dict(word.partition("=")[::2] for word in line["words"].split()) | words
     digest = _HASH.search(head, found.end())
     try:
         return Provenance(
@@ -108,6 +123,7 @@ def read_provenance(text: bytes) -> Provenance | None:
             weights=_weights(words.get("WEIGHTS", "1")),
             planned_feeds=words.get("FEEDS") == "plan",
             axis_tolerance=float(words["AXIS"]) if "AXIS" in words else None,
+            work_offset=words.get("OFFSET", ""),
         )
     except (KeyError, ValueError):
         return None

@@ -13,7 +13,8 @@ import numpy as np
 from cornersmooth.errors import OutputError, SettingsError
 from cornersmooth.model import Program
 from cornersmooth.nc.comments import comment_lines
-from cornersmooth.nc.control import Blocks, TextStyle
+from cornersmooth.nc.control import Blocks, Control, TextStyle
+from cornersmooth.nc.control_tables import control_names, load_control
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.program_table import ProgramTable
 from cornersmooth.settings import Settings
@@ -137,6 +138,12 @@ class Frame:
             "header": (*self._told(form.table.layout), *_filled(self.header, values)),
             "footer": tuple(_filled(self.footer, values)),
         }
+
+    def named_offset(self, table: Control) -> str:
+        """Work offset for the head of a text; empty for that of the table that the control's is like."""
+        offset = table.program.work_offset if self.work_offset is None else self.work_offset
+        usual = load_control(table.dialect).program.work_offset if table.dialect in control_names() else ""
+        return "" if offset == usual else offset.replace(" ", "_") or "none"
 
     def _told(self, layout: TextStyle) -> Blocks:
         """Comments that say what the text is made of."""

@@ -29,6 +29,11 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     may come as late as in the block that first moves Z. ``ends``: it must be switched off before the tool is changed.
     ``outside``: it may not be said while a word that ``ends`` holds. ``drops``: a state that the control forgets with
     it, and that must be said behind it. ``moves``: the tool moves, though the block names no axis.
+
+    In texts of our own (`own_frame`): ``first``: it must be said before the first retract (``"first"``), or before the
+    first motion of a text that uses its state (``"used"``). ``tidy``: it must be switched off before another tool and
+    at the end. ``turned``: the rotary axes must stand as the next motion has them. ``preset``: the one that is meant
+    where the head names none.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.
@@ -79,6 +84,10 @@ class WordRule:
     outside: bool = False
     drops: str = ""
     moves: bool = False
+    first: str = ""
+    tidy: bool = False
+    turned: bool = False
+    preset: str = ""
 
 
 @dataclass(frozen=True)

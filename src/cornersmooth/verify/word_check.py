@@ -14,6 +14,7 @@ from cornersmooth.nc_reader.block_texts import any_numbers, numbers_in, said, sh
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.machine_positions import MachinePositions
+from cornersmooth.nc_reader.own_frame import OwnFrame, shadowed
 from cornersmooth.nc_reader.word_list import WordList, WordRule, word_list
 from cornersmooth.nc_reader.word_rules import NOT_LISTED, WordRules
 from cornersmooth.nc_reader.words import Line, Table
@@ -40,6 +41,11 @@ _TOOL_CALL: Final = re.compile(r"TOOL CALL \d")
 _SPINDLE: Final = re.compile(r"M[345]")
 
 _CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
+
+
+def _row_words(table: Table, row: int) -> dict[str, float]:
+    """Words of axes in a row of motion blocks."""
+    return {name: float(column[row]) for name, column in table.columns.items() if not np.isnan(column[row])}
 
 
 class WordCheck:
@@ -81,6 +87,8 @@ class WordCheck:
         plain = [block for block in trusted if "{" not in block]
         self._own = {text_of(words) for words in map(self._words_of, plain) if words}
         templates = [(self._words_of(numbers_in(block))) for block in set(trusted) - set(plain)]
+        #: what texts of our own say beyond that
+        self._frame = OwnFrame(self.list, self._left, at_home=bool(self._positions.rules))
         self._own_patterns = [any_numbers(text_of(words)) for words in templates if words]
         self._blocks = 0
         self._begun = 0
@@ -145,6 +153,10 @@ class WordCheck:
         else:
             self._wrong(code, line, text)
 
+    def _unframe(self, line: int, texts: Iterable[str]) -> None:
+        for text in texts:
+            self._unframed(NOT_LISTED, line, text)
+
     def _table(self, table: Table) -> None:
         """Look at a run of motion blocks: its words are those of motion, and no others."""
         self._start(int(table.line[0]), "")
@@ -166,6 +178,7 @@ class WordCheck:
             rows = [row, row + int(np.argmax(down[row:]))] if self._above and not down[row] and down.any() else [row]
             for row in rows:
                 given = known[known <= row]
+                self._unframe(int(table.line[row]), self._frame.moved(_row_words(table, row)))
                 self._moved(
                     int(table.line[row]), float(codes[given[-1]]) if len(given) else self._code, bool(down[row])
                 )
@@ -175,10 +188,12 @@ class WordCheck:
             values = table.columns[name][~np.isnan(table.columns[name])]
             if len(values):
                 self._angles[name] = float(values[-1])
+        self._frame.angles(self._angles)
 
     def _block(self, line: Line) -> Line:
         """Look at a line on its own; of one that is taken on trust only what is understood goes on to the reader."""
         for comment in line.comments:
+            self._frame.comment(comment)
             if self.list.orders is not None and self.list.orders.match(comment):
                 self._wrong(NOT_LISTED, line.number, f"a comment that the control obeys: {comment[:40]}")
             if _CONTROL_CHARACTERS.search(comment):
@@ -212,6 +227,8 @@ class WordCheck:
         self.problems += self._rules.problems(line, words, rules)
         self._places(line.number, words, rules, before)
         self._states(line.number, words, rules)
+        changes_tool = any(rule is not None and rule.high and rule.compared for rule in rules)
+        self._unframe(line.number, self._frame.block(words, rules, changes_tool=changes_tool))
 
     def _users_block(self, line: Line, words: list[str], text: str) -> Line:
         """Look at a block that the user wants where it stands.
@@ -238,12 +255,15 @@ class WordCheck:
     def _note(self, line: Line, words: list[str]) -> None:
         """Keep the motion of a block on its own."""
         self._angles |= {word.name: word.value for word in line.words if word.name in _ROTARY}
+        self._frame.angles(self._angles)
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
         rules = self._rules.of(words, text_of(words))
         if any(rule is not None and rule.moves for rule in rules):
             self._moved(line.number, 1.0, True)
         elif not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
+            if not any(rule is not None and rule.cycle for rule in rules):
+                self._unframe(line.number, self._frame.moved({word.name: word.value for word in line.words}))
             self._moved(line.number, self._code, any(word.name == "Z" for word in line.words))
 
     # the frame of the program
@@ -288,11 +308,9 @@ class WordCheck:
             word, _ = self._state[state]
             if not self._is_off(state, word):
                 self._unframed(NOT_ESTABLISHED, last, f"{state}: {word} still holds at the end")
-        if not self._high and any(rule.high for rule in self.list.words if not self._shadowed(rule)):
+        if not self._high and any(rule.high for rule in self.list.words if not shadowed(self.list, rule)):
             self._unframed(NOT_ESTABLISHED, last, "the tool is not retracted at the end")
-
-    def _shadowed(self, rule: WordRule) -> bool:
-        return any(self.list.shadows(other, rule) for other in self.list.words)
+        self._unframe(last, self._frame.end())
 
     def _is_off(self, state: str, word: str) -> bool:
         return any(rule.state == state and rule.off and rule.pattern.fullmatch(word) for rule in self.list.words)

@@ -1,0 +1,156 @@
+"""What a text of our own promises around the motion, beyond what every text must say.
+
+Posts have many ways to begin, to change tools and to end, and most of them are right. A text that says in its head how
+it was made goes the way of the control's table: what is missing there has been lost since.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Set
+from typing import Final
+
+from cornersmooth.nc_reader.block_texts import shown, text_of
+from cornersmooth.nc_reader.word_list import WordList, WordRule
+
+#: state of the words that choose the zero of the part
+WORK_OFFSET: Final = "work offset"
+
+#: comments that say how a text was made, and the work offset in them
+_MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
+_OFFSET: Final = re.compile(r"\bOFFSET=([\w.]+)", re.IGNORECASE)
+
+#: words beside which Z may not come down from a retract, and the rotary axes among them
+_ASIDE: Final = frozenset("XYABC")
+_ROTARY: Final = frozenset("ABC")
+
+#: words of a second point on the axis, with which nothing can be said of a place high up
+_POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
+
+#: printed digits by which angles may differ, degrees
+_SAME: Final = 1e-5
+
+
+class OwnFrame:
+    """Follows the blocks around the motion of one text.
+
+    Nothing is asked for until a comment says how the text was made, and where the control has no retract.
+
+    Parameters
+    ----------
+    listed : WordList
+    trusted : set of str
+        States and kinds of words that are the user's own.
+    at_home : bool
+        Whether the machine's file says where the program ends.
+    """
+
+    def __init__(self, listed: WordList, trusted: Set[str], *, at_home: bool) -> None:
+        self._list, self._trusted, self._at_home = listed, trusted, at_home
+        self._ours = False
+        self._offset = ""  # that the head names
+        self._retracts = any(rule.high and not shadowed(listed, rule) for rule in listed.words)
+        self._state: dict[str, tuple[str, WordRule]] = {}
+        self._said: set[int] = set()  # rules of words so far, by identity
+        self._used: set[str] = set()  # states that something has been switched on in
+        self._angles: dict[str, float] = {}
+        self._turned: dict[str, float] | None = None  # angles at which tip control came on, until the tool moves
+        self._lost: list[str] | None = None  # what was missing before the first retract; the head is read behind it
+        self._high = self._moved = False
+
+    def comment(self, text: str) -> None:
+        """Take note of how the text was made, if a comment says so."""
+        if not self._moved and _MADE.match(text):
+            self._ours = True
+            offset = _OFFSET.search(text)
+            self._offset = offset[1] if offset and not self._offset else self._offset
+
+    @property
+    def _asked(self) -> bool:
+        return self._ours and self._retracts
+
+    def block(self, words: list[str], rules: list[WordRule | None], *, changes_tool: bool) -> Iterator[str]:
+        """Take over what a block says; give what should have been said before it."""
+        if len(rules) != len(words):
+            words, rules = [text_of(words)], rules[:1]
+        for word, rule in zip(words, rules, strict=True):
+            if rule is None:
+                continue
+            self._said.add(id(rule))
+            if rule.state:
+                beside = [
+                    other
+                    for other, theirs in zip(words, rules, strict=True)
+                    if theirs and theirs.needs and theirs.needs.fullmatch(word) and not theirs.compared
+                ]
+                self._state[rule.state] = (" ".join([word, *beside]), rule)
+                if not (rule.first or rule.off):
+                    self._used.add(rule.state)
+            if rule.turned:
+                self._turned = dict(self._angles)
+            if rule.retract:
+                if self._lost is None:
+                    self._lost = list(self._unsaid("first", word))
+                self._high = True
+        if changes_tool and self._asked:
+            yield from (f"{text_of(words)} under {word}" for word in self._running())
+
+    def _unsaid(self, when: str, word: str) -> Iterator[str]:
+        """Words of the head that have not been said before a retract (``"first"``), or that a later word needs."""
+        for rule in self._list.words:
+            wanted = rule.first == when and (when == "first" or rule.state in self._used)
+            if wanted and id(rule) not in self._said and not shadowed(self._list, rule):
+                yield f"{shown(rule.pattern)} must be said before {word}"
+
+    def _running(self) -> list[str]:
+        """Words in force that are switched off behind the last motion of a tool."""
+        held = [(state, *said) for state, said in self._state.items() if state not in self._trusted]
+        return [word for _, word, rule in held if rule.tidy]
+
+    def angles(self, angles: Mapping[str, float]) -> None:
+        """Take note of where the rotary axes are, as far as that is said."""
+        self._angles = dict(angles)
+
+    def moved(self, words: Mapping[str, float]) -> Iterator[str]:
+        """Look at the words of a motion, the first behind a retract or behind words that are no motion."""
+        high, self._high = self._high, False
+        turned, self._turned = self._turned, None
+        first, self._moved = not self._moved, True
+        if not self._asked:
+            return
+        if high and "Z" in words and words.keys() & _ASIDE and not words.keys() & _POINT:
+            yield "the tool comes down from a retract before it is over its place"
+        rotary = sorted(_ROTARY & words.keys()) if turned is not None else []
+        off = [name for name in rotary if not abs((turned or {}).get(name, math.nan) - words[name]) <= _SAME]
+        if off:
+            yield f"tool tip control comes on before {' and '.join(off)} stands where the next motion has it"
+        if first:
+            yield from self._lost or ()
+            yield from self._wrong_offset()
+
+    def _wrong_offset(self) -> Iterator[str]:
+        """What is wrong with the work offset, one for the whole text."""
+        if WORK_OFFSET not in self._state or WORK_OFFSET in self._trusted or self._offset == "none":
+            return
+        word, rule = self._state[WORK_OFFSET]
+        match = rule.pattern.fullmatch(word)
+        said = match[1] if match and match.re.groups else word
+        wanted = self._offset or rule.preset
+        if wanted and said.replace(" ", "_") != wanted:
+            yield f"{word}, where the text was made for {wanted.replace('_', ' ')}"
+
+    def end(self) -> Iterator[str]:
+        """Look at what holds where the program ends."""
+        if not self._asked or not self._moved:
+            return
+        yield from self._unsaid("used", "the first motion")
+        yield from (f"{word} still holds at the end" for word in self._running())
+        away = [name for name in sorted(self._angles) if abs(self._angles[name]) > _SAME]
+        if away and not self._at_home:
+            yield f"{' and '.join(away)} not at zero at the end"
+
+
+def shadowed(listed: WordList, rule: WordRule) -> bool:
+    """Whether another rule for the same words stands before one."""
+    return any(listed.shadows(other, rule) for other in listed.words)

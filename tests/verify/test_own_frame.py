@@ -1,0 +1,114 @@
+"""What a text of our own promises around the motion: each of its blocks that is lost or changed is found."""
+
+import io
+import re
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+
+from cornersmooth import read, verify
+from cornersmooth.kinematics import load_machine
+from cornersmooth.nc import Frame, choose_form, load_control
+from cornersmooth.pipeline import postprocess
+from cornersmooth.settings import Settings
+from oracle.files import SAMPLES
+
+MACHINES = {
+    "fanuc": "table-ac",
+    "mitsubishi": "table-ac",
+    "haas": "table-bc",
+    "siemens": "table-ac",
+    "heidenhain": "table-ac",
+    "linuxcnc": "xyzac-trt",
+}
+
+#: a block, what becomes of it, and what is said
+_MUTANTS: dict[str, tuple[str, Callable[[str], str] | None, str]] = {
+    "spindle on at a tool change": (r"M5", None, "M3"),
+    "coolant on at a tool change": (r"M9", None, "M[78]"),
+    "another work offset": (
+        r"G54|CYCL DEF 247.*",
+        lambda block: block.replace("G54", "G55").replace("+1", "+2"),
+        "where the text was made for|holds for the whole program",
+    ),
+    "axes not turned": (
+        r"(G0|L) [AB]\S+ C\S+( FMAX)?",
+        None,
+        "comes on before|not at zero at the end|without the rotary axes at zero",
+    ),
+    "not over the place": (r"(G0|L) X\S+ Y\S+ [AB]\S+ C\S+( FMAX)?", None, "before it is over its place"),
+    "transformation of the program before": (r"TRAFOOF", None, "TRAFOOF must be said before SUPA|TRAORI"),
+    "tilted plane of the program before": (r"PLANE RESET STAY", None, "PLANE RESET STAY must be said before"),
+    "length on at a tool change": (r"G49", None, "G43|G234"),
+}
+
+_FOUND_IN = {
+    "transformation of the program before": {"siemens"},
+    "tilted plane of the program before": {"heidenhain"},
+    "length on at a tool change": {"fanuc", "mitsubishi", "haas", "linuxcnc"},
+}
+
+
+def _how(control: str) -> dict[str, object]:
+    return {"control": control, "machine": load_machine(MACHINES[control]), "tolerance": 0.01, "axis_length": 10.0}
+
+
+@cache
+def _program():
+    return read((SAMPLES / "two_tools.cls").read_bytes(), name="two_tools.cls")
+
+
+@cache
+def _text(control: str, offset: str | None = None) -> str:
+    settings = Settings(tolerance=0.01, axis_length=10.0)
+    form = choose_form(load_control(control), None, machine=load_machine(MACHINES[control]))
+    stream = io.BytesIO()
+    postprocess(_program(), stream, settings, form=form, frame=Frame(work_offset=offset))
+    return stream.getvalue().decode("ascii")
+
+
+def _problems(control: str, lines: list[str]) -> list[str]:
+    found = verify(_program(), ("\n".join(lines) + "\n").encode(), **_how(control))
+    return [problem.text for problem in found.problems]
+
+
+@pytest.mark.parametrize(
+    ("control", "mutant"),
+    [(control, name) for control in MACHINES for name in _MUTANTS if control in _FOUND_IN.get(name, {control})],
+)
+def test_a_block_of_the_frame_that_is_lost_or_changed_is_found(control: str, mutant: str) -> None:
+    pattern, changed, said = _MUTANTS[mutant]
+    lines = _text(control).splitlines()
+    places = [k for k, line in enumerate(lines) if re.fullmatch(rf"(\d+ )?({pattern})", line)]
+    assert places
+    for k in places:
+        block = [changed(lines[k])] if changed else []
+        problems = _problems(control, [*lines[:k], *block, *lines[k + 1 :]])
+        assert any(re.search(said, text) for text in problems), (lines[k], problems)
+
+
+@pytest.mark.parametrize("control", MACHINES)
+def test_a_text_with_another_work_offset_says_so(control: str) -> None:
+    offset = "2" if control == "heidenhain" else "G55"
+    text = _text(control, offset)
+    assert f"OFFSET={offset}" in text
+    lines = text.splitlines()
+    assert not _problems(control, lines)
+    back = [line.replace("Q339=+2", "Q339=+1") if "Q339" in line else re.sub(r"^G55$", "G54", line) for line in lines]
+    assert any(f"was made for {offset}" in problem for problem in _problems(control, back))
+
+
+@pytest.mark.parametrize("control", MACHINES)
+def test_texts_that_do_not_say_how_they_were_made_have_their_own_habits(control: str) -> None:
+    lines = [line for line in _text(control).splitlines() if "CORNERSMOOTH 0" not in line]
+    kept = [line for line in lines if not re.fullmatch(r"(\d+ )?M[59]", line)]
+    assert len(kept) < len(lines)
+    assert not any("under M" in problem or "M3 still holds" in problem for problem in _problems(control, kept))
+
+
+def test_a_second_shorter_way_and_a_second_offset_are_harmless() -> None:
+    for control, block in (("heidenhain", "M126"), ("fanuc", "G54"), ("haas", "G54"), ("linuxcnc", "G54")):
+        lines = _text(control).splitlines()
+        second = [k for k, line in enumerate(lines) if re.fullmatch(rf"(\d+ )?{block}", line)][1]
+        assert not _problems(control, [*lines[:second], *lines[second + 1 :]])
