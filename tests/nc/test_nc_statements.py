@@ -241,6 +241,33 @@ def test_what_a_tool_change_stops_goes_on_behind_it() -> None:
     assert codes(written) == {"CS331": 1}
 
 
+def test_what_is_switched_on_ahead_of_the_tool_waits_for_it() -> None:
+    cl = (
+        "UNITS/MM\n{}COOLNT/ON\n{}LOADTL/2\nRAPID\nGOTO/0,0,9\nFEDRAT/100,MMPM\nGOTO/0,0,0\n"
+        "COOLNT/OFF\nCOOLNT/MIST\nLOADTL/3\nRAPID\nGOTO/0,0,9\nGOTO/0,0,0\nFINI\n"
+    )
+    lines, written = text_of_cl(cl.format("SPINDL/500,RPM,CLW\n", ""))
+    change = lines.index("T2 M6")
+    assert not {"M8", "M9", "S500 M3", "M5"} & set(lines[:change])
+    assert lines[change + 1 : change + 3] == ["S500 M3", "M8"]
+    assert [line for line in lines if line in ("M7", "M8", "M9", "M5")] == ["M8", "M9", "M5", "M7", "M9", "M5"]
+    assert codes(written) == {"CS331": 1}
+    lines, _ = text_of_cl(cl.format("", "STOP\n"))  # the operator may look at it
+    assert lines.index("M8") < lines.index("M0") < lines.index("T2 M6")
+
+
+def test_a_length_register_is_no_tool() -> None:
+    cl = "UNITS/MM\nLOADTL/{}\nSPINDL/500,CLW\nRAPID\nGOTO/0,0,9\nFEDRAT/100,MMPM\nGOTO/0,0,0\n{}GOTO/9,0,0\nFINI\n"
+    lines, written = text_of_cl(cl.format("2,ADJUST,12", "LOADTL/ADJUST,3\n"))
+    assert [line for line in lines if "T" in line and "(" not in line] == ["T2 M6"]
+    assert "(LOADTL/ADJUST,3)" in lines
+    assert codes(written) == {"CS310": 1}
+    for said in ("T2,ADJUST,12", "ADJUST,12,2"):
+        lines, _ = text_of_cl(cl.format(said, ""))
+        assert "T2 M6" in lines
+        assert any("H12" in line for line in lines)
+
+
 def test_fragments_say_what_is_missing() -> None:
     """No tool, no spindle, a first move at feed: each is counted."""
     _, written = text_of_cl("UNITS/MM\nFEDRAT/100,MMPM\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")

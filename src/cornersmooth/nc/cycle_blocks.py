@@ -23,21 +23,30 @@ from cornersmooth.text import format_number
 #: words that load a tool
 TOOL_WORDS: Final = frozenset({"LOADTL", "LOAD", "TURRET"})
 
+#: words at which the program waits for time or the operator
+_WAITING: Final = frozenset({"STOP", "OPSTOP", "DELAY"})
+
 #: by how much a tool axis along Z may be off, and a position at angles of zero, mm
 _ALONG_Z, _SAME_PLACE = 1e-9, 1e-9
 
 
 def loaded_tool(statement: Statement) -> tuple[int, int] | None:
-    """Tool and length register of LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]; None where it loads none."""
+    """Tool and length register of LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]; None where it loads none.
+
+    A register alone, as in LOADTL/ADJUST,3, names no tool.
+    """
     words, numbers = words_of(statement), numbers_of(statement)
     if statement.word == "LOAD" and words[:1] != ["TOOL"]:
         return None
+    registers = [value for word in ("ADJUST", "OSETNO") for value in number_after(statement, word)]
+    for register in registers:
+        numbers.remove(register)
     if not numbers and statement.word == "LOADTL" and words and words[0][:1] == "T" and words[0][1:].isdigit():
         numbers = [float(words[0][1:])]
     number = whole_number(numbers[:1])
     if number is None:
         return None
-    offset = whole_number(number_after(statement, "ADJUST") or number_after(statement, "OSETNO"))
+    offset = whole_number(registers[:1])
     return number, number if offset is None else offset
 
 
@@ -107,6 +116,25 @@ def tool_loads(program: Program) -> list[tuple[int, tuple[int, int]]]:
     words = TOOL_WORDS if TOOL_WORDS & {statement.word for statement in program.statements} else {"TOOLNO"}
     loads = [(statement.pose, loaded_tool(statement)) for statement in program.statements if statement.word in words]
     return [(pose, tool) for pose, tool in loads if tool is not None]
+
+
+def before_a_tool(program: Program) -> frozenset[int]:
+    """Statements behind which a tool is changed before it moves or the program waits, by identity."""
+    changes, tool = set(), None
+    for statement in program.statements:
+        loaded = loaded_tool(statement) if statement.word in TOOL_WORDS else None
+        if loaded is not None and loaded != tool:
+            changes.add(id(statement))
+            tool = loaded
+    found, pose = set(), -1
+    for statement in reversed(program.statements):
+        if id(statement) in changes:
+            pose = statement.pose
+        elif statement.word in _WAITING:
+            pose = -1
+        elif statement.pose == pose:
+            found.add(id(statement))
+    return frozenset(found)
 
 
 def tool_starts(program: Program) -> list[int]:

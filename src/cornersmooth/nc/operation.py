@@ -186,6 +186,11 @@ class Operation:
         self.spindle = blocks
         self._stopped.pop("spindle", None)
 
+    def later(self, what: str, blocks: Blocks) -> list[str]:
+        """Let blocks that turn the spindle, or let the coolant flow, wait for a tool change ahead of any motion."""
+        self._stopped[what] = blocks
+        return []
+
     def cool(self, blocks: Blocks) -> None:
         """Take note of the blocks that let the coolant flow, or of none where it stops."""
         self.coolant = blocks

@@ -68,11 +68,13 @@ class Asking:
         """Change the tool; ADJUST or OSETNO names another length register."""
         if statement.word == "LOAD" and words[:1] != ["TOOL"]:
             return
+        registers = [_behind(statement, word) for word in ("ADJUST", "OSETNO")]
+        for register in filter(None, registers):  # no tool by itself
+            numbers.remove(register)
         if not numbers and words and words[0][:1] == "T" and words[0][1:].isdigit():
             numbers = [float(words[0][1:])]
         if not numbers or not _whole(numbers[0]):
             return
-        registers = [_behind(statement, word) for word in ("ADJUST", "OSETNO")]
         offset = next((number for number in registers if number is not None), numbers[0])
         self.tool, self.offset = numbers[0], offset if _whole(offset) else numbers[0]
         self.say("tool", self.tool)
