@@ -24,6 +24,7 @@ from oracle.command import (
     quiet,
     run,
     run_process,
+    run_script,
     seen_on_a_terminal,
 )
 from oracle.nc_text import Line, parse
@@ -190,7 +191,7 @@ def test_smoothing_alone_waits_for_no_planner(small: Path, tmp_path: Path) -> No
 
 
 def test_version() -> None:
-    result = run_process("--version")
+    result = run_script("--version")
     assert result.returncode == DONE
     assert re.fullmatch(rb"cornersmooth,? (?:version )?\d+\.\d+\.\d+\S*\n", result.stdout)
 
@@ -242,7 +243,7 @@ def test_errors_of_usage_are_one_line(small: Path) -> None:
 
 
 def test_unknown_command_is_two() -> None:
-    assert run_process("polish").returncode == USAGE
+    assert run_script("polish").returncode == USAGE
 
 
 def test_an_option_that_looks_like_a_tolerance_below_the_digits(small: Path) -> None:

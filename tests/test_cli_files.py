@@ -24,12 +24,12 @@ from oracle.command import (
     PATIENCE,
     SMALL,
     USAGE,
-    command,
     message,
     only,
     quiet,
     run,
     run_process,
+    run_script,
     started,
     wait_for,
 )
@@ -77,9 +77,7 @@ def test_out_is_never_in(small: Path, tmp_path: Path, how: str) -> None:
 
 def test_out_is_never_the_file_behind_standard_input(small: Path) -> None:
     with small.open("rb") as stream:
-        result = subprocess.run(
-            command("smooth", "-", "-o", small, "--force"), stdin=stream, capture_output=True, check=False
-        )
+        result = run_process("smooth", "-", "-o", small, "--force", stdin=stream)
     assert small.read_bytes() == SMALL
     assert result.returncode in (USAGE, BAD_OUTPUT)
 
@@ -96,7 +94,7 @@ def test_names_that_are_no_text(small: Path, tmp_path: Path) -> None:
 def test_closed_streams(small: Path, tmp_path: Path, closed: int) -> None:
     """Without standard error the work is done in silence; without standard output there is nowhere to write to."""
     options = ["-o", str(tmp_path / "o.nc")] if closed == 2 else []
-    result = run_process("smooth", small, *options, prepare=lambda: os.close(closed))
+    result = run_script("smooth", small, *options, prepare=lambda: os.close(closed))
     assert result.returncode == (BAD_OUTPUT if closed == 1 else DONE)
     assert quiet(result.stderr)
 
@@ -151,12 +149,21 @@ def test_a_device_is_not_replaced_by_a_file(small: Path, tmp_path: Path) -> None
         assert quiet(result.stderr)
 
 
-def test_full_disk_on_standard_output(small: Path) -> None:
+@pytest.mark.parametrize("words", [("smooth",), ("info",), ("controls",)])
+def test_full_disk_on_standard_output(small: Path, words: tuple[str, ...]) -> None:
+    """Whether the text is written at once or left to the end of the process."""
     with open("/dev/full", "wb") as full:
-        result = subprocess.run(command("smooth", small), stdout=full, stderr=subprocess.PIPE, check=False)
+        result = run_process(*words, *([small] if words != ("controls",) else []), stdout=full)
     assert result.returncode == BAD_OUTPUT
     assert quiet(result.stderr)
-    message(result.stderr)
+    assert "no space left" in message(result.stderr)
+
+
+def test_full_disk_on_standard_error(small: Path, tmp_path: Path) -> None:
+    """Nothing can be said, but for the exit code."""
+    with open("/dev/full", "wb") as full:
+        assert run_process("polish", stderr=full).returncode == USAGE
+        assert run_process("smooth", small, "-o", tmp_path / "o.nc", stderr=full).returncode == BAD_OUTPUT
 
 
 @pytest.mark.parametrize("old", [None, b"old program\n"])

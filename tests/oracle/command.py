@@ -10,8 +10,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+import traceback
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import IO, Any
 from unittest.mock import patch
 
 import pytest
@@ -83,19 +85,80 @@ def _written(stream: io.TextIOWrapper) -> bytes:
     return buffer.getvalue()
 
 
-def run_process(
-    *args: str | Path, data: bytes = b"", prepare: Callable[[], None] | None = None
-) -> subprocess.CompletedProcess[bytes]:
-    """Run the installed command to its end in a process of its own."""
+def run_script(*args: str | Path, prepare: Callable[[], None] | None = None) -> subprocess.CompletedProcess[bytes]:
+    """Run the installed script to its end: for tests about how Python starts."""
     return subprocess.run(
         command(*args),
-        input=data,
+        input=b"",
         capture_output=True,
         env=environment(),
         timeout=PATIENCE,
         preexec_fn=prepare,
         check=False,
     )
+
+
+def run_process(
+    *args: str | Path, data: bytes | None = None, prepare: Callable[[], None] = lambda: None, **streams: IO[bytes]
+) -> subprocess.CompletedProcess[bytes]:
+    """Run the command to its end in a process of its own; streams that are not given are pipes."""
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    with forked(*args, prepare=prepare, **(pipes | streams)) as process:
+        out, said = process.communicate(data, PATIENCE)
+    return subprocess.CompletedProcess(process.args, process.returncode, out, said)
+
+
+def forked(
+    *args: str | Path,
+    prepare: Callable[[], None] = lambda: None,
+    changes: Mapping[str, str] | None = None,
+    **options: Any,
+) -> subprocess.Popen[bytes]:
+    """A process of the command that is a copy of this one: Python and its arrays are loaded already.
+
+    Streams, session and signals are those of a process that is started. What is called before a process would load its
+    program is the command, and ends it.
+    """
+    words = [str(word) for word in args]
+    around = environment(**changes or {})
+
+    def work() -> None:
+        code = 1
+        try:
+            prepare()
+            code = _command_line(words, around)
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(code)
+
+    return subprocess.Popen([SCRIPT, *words], preexec_fn=work, restore_signals=False, **options)
+
+
+def _command_line(words: list[str], around: dict[str, str]) -> int:
+    """Be a process that has just been started."""
+    from cornersmooth import cli
+
+    os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # Popen waits for its own of these
+    os.environ.clear()
+    os.environ.update(around)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
+    sys.argv = ["cornersmooth", *words]
+    sys.stdin, sys.stdout, sys.stderr = (
+        os.fdopen(number, mode, line, encoding="utf-8", errors=errors, closefd=False)
+        for number, mode, line, errors in (
+            (0, "r", -1, "strict"),
+            (1, "w", -1, "strict"),
+            (2, "w", 1, "backslashreplace"),
+        )
+    )
+    try:
+        cli.main()
+    except SystemExit as leaving:
+        sys.stdout.flush()
+        return leaving.code if isinstance(leaving.code, int) else 1
 
 
 def _interruptible() -> None:
@@ -106,14 +169,9 @@ def _interruptible() -> None:
 @contextlib.contextmanager
 def started(*args: str | Path, session: bool = False) -> Iterator[subprocess.Popen[bytes]]:
     """A process of the command with its streams in pipes; it is gone when the block ends."""
-    with subprocess.Popen(
-        command(*args),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env=environment(),
-        start_new_session=session,
-        preexec_fn=_interruptible,
+    pipe = subprocess.PIPE
+    with forked(
+        *args, prepare=_interruptible, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=session
     ) as process:
         try:
             yield process
@@ -124,12 +182,12 @@ def started(*args: str | Path, session: bool = False) -> Iterator[subprocess.Pop
 def seen_on_a_terminal(*args: str | Path, out: bool = True, **changes: str) -> bytes:
     """What a terminal shows of a run that ends well: standard error and, unless `out` is false, standard output."""
     leader, follower = pty.openpty()
-    process = subprocess.Popen(
-        command(*args),
+    process = forked(
+        *args,
+        changes=changes,
         stdin=subprocess.DEVNULL,
         stdout=follower if out else subprocess.DEVNULL,
         stderr=follower,
-        env=environment(**changes),
     )
     os.close(follower)
     seen = b""

@@ -23,7 +23,7 @@ def main() -> NoReturn:
 
     if sys.stderr is None:  # closed by the caller; what is said to it must not end up in the NC text
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115
-    sys.exit(group.run(None, ending))
+    sys.exit(group.flushed(group.run(None, ending)))
 
 
 def run(args: list[str]) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
 import sys
 from importlib import import_module
@@ -27,6 +29,9 @@ COMMANDS = {
 }
 
 EXIT_INTERRUPTED = 130
+
+#: what the system says where a disk, a share of it or a file is full, or the disk is broken
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 class LazyGroup(click.Group):
@@ -89,18 +94,18 @@ def run(args: list[str] | None, ending: Ending) -> int:
     except click.exceptions.Exit as leaving:
         return leaving.exit_code
     except click.exceptions.NoArgsIsHelpError as helping:
-        click.echo(helping.ctx.get_help() if helping.ctx else "", err=True)
+        _say(helping.ctx.get_help() if helping.ctx else "")
         return 2
     except click.UsageError as wrong:
         where = f"{wrong.ctx.command_path} --help" if wrong.ctx else "cornersmooth --help"
         text = wrong.format_message().rstrip(".")
-        click.echo(f"error: {text}{'' if '; ' in text else f'; {where} shows the options'}", err=True)
+        _say(f"error: {text}{'' if '; ' in text else f'; {where} shows the options'}")
         return 2
     except click.ClickException as wrong:
-        click.echo(f"error: {wrong.format_message()}", err=True)
+        _say(f"error: {wrong.format_message()}")
         return 2
     except CornersmoothError as failure:
-        click.echo(str(failure), err=True)
+        _say(str(failure))
         return failure.exit_code
     except (ClosedPipe, BrokenPipeError):
         _close_quietly()
@@ -108,8 +113,22 @@ def run(args: list[str] | None, ending: Ending) -> int:
     except (click.exceptions.Abort, KeyboardInterrupt):
         return EXIT_INTERRUPTED
     except Exception as failure:  # a fault of ours: said in a line, and never with the code of a broken promise
-        click.echo(internal_error(failure), err=True)
+        if isinstance(failure, OSError) and failure.errno in _NO_ROOM:  # files are spoken for: it is standard output
+            return _unwritten(failure)
+        _say(internal_error(failure))
         return EXIT_INTERNAL
+
+
+def flushed(code: int) -> int:
+    """Exit code after standard output has taken what it still holds; Python's own complaint would come at its end."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as failure:
+        if code == 0:
+            return _unwritten(failure)
+        _close_quietly()  # it has been said already
+    return code
 
 
 def _close_quietly() -> None:
@@ -117,3 +136,18 @@ def _close_quietly() -> None:
     if sys.stdout is None:
         return
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _unwritten(failure: OSError) -> int:
+    """Say that standard output does not take what is written to it; returns the exit code."""
+    from cornersmooth.output import reason
+
+    _close_quietly()
+    _say(f"<stdout>: error: cannot write to it: {reason(failure)}; choose another place")
+    return 4
+
+
+def _say(text: str) -> None:
+    """Print a line of error; where standard error is full, the exit code must do."""
+    with contextlib.suppress(OSError):
+        click.echo(text, err=True)
