@@ -244,7 +244,7 @@ def test_what_a_tool_change_stops_goes_on_behind_it() -> None:
 def test_what_is_switched_on_ahead_of_the_tool_waits_for_it() -> None:
     cl = (
         "UNITS/MM\n{}COOLNT/ON\n{}LOADTL/2\nRAPID\nGOTO/0,0,9\nFEDRAT/100,MMPM\nGOTO/0,0,0\n"
-        "COOLNT/OFF\nCOOLNT/MIST\nLOADTL/3\nRAPID\nGOTO/0,0,9\nGOTO/0,0,0\nFINI\n"
+        "LOADTL/3\nCOOLNT/MIST\nRAPID\nGOTO/0,0,9\nGOTO/0,0,0\nFINI\n"
     )
     lines, written = text_of_cl(cl.format("SPINDL/500,RPM,CLW\n", ""))
     change = lines.index("T2 M6")

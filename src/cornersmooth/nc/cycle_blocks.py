@@ -118,23 +118,16 @@ def tool_loads(program: Program) -> list[tuple[int, tuple[int, int]]]:
     return [(pose, tool) for pose, tool in loads if tool is not None]
 
 
-def before_a_tool(program: Program) -> frozenset[int]:
-    """Statements behind which a tool is changed before it moves or the program waits, by identity."""
-    changes, tool = set(), None
+def ahead_of_tools(program: Program) -> frozenset[int]:
+    """Last statements of each word ahead of the first tool, if no motion and no wait comes before it; by identity."""
+    found: dict[str, int] = {}
     for statement in program.statements:
-        loaded = loaded_tool(statement) if statement.word in TOOL_WORDS else None
-        if loaded is not None and loaded != tool:
-            changes.add(id(statement))
-            tool = loaded
-    found, pose = set(), -1
-    for statement in reversed(program.statements):
-        if id(statement) in changes:
-            pose = statement.pose
-        elif statement.word in _WAITING:
-            pose = -1
-        elif statement.pose == pose:
-            found.add(id(statement))
-    return frozenset(found)
+        if statement.pose > program.statements[0].pose or statement.word in _WAITING:
+            return frozenset()
+        if statement.word in TOOL_WORDS and loaded_tool(statement) is not None:
+            return frozenset(found.values())
+        found[statement.word] = id(statement)
+    return frozenset()
 
 
 def tool_starts(program: Program) -> list[int]:

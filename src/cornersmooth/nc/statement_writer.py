@@ -17,7 +17,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.control import Blocks, Words
-from cornersmooth.nc.cycle_blocks import TOOL_WORDS, before_a_tool, loaded_tool
+from cornersmooth.nc.cycle_blocks import TOOL_WORDS, ahead_of_tools, loaded_tool
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.holes import Cycle, read_cycle
@@ -77,13 +77,13 @@ class StatementWriter:
     _cycle_line: int = 0
     words: Words = field(init=False)
     toolno_loads: bool = field(init=False)
-    _before_a_tool: frozenset[int] = field(init=False)
+    _ahead_of_tools: frozenset[int] = field(init=False)
 
     def __post_init__(self) -> None:
         self.words = self.form.table.words
         said = {statement.word for statement in self.program.statements}
         self.toolno_loads = not TOOL_WORDS & said
-        self._before_a_tool = before_a_tool(self.program)
+        self._ahead_of_tools = ahead_of_tools(self.program)
 
     def blocks(self, statement: Statement) -> list[str]:
         """NC blocks of one statement, without line ends."""
@@ -222,7 +222,7 @@ class StatementWriter:
         self._read_cycle()
         digits = format_number(self.speed or 0.0, self.form.table.digits.speed, trim=True).rstrip(".")
         turning = tuple(block.format(speed=digits, direction=direction) for block in self.words.spindle_speed)
-        if not self.operation.spindle and id(statement) in self._before_a_tool:
+        if not self.operation.spindle and id(statement) in self._ahead_of_tools:
             return self.operation.later("spindle", turning)
         self.operation.turn(turning)
         return [direction] if speed is None else [*self._outside_tip_control(), *turning]
@@ -247,7 +247,7 @@ class StatementWriter:
         blocks = self.words.coolant.get(kinds[0])
         if blocks is None:
             return None
-        if not self.operation.coolant and id(statement) in self._before_a_tool:
+        if not self.operation.coolant and id(statement) in self._ahead_of_tools:
             return self.operation.later("coolant", blocks)
         self.operation.cool(blocks)
         return list(blocks)
