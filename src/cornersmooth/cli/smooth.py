@@ -48,14 +48,8 @@ if TYPE_CHECKING:
 @surface.tool
 @nc_text.writing_options
 @smoothing.method
-@smoothing.shape
-@smoothing.allocation
-@smoothing.weights
-@smoothing.orientation_tolerance
-@smoothing.reversal_angle
-@smoothing.lines
-@smoothing.chord_tolerance
-@smoothing.axis_step
+@smoothing.curve_options
+@smoothing.line_options
 @reading.feed
 @motion.planned_feed_options
 @reading.reading_options

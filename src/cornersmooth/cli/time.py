@@ -45,11 +45,7 @@ LAWS = tuple(_TITLES)
 @motion.text_machine
 @motion.block_time
 @motion.look_ahead
-@smoothing.shape
-@smoothing.allocation
-@smoothing.weights
-@smoothing.orientation_tolerance
-@smoothing.reversal_angle
+@smoothing.curve_options
 @reading.reading_options
 @outputs.as_json
 @motion.law

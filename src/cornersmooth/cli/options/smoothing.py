@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.options.parameters import LENGTH, Weights
+from cornersmooth.cli.options.parameters import LENGTH, Weights, all_of
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
 
 if TYPE_CHECKING:
@@ -100,6 +101,16 @@ _SETTINGS = {
     "chord_tolerance": chord_tolerance,
     "axis_step": axis_step,
 }
+
+
+def curve_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every command that makes curves, besides their tolerance and method."""
+    return all_of(function, (shape, allocation, weights, orientation_tolerance, reversal_angle))
+
+
+def line_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every command that writes lines along the curves."""
+    return all_of(function, (lines, chord_tolerance, axis_step))
 
 
 def settings_of(given: dict[str, Any]) -> Settings:
