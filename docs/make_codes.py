@@ -32,6 +32,7 @@ Errors, warnings and notes carry a code that does not change; reports name it. T
 
 An *error* ends the command (exit code 2 for settings, 3 for input, 4 for output); a *problem* is something that
 verification finds in a text (exit code 1); *warnings* and *notes* are findings, and the work goes on.
+CS551 to CS559 and CS566 say of a word that it is missing, that nothing asks for it, that it is another or elsewhere.
 """
 #: arguments by which a code is given to a method that is called with its texts
 CALLS = {"wrong_value": "wrong"}

@@ -12,21 +12,21 @@ from itertools import takewhile
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.tokens import Token
 
-#: names and codes of kinds
+#: codes and names of kinds
 _NAMES = {
-    "tool": ("tool T{:g}", 551),
-    "next tool": ("next tool T{:g}", 551),
-    "offset": ("offset H{:g}", 559),
-    "spindle": ("spindle M{:g}", 552),
-    "speed": ("speed S{:g}", 552),
-    "coolant": ("coolant M{:g}", 553),
-    "compensation": ("cutter compensation G{:g}", 554),
-    "register": ("compensation register D{:g}", 554),
-    "stop": ("stop M{:g}", 555),
-    "dwell": ("dwell of {:g} ms", 556),
-    "tap": ("tap G{:g}", 566),
-    "end": ("end of program M{:g}", 557),
-    "auxiliary": ("M{:g}", 558),
+    "tool": ("CS551", "tool T{:g}"),
+    "next tool": ("CS551", "next tool T{:g}"),
+    "offset": ("CS559", "offset H{:g}"),
+    "spindle": ("CS552", "spindle M{:g}"),
+    "speed": ("CS552", "speed S{:g}"),
+    "coolant": ("CS553", "coolant M{:g}"),
+    "compensation": ("CS554", "cutter compensation G{:g}"),
+    "register": ("CS554", "compensation register D{:g}"),
+    "stop": ("CS555", "stop M{:g}"),
+    "dwell": ("CS556", "dwell of {:g} ms"),
+    "tap": ("CS566", "tap G{:g}"),
+    "end": ("CS557", "end of program M{:g}"),
+    "auxiliary": ("CS558", "M{:g}"),
 }
 
 #: kinds of which there may be others where the user says them in his own words, too
@@ -116,7 +116,7 @@ def _differences(theirs: list[Token], ours: list[Token], found: list[Token], nea
     problems = []
 
     def add(cl_line: int, nc_line: int, kind: str, text: str) -> None:
-        problems.append(Problem(f"CS{_NAMES[kind][1]}", cl_line, nc_line, text))
+        problems.append(Problem(_NAMES[kind][0], cl_line, nc_line, text))
 
     matcher = difflib.SequenceMatcher(None, _values(theirs), _values(ours), autojunk=False)
     for tag, i0, i1, j0, j1 in matcher.get_opcodes():
@@ -137,7 +137,7 @@ def _differences(theirs: list[Token], ours: list[Token], found: list[Token], nea
 
 
 def _label(token: Token) -> str:
-    return _NAMES[token.kind][0].format(token.value)
+    return _NAMES[token.kind][1].format(token.value)
 
 
 def _without_idle_stops(asked_for: list[Token], found: list[Token], near: _Nearness) -> list[Token]:

@@ -13,17 +13,17 @@ from cornersmooth.nc_reader.elements import Problem
 #: neighbouring violations no farther apart on the original than this many segments are one problem
 _SAME_PROBLEM: Final = 3.0
 
-#: code of an axis that is beyond its own tolerance
+#: number of the code of an axis that is beyond its own tolerance
 AXIS_OFF: Final = 527
 
-#: what a violation of each code is said to be; its amount in mm, that of `AXIS_OFF` in degrees
+#: what a violation of each code is said to be; its amount in mm, that of the tool axis in degrees
 _TEXT = {
-    521: "the tip leaves its path by {:.6f} mm",
-    522: "the axis point leaves its path by {:.6f} mm",
-    523: "the path is not run in order: {:.6f} mm backwards",
-    525: "tip and axis point are {:.6f} mm from any common pose",
-    AXIS_OFF: "the tool axis is off by {:.6f} deg where the tip is nearest within its tolerance",
-    524: "a pose that must be passed exactly is missed by {:.6f} mm",
+    "CS521": "the tip leaves its path by {:.6f} mm",
+    "CS522": "the axis point leaves its path by {:.6f} mm",
+    "CS523": "the path is not run in order: {:.6f} mm backwards",
+    "CS525": "tip and axis point are {:.6f} mm from any common pose",
+    "CS527": "the tool axis is off by {:.6f} deg where the tip is nearest within its tolerance",
+    "CS524": "a pose that must be passed exactly is missed by {:.6f} mm",
 }
 
 
@@ -54,7 +54,9 @@ class Violations:
     code: list[Ints] = field(default_factory=list)
 
     def add(self, code: int, place: Floats, cl_line: Ints, nc_line: Ints, amount: Floats) -> None:
-        """Add k places."""
+        """Add k places, or none."""
+        if not len(place):
+            return
         self.place.append(place)
         self.cl_line.append(cl_line)
         self.nc_line.append(nc_line)
@@ -82,7 +84,7 @@ class Violations:
             k = int(rows[np.argmax(amount[rows])])
             value = float(amount[k])
             found.append(
-                Problem(f"CS{code[k]}", int(cl_line[k]), int(nc_line[k]), _TEXT[int(code[k])].format(value), value)
+                Problem(name := f"CS{code[k]}", int(cl_line[k]), int(nc_line[k]), _TEXT[name].format(value), value)
             )
         return found
 
