@@ -1,8 +1,9 @@
 """Holes as cycles of the control: which tools may have them, and the blocks of each hole.
 
-Controls take no hole cycles under tool tip control. So a tool has them only where it stays along Z from its change to
-the next, and where the rotary axes are known to stand at zero: then it runs without tool tip control (`Form.upright`),
-and X Y Z mean the same. All its other motion is written without orientation. Everything else stays plain moves.
+Controls take no hole cycles and no cutter compensation under tool tip control. So a tool has cycles only where it stays
+along Z from its change to the next, and where the rotary axes are known to stand at zero: then it runs without tool tip
+control (`Form.upright`), and X Y Z mean the same; one with cutter compensation does so, too. All its other motion is
+written without orientation. Everything else stays plain moves.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ from cornersmooth.text import format_number
 
 #: words that load a tool
 TOOL_WORDS: Final = frozenset({"LOADTL", "LOAD", "TURRET"})
+
+#: sides of the path on which cutter compensation keeps the tool
+_SIDES: Final = (["LEFT"], ["RIGHT"])
 
 #: words at which the program waits for time or the operator
 _WAITING: Final = frozenset({"STOP", "OPSTOP", "DELAY"})
@@ -51,7 +55,7 @@ def loaded_tool(statement: Statement) -> tuple[int, int] | None:
 
 
 def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> Bools:
-    """(n,) whether a pose belongs to a tool that runs without tool tip control, as its holes are cycles of the control.
+    """(n,) whether a pose belongs to a tool that runs without tool tip control, for cycles or cutter compensation.
 
     Parameters
     ----------
@@ -62,7 +66,8 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
     """
     chosen = np.zeros(len(program), np.bool_)
     holes = program.kind == Move.HOLE
-    if not (drills or taps) or not holes.any() or not _can_stand_upright(form):
+    compensated = [one.pose for one in program.statements if one.word == "CUTCOM" and words_of(one)[:1] in _SIDES]
+    if not compensated and (not (drills or taps) or not holes.any()) or not _can_stand_upright(form):
         return chosen
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
     tilted &= program.kind != Move.FROM
@@ -72,7 +77,8 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
     for first, stop in zip(starts, [*starts[1:], len(program)], strict=True):
         here = slice(first, stop)
         if not tilted[here].any():
-            chosen[here] = has_cycles(program, form, here, drills=drills, taps=taps)
+            offset = any(first <= pose < stop for pose in compensated)
+            chosen[here] = offset or has_cycles(program, form, here, drills=drills, taps=taps)
     return chosen
 
 

@@ -292,13 +292,13 @@ class StatementWriter:
         if not side or len(words) > 2 or not set(words[1:]) <= planes.keys() or register is None:
             return None
         self._check_entry(statement)
-        self.findings.add(
-            "CS319",
-            "warning",
-            statement.line,
+        tip = self.operation.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
+        where = "it may be used with tool tip control, and that " if tip else ""
+        text = (
             "cutter compensation is left to the control, which offsets the path in the plane and not along the tool; "
-            "see that it may be used with tool tip control, and that the register holds what the CAM system meant",
         )
+        text += f"see that {where}the register holds what the CAM system meant"
+        self.findings.add("CS319", "warning", statement.line, text)
         self.compensated = True
         blocks = []
         plane = planes[words[1]] if len(words) > 1 else 17

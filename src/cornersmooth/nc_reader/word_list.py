@@ -24,7 +24,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     what the number in brackets may be of the tolerance. ``varies``: it may change within the program. ``zero``: the
     rotary axes must have been sent to zero before: where a parameter says so, the part program turns with the angles of
     that moment. ``turns``: the control turns them, and nobody says where to. ``never``: the control has no such word.
-    ``tool``: in a text with a ``cycle`` of the control, or a tilted plane, it may differ from tool to tool. ``high``:
+    ``tool``: in a text with a ``cycle`` of the control, a tilted plane or cutter compensation (all ``cycle``), it may
+    differ from tool to tool. ``high``:
     only behind a retract; a control with such a word wants the tool high at the end, too. ``late``: behind a retract it
     may come as late as in the block that first moves Z. ``ends``: it must be switched off before the tool is changed.
     ``outside``: it may not be said while a word that ``ends`` holds. ``drops``: a state that the control forgets with
