@@ -67,7 +67,7 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
     chosen = np.zeros(len(program), np.bool_)
     holes = program.kind == Move.HOLE
     compensated = [one.pose for one in program.statements if one.word == "CUTCOM" and words_of(one)[:1] in _SIDES]
-    if not compensated and (not (drills or taps) or not holes.any()) or not _can_stand_upright(form):
+    if (not compensated and (not (drills or taps) or not holes.any())) or not _can_stand_upright(form):
         return chosen
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
     tilted &= program.kind != Move.FROM
