@@ -14,7 +14,7 @@ from cornersmooth.nc_reader.reading import read_nc
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.distances import from_original, owner_fraction
 from cornersmooth.verify.match import Match, match
-from cornersmooth.verify.nearest import nearest_segments
+from cornersmooth.verify.nearest import nearest_places
 from cornersmooth.verify.polyline import written_at
 from cornersmooth.verify.task import Task
 
@@ -136,7 +136,7 @@ def _of_elements(match: Match, offset: int, samples: int) -> Floats:
     limits = match.low[vertex], match.high[vertex]
     middle = np.clip(place.astype(np.int64), *limits)
     six = match.task.six(tip, axis)
-    segment, at = nearest_segments(six, match.path.six, middle, _REACH, *limits)
+    segment, at, _ = nearest_places(six, match.path.six, middle, _REACH, *limits)
     original, length = match.original, match.path.length
     owner, fraction = owner_fraction(original.trail.owner, original.trail.fraction, segment, at)
     gap = match.task.gap(tip, axis, *original.at(owner, fraction))

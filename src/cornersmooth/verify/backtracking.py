@@ -13,7 +13,7 @@ from cornersmooth.verify.distances import Distances, Reached
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.in_order import Windows, passage
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import distance_between, nearest_places, nearest_segments
+from cornersmooth.verify.nearest import distance_between, nearest_places
 
 #: segments looked at on either side
 _REACH = 3
@@ -61,7 +61,7 @@ def written_backwards(match: Match, written: Reached, windows: Windows) -> Found
     if not len(vertex):
         return None
     own, path = match.six[vertex], match.path
-    segment, at = nearest_segments(own, path.six, match.segment[vertex], _REACH, match.low[vertex], match.high[vertex])
+    segment, at, _ = nearest_places(own, path.six, match.segment[vertex], _REACH, match.low[vertex], match.high[vertex])
     free, held = segment + at, match.place[vertex]
     off = distance_between(own, _on(path.six, free))
     gain = distance_between(own, _on(path.six, held)) - off
@@ -208,7 +208,7 @@ def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: b
     first = np.concatenate(([0], ends[:-1] + 1))[stretch]
     last = np.maximum(ends[stretch] - 1, middle)
     # the segment that the bound lies on counts in part, those beyond it whole
-    _, at = nearest_segments(own, six, middle, 0, middle, middle)
+    _, at, _ = nearest_places(own, six, middle, 0, middle, middle)
     limited = np.maximum(at, bound - middle) if forward else np.minimum(at, bound - middle)
     best = distance_between(own, _on(six, middle + limited))
     beyond = middle + (1 if forward else -1)

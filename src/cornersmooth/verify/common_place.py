@@ -15,7 +15,7 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.verify.distances import REACH, Reached, elements_around, owner_fraction
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import nearest_segments
+from cornersmooth.verify.nearest import nearest_places
 from cornersmooth.verify.polyline import written_at
 
 #: places looked at on every move or element, and rounds of halving around the best of them
@@ -68,7 +68,7 @@ def axis_off_of_original(match: Match, reached: Reached, rows: Ints) -> Floats:
 def axis_off_at(match: Match, tip: Floats, axis: Floats, middle: Ints, reach: int, low: Ints, high: Ints) -> Floats:
     """What is off at the best place of the original for any written poses (k, 3), from path segments (k,) on, mm."""
     original, trail = match.original, match.original.trail
-    middle, at = nearest_segments(match.task.six(tip, axis), match.path.six, middle, reach, low, high)
+    middle, at, _ = nearest_places(match.task.six(tip, axis), match.path.six, middle, reach, low, high)
     gap = match.task.gap(tip, axis, *original.at(*owner_fraction(trail.owner, trail.fraction, middle, at)))
     return _least(match, original.at, _moves_around(match, middle, low, high), (tip, axis), (gap.tip, gap.axis_point))
 

@@ -17,7 +17,7 @@ from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.verify.in_order import Windows
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import Gap, Metric, climb, distance_between, nearest_segments
+from cornersmooth.verify.nearest import Gap, Metric, climb, distance_between, nearest_places
 from cornersmooth.verify.polyline import directions, written_at
 from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.wide_search import look_farther, nearest_alone
@@ -102,7 +102,7 @@ def from_written(match: Match) -> Reached:
     again = loose[~match.nearest[rows]]
     if len(again):
         own = vertex[again]
-        segment[again], at[again] = nearest_segments(
+        segment[again], at[again], _ = nearest_places(
             match.six.take(own, axis=0), match.path.six, segment[again], 1, match.low[own], match.high[own]
         )
     better = _gap_to_original(match, rows, segment[loose], at[loose])
@@ -110,7 +110,7 @@ def from_written(match: Match) -> Reached:
     over = np.flatnonzero(better.larger > match.tolerance)
     if len(over):
         own = rows[over]
-        segment[loose[over]], at[loose[over]] = nearest_segments(
+        segment[loose[over]], at[loose[over]], _ = nearest_places(
             match.six[own], match.path.six, segment[loose[over]], REACH, match.low[own], match.high[own]
         )
         wider = _gap_to_original(match, own, segment[loose[over]], at[loose[over]])
@@ -131,7 +131,7 @@ def from_original(match: Match) -> Reached:
     vertex, middle, low, high = _brackets(match)
     trail, six = match.original.trail, match.path.six
     point = six.take(vertex, axis=0)
-    segment, at = nearest_segments(point, match.six, middle, 1, low, high)
+    segment, at, _ = nearest_places(point, match.six, middle, 1, low, high)
     climb(point, match.six, middle, low, high, segment, at)
     look_farther(match, vertex, low, high, segment, at)
     tip = _on(match.written.trail.tip, segment, at)
@@ -335,7 +335,7 @@ def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Flo
     trail, original = match.written.trail, match.original
     result = []
     for metric in ("tip", "axis point"):
-        segment, at = nearest_segments(
+        segment, at, _ = nearest_places(
             match.six[vertex],
             match.path.six,
             match.segment[vertex],
@@ -404,7 +404,7 @@ def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Fl
         ("axis point", slice(3, 6), reached.gap.axis_point[rows]),
     )
     for metric, column, known in ways:
-        near, at = nearest_segments(point, match.six, segment, REACH * match.parts, low, high, metric)
+        near, at, _ = nearest_places(point, match.six, segment, REACH * match.parts, low, high, metric)
         climb(point, match.six, segment, low, high, near, at, metric)
         elements = elements_around(match, near)
         values = np.minimum(known, distance_between(_on(match.six, near, at)[:, column], point[:, column]))

@@ -10,10 +10,11 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import CurveGroup
+from cornersmooth.vectors import unit
 from cornersmooth.verify.common_place import axis_off_at
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import nearest_segments
-from cornersmooth.verify.polyline import directions, unit, written_at
+from cornersmooth.verify.nearest import nearest_places
+from cornersmooth.verify.polyline import directions, written_at
 
 #: samples between two knots where the hull alone does not settle it
 _SAMPLES = 32
@@ -78,7 +79,7 @@ def _searched(match: Match, element: Ints, middle: Ints, reach: int) -> tuple[Fl
         if metric == "axis point" and match.task.own_axis:
             result.append(off.reshape(len(element), len(grid)))
             continue
-        segment, at = nearest_segments(
+        segment, at, _ = nearest_places(
             six,
             match.path.six,
             np.repeat(middle, len(grid)),

@@ -8,6 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
+from cornersmooth.vectors import norm
 from cornersmooth.verify.polyline import Polyline
 
 #: which distance is made smallest: tip and axis point together, or one of them
@@ -52,36 +53,7 @@ class Gap:
 
 def distance_between(points: Floats, others: Floats | float) -> Floats:
     """(k,) distances of points taken pairwise."""
-    away = points - others
-    distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
-    return distance
-
-
-def gap_between(
-    tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats, axis_length: float, *, own_axis: bool = False
-) -> Gap:
-    """Distances between poses taken pairwise; axis points as in `Task`."""
-    off, turned = tip - other_tip, axis - other_axis
-    apart = axis_length * turned if own_axis else off + axis_length * turned
-    chord = np.sqrt(np.einsum("ij,ij->i", turned, turned))
-    return Gap(
-        np.sqrt(np.einsum("ij,ij->i", off, off)),
-        np.sqrt(np.einsum("ij,ij->i", apart, apart)),
-        2 * np.arcsin(np.minimum(chord / 2, 1.0)),
-    )
-
-
-def nearest_segments(
-    point: Floats, vertices: Floats, middle: Ints, reach: int, low: Ints, high: Ints, metric: Metric = "both"
-) -> tuple[Ints, Floats]:
-    """Nearest place on a trail among the segments around a given one; see `nearest_places`.
-
-    Returns
-    -------
-    segment : (k,) int64
-    fraction : (k,) float64
-    """
-    return nearest_places(point, vertices, middle, reach, low, high, metric)[:2]
+    return norm(points - others)
 
 
 def nearest_places(
@@ -169,7 +141,7 @@ def nearest_from(point: Floats, path: Polyline, about: Floats, low: Ints, high: 
     stuck = ended[(path.length[beside] == path.length[beside + 1]).any(axis=0)]
     if len(stuck):  # at a repeated pose, beyond which it may be nearer
         own, part = point[stuck], (low[stuck], high[stuck])
-        there, share = nearest_segments(own, path.six, segment[stuck], _BEYOND_REPEATED, *part)
+        there, share, _ = nearest_places(own, path.six, segment[stuck], _BEYOND_REPEATED, *part)
         climb(own, path.six, segment[stuck], *part, there, share)
         segment[stuck], fraction[stuck] = there, share
         moved = np.union1d(moved, stuck)

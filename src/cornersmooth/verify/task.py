@@ -9,7 +9,8 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Keep, Program
 from cornersmooth.nc_reader.elements import Elements
-from cornersmooth.verify.nearest import Gap, gap_between
+from cornersmooth.vectors import norm
+from cornersmooth.verify.nearest import Gap
 from cornersmooth.verify.polyline import Original, Polyline, original_motion
 
 #: last printed digits by which the next segment must be nearer to be taken
@@ -64,7 +65,9 @@ class Task:
 
     def gap(self, tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats) -> Gap:
         """Distances between poses taken pairwise."""
-        return gap_between(tip, axis, other_tip, other_axis, self.axis_length, own_axis=self.own_axis)
+        off, turned = tip - other_tip, axis - other_axis
+        apart = self.axis_length * turned if self.own_axis else off + self.axis_length * turned
+        return Gap(norm(off), norm(apart), 2 * np.arcsin(np.minimum(norm(turned) / 2, 1.0)))
 
     def degrees(self, off: Floats | float) -> Floats:
         """What axis points that are `off` by so many mm make of the axis, where that has a tolerance of its own."""
