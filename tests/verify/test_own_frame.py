@@ -112,3 +112,15 @@ def test_a_second_shorter_way_and_a_second_offset_are_harmless() -> None:
         lines = _text(control).splitlines()
         second = [k for k, line in enumerate(lines) if re.fullmatch(rf"(\d+ )?{block}", line)][1]
         assert not _problems(control, [*lines[:second], *lines[second + 1 :]])
+
+
+def test_tip_control_that_pauses_in_a_cut_needs_no_turn_before_it() -> None:
+    """Heidenhain takes a new speed without FUNCTION TCPM only; the next motion is a cut in which the axes turn."""
+    cl = (
+        "LOADTL/1\nSPINDL/1000,RPM,CLW\nRAPID\nGOTO/0,0,50,0,0,1\nFEDRAT/100,MMPM\nGOTO/0,0,0,0,0,1\n"
+        "SPINDL/2000,RPM,CLW\nGOTO/20,0,0,0,0.1,0.99498744\nGOTO/40,0,0,0,0.1,0.99498744\nSPINDL/OFF\nFINI\n"
+    )
+    form = choose_form(load_control("heidenhain"), None, machine=load_machine("table-ac"))
+    result = postprocess(cl.encode(), io.BytesIO(), Settings(tolerance=0.01, axis_length=10.0), form=form)
+    assert result.verification is not None
+    assert result.verification.passed

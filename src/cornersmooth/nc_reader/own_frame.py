@@ -87,7 +87,7 @@ class OwnFrame:
                 self._state[rule.state] = (" ".join([word, *beside]), rule)
                 if not (rule.first or rule.off):
                     self._used.add(rule.state)
-            if rule.turned:
+            if rule.turned and self._high:  # elsewhere the axes stand where the last motion left them
                 self._turned = dict(self._angles)
             if rule.retract:
                 if self._lost is None:

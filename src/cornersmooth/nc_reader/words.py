@@ -76,6 +76,10 @@ class Table:
         first = self.columns.get("G")
         return first is not None and not np.isnan(first[0])
 
+    def row(self, row: int) -> dict[str, float]:
+        """Words of one block."""
+        return {letter: float(column[row]) for letter, column in self.columns.items() if not np.isnan(column[row])}
+
     def column(self, letter: str) -> Floats:
         """(r,) float64: the words of one letter, NaN where there is none."""
         found = self.columns.get(letter)

@@ -11,6 +11,7 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.nc_reader.block_texts import any_numbers, numbers_in, said, shown, text_of
+from cornersmooth.nc_reader.curve_weights import odd_weights
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.nc_reader.lexer import Lexer
 from cornersmooth.nc_reader.machine_positions import MachinePositions
@@ -18,7 +19,6 @@ from cornersmooth.nc_reader.own_frame import OwnFrame, shadowed
 from cornersmooth.nc_reader.word_list import WordList, WordRule, word_list
 from cornersmooth.nc_reader.word_rules import NOT_LISTED, WordRules
 from cornersmooth.nc_reader.words import Line, Table
-from cornersmooth.verify.curve_weights import odd_weights
 
 #: what is said of a retract with the same tool, which only GOHOME of the CL file asks for
 GONE_ON: Final = "a retract that another motion of the same tool follows"
@@ -41,11 +41,6 @@ _TOOL_CALL: Final = re.compile(r"TOOL CALL \d")
 _SPINDLE: Final = re.compile(r"M[345]")
 
 _CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
-
-
-def _row_words(table: Table, row: int) -> dict[str, float]:
-    """Words of axes in a row of motion blocks."""
-    return {name: float(column[row]) for name, column in table.columns.items() if not np.isnan(column[row])}
 
 
 class WordCheck:
@@ -178,7 +173,7 @@ class WordCheck:
             rows = [row, row + int(np.argmax(down[row:]))] if self._above and not down[row] and down.any() else [row]
             for row in rows:
                 given = known[known <= row]
-                self._unframe(int(table.line[row]), self._frame.moved(_row_words(table, row)))
+                self._unframe(int(table.line[row]), self._frame.moved(table.row(row)))
                 self._moved(
                     int(table.line[row]), float(codes[given[-1]]) if len(given) else self._code, bool(down[row])
                 )
