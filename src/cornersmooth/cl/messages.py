@@ -1,4 +1,4 @@
-"""What the readers of CL files say: codes CS100-CS149, one place for all texts.
+"""What the readers of CL files say: codes CS100-CS149 and CS180 on, one place for all texts.
 
 Texts take their values by `str.format`. The readers of point files have their own table (`points_messages`).
 """
@@ -48,6 +48,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS126": ("{word} cannot be resolved: {why}", "export arcs as CIRCLE statements or as points"),
     "CS127": ("{word} with {value:g} turns", "give 1 to {limit:g}"),
     "CS128": ("NURBS cannot be read: {why}", "export the path with GOTO statements"),
+    "CS181": ("{word} inside a CYCLE, which is drilled at every position", "put CYCLE/OFF before it"),
 }
 
 #: code: (what is wrong with the call, what to do)

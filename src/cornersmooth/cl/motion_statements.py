@@ -68,9 +68,16 @@ def _godlta(state: ReaderState, record: Record) -> None:
     state.add((x, y, z), own, record.line)
 
 
-def _circle(state: ReaderState, record: Record) -> None:
+def _check_curve(state: ReaderState, record: Record) -> None:
+    """Refuse a curve from nowhere, and one among holes."""
     if not state.builder.n:
         raise state.fail("CS122", record.line, word=record.word)
+    if state.hole:
+        raise state.fail("CS181", record.line, word=record.word)
+
+
+def _circle(state: ReaderState, record: Record) -> None:
+    _check_curve(state, record)
     values = [value for value in record.args if isinstance(value, float)]
     decimals = state.dialect.decimals if state.dialect.strips_zeros else 0
     state.arc = read_arc(record, values, state.file, state.arc_rule, decimals)
@@ -84,8 +91,7 @@ def _direction(state: ReaderState, record: Record) -> None:
 
 
 def _drive(state: ReaderState, record: Record) -> None:
-    if not state.builder.n:
-        raise state.fail("CS122", record.line, word=record.word)
+    _check_curve(state, record)
     read = read_helix if record.word == "HELICAL" else read_drive_arc
     state.arc, end = read(record, state.builder.last_tip(), state.direction, state.file)
     state.direction = None
@@ -98,8 +104,7 @@ def _nothing(state: ReaderState, record: Record) -> None:
 
 
 def _nurbs(state: ReaderState, record: Record) -> None:
-    if not state.builder.n:
-        raise state.fail("CS122", record.line, word=record.word)
+    _check_curve(state, record)
     if record.args:
         raise state.fail("CS128", record.line, why="numbers behind NURBS are not understood")
     _at_feed(state, record)

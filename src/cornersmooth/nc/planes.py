@@ -78,8 +78,9 @@ def plan_planes(
 ) -> Planes:
     """Choose the runs of poses that are written in tilted planes.
 
-    A run has one axis, cuts, and lies between rapids or changes of the tool: there it can go up and be turned. Along Z
-    it needs no plane, but for holes that are cycles of the control, which tool tip control does not take: then it is
+    A run has one axis, cuts, and lies between rapids or changes of the tool: there it can go up and be turned. Where a
+    new tool begins with a feed move that turns rotary axes, these are written as they turn, outside of any plane. Along
+    Z it needs no plane, but for holes that are cycles of the control, which tool tip control does not take: then it is
     written in a plane that is not tilted.
 
     Parameters
@@ -100,7 +101,7 @@ def plan_planes(
         return Planes(of)
     planes: dict[tuple[str, ...], int] = {}
     found: list[Plane] = []
-    for first, stop in _runs(program):
+    for first, stop in _runs(program, form):
         along_z = bool(norm(program.axis[first] - _UNIT["z"]) <= _SAME)
         if upright[first] or (along_z and not has_cycles(program, form, slice(first, stop), drills=drills, taps=taps)):
             continue
@@ -118,7 +119,7 @@ def plan_planes(
     return Planes(of, tuple(found))
 
 
-def _runs(program: Program) -> list[tuple[int, int]]:
+def _runs(program: Program, form: Form) -> list[tuple[int, int]]:
     """First poses, and those behind the last, of runs that could be written in a plane."""
     kind, axis = program.kind, program.axis
     moving = np.flatnonzero(kind != Move.FROM)
@@ -127,15 +128,17 @@ def _runs(program: Program) -> list[tuple[int, int]]:
     turned = np.zeros(len(kind) + 1, np.bool_)
     turned[moving[1:]] = norm(np.diff(axis[moving], axis=0)) > _SAME
     starts = np.array([start for start in tool_starts(program) if start < len(kind)], np.int64)
-    turned[[*starts, moving[0], len(kind)]] = True
     free = np.append(np.isin(kind, _FREE), True)
+    turns_at_feed = np.zeros_like(free)
+    turns_at_feed[starts] = form.rotary & turned[starts] & ~free[starts]
     free[[*starts, moving[0]]] = True
+    turned[[*starts, moving[0], len(kind)]] = True
     # where the control offsets the path, it goes on doing so from one run to the next
     free &= ~np.append(program.keep == Keep.CUTTER_COMPENSATION, False)
     runs = []
     for first, stop in pairwise(np.flatnonzero(turned).tolist()):
         here = moving[(moving >= first) & (moving < stop)]
-        if not (free[first] and free[stop] and (~np.isin(kind[here], _IDLE)).any()):
+        if not (free[first] and not turns_at_feed[first] and free[stop] and (~np.isin(kind[here], _IDLE)).any()):
             continue
         if norm(axis[here] - axis[first]).max() <= _SAME:
             runs.append((first, stop))

@@ -411,12 +411,13 @@ def _rates(
     step = np.diff(path.tip, axis=0, prepend=path.tip[:1])
     swing = step + settings.axis_scale * np.diff(path.axis, axis=0, prepend=path.axis[:1])
     length = norm(step)
-    still = length < form.rounding(program.units)
+    digits = form.rounding(program.units)
+    still = length < digits
     turn = np.abs(np.diff(path.angles, axis=0, prepend=path.angles[:1])).max(axis=1)
     chosen = _cuts(own, program) & still & (turn > _NO_TURN) if timed is None else timed[path.pose]
     if not chosen.any():
         return None
-    way = np.where(still, norm(swing), length)
+    way = np.maximum(np.where(still, norm(swing), length), digits)  # what is written at all moves by a digit
     rate = np.full(len(own), np.nan)
     rate[chosen] = inverse_time(way[chosen], program.feed[own[chosen]], turn[chosen], _FASTEST_TURN)
     rate[~np.isfinite(rate)] = np.nan

@@ -119,8 +119,11 @@ class HoleSearch:
         others = np.flatnonzero(self.kind[move + 1 : move + 1 + _NEXT] != Move.RAPID)
         if not len(others):
             return False
-        following = move + 1 + int(others[0])
-        away, turned = (values[following] - values[move] for values in (self.tip, self.axis))
+        return self.in_line(move, move + 1 + int(others[0]))
+
+    def in_line(self, move: int, other: int) -> bool:
+        """Whether the pose of another move is in the line of a hole, as far as the digits show."""
+        away, turned = (values[other] - values[move] for values in (self.tip, self.axis))
         beside = np.linalg.norm(away - (away @ self.axis[move]) * self.axis[move])
         return bool(beside <= self.room and np.linalg.norm(turned) * self.axis_length <= 2 * self.room)
 
@@ -180,6 +183,9 @@ class HoleSearch:
             yield begin, True
             return
         visits, seen, before = self.visits(move, hole), 0, -2
+        unknown = bool(np.isnan(cycle.depth))
+        left_out = unknown and not cycle.tap
+        stays = left_out and self.in_line(hole, hole - 1)  # then nothing need be over it
         while self.ahead.has(begin + _WINDOW) or self.ahead.has(begin):
             window = np.arange(begin, min(begin + _WINDOW, self.ahead.count, self.of_its_tool(hole)[1]))
             if not len(window):
@@ -189,9 +195,11 @@ class HoleSearch:
                 if seen < visits:
                     continue
                 reached = k if reached is None or k == reached + 1 else reached
-                left_out = np.isnan(cycle.depth) and (k > reached or not cycle.tap)
-                if left_out or not self.over(hole, k + 1):
+                if stays or (unknown and cycle.tap and k > reached) or not self.over(hole, k + 1):
                     continue
+                if left_out:
+                    yield k + 1, True
+                    return
                 if cycle.tap and self.feeds_above(hole, k + 1):
                     continue
                 if cycle.tap or self.drills(hole, k + 1, cycle):
@@ -201,7 +209,7 @@ class HoleSearch:
             begin += len(window)
             if doubtful is not None and begin - doubtful > _DOUBTFUL:
                 break
-            if reached is not None and np.isnan(cycle.depth):
+            if reached is not None and unknown and (stays or cycle.tap):
                 break
             if reached is not None and begin - reached > _UNDECIDED:
                 reached = None
