@@ -17,9 +17,9 @@ from cornersmooth.model import Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.verify.drilling import Holes
-from cornersmooth.verify.guide import STRIDE, cut, guide
+from cornersmooth.verify.guide import STRIDE, cut, guide, places_on_each
 from cornersmooth.verify.polyline import Polyline, directions
-from cornersmooth.verify.rapids import Rapids, fraction_along, moving_rapids
+from cornersmooth.verify.rapids import Rapids, moving_rapids
 from cornersmooth.verify.task import Task
 from cornersmooth.verify.tool_changes import ToolChanges
 
@@ -236,29 +236,29 @@ class _Part:
         task, first = self.task, self.move < 0
         original = task.original
         kind = original.program.kind[original.pose[move]]
-        share = 0.0
+        path, last_vertex = task.path, original.trail.last
+        start = int(last_vertex[move])
+        there = begin = float(path.length[start])
         if first:
             at = element - self.base
             if kind == Move.RAPID and self.held.kind[at] != Element.RAPID:
                 text = "the first rapid is written as a feed move"
                 line = int(original.program.line[original.pose[move]])
                 self.batches.problems.append(Problem("CS532", line, int(self.held.line[at]), text))
-            if kind == Move.HOLE:
-                share = fraction_along(original, self.held, move, at, task.axis_length)
-        self.move, self.element, self.share, self.continued = move, element, share, False
-        last_vertex = original.trail.last
-        start = int(last_vertex[move])
+            if kind == Move.HOLE:  # out of it the way begins anywhere
+                places, squares = places_on_each(
+                    self._six(slice(at, at + 1))[0], path, start, int(last_vertex[move + 1]) - 1
+                )
+                there = float(places[np.argmin(squares)])
+        self.move, self.element, self.continued = move, element, False
+        self.start, self.fraction, self.share = start, 0.0, 0.0
+        if there > begin:
+            self.start, self.fraction = path.place_at(there)
+            self.share = (there - begin) / float(path.length[last_vertex[move + 1]] - begin)
         self.batches.stops.element.append(element)
-        length = task.path.length
-        there = length[start] + share * (length[last_vertex[move + 1]] - length[start]) if share else length[start]
-        self.batches.stops.length.append(float(there))
+        self.batches.stops.length.append(there)
         before = last_vertex[max(move - (kind == Move.RAPID), 0)]
-        self.batches.stops.begin.append(float(length[before]))
-        if share == 0:
-            self.start, self.fraction = start, 0.0
-        else:  # in vertices; the search finds the rest
-            along = share * (int(last_vertex[move + 1]) - start)
-            self.start, self.fraction = start + int(along), float(along - int(along))
+        self.batches.stops.begin.append(float(path.length[before]))
 
     def _close(self, move_last: int, element_last: int) -> Iterator[Batch]:
         """End the stretch."""

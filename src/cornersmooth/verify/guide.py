@@ -125,7 +125,7 @@ def _farther_on(
     high = min(high, limits[1], low + _MOST_SEGMENTS)
     if high < low:
         return None
-    place, square = _places(point, path, low, high)
+    place, square = places_on_each(point, path, low, high)
     best = int(np.argmin(square))
     close = place[square <= 4 * far * far]
     if square[best] > far * far or place[best] < here or close.max() - close.min() > 8 * far:
@@ -133,7 +133,7 @@ def _farther_on(
     return float(place[best]), float(square[best])
 
 
-def _places(point: Floats, path: Polyline, low: int, high: int) -> tuple[Floats, Floats]:
+def places_on_each(point: Floats, path: Polyline, low: int, high: int) -> tuple[Floats, Floats]:
     """Path lengths of the nearest places on each of some segments, and the squared distances."""
     start = path.six[low : high + 1]
     way = path.six[low + 1 : high + 2] - start
@@ -204,7 +204,7 @@ def _clear(point: Floats, path: Polyline, place: float, distance: float, near: f
     """Whether no other place in its neighbourhood could be that of a vertex as well."""
     around = _AROUND * near
     low, high = np.searchsorted(path.length, (place - around, place + around)).tolist()
-    places, square = _places(point, path, max(low - 1, 0), min(high, len(path.length) - 2))
+    places, square = places_on_each(point, path, max(low - 1, 0), min(high, len(path.length) - 2))
     close = square <= 4 * near * near
     away = np.abs(places - place)[close]
     return not (away > _FOLD * (np.sqrt(square[close]) + distance) + _SLACK * near).any()

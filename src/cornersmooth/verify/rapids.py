@@ -61,20 +61,6 @@ def digit_errors(nc: Elements, element: Ints, tip: Floats, axis: Floats, axis_le
     return exact, np.maximum(np.linalg.norm(off, axis=1), np.linalg.norm(turned, axis=1))
 
 
-def fraction_along(original: Original, nc: Elements, move: int, element: int, axis_length: float) -> float:
-    """Where on the move after `move` an element ends."""
-    program = original.program
-    start, end = (
-        np.concatenate((program.tip[pose], program.tip[pose] + axis_length * program.axis[pose]))
-        for pose in original.pose[[move, move + 1]]
-    )
-    axis = directions(nc, nc.tip[element : element + 1], nc.second[element : element + 1])[0]
-    point = np.concatenate((nc.tip[element], nc.tip[element] + axis_length * axis))
-    way = end - start
-    size = float(way @ way)
-    return float(np.clip((point - start) @ way / size, 0.0, 1.0)) if size > 0 else 1.0
-
-
 class Rapids:
     """Pairs the stops of a part of the CL motion with those of the text, in order, as they are read.
 
