@@ -146,10 +146,12 @@ def rotary_angles(
 def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
     """Poses of a program whose move does not cut, so that solution and turn may change in it: (n,) bool.
 
-    Everything but linear feed moves and arcs, and what follows a start position that is stated, not moved to.
+    Everything but linear feed moves and arcs, and what comes from a start position that is stated, not moved to: the
+    first move, and an arc. A line behind it comes from where the tool is.
     """
     rapid: Bools = (kind != Move.LINEAR) & (kind != Move.ARC)
-    rapid[1:] |= kind[:-1] == Move.FROM
+    first = np.cumsum(kind != Move.FROM) == 1
+    rapid[1:] |= (kind[:-1] == Move.FROM) & (first[1:] | (kind[1:] == Move.ARC))
     rapid[:1] = True
     return rapid
 
