@@ -161,11 +161,12 @@ class Reader:
                 self.problems += clamp_problems(run, before.second, self.rotary.machine, self.memory)
             approach: frozenset[int] = frozenset()
             if self.way_back.open:
-                lines = set(run.line.tolist())
-                run = self.way_back.arrive(run, self.problems)
-                approach = frozenset(lines.difference(run.line.tolist()))
+                whole, run = run, self.way_back.arrive(run, self.problems)
+                approach = frozenset(whole.line.tolist()).difference(run.line.tolist())
                 if not len(run.kind):
                     continue
+                if self.rotary is not None and len(run.kind) < len(whole.kind):  # on the way back axes turn, too
+                    before = before.but(second=tuple(whole.second[-len(run.kind) - 1].tolist()))
             if self.plane is not None:
                 self._in_plane(table, run, self.plane, factor, before)
                 continue
