@@ -38,16 +38,16 @@ def config(part: Path) -> dict[str, tuple[str, str]]:
 
 
 def test_option_environment_project_user_default_in_this_order(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    plain = run("smooth", part).stdout
-    texts = {e: run("smooth", part, "-e", e).stdout for e in ("0.02", "0.03", "0.04", "0.05")}
+    plain = run("smooth", part, "-q").stdout
+    texts = {e: run("smooth", part, "-q", "-e", e).stdout for e in ("0.02", "0.03", "0.04", "0.05")}
     assert len({plain, *texts.values()}) == 5
     user(part, "[smooth]\ntolerance = 0.02\naxis-length = 25\n")
-    assert run("smooth", part, "-H", "10").stdout == texts["0.02"]
+    assert run("smooth", part, "-q", "-H", "10").stdout == texts["0.02"]
     project(part, "[smooth]\ntolerance = 0.03\naxis_length = 10\n")
-    assert run("smooth", part).stdout == texts["0.03"]
+    assert run("smooth", part, "-q").stdout == texts["0.03"]
     monkeypatch.setenv("CORNERSMOOTH_TOLERANCE", "0.04mm")
-    assert run("smooth", part).stdout == texts["0.04"]
-    assert run("smooth", part, "-e", "0.05").stdout == texts["0.05"]
+    assert run("smooth", part, "-q").stdout == texts["0.04"]
+    assert run("smooth", part, "-q", "-e", "0.05").stdout == texts["0.05"]
 
 
 def test_config_says_where_every_value_is_from(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -101,9 +102,11 @@ def test_built_in_verification_agrees(case: Case, tmp_path: Path) -> None:
 @pytest.mark.parametrize("tolerance", ["0.003", "0.04"])
 def test_samples_are_verified(sample: str, tolerance: str, tmp_path: Path) -> None:
     source = Path(__file__).parents[1] / "samples" / sample
-    result = run("smooth", source, "-o", tmp_path / "o.nc", "--method", "global", "-e", tolerance)
+    report = tmp_path / "r.json"
+    options = ("--method", "global", "-e", tolerance, "--report", report, "-q")
+    result = run("smooth", source, "-o", tmp_path / "o.nc", *options)
     assert result.returncode == 0, result.stderr.decode()
-    assert "passed" in result.stderr.decode()
+    assert json.loads(report.read_text())["verification"]["passed"] is True
 
 
 def test_program_of_a_single_corner_and_of_none() -> None:

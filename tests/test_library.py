@@ -135,7 +135,7 @@ def test_points_on_the_smoothed_path():
 
 def test_one_call_does_what_the_command_does(tmp_path, capsys):
     out, ours = tmp_path / "command.nc", tmp_path / "call.nc"
-    assert run(["smooth", str(SAMPLE), "-e", "0.02", "-f", "g6.2", "-o", str(out)]) == 0
+    assert run(["smooth", str(SAMPLE), "-e", "0.02", "-f", "g6.2", "-o", str(out), "-q"]) == 0
     stages = set()
     form = cornersmooth.choose_form("fanuc", "g6.2")
     result = cornersmooth.postprocess(

@@ -62,7 +62,7 @@ def test_the_head_of_a_text(part: Path) -> None:
 )
 def test_verify_needs_no_options(part: Path, tmp_path: Path, options: tuple[str, ...]) -> None:
     out = tmp_path / "out.nc"
-    assert run("smooth", part, "-o", out, *options).returncode == DONE
+    assert run("smooth", part, "-o", out, "-q", *options).returncode == DONE
     found = run("verify", part, out)
     assert found.returncode == DONE, found.stdout.decode() + found.stderr.decode()
     tolerance, height = ("0.05", "40") if "-e" in options else ("0.01", "10")
@@ -72,7 +72,7 @@ def test_verify_needs_no_options(part: Path, tmp_path: Path, options: tuple[str,
 
 def test_the_command_line_counts_more(part: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.nc"
-    assert run("smooth", part, "-o", out, "-e", "0.05").returncode == DONE
+    assert run("smooth", part, "-o", out, "-e", "0.05", "-q").returncode == DONE
     assert run("verify", part, out, "-e", "0.001").returncode == 1
     assert run("verify", part, out, "-H", "20").stdout.decode().count("axis point at 20 mm") == 1
     assert run("verify", part, out, "--control", "heidenhain").returncode != DONE

@@ -126,12 +126,12 @@ def test_weights_stand_in_the_text_with_three_decimals() -> None:
 
 def test_the_command_takes_both_options(tmp_path: Path) -> None:
     out = tmp_path / "out.nc"
-    result = run("smooth", ROOT / "samples" / "impeller.cls", "-f", "g6.2", "--shape", "auto", "-o", out)
+    result = run("smooth", ROOT / "samples" / "impeller.cls", "-f", "g6.2", "--shape", "auto", "-o", out, "-q")
     assert result.returncode == 0, result.stderr.decode()
     assert b" R0.58" in out.read_bytes()
     half = out.stat().st_size
     result = run(
-        "smooth", ROOT / "samples" / "impeller.cls", "-f", "g6.2", "--allocation", "fair", "-o", out, "--force"
+        "smooth", ROOT / "samples" / "impeller.cls", "-f", "g6.2", "--allocation", "fair", "-o", out, "--force", "-q"
     )
     assert result.returncode == 0, result.stderr.decode()
     assert out.stat().st_size < half, "fewer lines between transitions"
