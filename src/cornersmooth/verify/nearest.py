@@ -8,7 +8,6 @@ from typing import Final, Literal
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.vectors import norm
 from cornersmooth.verify.polyline import Polyline
 
 #: which distance is made smallest: tip and axis point together, or one of them
@@ -53,7 +52,9 @@ class Gap:
 
 def distance_between(points: Floats, others: Floats | float) -> Floats:
     """(k,) distances of points taken pairwise."""
-    return norm(points - others)
+    away = points - others
+    distance: Floats = np.sqrt(np.einsum("ij,ij->i", away, away))
+    return distance
 
 
 def nearest_places(

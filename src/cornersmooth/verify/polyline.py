@@ -15,7 +15,6 @@ from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader.arcs import arc_points
 from cornersmooth.nc_reader.curves import CurveGroup, groups
 from cornersmooth.nc_reader.elements import Element, Elements
-from cornersmooth.vectors import unit
 
 #: how far, relative to the tolerance, a trail may stay off the motion it stands for
 CHORD_SHARE = 0.1
@@ -156,6 +155,13 @@ def between(values: Floats, start: Ints, end: Ints, fraction: Floats) -> Floats:
     way *= fraction[:, None]
     way += first
     return way
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors (k, 3) at length one; zero stays zero."""
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    result: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    return result
 
 
 def original_motion(program: Program, tolerance: float, axis_length: float) -> Original:

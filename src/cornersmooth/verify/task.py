@@ -9,8 +9,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Keep, Program
 from cornersmooth.nc_reader.elements import Elements
-from cornersmooth.vectors import norm
-from cornersmooth.verify.nearest import Gap
+from cornersmooth.verify.nearest import Gap, distance_between
 from cornersmooth.verify.polyline import Original, Polyline, original_motion
 
 #: last printed digits by which the next segment must be nearer to be taken
@@ -67,7 +66,8 @@ class Task:
         """Distances between poses taken pairwise."""
         off, turned = tip - other_tip, axis - other_axis
         apart = self.axis_length * turned if self.own_axis else off + self.axis_length * turned
-        return Gap(norm(off), norm(apart), 2 * np.arcsin(np.minimum(norm(turned) / 2, 1.0)))
+        chord = distance_between(turned, 0.0)
+        return Gap(distance_between(off, 0.0), distance_between(apart, 0.0), 2 * np.arcsin(np.minimum(chord / 2, 1.0)))
 
     def degrees(self, off: Floats | float) -> Floats:
         """What axis points that are `off` by so many mm make of the axis, where that has a tolerance of its own."""
