@@ -184,21 +184,22 @@ def test_cutter_compensation_names_register_and_plane() -> None:
     kept = [line for line in lines if line[:3] in ("G40", "G41", "G42", "G18", "G17")]
     assert kept == ["G41 D4", "G40", "G18", "G42 D14", "G40", "G17"]
     assert codes(written) == {"CS319": 2}
-    assert "G1 X5.0000 Y0.0000 Z0.0000" in lines  # without tool tip control, under which most controls refuse G41
+    assert "G1 X5.0000 Y0.0000 Z0.0000 I0.0000000 J0.0000000 K1.0000000" in lines
 
 
-def test_a_tool_that_tilts_is_compensated_under_tool_tip_control() -> None:
+def test_a_tool_along_z_is_compensated_without_tool_tip_control() -> None:
+    """With cycles of the control: most refuse G41 with it. A tool that tilts has it under tool tip control."""
     cl = (
         "UNITS/MM\nLOADTL/4\nFEDRAT/100,MMPM\nGOTO/0,0,0,0,0,1\nCUTCOM/LEFT\nGOTO/5,0,0,0,0,1\nCUTCOM/OFF\n"
         "GOTO/9,5,0,{}\nFINI\n"
     )
-    lines, written = text_of_cl(cl.format("0,0,1"))
+    form = choose_form("fanuc", None)
+    lines = lines_of(form, cl.format("0,0,1"), frame=Frame(cycles="native"))
     assert "G43.5 H4" not in lines
     assert "G1 X5.0000 Y0.0000 Z0.0000" in lines
-    assert not any("tip control" in finding.text for finding in written.findings)
-    lines, written = text_of_cl(cl.format("0,0.6,0.8"))
-    assert "G43.5 H4" in lines
-    assert any("tip control" in finding.text for finding in written.findings if finding.code == "CS319")
+    for axis, cycles in (("0,0,1", "moves"), ("0,0.6,0.8", "native")):
+        lines = lines_of(form, cl.format(axis), frame=Frame(cycles=cycles))
+        assert "G43.5 H4" in lines
 
 
 def test_from_is_told_and_not_moved_to() -> None:

@@ -2,8 +2,8 @@
 
 Controls take no hole cycles and no cutter compensation under tool tip control. So a tool has cycles only where it stays
 along Z from its change to the next, and where the rotary axes are known to stand at zero: then it runs without tool tip
-control (`Form.upright`), and X Y Z mean the same; one with cutter compensation does so, too. All its other motion is
-written without orientation. Everything else stays plain moves.
+control (`Form.upright`), and X Y Z mean the same. All its other motion is written without orientation. Everything else
+stays plain moves. Where cycles are asked for, a tool with cutter compensation runs in the same way.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
     """
     chosen = np.zeros(len(program), np.bool_)
     holes = program.kind == Move.HOLE
-    compensated = [one.pose for one in program.statements if one.word == "CUTCOM" and words_of(one)[:1] in _SIDES]
+    sides = [one for one in program.statements if one.word == "CUTCOM" and words_of(one)[:1] in _SIDES]
+    compensated = [one.pose for one in sides if drills]
     if (not compensated and (not (drills or taps) or not holes.any())) or not _can_stand_upright(form):
         return chosen
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z

@@ -293,7 +293,7 @@ class StatementWriter:
             return None
         self._check_entry(statement)
         tip = self.operation.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
-        where = "it may be used with tool tip control, and that " if tip else ""
+        where = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
         text = (
             "cutter compensation is left to the control, which offsets the path in the plane and not along the tool; "
         )

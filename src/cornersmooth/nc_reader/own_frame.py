@@ -35,7 +35,7 @@ _SAME: Final = 1e-5
 class OwnFrame:
     """Follows the blocks around the motion of one text.
 
-    Nothing is asked for until a comment says how the text was made, and where the control has no retract.
+    Nothing is asked for until a comment says how the text was made; what goes with a retract only where there is one.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class OwnFrame:
                 if self._lost is None:
                     self._lost = list(self._unsaid("first", word))
                 self._high = True
-        if changes_tool and self._asked:
+        if changes_tool and self._ours:
             yield from (f"{text_of(words)} under {word}" for word in self._running())
 
     def _unsaid(self, when: str, word: str) -> Iterator[str]:
@@ -142,10 +142,11 @@ class OwnFrame:
 
     def end(self) -> Iterator[str]:
         """Look at what holds where the program ends."""
+        if self._ours and self._moved:
+            yield from (f"{word} still holds at the end" for word in self._running())
         if not self._asked or not self._moved:
             return
         yield from self._unsaid("used", "the first motion")
-        yield from (f"{word} still holds at the end" for word in self._running())
         away = [name for name in sorted(self._angles) if abs(self._angles[name]) > _SAME]
         if away and not self._at_home:
             yield f"{' and '.join(away)} not at zero at the end"

@@ -222,7 +222,7 @@ class WordCheck:
         self.problems += self._rules.problems(line, words, rules)
         self._places(line.number, words, rules, before)
         self._states(line.number, words, rules)
-        changes_tool = any(rule is not None and rule.high and rule.compared for rule in rules)
+        changes_tool = any(rule is not None and rule.compared and (rule.high or rule.after) for rule in rules)
         self._unframe(line.number, self._frame.block(words, rules, changes_tool=changes_tool))
 
     def _users_block(self, line: Line, words: list[str], text: str) -> Line:
