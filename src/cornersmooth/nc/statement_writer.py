@@ -294,11 +294,13 @@ class StatementWriter:
         self._check_entry(statement)
         tip = self.operation.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
         where = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
-        text = (
+        self.findings.add(
+            "CS319",
+            "warning",
+            statement.line,
             "cutter compensation is left to the control, which offsets the path in the plane and not along the tool; "
+            f"see that {where}the register holds what the CAM system meant",
         )
-        text += f"see that {where}the register holds what the CAM system meant"
-        self.findings.add("CS319", "warning", statement.line, text)
         self.compensated = True
         blocks = []
         plane = planes[words[1]] if len(words) > 1 else 17
