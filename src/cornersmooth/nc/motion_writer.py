@@ -273,11 +273,11 @@ class MotionWriter:
                 else:
                     other = continued(self.writer.form.machine, other, near, np.array([-1]), 0.0)[0]
             again = self.writer.ticks(self.program.tip[pose], other)
-        yield from self._emit(self._run(again, np.array([move])))
+        yield from self._emit(Run.straight(self.program, again, np.array([move])))
 
     def _go_to(self, ticks: Ints, move: Ints) -> Iterator[bytes]:
         """Go to a place at the feed of a move, if the tool is elsewhere."""
-        yield from self._emit(self._moving(self._run(ticks, move)))
+        yield from self._emit(self._moving(Run.straight(self.program, ticks, move)))
 
     def _holes(self, rows: Rows, part: slice, approach: Ints) -> Iterator[bytes]:
         """Holes of one cycle, of the control or as plain moves; those not understood are only approached."""
@@ -301,7 +301,7 @@ class MotionWriter:
         moves = hole_moves(cycle, program, poses, approach[poses])
         move = poses[moves.hole]
         ticks = self._shifted(rows, part, moves.tip, moves.hole)
-        run = replace(self._run(ticks, move), rapid=moves.rapid, dwell=moves.dwell)
+        run = replace(Run.straight(program, ticks, move), rapid=moves.rapid, dwell=moves.dwell)
         if not np.isnan(cycle.feed):
             run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
         yield from self._emit_above(self._moving(run), cycle.dwell)
@@ -341,7 +341,8 @@ class MotionWriter:
         said: tuple[str, ...] = ()
         for k, pose in enumerate(poses.tolist()):
             tip = program.tip[pose]
-            above = self._run(writer.ticks((tip + travel[k] * frame[:, 2])[None], program.axis[[pose]]), poses[[k]])
+            over = writer.ticks((tip + travel[k] * frame[:, 2])[None], program.axis[[pose]])
+            above = Run.straight(program, over, poses[[k]])
             level = above.ticks[0, 2]
             if not said or self._position is None or self._position[2] != level:
                 yield from self._blocks(table.off if said else ())
@@ -375,7 +376,8 @@ class MotionWriter:
                 f"{letter}{format_number(value, decimals)}" for letter, value in zip("XYZ", tip, strict=True)
             )
             yield from self._blocks(self.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
-            run = replace(self._run(ticks[index : index + 1], poses[index : index + 1]), rapid=np.ones(1, np.bool_))
+            run = Run.straight(program, ticks[index : index + 1], poses[index : index + 1])
+            run = replace(run, rapid=np.ones(1, np.bool_))
             yield from self._emit_above(self._moving(run))
 
     def _shifted(self, rows: Rows, part: slice, tips: Floats, own: Ints) -> Ints:
@@ -384,12 +386,6 @@ class MotionWriter:
         if self.writer.form.orientation == "point":
             other = other + (tips - rows.tip[part][own])
         return self.writer.ticks(tips, other)
-
-    def _run(self, ticks: Ints, move: Ints) -> Run:
-        """Straight moves at the feeds of moves of the program."""
-        program, count = self.program, len(ticks)
-        mode = program.feed_mode[move].astype(np.int64)
-        return Run(ticks, move, np.zeros(count, np.bool_), program.feed[move], mode, np.zeros(count, np.int8))
 
     def _join(self, ticks: Ints, joined: Bools) -> None:
         """Give first control points that follow without a line the digits of the row before."""
@@ -426,7 +422,7 @@ class MotionWriter:
         if self.operation.retracted:
             self.operation.retracted = False
             yield from self._blocks(self._approaches(first, above or self.approach * bool(run.rapid[0])))
-            run = run if above else self._coming_down(run)
+            run = run if above else run.first_as_said(self.program)
         self._warnings.of_tool(int(run.move[0]), self.statements.tool)
         if not run.rapid.all():
             self._warnings.of_cut(int(run.move[np.argmin(run.rapid)]), turning=bool(self.operation.spindle))
@@ -435,14 +431,6 @@ class MotionWriter:
         self._position = self._last = run.ticks[-1]
         self._last_writer, self.operation.halted = self.writer, False
         yield self.writer.text(run, dwell, self.operation.take_with_z())
-
-    def _coming_down(self, run: Run) -> Run:
-        """Give the first move behind a retract its feed in mm/min: a time counts the way from the pose before it."""
-        if run.mode[0] != INVERSE_TIME:
-            return run
-        feed, mode = run.feed.copy(), run.mode.copy()
-        feed[0], mode[0] = self.program.feed[run.move[0]], self.program.feed_mode[run.move[0]]
-        return replace(run, feed=feed, mode=mode)
 
     def _approaches(self, first: Ints, above: float) -> list[str]:
         """Blocks that bring the tool over its first position, and to where it comes down along its axis."""

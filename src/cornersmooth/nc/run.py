@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.model import Bools, Floats, Ints, Program
+from cornersmooth.nc.control import INVERSE_TIME
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,12 @@ class Run:
     blend: Floats | None = None
     left: Bools | None = None
 
+    @classmethod
+    def straight(cls, program: Program, ticks: Ints, move: Ints) -> Run:
+        """Straight moves at the feeds of moves of the program."""
+        count, mode = len(ticks), program.feed_mode[move].astype(np.int64)
+        return cls(ticks, move, np.zeros(count, np.bool_), program.feed[move], mode, np.zeros(count, np.int8))
+
     def __len__(self) -> int:
         return len(self.ticks)
 
@@ -64,6 +71,14 @@ class Run:
             name: None if column is None else column[first:stop] for name, column in vars(self).items()
         }
         return Run(**columns)
+
+    def first_as_said(self, program: Program) -> Run:
+        """Give the first move the program's feed where it has a time, which counts the way from the pose before."""
+        if self.mode[0] != INVERSE_TIME:
+            return self
+        feed, mode = self.feed.copy(), self.mode.copy()
+        feed[0], mode[0] = program.feed[self.move[0]], program.feed_mode[self.move[0]]
+        return replace(self, feed=feed, mode=mode)
 
     def only(self, chosen: Bools) -> Run:
         """Return the chosen rows."""
