@@ -57,6 +57,8 @@ REFUSED_ONCE = {
     10607: "a feed to the pose of the last hole, said twice behind a tool change",
     11277: "a feed from above behind GOHOME, to where a hole has been left",
     11598: "coolant off and on between holes at the end of the path",
+    20624: "holes that are not drilled, the last of them higher, and a rapid to the height of the first",
+    21188: "coolant off and on behind the last motion, where the neutral form ends it for two tool changes, too",
     10006: "a feed to and fro above a hole, as fast as the hole's",
 }
 

@@ -88,17 +88,48 @@ def test_a_turn_may_be_waited_for_but_not_run_backwards() -> None:
     assert np.isnan(passage(straight, path, (0.0, 3.0), 0.4)[0]).all()
 
 
+def in_order(cl: list[float], order: list[float], tolerance: float) -> bool:
+    """Whether a text along a line is taken to be in order with a CL file along it."""
+    goto = [f"GOTO/{x:.4f},0,0,0,0,1" for x in cl]
+    program = read("\n".join(["UNITS/MM", "RAPID", goto[0], "FEDRAT/500,MMPM", *goto[1:], "FINI"]).encode())
+    tip = np.array([[x, 0.0, 0.0] for x in order])
+    axis = np.tile([0.0, 0.0, 1.0], (len(order), 1))
+    text = simple_text(tip, axis, tolerance, 10.0, "g1", feed=500.0, sharp=range(1, len(order) - 1))
+    found = verify(program, text, tolerance=tolerance, axis_length=10.0)
+    return all(one.code != "CS523" for one in found.problems)
+
+
 def test_a_long_way_run_in_a_wrong_order_is_found() -> None:
     """Every vertex is on the path, but between one turn and the next they are run backwards."""
     cl = [0.0, 0.94, 1.0, -3.0, -4.0, -3.94]
-    goto = [f"GOTO/{x:.4f},0,0,0,0,1" for x in cl]
-    program = read("\n".join(["UNITS/MM", "RAPID", goto[0], "FEDRAT/500,MMPM", *goto[1:], "FINI"]).encode())
+    assert in_order(cl, [0.0, 1.0, -4.0, -3.94], 0.2)
+    assert not in_order(cl, [0.0, 0.94, -4.0, -3.0, 1.0, -3.94], 0.2)
 
-    def passed(order: list[float]) -> bool:
-        tip = np.array([[x, 0.0, 0.0] for x in order])
-        axis = np.tile([0.0, 0.0, 1.0], (len(order), 1))
-        text = simple_text(tip, axis, 0.2, 10.0, "g1", feed=500.0, sharp=range(1, len(order) - 1))
-        return all(one.code != "CS523" for one in verify(program, text, tolerance=0.2, axis_length=10.0).problems)
 
-    assert passed([0.0, 1.0, -4.0, -3.94])
-    assert not passed([0.0, 0.94, -4.0, -3.0, 1.0, -3.94])
+@pytest.mark.parametrize(
+    ("cl", "order", "tolerance"),
+    [
+        (
+            [0.4, 0.34, 1.04, 1.24, 0.84, 4.84, 5.04, 4.34, 5.34, 5.14, 6.14],
+            [0.4, 0.34, 1.04, 1.24, 0.84, 4.84, 5.14, 5.34, 4.34, 5.04, 6.14],
+            0.2,
+        ),
+        (
+            [-0.4, -0.8, 0.2, -3.8, -4.8, -4.1, -4.3, -5.0, -4.3, -4.1, -4.04, -3.64],
+            [-0.4, -0.8, 0.2, -3.8, -4.8, -4.1, -4.3, -4.04, -3.64],
+            0.2,
+        ),
+        (
+            [0.05, 0.047, -0.153, -0.203, -0.168, -0.148, -0.128, -0.148, -0.151, -0.116, -0.166],
+            [0.05, 0.047, -0.153, -0.203, -0.168, -0.148, -0.116, -0.151, -0.148, -0.128, -0.166],
+            0.01,
+        ),
+    ],
+    ids=["turns the other way round", "a turn is left out", "the last turns come first"],
+)
+def test_every_turn_must_be_passed_in_its_order(cl: list[float], order: list[float], tolerance: float) -> None:
+    """All vertices of either are near the other, and what joins them is, too."""
+    assert in_order(cl, cl, tolerance)
+    assert not in_order(cl, order, tolerance)
+    # within a wider tolerance nothing of it is missing
+    assert in_order(cl, order, 3.0 * tolerance)

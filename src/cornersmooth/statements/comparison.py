@@ -171,6 +171,7 @@ def _without_tidying(asked_for: list[Token], found: list[Token], end: float, nea
         if kind in _STOPPED:  # what a tool change stops says nothing of the end
             ours = _effective(_without_habits(ours, theirs, lines, near), kind)
         more = sum(token.value == off for token in ours) > sum(token.value == off for token in theirs)
+        more |= _values(ours)[-1:] == [off] and _values(theirs)[-1:] not in ([], [off])
         if more and not tidying(theirs, kind):
             last = tidying(found, kind)
             found = [token for token in found if not any(token is one for one in last)]

@@ -9,11 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.distances import Distances, Reached
+from cornersmooth.vectors import norm
+from cornersmooth.verify.distances import Distances, Reached, own_gaps_of_original, own_gaps_of_written
 from cornersmooth.verify.findings import Findings
-from cornersmooth.verify.in_order import Windows, passage
+from cornersmooth.verify.in_order import Window, Windows, passage
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import distance_between, nearest_places
+from cornersmooth.verify.rapids import ARITHMETIC
 
 #: segments looked at on either side
 _REACH = 3
@@ -38,6 +40,7 @@ def check_backtracking(distances: Distances, found: Findings) -> None:
     match = distances.match
     mine = written_backwards(match, distances.written, distances.windows)
     mine = mine or written_elsewhere(match, distances.written, distances.windows)
+    mine = mine or turned_elsewhere(distances)
     theirs = original_backwards(match, distances.original, distances.windows)
     for places in (mine, theirs):
         if places is not None:
@@ -123,6 +126,110 @@ def written_elsewhere(match: Match, written: Reached, windows: Windows) -> Found
     move = original.trail.owner[match.segment[vertex] + 1]
     nc_line = match.nc.line[match.written.trail.owner[vertex]]
     return match.place[vertex], original.program.line[original.pose[move]], nc_line, away[found]
+
+
+def turned_elsewhere(distances: Distances) -> Found | None:
+    """Blocks along which a path that turns back is not followed in order, be it tips and axis points each on their own.
+
+    Every turn is near the other motion, and so is every vertex; but not one after the other. Where one is not, that is
+    said already.
+
+    Returns
+    -------
+    As `written_backwards`; the amount is how far the motions are apart in the order of their places.
+    """
+    match, written, windows = distances.match, distances.written, distances.windows
+    away = _apart_in_order(match, written)
+    found: list[int] = []
+    failed: list[Window] = []
+    for row in np.flatnonzero(away > match.tolerance + match.slack).tolist():
+        vertex = int(written.vertex[row])
+        if any(window.inner[0] <= vertex <= window.inner[1] for window in failed):
+            continue  # one problem with what was found there
+        window = windows.around(vertex)
+        if window is None or window.passed or windows.alone(window):
+            continue
+        failed.append(window)
+        if not _left(distances, window):
+            found.append(row)
+    if not found:
+        return None
+    vertices = written.vertex[found]
+    original = match.original
+    move = original.trail.owner[match.segment[vertices] + 1]
+    nc_line = match.nc.line[match.written.trail.owner[vertices]]
+    return match.place[vertices], original.program.line[original.pose[move]], nc_line, away[found]
+
+
+def _left(distances: Distances, window: Window) -> bool:
+    """Whether one of the motions leaves the other in a window, in whatever order."""
+    match, (rows, columns) = distances.match, window.low.shape
+    limit = match.tolerance + ARITHMETIC
+    for reached, own_gaps, first, last in (
+        (distances.written, own_gaps_of_written, window.vertex, window.vertex + rows - 1),
+        (distances.original, own_gaps_of_original, window.segment, window.segment + columns),
+    ):
+        inside = (reached.vertex >= first) & (reached.vertex <= last)
+        over = np.flatnonzero(inside & (reached.gap.larger > limit))
+        if len(over) and max(own.max() for own in own_gaps(match, reached, over)) > limit:
+            return True
+    return False
+
+
+def _apart_in_order(match: Match, written: Reached) -> Floats:
+    """(k,) how far the motions are apart on the block from each written vertex on, if followed in order of places.
+
+    0 where neither turns back nearby: all that is passed is passed in order there.
+    """
+    vertex, path = written.vertex, match.path
+    away = np.zeros(len(vertex))
+    if len(vertex) < 2:
+        return away
+    place = np.maximum.accumulate(match.place[vertex])
+    length = path.length_at(*_segments(path.six, place))
+    first, last = int(place[0]), int(np.ceil(place[-1]))
+    turns = [path.length[first + 1 + np.flatnonzero(_turns(path.six[first : last + 1]))]]
+    turns.append(length[1 + np.flatnonzero(_turns(match.six[vertex]))])
+    at = np.concatenate(turns)
+    if not len(at):
+        return away
+    edges = np.zeros(len(vertex) + 1, np.int64)
+    np.add.at(edges, np.maximum(np.searchsorted(length, at - 2.0 * match.near) - 1, 0), 1)
+    np.add.at(edges, np.searchsorted(length, at + 2.0 * match.near, side="right"), -1)
+    rows = np.flatnonzero((np.cumsum(edges)[:-1] > 0)[:-1] & (np.diff(match.stretch[vertex]) == 0))
+    away[rows] = _farther(match.six[vertex[rows]], _on(path.six, place[rows]))
+    # vertices of the path between the places of a block's ends are passed on it, one after the other
+    begin, end = np.floor(place[rows]).astype(np.int64) + 1, np.ceil(place[rows + 1]).astype(np.int64)
+    count = np.maximum(end - begin, 0)
+    row = np.repeat(rows, count)
+    passed = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
+    start = match.six[vertex[row]]
+    way = match.six[vertex[row] + 1] - start
+    size = np.einsum("ij,ij->i", way, way)
+    share = np.einsum("ij,ij->i", path.six[passed] - start, way)
+    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+    share = np.maximum.accumulate(row + share) - row
+    np.maximum.at(away, row, _farther(path.six[passed], start + share[:, None] * way))
+    return away
+
+
+def _farther(points: Floats, others: Floats) -> Floats:
+    """(k,) the larger of the distances of tips and of axis points of points (k, 6) taken pairwise."""
+    off = points - others
+    return np.maximum(norm(off[:, :3]), norm(off[:, 3:]))
+
+
+def _turns(six: Floats) -> Bools:
+    """(v − 2,) whether a polyline (v, 6) turns back at each inner vertex, at tip or axis point."""
+    way = np.diff(six, axis=0)
+    back = way[1:] * way[:-1]
+    turned: Bools = (back[:, :3].sum(axis=1) < 0.0) | (back[:, 3:].sum(axis=1) < 0.0)
+    return turned
+
+
+def _segments(six: Floats, place: Floats) -> tuple[Ints, Floats]:
+    segment = np.clip(place.astype(np.int64), 0, len(six) - 2)
+    return segment, place - segment
 
 
 def _in_order(match: Match, vertex: Ints) -> bool:
@@ -221,9 +328,9 @@ def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: b
 
 def _on(six: Floats, place: Floats) -> Floats:
     """(k, 6) points of a trail at segment plus fraction."""
-    segment = np.clip(place.astype(np.int64), 0, len(six) - 2)
+    segment, fraction = _segments(six, place)
     start = six[segment]
-    point: Floats = start + (place - segment)[:, None] * (six[segment + 1] - start)
+    point: Floats = start + fraction[:, None] * (six[segment + 1] - start)
     return point
 
 

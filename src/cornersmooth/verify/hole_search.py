@@ -353,6 +353,8 @@ class HoleSearch:
             done = height <= self.room - cycle.depth
             deepest = feeds[int(np.argmax(done) if done.any() else np.argmin(height))]
         low = self.of_its_tool(move)[0]
+        if not feeds:  # of several holes one above another the last is met first
+            low = max(low, next(iter(self.passes(move - 1, np.array(group))), low))
         behind = np.array([k for k in group if k > deepest and k >= low], np.int64)
         same = behind[self.exact(move, behind)] if len(behind) else behind
         if not len(same):
