@@ -95,14 +95,27 @@ def test_a_block_of_the_frame_that_is_lost_or_changed_is_found(control: str, mut
         assert any(re.search(said, text) for text in problems), (lines[k], problems)
 
 
-@pytest.mark.parametrize("control", sorted(_HIGH))
-def test_a_text_with_another_work_offset_says_so(control: str) -> None:
-    offset = "2" if control == "heidenhain" else "G55"
+@pytest.mark.parametrize(
+    ("control", "offset", "other"),
+    [
+        ("fanuc", "G55", "G54"),
+        ("fanuc", "G54.1 P48", "G54.1 P47"),
+        ("mitsubishi", "G54.1 P3", "G54"),
+        ("haas", "G154 P20", "G154 P2"),
+        ("siemens", "G55", "G54"),
+        ("siemens", "G599", "G505"),
+        ("heidenhain", "2", "1"),
+        ("linuxcnc", "G59.3", "G59.1"),
+    ],
+)
+def test_a_text_with_another_work_offset_says_so(control: str, offset: str, other: str) -> None:
     text = _text(control, offset)
-    assert f"OFFSET={offset}" in text
+    assert f"OFFSET={offset.replace(' ', '_')}" in text
     lines = text.splitlines()
     assert not _problems(control, lines)
-    back = [line.replace("Q339=+2", "Q339=+1") if "Q339" in line else re.sub(r"^G55$", "G54", line) for line in lines]
+    block = f"CYCL DEF 247 DATUM SETTING Q339=+{offset}" if control == "heidenhain" else offset
+    said = re.compile(rf"(\d+ )?{re.escape(block)}")
+    back = [line.removesuffix(offset) + other if said.fullmatch(line) else line for line in lines]
     assert any(f"was made for {offset}" in problem for problem in _problems(control, back))
 
 

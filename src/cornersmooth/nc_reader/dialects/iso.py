@@ -89,14 +89,18 @@ _NO_THROUGH: frozenset[str | tuple[str, float]] = frozenset((("coolant", 88.0),)
 
 #: look ahead and smoothing: G5 P10000, G5.1 Q1, G8 P1
 _HIGH_SPEED = frozenset((5.0, 5.1, 8.0))
+#: further work offsets: G54.1 P1
+_OFFSETS = frozenset((54.1,))
 
 ISO_WORDS: Mapping[str, IsoWords] = {
-    "fanuc": IsoWords(_FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED, unsaid=_NO_THROUGH, rigid=True, planes="G68.2"),
+    "fanuc": IsoWords(
+        _FANUC, _FANUC_CONTROLS, silent=_HIGH_SPEED | _OFFSETS, unsaid=_NO_THROUGH, rigid=True, planes="G68.2"
+    ),
     # high-speed high-accuracy control II, or III (P20000): program error P29 without it
     "mitsubishi": IsoWords(
         _FANUC,
         _FANUC_CONTROLS,
-        silent=_HIGH_SPEED,
+        silent=_HIGH_SPEED | _OFFSETS,
         unsaid=_NO_THROUGH,
         curves_need="G5 P10000",
         planes="G68.2",
@@ -104,7 +108,7 @@ ISO_WORDS: Mapping[str, IsoWords] = {
     "haas": IsoWords(
         {43.0: "G43", 234.0: "G234", 49.0: ""},
         {"angles": ("G234",), "machine": ("", "G43"), "vector": ("G234",)},
-        silent=frozenset((187.0,)),
+        silent=frozenset((154.0, 187.0)),
         others="NOQPE",
         unsaid=frozenset((("coolant", 7.0),)),
         dwell=1000.0,
@@ -112,7 +116,7 @@ ISO_WORDS: Mapping[str, IsoWords] = {
     ),
     "linuxcnc": IsoWords(
         {43.0: "G43", 43.1: "G43.1", 49.0: ""},
-        silent=frozenset((61.0, 61.1, 64.0)),
+        silent=frozenset((59.1, 59.2, 59.3, 61.0, 61.1, 64.0)),
         dwell=1000.0,
         unsaid=_NO_THROUGH,
         semicolon=True,

@@ -35,7 +35,7 @@ _NUMBER_ONLY: Final = re.compile(NUMBER)
 
 #: words and calls that change nothing measured here
 _SILENT_CALLS = frozenset(("CYCLE832", "ORIWKS", "ORIMKS", "FFWON", "FFWOF", "SOFT", "BRISK", "STOPRE", "MSG", "CFTCP"))
-_SILENT_CODES = frozenset((9.0, 53.0, *map(float, range(54, 60)), 60.0, 64.0, 90.0, *map(float, range(500, 506))))
+_SILENT_CODES = frozenset((9.0, 53.0, *map(float, range(54, 60)), 60.0, 64.0, 90.0, *map(float, range(500, 600))))
 _SILENT_CODES |= frozenset(map(float, (153, 601, 602, 641, 642, 643, 644, 645)))
 _ORIENTATIONS = ("ORIVECT", "ORIPLANE", "ORICURVE", "ORIAXES")
 _CODES = (0.0, 1.0, 2.0, 3.0)
