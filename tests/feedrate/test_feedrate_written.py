@@ -160,6 +160,24 @@ def test_what_rotary_words_make_of_a_block_is_one_motion() -> None:
     assert np.isinf(law.path.junction_speed[1:-1][same]).all()
 
 
+def test_a_tiny_block_with_the_fastest_inverse_time_does_not_stand_still() -> None:
+    """Its digits do not show how far the tip goes, so what is read is only that its feed is more than nothing."""
+    head, far = (
+        ["G21 G90 G17", "G93", "G0 X0 Y0 Z0 A20. C0", "G1 X10. A21. F10.", "G1 X20. A20. F10."],
+        "G1 X30. A21. F10.",
+    )
+    law = [
+        plan_text(
+            read_nc(
+                "\n".join([*head, *tiny, far]).encode(), control="fanuc", machine=load_machine("table-ac"), tcp=False
+            ),
+            Limits(),
+        ).total
+        for tiny in ([], ["G1 X20.0001 A20.001 F9999.999"])
+    ]
+    assert law[1] == pytest.approx(law[0], abs=0.05)
+
+
 def test_polynomials_of_an_upright_tool_are_planned() -> None:
     program = blade()
     program = replace(program, axis=np.tile([0.0, 0.0, 1.0], (len(program), 1)))

@@ -26,6 +26,9 @@ _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Mov
 #: parts of blocks add up to whole ones but for this
 _PART_OF_A_BLOCK = 1e-6
 
+#: mm/min: a feed below it of a block with the largest F of inverse time says only that the block is not at rest
+_SAYS_NOTHING = 1.0
+
 #: minutes: no block takes less
 _SHORTEST = 1e-9
 
@@ -107,7 +110,7 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
     move = np.array([_MOVES[Element(kind)] for kind in sorted(Element)], np.uint8)[nc.kind]
     arcs = nc.arcs
     proper = arcs.element > 0
-    feed, turning = np.where(nc.kind == Element.RAPID, np.nan, nc.feed), nc.per_revolution
+    feed, turning = np.where(nc.kind == Element.RAPID, np.nan, _said(nc)), nc.per_revolution
     if turning.any():  # with the speed of the spindle it is a feed per minute
         speed = np.full(len(nc), np.nan)
         for event in nc.events:
@@ -135,6 +138,19 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
     )
     same = np.concatenate(([False], (nc.line[owner[1:]] == nc.line[owner[:-1]]) & nc.rotary))
     return WrittenMotion(program, pieces, (_blocks(nc) / count)[owner], owner, same & (nc.kind[owner] != Element.RAPID))
+
+
+def _said(nc: NcProgram) -> Floats:
+    """(m,) feeds; of blocks of the largest F of inverse time, whose way the digits do not show, the one before.
+
+    What is read for them is only a feed that they are not below.
+    """
+    unsaid = np.isnan(nc.feed_room) & (nc.feed < _SAYS_NOTHING)
+    known = np.flatnonzero(~unsaid & (nc.feed > 0.0))
+    if not unsaid.any() or not len(known):
+        return nc.feed
+    before = np.maximum(np.searchsorted(known, np.arange(len(nc))) - 1, 0)
+    return np.where(unsaid, nc.feed[known[before]], nc.feed)
 
 
 def _blocks(nc: NcProgram) -> Floats:
