@@ -15,8 +15,9 @@ from cornersmooth.model import Floats, Ints, Program, Runs
 from cornersmooth.smoothing.runs.ranges import spread, starts
 from cornersmooth.smoothing.runs.splines import Splines
 
-#: knot intervals of a section, and its parameter in steps beyond which it ends as soon as it can
-SPANS, LONGEST = 100, 5e6
+#: knot intervals of a section, whose control points `Rows.curve` counts to 127, and its parameter in steps beyond which
+#: it ends as soon as it can
+SPANS, LONGEST = 120, 5e6
 
 #: knot intervals among which the widest is looked for where a section is to end
 CHOICE = 12
