@@ -2,4 +2,5 @@
 
 Verification's own, as `nc_reader` is: shares no code with what writes. `asked` and `cycles` interpret the CL file,
 `said` the words of a text; both give `tokens`, and `comparison` compares them.
+`tool_changes` divides both alike.
 """

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from cornersmooth.model import Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
+from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.drilling import Holes
 from cornersmooth.verify.guide import STRIDE, cut, guide, places_on_each
 from cornersmooth.verify.polyline import Polyline, directions
 from cornersmooth.verify.rapids import Rapids, moving_rapids
 from cornersmooth.verify.task import Task
-from cornersmooth.verify.tool_changes import ToolChanges
 
 #: elements in a batch
 BATCH: Final = 1 << 14

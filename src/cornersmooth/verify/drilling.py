@@ -17,9 +17,9 @@ from cornersmooth.model import Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.cycles import Drilling, drillings
+from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.hole_search import HoleSearch
 from cornersmooth.verify.polyline import Original
-from cornersmooth.verify.tool_changes import ToolChanges
 
 #: elements held of what has been given out
 _KEPT = 16

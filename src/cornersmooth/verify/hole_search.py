@@ -10,9 +10,9 @@ from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Problem
 from cornersmooth.statements.cycles import Drilling
+from cornersmooth.statements.tool_changes import NEVER, ToolChanges
 from cornersmooth.verify.polyline import Original, directions
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
-from cornersmooth.verify.tool_changes import NEVER, ToolChanges
 
 #: elements looked through at a time for the beginning of a run
 _WINDOW = 512
