@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.vectors import norm
 from cornersmooth.verify.distances import Distances, Reached, own_gaps_of_original, own_gaps_of_written
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.in_order import Window, Windows, passage
@@ -216,7 +215,7 @@ def _apart_in_order(match: Match, written: Reached) -> Floats:
 def _farther(points: Floats, others: Floats) -> Floats:
     """(k,) the larger of the distances of tips and of axis points of points (k, 6) taken pairwise."""
     off = points - others
-    return np.maximum(norm(off[:, :3]), norm(off[:, 3:]))
+    return np.maximum(distance_between(off[:, :3], 0.0), distance_between(off[:, 3:], 0.0))
 
 
 def _turns(six: Floats) -> Bools:
