@@ -34,10 +34,14 @@ from nc.cases import CHOSEN, Case
 from nc.grammars import reader
 from nc.promise import runs_of
 from oracle.distance import within
+from oracle.motion import Original
 from verify.random_programs import Trial, trial
 
 #: what verification may find beyond ε and the oracle not, and the other way round: its own arithmetic, in ε
 HAIR = 2e-3
+
+#: digits behind the point, where a form has no others
+DIGITS = 4
 
 #: how much finer a text is read where few samples do not show that it keeps ε
 FINER = 50.0
@@ -68,15 +72,24 @@ def keeps(case: Case, program: Program, text: bytes, settings: Settings, allowed
     limit = allowed * settings.tolerance
     given = reader(case.control, case.form, case.machine, case.tcp, program.units, digits)
     originals = runs_of(program, settings.tolerance)
+    step = program.mm_per_unit * 10.0 ** -int(digits or DIGITS)
     for finer in (1.0, FINER):
         found = given.read(text.decode("ascii"), settings.axis_length, settings.tolerance / finer)
         paths = found.runs(settings.axis_length)
+        if len(paths) < len(originals):  # there is nothing to write of what the digits do not show
+            originals = [run for run in originals if not stands_still(run, settings.axis_length, step)]
         assert len(paths) == len(originals), f"{len(paths)} runs written for {len(originals)}"
         if all(
             within(path, original, settings.axis_length, limit) for path, original in zip(paths, originals, strict=True)
         ):
             return True
     return False
+
+
+def stands_still(run: Original, axis_length: float, step: float) -> bool:
+    """Whether a run leads nowhere in numbers of so many mm a step."""
+    tip, point = run.at(np.arange(len(run), dtype=float), axis_length)
+    return max(float(np.ptp(end, axis=0).max()) for end in (tip, point)) < step
 
 
 def judged(one: Trial, program: Program, *, oracle: bool = True) -> tuple[str, str]:
