@@ -76,6 +76,7 @@ def test_curve():
         (b"K1.\nK1.\nK1.\nK1.\n", b"K1.\nK1.\nK1.\nK1.\nK1.\n", ("CS513", 6)),
         (b"K0.5 X2", b"K-0.5 X2", ("CS516", 10)),
         (b"K1.\nK1.\nK1.\nK1.\n", b"K1.\nK1.\nK1.\nK2.\n", ("CS517", 6)),
+        (b"K0.5 X2", b"K0. X2", ("CS517", 10)),  # five times: the curve begins at its second control point
         (b"R2.", b"R0.", ("CS518", 8)),
         (b"P4 K0. X0.0000", b"P4 K0. X0.0001", ("CS519", 6)),
         (b"V0.0000 W10.0000 R1.\nK0. X1.", b"V0.0001 W10.0000 R1.\nK0. X1.", ("CS519", 6)),

@@ -155,13 +155,15 @@ def knot_curves(
     complain(falls, "CS516", "a knot below the one before it")
     unclamped = _unclamped(knot, start, size, order)
     complain_curve(unclamped, "CS517", "first or last knots that are not all equal")
+    crowded = _crowded(knot, start, size, order) & np.repeat(single == order, size)
+    complain(crowded, "CS517", "a knot that stands more often than the order of the curve")
     point_rows = rows[is_point]
     wrong = np.flatnonzero((weight <= 0) | ~np.isfinite(weight))
     text = "a weight R that is not positive"
     problems.extend(Problem("CS518", 0, int(table.line[row]), text) for row in point_rows[wrong].tolist())
     weight[wrong] = 1.0  # has been said; what follows wants curves that can be measured
     bad = (single != order) | (points < order) | (order < 2) | unclamped
-    bad |= np.logical_or.reduceat(falls, start)
+    bad |= np.logical_or.reduceat(falls | crowded, start)
     own = _exactly(knot, start, size, points + order)
     if bad.any():
         order, own = _replaced(own, order, points, bad)
@@ -198,6 +200,14 @@ def _unclamped(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
         end = start[used] + size[used] - 1
         wrong[used] |= knot[end - k] != knot[end]
     return wrong
+
+
+def _crowded(knot: Floats, start: Ints, size: Ints, order: Ints) -> Bools:
+    """(q,) whether a knot is equal to the one `order` knots before it in its curve: that does not meet its points."""
+    before = np.arange(len(knot)) - np.repeat(order, size)
+    own = (before >= np.repeat(start, size)) & (np.repeat(order, size) > 0)
+    crowded: Bools = own & (knot == knot[np.maximum(before, 0)])
+    return crowded
 
 
 def _exactly(knot: Floats, start: Ints, size: Ints, wanted: Ints) -> Floats:
