@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.nc_reader.elements import Element
 from cornersmooth.verify.distances import Distances, Reached, own_gaps_of_original, own_gaps_of_written
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.in_order import Window, Windows, passage
@@ -131,7 +132,7 @@ def turned_elsewhere(distances: Distances) -> Found | None:
     """Blocks along which a path that turns back is not followed in order, be it tips and axis points each on their own.
 
     Every turn is near the other motion, and so is every vertex; but not one after the other. Where one is not, that is
-    said already.
+    said already. Near curves nothing is said.
 
     Returns
     -------
@@ -149,7 +150,7 @@ def turned_elsewhere(distances: Distances) -> Found | None:
         if window is None or window.passed or windows.alone(window):
             continue
         failed.append(window)
-        if not _left(distances, window):
+        if not _curved(match, window) and not _left(distances, window):
             found.append(row)
     if not found:
         return None
@@ -158,6 +159,12 @@ def turned_elsewhere(distances: Distances) -> Found | None:
     move = original.trail.owner[match.segment[vertices] + 1]
     nc_line = match.nc.line[match.written.trail.owner[vertices]]
     return match.place[vertices], original.program.line[original.pose[move]], nc_line, away[found]
+
+
+def _curved(match: Match, window: Window) -> bool:
+    """Whether there are curves in a window: its polyline runs from knot to knot, and tells no order between them."""
+    owner = match.written.trail.owner[window.vertex : window.vertex + len(window.low)]
+    return bool((match.nc.kind[owner] == Element.CURVE).any())
 
 
 def _left(distances: Distances, window: Window) -> bool:
