@@ -85,8 +85,9 @@ class OwnFrame:
                     if theirs and theirs.needs and theirs.needs.fullmatch(word) and not theirs.compared
                 ]
                 self._state[rule.state] = (" ".join([word, *beside]), rule)
-                if not (rule.first or rule.off):
+                if not (rule.first or rule.off) and rule.state not in self._used:
                     self._used.add(rule.state)
+                    yield from self._unsaid("used", word, rule.state) if self._asked else ()
             if rule.turned and self._high:  # elsewhere the axes stand where the last motion left them
                 self._turned = dict(self._angles)
             if rule.retract:
@@ -96,10 +97,10 @@ class OwnFrame:
         if changes_tool and self._ours:
             yield from (f"{text_of(words)} under {word}" for word in self._running())
 
-    def _unsaid(self, when: str, word: str) -> Iterator[str]:
-        """Words of the head that have not been said before a retract (``"first"``), or that a later word needs."""
+    def _unsaid(self, when: str, word: str, state: str = "") -> Iterator[str]:
+        """Words that have not been said before the first retract (``"first"``), or before others of a state."""
         for rule in self._list.words:
-            wanted = rule.first == when and (when == "first" or rule.state in self._used)
+            wanted = rule.first == when and state in ("", rule.state)
             if wanted and id(rule) not in self._said and not shadowed(self._list, rule):
                 yield f"{shown(rule.pattern)} must be said before {word}"
 
@@ -146,7 +147,6 @@ class OwnFrame:
             yield from (f"{word} still holds at the end" for word in self._running())
         if not self._asked or not self._moved:
             return
-        yield from self._unsaid("used", "the first motion")
         away = [name for name in sorted(self._angles) if abs(self._angles[name]) > _SAME]
         if away and not self._at_home:
             yield f"{' and '.join(away)} not at zero at the end"

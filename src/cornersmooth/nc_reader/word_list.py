@@ -31,8 +31,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     ``outside``: it may not be said while a word that ``ends`` holds. ``drops``: a state that the control forgets with
     it, and that must be said behind it. ``moves``: the tool moves, though the block names no axis.
 
-    In texts of our own (`own_frame`): ``first``: it must be said before the first retract (``"first"``), or before the
-    first motion of a text that uses its state (``"used"``). ``tidy``: it must be switched off before another tool and
+    In texts of our own (`own_frame`): ``first``: it must be said before the first retract (``"first"``), or before
+    another word of its state (``"used"``). ``tidy``: it must be switched off before another tool and
     at the end. ``turned``: the rotary axes must stand as the next motion has them. ``preset``: the one that is meant
     where the head names none.
 ``[[block]]``

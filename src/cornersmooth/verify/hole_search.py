@@ -80,10 +80,11 @@ class HoleSearch:
         return bool((nc.tip[at] == nc.tip[at - 1]).all() and (nc.second[at] == nc.second[at - 1]).all())
 
     def exact(self, move: int, elements: Ints) -> Bools:
-        """(k,) whether elements end exactly at a move's pose."""
-        tip = np.broadcast_to(self.tip[move], (len(elements), 3))
-        axis = np.broadcast_to(self.axis[move], (len(elements), 3))
-        same: Bools = digit_errors(self.ahead.nc, elements - self.ahead.base, tip, axis, self.axis_length)[0]
+        """(k,) whether elements end exactly at a move's pose; none that are not at hand, as behind the last."""
+        at = elements - self.ahead.base
+        same = (at >= 0) & (at < len(self.ahead.nc))
+        tip, axis = (np.broadcast_to(values[move], (int(same.sum()), 3)) for values in (self.tip, self.axis))
+        same[same] = digit_errors(self.ahead.nc, at[same], tip, axis, self.axis_length)[0]
         return same
 
     def heights(self, move: int, elements: Ints) -> Floats:
@@ -396,7 +397,7 @@ class HoleSearch:
 
     def stays(self, move: int, element: int) -> bool:
         """Whether a move ends where an element has left the tool."""
-        return element >= self.ahead.base and bool(self.exact(move, np.array([element]))[0])
+        return bool(self.exact(move, np.array([element]))[0])
 
     def repeats(self, first: int, stop: int, move: int) -> bool:
         """Whether a neighbour in a run of holes is the same hole."""

@@ -381,6 +381,8 @@ class WordCheck:
         if len(rules) != len(words):
             words, rules = [text_of(words)], rules[:1]
         for word, rule in zip(words, rules, strict=True):
+            if rule is not None and rule.drops in self._state:
+                self._dropped[rule.drops] = word
             if rule is None or not rule.state:
                 continue
             beside = [
@@ -391,8 +393,6 @@ class WordCheck:
             self._state[rule.state] = (" ".join([word, *beside]), number)
             self._changed = True
             self._dropped.pop(rule.state, None)
-            if rule.drops in self._state:
-                self._dropped[rule.drops] = word
             if not rule.off and rule.state in self._approach:  # GOHOME: the same tool comes back as a new one does
                 self._retract = 0
             if rule.before and self._first is not None and word != self._first.get(rule.state):
