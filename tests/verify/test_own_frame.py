@@ -144,3 +144,42 @@ def test_tip_control_that_pauses_in_a_cut_needs_no_turn_before_it() -> None:
     result = postprocess(cl.encode(), io.BytesIO(), Settings(tolerance=0.01, axis_length=10.0), form=form)
     assert result.verification is not None
     assert result.verification.passed
+
+
+#: a hole along Z, and one in a tilted plane
+_PLANES = (
+    "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\n"
+    + "".join(
+        f"RAPID\nGOTO/0,0,60,{axis}\nCYCLE/DRILL,FEDTO,9,MMPM,200,RAPTO,3,RTRCTO,25\nGOTO/0,0,0,{axis}\nCYCLE/OFF\n"
+        f"RAPID\nGOTO/0,0,60,{axis}\n"
+        for axis in ("0,0,1", "0.6,0,0.8")
+    )
+    + "SPINDL/OFF\nFINI\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("control", "block", "which", "said"),
+    [
+        ("fanuc", "G69", 0, "G69 must be said before G68.2"),
+        ("haas", "G255", 0, "G255 must be said before G254"),
+        ("siemens", "CYCLE800()", 0, "CYCLE800() must be said before CYCLE800("),
+        ("siemens", "D1", 1, "cutting edge: it must be said behind SUPA"),
+        ("heidenhain", "PLANE RESET STAY", 0, "PLANE RESET STAY must be said before"),
+        ("fanuc", "T1 M6", 0, "tool T1"),  # its holes belong to no tool then
+        ("siemens", "M6", 0, "tool T1"),
+    ],
+)
+def test_what_planes_need_around_them_is_found_where_it_is_lost(
+    control: str, block: str, which: int, said: str
+) -> None:
+    form = choose_form(load_control(control), None, machine=load_machine(MACHINES[control]), planes=True)
+    stream = io.BytesIO()
+    postprocess(
+        _PLANES.encode(), stream, Settings(tolerance=0.01, axis_length=10.0), form=form, frame=Frame(cycles="native")
+    )
+    lines = stream.getvalue().decode("ascii").splitlines()
+    at = [k for k, line in enumerate(lines) if re.sub(r"^\d+ ", "", line) == block][which]
+    text = "\n".join([*lines[:at], *lines[at + 1 :], ""]).encode()
+    found = verify(read(_PLANES.encode(), name="planes.cls"), text, **_how(control))
+    assert any(said in problem.text.replace("\\", "") for problem in found.problems), found.problems
