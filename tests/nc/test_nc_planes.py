@@ -266,8 +266,6 @@ def test_forms_and_machines_without_planes_say_so() -> None:
 def test_what_is_no_run_between_rapids_is_written_as_ever(cut: str) -> None:
     cl = f"UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nFEDRAT/MMPM,300\nRAPID\n{cut}RAPID\nGOTO/0,0,99\nFINI\n"
     for case in (*CASES[:3], CASES[4]):
-        if "LOADTL" in cut and not form_of(case).rotary:
-            continue  # a vector comes down from the retract as it is
         lines, said = text_of(case, cl)
         assert "CS356" not in said
         plain, stream = replace(form_of(case), plane=None), io.BytesIO()

@@ -79,9 +79,9 @@ def plan_planes(
     """Choose the runs of poses that are written in tilted planes.
 
     A run has one axis, cuts, and lies between rapids or changes of the tool: there it can go up and be turned. Where a
-    new tool begins with a feed move that turns rotary axes, these are written as they turn, outside of any plane. Along
-    Z it needs no plane, but for holes that are cycles of the control, which tool tip control does not take: then it is
-    written in a plane that is not tilted.
+    new tool begins with a feed move that turns it, the turn is written, outside of any plane. Along Z none is needed
+    but for holes that are cycles of the control, which tool tip control does not take: they stand in a plane
+    that is not tilted.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def plan_planes(
         return Planes(of)
     planes: dict[tuple[str, ...], int] = {}
     found: list[Plane] = []
-    for first, stop in _runs(program, form):
+    for first, stop in _runs(program):
         along_z = bool(norm(program.axis[first] - _UNIT["z"]) <= _SAME)
         if upright[first] or (along_z and not has_cycles(program, form, slice(first, stop), drills=drills, taps=taps)):
             continue
@@ -119,7 +119,7 @@ def plan_planes(
     return Planes(of, tuple(found))
 
 
-def _runs(program: Program, form: Form) -> list[tuple[int, int]]:
+def _runs(program: Program) -> list[tuple[int, int]]:
     """First poses, and those behind the last, of runs that could be written in a plane."""
     kind, axis = program.kind, program.axis
     moving = np.flatnonzero(kind != Move.FROM)
@@ -130,7 +130,7 @@ def _runs(program: Program, form: Form) -> list[tuple[int, int]]:
     starts = np.array([start for start in tool_starts(program) if start < len(kind)], np.int64)
     free = np.append(np.isin(kind, _FREE), True)
     turns_at_feed = np.zeros_like(free)
-    turns_at_feed[starts] = form.rotary & turned[starts] & ~free[starts]
+    turns_at_feed[starts] = turned[starts] & ~free[starts]
     free[[*starts, moving[0]]] = True
     turned[[*starts, moving[0], len(kind)]] = True
     # where the control offsets the path, it goes on doing so from one run to the next
