@@ -46,6 +46,15 @@ def test_a_whole_program_is_planned(program, whole):
     assert ideal * 0.98 < found.written < found.direct
 
 
+def test_a_path_that_ends_where_its_from_is():
+    """The first pose that a text goes to is not its last: all the time between them counts."""
+    text = "FROM/0,0,99\nFEDRAT/MMPM,100\nRAPID\nGOTO/0,0,50\nGOTO/0,0,10\nRAPID\nGOTO/0,0,50\nGOHOME/0,0,99\nFINI\n"
+    program, form = cornersmooth.read(text.encode()), choose_form()
+    found = estimate_saving(program, fitted(form), form, Limits(), poses=100, stretches=1)
+    assert found.direct > 24.0  # 40 mm at 100 mm/min
+    assert found.written == pytest.approx(found.direct, abs=0.05)
+
+
 def test_stretches_tell_of_the_whole(program, whole):
     form = choose_form()
     settings = fitted(form)

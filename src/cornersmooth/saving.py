@@ -112,14 +112,15 @@ def _part(program: Program, first: int, last: int) -> Program:
 
 
 def _written_time(program: Program, settings: Settings, form: Form, limits: Limits, machine: Machine | None) -> float:
-    """Time of the text from the first to the last pose of the program: without its way there and back."""
+    """Time of the text from the first to the last pose it goes to: without its way there and back."""
     stream = io.BytesIO()
     nc.write(smoothing.smooth(program, settings), stream, form=form)
     text = read_back(stream.getvalue(), form, settings)
     law = plan_text(text, limits, settings=settings, machine=machine)
     moves = written_motion(text, program.source.name, settings.axis_length).program
-    begin, end = (_poses_at(moves, program, pose) for pose in (0, len(program) - 1))
-    if not len(begin) or not len(end):  # approached in another way than from the pose
+    gone_to = np.flatnonzero(program.kind != Move.FROM)[[0, -1]]  # no text goes to a FROM
+    begin, end = (_poses_at(moves, program, pose) for pose in gone_to.tolist())
+    if not len(begin) or not len(end) or begin[0] >= end[-1]:  # approached in another way than from the pose
         return law.total
     from_second, to_second = law.times_at(law.edge[np.searchsorted(law.path.move, [begin[0], end[-1]], side="right")])
     return float(to_second - from_second)
