@@ -148,6 +148,14 @@ def test_solidworks_pecks() -> None:
     assert findings == {"CS316": 1}
 
 
+def test_the_last_peck_takes_what_would_hardly_be_left() -> None:
+    """Two pecks of 2.4102 mm leave 0.001 mm of 4.8214: no tool comes out and back for that."""
+    found, _ = heights(
+        f"{PLAIN}RAPID\nGOTO/0,0,20\nCYCLE/DEEP,FEDTO,4.8214,STEP,2.4102,MMPM,90,RAPTO,2\nGOTO/0,0,0\nCYCLE/OFF\nFINI\n"
+    )
+    assert found == ["G0 20", "G0 2", "G1 -2.4102", "G0 2", "G0 -1.9102", "G1 -4.8214", "G0 20"]
+
+
 def test_several_holes_share_the_height_of_travel() -> None:
     found, findings = heights(
         f"{PLAIN}RAPID\nGOTO/0,0,20\nCYCLE/DRILL,FEDTO,5,IPM,10,RAPTO,2\nGOTO/10,0,0\nPPRINT next\nGOTO/20,0,8\n"

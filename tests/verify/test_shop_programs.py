@@ -23,6 +23,11 @@ def test_random_programs_for_these_machines(seed: int) -> None:
     assert word == "passed" or "the method turns the tool" in why or "or give --rewind" in why, why
 
 
+def test_blocks_are_not_merged_past_a_corner_of_two_parameters() -> None:
+    """Seed 251151: `zhang2016`, whose axis point is nearest to a corner at another row than the tip."""
+    assert outcome(shop_trial(251151))[0] == "passed"
+
+
 @pytest.mark.parametrize("seed", range(how_many(6, 60)))
 def test_random_programs_with_options_of_all_kinds(seed: int) -> None:
     one = with_options(shop_trial(seed))

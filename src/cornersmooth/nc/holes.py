@@ -32,6 +32,9 @@ from cornersmooth.vectors import dot
 #: mm left above the last depth before feeding goes on, and moved up to break a chip
 PECK_GAP = 0.5
 
+#: mm: the last peck takes what would be left; a tool only rubs there
+LEAST_PECK = 0.01
+
 #: more pecks in one hole are a misunderstanding
 _MOST_PECKS = 1000
 
@@ -263,7 +266,7 @@ def _peck_depths(cycle: Cycle) -> list[float]:
     depth, steps = 0.0, list(cycle.steps) if cycle.pecking else []
     while steps:
         depth += steps.pop(0) if len(steps) > 1 else steps[0]
-        if depth >= cycle.depth:
+        if depth >= cycle.depth - LEAST_PECK:
             break
         depths.append(depth)
     return [*depths, cycle.depth]

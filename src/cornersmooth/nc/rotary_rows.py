@@ -17,6 +17,7 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import Machine, inverse_time, machine_position, solutions
 from cornersmooth.kinematics.travel import check_travel
 from cornersmooth.memory import return_free_memory
+from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
@@ -34,7 +35,7 @@ from cornersmooth.rotary import (
 )
 from cornersmooth.rotary.axis_findings import reach_error
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.long_lines import LineLimits, fewest_lines, segments_of_rows, vertices
+from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.vectors import norm
 
@@ -323,7 +324,22 @@ def _merged(
         axis_point=_MERGED_SHARE * limits.axis_point,
         turn=min(limits.turn, _MERGED_TURN),
     )
+    if not METHODS[smoothed.settings.method].one_parameter:
+        fixed |= _beside_far_corners(found, at_pose, limits)
     return filled.only(fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits))
+
+
+def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> Bools:
+    """(m,) bool: rows of the two moves at poses that the motion is far from at their own parameter.
+
+    Where tip and axis point run by parameters of their own, another row may be the one that is near the pose.
+    """
+    axis_point = rows.tip + limits.axis_length * limits.axis_of(rows.words)
+    off_tip, off_axis_point = norm(rows.tip - rows.original_tip), norm(axis_point - rows.original_axis_point)
+    far = at_pose & ((off_tip > limits.tip) | (off_axis_point > limits.axis_point))
+    move = np.concatenate(([0], np.cumsum(at_pose)[:-1]))
+    beside: Bools = np.isin(move, move[far]) | np.isin(move, move[far] + 1)
+    return beside
 
 
 def _check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, tolerance: float) -> None:
