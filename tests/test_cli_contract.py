@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from cornersmooth.cl.dialects import NAMES
 from oracle.command import (
     BAD_INPUT,
     BAD_OUTPUT,
@@ -167,6 +168,13 @@ def test_help_has_examples(args: list[str]) -> None:
     assert re.search(rb"cornersmooth smooth \S+", result.stdout)
 
 
+def test_help_names_all_dialects() -> None:
+    said = " ".join(run("info", "--help").stdout.decode().split())
+    listed = re.search(r"CL dialect, instead of what the text looks like: (.+?)\.", said)
+    assert listed
+    assert set(re.split(r", | or ", listed[1])) == set(NAMES)
+
+
 def modules_of(args: Sequence[str]) -> set[str]:
     """What is imported by a run that ends well."""
     code = f"import sys; from cornersmooth.cli import run; code = run({args}); print(code, *sys.modules, sep='\\n')"
@@ -298,3 +306,4 @@ def test_missing_file_and_folder_as_input(tmp_path: Path) -> None:
         assert result.returncode == BAD_INPUT
         assert name in message(result.stderr)
         assert quiet(result.stderr)
+    assert "smooth takes folders with -d" in message(run("info", ".", cwd=tmp_path).stderr)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import re
@@ -24,6 +25,7 @@ from oracle.command import (
     PATIENCE,
     SMALL,
     USAGE,
+    lock,
     message,
     only,
     quiet,
@@ -375,9 +377,41 @@ def test_two_inputs_never_share_an_output(several: list[Path], tmp_path: Path) -
     twin = tmp_path / several[0].name
     twin.write_bytes(SMALL)
     (tmp_path / "out").mkdir()
-    result = run("smooth", several[0], twin, "-d", tmp_path / "out")
-    assert result.returncode == USAGE
-    assert not any((tmp_path / "out").iterdir())
+    for args, said in (
+        ([several[0], twin], f"{several[0]} and {twin} would both be written to "),
+        ([several[0], several[0]], f"{several[0]} is named twice"),
+        ([several[0], "--report", "r.json", "--report", "r.json"], "r.json is the name of two outputs"),
+    ):
+        result = run("smooth", *args, "-d", tmp_path / "out")
+        assert result.returncode == USAGE
+        assert said in message(result.stderr)
+        assert "--help" not in message(result.stderr)  # the line itself says what to do
+        assert not any((tmp_path / "out").iterdir())
+
+
+def test_a_compressed_input_gives_its_output_the_name_of_the_part(small: Path, tmp_path: Path) -> None:
+    packed = tmp_path / "part.cls.gz"
+    packed.write_bytes(gzip.compress(SMALL))
+    assert run("smooth", packed, "-d", tmp_path / "out").returncode == DONE
+    assert only(tmp_path / "out", "part.nc")
+
+
+def test_what_may_not_be_read_is_bad_input(
+    several: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a batch it is one file that failed, and a folder that cannot be looked into is not left out in silence."""
+    closed = several[0].parent / "closed"
+    closed.mkdir()
+    lock(monkeypatch, several[0], closed)
+    for args in (["smooth", several[0]], ["info", several[0]], ["verify", several[0], "x.nc"], ["info", closed / "x"]):
+        result = run(*args)
+        assert result.returncode == BAD_INPUT
+        assert message(result.stderr) == f"{args[1]}: error: cannot read it: permission denied; check the path"
+    result = run("smooth", several[0].parent, "-d", tmp_path / "out")
+    assert result.returncode == BAD_INPUT
+    assert f"{closed}: error: cannot read it: permission denied; check the path\n" in result.stderr.decode()
+    assert len(_contents(tmp_path / "out")) == len(several) - 1
+    assert result.stderr.decode().splitlines()[-1] == f"{len(several) + 1} files: {len(several) - 1} done, 2 failed"
 
 
 def test_existing_outputs_in_the_folder_are_kept(several: list[Path], tmp_path: Path) -> None:

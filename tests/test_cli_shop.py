@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from oracle.command import DONE, SMALL, USAGE, run
+from oracle.command import DONE, SMALL, USAGE, lock, run
 
 
 @pytest.fixture
@@ -48,6 +48,30 @@ def test_option_environment_project_user_default_in_this_order(part: Path, monke
     monkeypatch.setenv("CORNERSMOOTH_TOLERANCE", "0.04mm")
     assert run("smooth", part, "-q").stdout == texts["0.04"]
     assert run("smooth", part, "-q", "-e", "0.05").stdout == texts["0.05"]
+
+
+def test_marks_before_the_text_are_none_of_it(part: Path) -> None:
+    """Some editors put the three bytes EF BB BF before a text."""
+    mark = "\ufeff"
+    header = part.parent / "head.txt"
+    header.write_text(mark + "(OF THE SHOP)\r\n")
+    project(part, mark + "[smooth]\r\ntolerance = 0.03\r\n")
+    (part.parent / "mill.toml").write_text(mark + 'like = "table-ac"\n')
+    assert config(part)["tolerance"] == ("0.03", f"{part.parent.parent / 'cornersmooth.toml'} [smooth]")
+    assert run("machines", part.parent / "mill.toml").returncode == DONE
+    text = part.parent / "part.nc"
+    assert run("smooth", part, "--header", header, "-o", text).returncode == DONE
+    assert b"\n(OF THE SHOP)\n" in text.read_bytes()
+    assert run("verify", part, text, "--trust", header).returncode == DONE
+
+
+def test_settings_that_cannot_be_read_say_why(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    project(part, "[smooth]\n")
+    settings = part.parent.parent / "cornersmooth.toml"
+    lock(monkeypatch, settings)
+    said = run("config", part)
+    assert said.returncode == USAGE
+    assert said.stderr.decode() == f"{settings}: error: cannot read it: permission denied; correct the file\n"
 
 
 def test_config_says_where_every_value_is_from(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:

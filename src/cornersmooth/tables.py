@@ -96,7 +96,7 @@ class Shelf:
         if not is_file(name_or_path):
             return TableText(self.built_in(given), f"{given}.toml", given)
         try:
-            text = Path(name_or_path).read_text(encoding="utf-8")
+            text = Path(name_or_path).read_text(encoding="utf-8-sig")  # some editors put a mark before it
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) and error.strerror else "not UTF-8 text"
             what = f"{self.kind} file cannot be read: {reason}"

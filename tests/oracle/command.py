@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
 import pty
@@ -222,6 +223,25 @@ def message(stderr: bytes) -> str:
     lines = [line for line in stderr.decode().splitlines() if "error:" in line]
     assert len(lines) == 1, stderr.decode()
     return lines[0]
+
+
+def lock(monkeypatch: pytest.MonkeyPatch, *paths: Path) -> None:
+    """Answer as the system does where there is no right to read: root has it, whatever the mode of a file says."""
+    locked = tuple(map(str, paths))
+
+    def answering(real: Callable[..., object]) -> Callable[..., object]:
+        def answer(path: object = ".", *more: object, **how: object) -> object:
+            below = tuple(one + os.sep for one in locked)
+            if str(path).startswith(below) or (str(path) in locked and real is not os_stat):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+            return real(path, *more, **how)
+
+        return answer
+
+    os_stat, allowed = os.stat, os.access
+    for module, name in ((io, "open"), (os, "scandir"), (os, "stat")):
+        monkeypatch.setattr(module, name, answering(getattr(module, name)))
+    monkeypatch.setattr(os, "access", lambda path, mode: str(path) not in locked and allowed(path, mode))
 
 
 def only(folder: Path, *names: str) -> bool:

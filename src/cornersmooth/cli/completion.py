@@ -14,7 +14,7 @@ _LINES = {
 @click.command(
     "completion",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
 )
 @click.argument("shell", type=click.Choice(list(_LINES)))
 def command(shell: str) -> int:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import click
 
 from cornersmooth.cli import shop
+from cornersmooth.cli.options.parameters import PATH
 
 
 @click.command(
     "config",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
 )
-@click.argument("source", type=click.Path(), metavar="[IN]", default=".")
+@click.argument("source", type=PATH, metavar="[IN]", default=".")
 def command(source: str) -> int:
     """Say which values 'cornersmooth smooth' would use for the file or folder IN, and where each comes from.
 

@@ -20,7 +20,7 @@ _MODES = {
 @click.command(
     "controls",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]", shell_complete=completing.controls)
 @outputs.table

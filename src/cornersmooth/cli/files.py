@@ -63,7 +63,14 @@ def read_input(path: str) -> tuple[bytes, str]:
         return Path(path).read_bytes(), path
     except OSError as failure:
         what = f"cannot read it: {output.reason(failure)}"
-        raise InputError("CS100", what, "check the path", file=path) from failure
+        folder = isinstance(failure, IsADirectoryError)
+        hint = "name a file; smooth takes folders with -d" if folder else "check the path"
+        raise InputError("CS100", what, hint, file=path) from failure
+
+
+def read_lines(path: str) -> tuple[str, ...]:
+    """Lines of a text of the user's own; a mark that some editors put before it is none of it."""
+    return tuple(read_input(path)[0].decode("utf-8-sig", "replace").splitlines())
 
 
 def target_of(path: str) -> output.Target:

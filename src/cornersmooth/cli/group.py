@@ -18,6 +18,7 @@ from cornersmooth.cli.ending import Ending
 COMMANDS = {
     "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC text."),
     "verify": ("cornersmooth.cli.verify", "Measure NC text against the CL file it was made from."),
+    "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
     "surface": ("cornersmooth.cli.surface", "Measure what the NC text leaves of the surface of the CL file."),
     "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
     "controls": ("cornersmooth.cli.controls", "List the controls that NC text can be written for, and their forms."),
@@ -25,7 +26,6 @@ COMMANDS = {
     "config": ("cornersmooth.cli.config", "Say which values hold here, and where each comes from."),
     "completion": ("cornersmooth.cli.completion", "Print what makes a shell complete commands, names and files."),
     "man": ("cornersmooth.cli.man", "Print the manual page."),
-    "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
 }
 
 EXIT_INTERRUPTED = 130

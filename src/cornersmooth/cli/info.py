@@ -9,6 +9,7 @@ import click
 
 from cornersmooth.cli.files import read_input
 from cornersmooth.cli.options import outputs, reading, smoothing
+from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 
 if TYPE_CHECKING:
@@ -19,9 +20,10 @@ if TYPE_CHECKING:
     "info",
     cls=ShopCommand,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid.",
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid; "
+    "4 output cannot be written.",
 )
-@click.argument("source", type=click.Path(), metavar="IN")
+@click.argument("source", type=PATH, metavar="IN")
 @smoothing.tolerance
 @smoothing.axis_length
 @reading.reading_options

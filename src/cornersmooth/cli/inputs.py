@@ -51,13 +51,22 @@ def find_inputs(named: tuple[str, ...], patterns: tuple[str, ...]) -> list[Input
                 raise SettingsError("CS224", f"no file in {name} is like {wanted}", "name others with --glob")
             found += inside
         else:
-            found.append(Input(name, "stdin" if name == STANDARD else _stem(os.path.basename(name))))
+            found.append(named_input(name))
     return found
 
 
+def named_input(name: str) -> Input:
+    """Make an input of a file that was named by itself, or of standard input."""
+    return Input(name, "stdin" if name == STANDARD else _stem(os.path.basename(name)))
+
+
 def _inside(folder: str, patterns: tuple[str, ...]) -> list[Input]:
-    found = []
-    for here, below, names in os.walk(folder):
+    found: list[Input] = []
+
+    def refused(failure: OSError) -> None:  # reading it will say why
+        found.append(Input(failure.filename, os.path.relpath(failure.filename, folder)))
+
+    for here, below, names in os.walk(folder, onerror=refused):
         below.sort()
         for name in sorted(names):
             if any(fnmatch(name.lower(), pattern.lower()) for pattern in patterns):
@@ -67,4 +76,5 @@ def _inside(folder: str, patterns: tuple[str, ...]) -> list[Input]:
 
 
 def _stem(path: str) -> str:
-    return os.path.splitext(path)[0]
+    stem, ending = os.path.splitext(path)
+    return os.path.splitext(stem)[0] if ending.lower() == ".gz" else stem

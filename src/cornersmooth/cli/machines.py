@@ -11,7 +11,7 @@ from cornersmooth.cli.options import outputs
 @click.command(
     "machines",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]", shell_complete=completing.machines)
 @outputs.table

@@ -14,7 +14,7 @@ from cornersmooth import __version__
 @click.command(
     "man",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration.",
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
 )
 def command() -> int:
     """Print the manual page of all commands, for the program man.

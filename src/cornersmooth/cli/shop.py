@@ -31,6 +31,7 @@ from typing import Any
 import click
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.output import reason
 
 FILE = "cornersmooth.toml"
 PREFIX = "CORNERSMOOTH_"
@@ -121,11 +122,11 @@ def find_files(first: str) -> tuple[ShopFile, ...]:
         CS240: a file cannot be read or is not TOML. CS241: an unknown table.
     """
     here = Path(os.path.abspath(first))
-    folders = [here, *here.parents] if here.is_dir() else list(here.parents)
-    project = next((folder / FILE for folder in folders if (folder / FILE).is_file()), None)
+    folders = [here, *here.parents] if os.path.isdir(here) else list(here.parents)
+    project = next((folder / FILE for folder in folders if os.path.isfile(folder / FILE)), None)
     config = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
     user = Path(config) / "cornersmooth" / FILE
-    return tuple(_read(path) for path in (project, user) if path is not None and path.is_file())
+    return tuple(_read(path) for path in (project, user) if path is not None and os.path.isfile(path))
 
 
 def defaults(command: click.Command, shop: Shop, control: str | None) -> dict[str, Any]:
@@ -221,9 +222,10 @@ def _read(path: Path) -> ShopFile:
     import tomllib
 
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors put a mark before it
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as wrong:
-        raise SettingsError("CS240", f"cannot read it: {wrong}", "correct the file", file=str(path)) from wrong
+        why = reason(wrong) if isinstance(wrong, OSError) else wrong
+        raise SettingsError("CS240", f"cannot read it: {why}", "correct the file", file=str(path)) from wrong
     known = (*COMMAND_TABLES, *_OWN_TABLES)
     for name, table in tables.items():
         if name not in known:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import os
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from cornersmooth.cli.batch import Batch
 from cornersmooth.cli.ending import Ending
-from cornersmooth.cli.files import STANDARD, check_path, read_input
-from cornersmooth.cli.inputs import Input, find_inputs
+from cornersmooth.cli.files import STANDARD, check_path, read_lines
+from cornersmooth.cli.inputs import Input, find_inputs, named_input
 from cornersmooth.cli.job import Job, Outcome, check, run_job
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
+from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import more, print_line, progress_bar, show_findings, show_summary, show_verdict
 from cornersmooth.cli.summary import check_summary, counts_line, line_of, row_of, write_summary
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     epilog="Exit codes: 0 done; 1 done, but a promise is broken; 2 wrong usage or configuration; "
     "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
 )
-@click.argument("inputs", type=click.Path(), nargs=-1, required=True, metavar="IN...")
+@click.argument("inputs", type=PATH, nargs=-1, required=True, metavar="IN...")
 @smoothing.tolerance
 @outputs.output
 @nc_text.form
@@ -125,7 +126,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
 
     folder, output = given["directory"], given["output"]
     _check_usage(inputs, given)
-    files = find_inputs(inputs, given["glob"]) if folder else [Input(path, _stem(path)) for path in inputs]
+    files = find_inputs(inputs, given["glob"]) if folder else [named_input(path) for path in inputs]
     _check_side_outputs(files, given)
     settings, form, frame = smoothing.settings_of(given), _form(given), _frame(given)
     fit_settings(settings, form, "mm")  # refuses wrong ones before any file is touched
@@ -228,15 +229,11 @@ def _frame(given: dict[str, Any]) -> Frame:
     """What stands around the motion, with the texts of header and footer."""
     from cornersmooth.nc import Frame
 
-    texts = {}
-    for name in ("header", "footer"):
-        path = given[name]
-        texts[name] = tuple(read_input(path)[0].decode("utf-8", "replace").splitlines()) if path else ()
     return Frame(
         given["program_name"],
         given["block_numbers"],
-        header=texts["header"],
-        footer=texts["footer"],
+        header=read_lines(given["header"]) if given["header"] else (),
+        footer=read_lines(given["footer"]) if given["footer"] else (),
         comments=not given["no_comments"],
         skip_taps=given["skip_taps"],
         cycles=given["cycles"],
@@ -248,15 +245,25 @@ def _frame(given: dict[str, Any]) -> Frame:
 
 
 def _check_targets(jobs: list[Job]) -> None:
-    """No two jobs may write to one file."""
-    by_target: dict[str, str] = {}
+    """Refuse two outputs of one name."""
+    by_target: dict[str, Job] = {}
     for job in jobs:
         for path in (job.target, *job.reports):
             if path == STANDARD:
                 continue
             if path in by_target:
-                raise click.UsageError(f"{by_target[path]} and {job.source} would both be written to {path}")
-            by_target[path] = job.source
+                _refuse_clash(by_target[path], job, path)
+            by_target[path] = job
+
+
+def _refuse_clash(one: Job, other: Job, path: str) -> NoReturn:
+    if one is other:
+        raise click.UsageError(f"{path} is the name of two outputs; give each its own")
+    if one.source == other.source:
+        raise click.UsageError(f"{one.source} is named twice; name it once")
+    raise click.UsageError(
+        f"{one.source} and {other.source} would both be written to {path}; rename one, or give each a -d of its own"
+    )
 
 
 def _check_against_inputs(jobs: list[Job]) -> None:
@@ -281,7 +288,3 @@ def _names(path: str) -> list[object]:
 
 def _to_terminal() -> bool:
     return sys.stdout is not None and sys.stdout.isatty()
-
-
-def _stem(path: str) -> str:
-    return "stdin" if path == STANDARD else os.path.splitext(os.path.basename(path))[0]

@@ -9,6 +9,7 @@ import click
 
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
+from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
@@ -27,8 +28,8 @@ _SUFFIXES = (".json", ".csv", ".html", ".png", ".svg", ".pdf")
     epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
     "cannot be read or is not valid; 4 output cannot be written.",
 )
-@click.argument("source", type=click.Path(), metavar="IN")
-@click.argument("text", type=click.Path(), metavar="NC")
+@click.argument("source", type=PATH, metavar="IN")
+@click.argument("text", type=PATH, metavar="NC")
 @smoothing.tolerance
 @smoothing.axis_length
 @surface.tool

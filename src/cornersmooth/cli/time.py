@@ -9,6 +9,7 @@ import click
 
 from cornersmooth.cli.files import check_path, read_input, target_of
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
+from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import print_line, progress_bar
 from cornersmooth.methods import METHODS
@@ -34,7 +35,7 @@ LAWS = tuple(_TITLES)
     epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid; "
     "4 output cannot be written.",
 )
-@click.argument("source", type=click.Path(), metavar="IN")
+@click.argument("source", type=PATH, metavar="IN")
 @smoothing.tolerance
 @smoothing.axis_length
 @smoothing.axis_tolerance

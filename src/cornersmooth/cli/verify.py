@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.files import STANDARD, check_path, read_input, read_lines, target_of
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
+from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import more
 from cornersmooth.errors import SettingsError
@@ -38,8 +39,8 @@ _REWINDS_SHOWN = 5
     epilog="Exit codes: 0 the text keeps the tolerance; 1 it does not, or something else is wrong with it; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
 )
-@click.argument("source", type=click.Path(), metavar="IN")
-@click.argument("text", type=click.Path(), metavar="NC")
+@click.argument("source", type=PATH, metavar="IN")
+@click.argument("text", type=PATH, metavar="NC")
 @smoothing.tolerance
 @smoothing.axis_length
 @smoothing.axis_tolerance
@@ -53,7 +54,7 @@ _REWINDS_SHOWN = 5
 @outputs.plot_deviation
 @outputs.force
 @outputs.quiet
-@outputs.verbose
+@outputs.verbose_found
 def command(source: str, text: str, **given: Any) -> int:
     """Measure the NC text NC against the CL file IN, whoever wrote it.
 
@@ -93,9 +94,7 @@ def command(source: str, text: str, **given: Any) -> int:
     pages = [path for path in given["reports"] if path.lower().endswith(".html")]
     if given["plot"] or given["verbose"] or pages:  # it is looked at more than once
         nc = readable_twice(nc)
-    trusted = [
-        line for path in given["trusted"] for line in read_input(path)[0].decode("utf-8", "replace").splitlines()
-    ]
+    trusted = [line for path in given["trusted"] for line in read_lines(path)]
     if remark:  # first: what follows may be hard to understand without it
         click.echo(f"{text}: warning: {remark}", err=True)
     found = verify(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli import completing
-from cornersmooth.cli.options.parameters import Duration, all_of
+from cornersmooth.cli.options.parameters import PATH, Duration, all_of
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ limits_machine = click.option(
 )
 text = click.option(
     "--text",
-    type=click.Path(),
+    type=PATH,
     metavar="NC",
     help="Plan this NC text, too, as its control would run it: its lines, digits and feeds.",
 )
@@ -145,7 +145,7 @@ look_ahead = click.option(
     "--look-ahead",
     type=click.IntRange(min=1),
     metavar="BLOCKS",
-    help="Blocks within which the control must be able to stop; all of --text by default.",
+    help="Blocks within which the control must be able to stop. [default: all of --text]",
 )
 law = click.option(
     "--law",
@@ -154,4 +154,4 @@ law = click.option(
     show_default=True,
     help="Motion that --csv writes.",
 )
-motion_csv = click.option("--csv", type=click.Path(), help="Write the motion, a row every period.")
+motion_csv = click.option("--csv", type=PATH, help="Write the motion, a row every period.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli import completing
-from cornersmooth.cli.options.parameters import LENGTH, all_of
+from cornersmooth.cli.options.parameters import LENGTH, PATH, all_of
 from cornersmooth.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ work_offset = click.option(
     "--work-offset",
     type=str,
     metavar="WORD",
-    help="Work offset, such as G55, or the number of a preset; 'none' leaves it out. Default: G54, or preset 1.",
+    help="Work offset, such as G55, or the number of a preset; 'none' leaves it out. [default: G54, or preset 1]",
 )
 approach = click.option(
     "--approach",
@@ -98,18 +98,19 @@ planes = click.option(
 )
 header = click.option(
     "--header",
-    type=click.Path(),
+    type=PATH,
     metavar="FILE",
     help="Lines to write behind the head; {program} and {units} are filled in.",
 )
-footer = click.option("--footer", type=click.Path(), metavar="FILE", help="Lines to write before the tail.")
+footer = click.option("--footer", type=PATH, metavar="FILE", help="Lines to write before the tail.")
 trusted = click.option(
     "--trust",
     "trusted",
-    type=click.Path(),
+    type=PATH,
     multiple=True,
     metavar="FILE",
-    help="Lines that belong in the text because you put them there, as --header and --footer of smooth. Repeatable.",
+    help="Lines that belong in the text because you put them there, as --header and --footer of smooth. May be "
+    "repeated.",
 )
 digits = click.option(
     "--digits",

@@ -6,15 +6,15 @@ import os
 
 import click
 
-from cornersmooth.cli.options.parameters import Jobs
+from cornersmooth.cli.options.parameters import PATH, Jobs
 
 output = click.option(
-    "-o", "--output", type=click.Path(), help="NC file, - for standard output. [default: - for a single input]"
+    "-o", "--output", type=PATH, help="NC file, - for standard output. [default: - for a single input]"
 )
 directory = click.option(
     "-d",
     "--directory",
-    type=click.Path(),
+    type=PATH,
     help="Folder for the NC files of several inputs, made where missing; folders below an input stay folders.",
 )
 glob = click.option(
@@ -27,7 +27,7 @@ glob = click.option(
 skip_existing = click.option(
     "--skip-existing", is_flag=True, help="Leave outputs that exist as they are, whatever they were made of."
 )
-summary = click.option("--summary", type=click.Path(), help="Write a row for each file of a batch: .json or .csv.")
+summary = click.option("--summary", type=PATH, help="Write a row for each file of a batch: .json or .csv.")
 jobs = click.option(
     "-j",
     "--jobs",
@@ -35,7 +35,7 @@ jobs = click.option(
     default=1,
     is_flag=False,
     flag_value=0,
-    help="Processes for several inputs; a bare -j takes all cores.",
+    help="Processes for several inputs; a bare -j takes all cores. [default: 1]",
 )
 scheduler = click.option(
     "--scheduler",
@@ -46,7 +46,7 @@ scheduler = click.option(
 reports = click.option(
     "--report",
     "reports",
-    type=click.Path(),
+    type=PATH,
     multiple=True,
     help="Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} stands "
     "for the input's name.",
@@ -54,32 +54,30 @@ reports = click.option(
 found_reports = click.option(
     "--report",
     "reports",
-    type=click.Path(),
+    type=PATH,
     multiple=True,
     help="Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
     "repeated.",
 )
 page_reports = click.option(
-    "--report", "reports", type=click.Path(), multiple=True, help="Write a page to look at: .html. May be repeated."
+    "--report", "reports", type=PATH, multiple=True, help="Write a page to look at: .html. May be repeated."
 )
 surface_reports = click.option(
     "--report",
     "reports",
-    type=click.Path(),
+    type=PATH,
     multiple=True,
     help="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be repeated.",
 )
-plot_path = click.option(
-    "--plot", type=click.Path(), help="Draw the path, its corners and its deviation: .png, .svg or .pdf."
-)
+plot_path = click.option("--plot", type=PATH, help="Draw the path, its corners and its deviation: .png, .svg or .pdf.")
 plot_deviation = click.option(
     "--plot",
-    type=click.Path(),
+    type=PATH,
     help="Draw the deviation along the path: .png, .svg or .pdf.",
 )
 plot_motion = click.option(
     "--plot",
-    type=click.Path(),
+    type=PATH,
     help="Draw speed and acceleration over time: .png, .svg or .pdf.",
 )
 
@@ -99,3 +97,6 @@ table = click.option(
 force = click.option("--force", is_flag=True, help="Replace existing files.")
 quiet = click.option("-q", "--quiet", is_flag=True, help="Only errors.")
 verbose = click.option("-v", "--verbose", count=True, help="More: every finding, times of the stages.")
+verbose_found = click.option(
+    "-v", "--verbose", count=True, help="More: every problem, and how large deviations are and where along the path."
+)

@@ -93,6 +93,8 @@ class ToolShape(click.ParamType[Any]):
 
 
 LENGTH = Length()
+#: whether a file can be read is said where it is read, with the exit code of inputs
+PATH = click.Path(readable=False)
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 

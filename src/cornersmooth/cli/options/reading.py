@@ -16,7 +16,12 @@ input_format = click.option(
     type=click.Choice(["apt", "points"]),
     help="Form of the input, instead of what it looks like.",
 )
-dialect = click.option("--dialect", type=str, metavar="NAME", help="CL dialect, instead of what the text looks like.")
+dialect = click.option(
+    "--dialect",
+    type=str,
+    metavar="NAME",
+    help="CL dialect, instead of what the text looks like: nx, catia, creo, solidworks, hsm, ncl, makino or plain.",
+)
 units = click.option(
     "--units", type=click.Choice(["mm", "inch"]), help="Units of the input, where it does not say or says it wrong."
 )

@@ -13,8 +13,18 @@ tool = click.option(
     help="Shape of the tool: diameter, corner radius, taper in degrees, length. [default: that of the file]",
 )
 stations = click.option(
-    "--stations", type=click.IntRange(1, 1_000_000), default=2000, show_default=True, help="Places along the path."
+    "--stations",
+    type=click.IntRange(1, 1_000_000),
+    metavar="N",
+    default=2000,
+    show_default=True,
+    help="Places along the path.",
 )
 levels = click.option(
-    "--levels", type=click.IntRange(1, 60), default=7, show_default=True, help="Points along the cutting edge."
+    "--levels",
+    type=click.IntRange(1, 60),
+    metavar="N",
+    default=7,
+    show_default=True,
+    help="Points along the cutting edge.",
 )
