@@ -146,13 +146,13 @@ def test_tip_control_that_pauses_in_a_cut_needs_no_turn_before_it() -> None:
     assert result.verification.passed
 
 
-#: a hole along Z, and one in a tilted plane
+#: a hole along Z, one in a tilted plane, and one along Z again
 _PLANES = (
     "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\n"
     + "".join(
         f"RAPID\nGOTO/0,0,60,{axis}\nCYCLE/DRILL,FEDTO,9,MMPM,200,RAPTO,3,RTRCTO,25\nGOTO/0,0,0,{axis}\nCYCLE/OFF\n"
         f"RAPID\nGOTO/0,0,60,{axis}\n"
-        for axis in ("0,0,1", "0.6,0,0.8")
+        for axis in ("0,0,1", "0.6,0,0.8", "0,0,1")
     )
     + "SPINDL/OFF\nFINI\n"
 )
@@ -166,6 +166,13 @@ _PLANES = (
         ("siemens", "CYCLE800()", 0, "CYCLE800() must be said before CYCLE800("),
         ("siemens", "D1", 1, "cutting edge: it must be said behind SUPA"),
         ("heidenhain", "PLANE RESET STAY", 0, "PLANE RESET STAY must be said before"),
+        ("siemens", f'CYCLE800(0,"",0,57{",0" * 3}{",0.000000" * 3},0,0,0,-1)', 1, "no word says how the rotary axes"),
+        ("heidenhain", "PLANE SPATIAL SPA+0.0000 SPB+0.0000 SPC+0.0000 TURN FMAX", 1, "no word says how"),
+        ("fanuc", "G53.1", 2, "before the tool is turned to it"),
+        ("fanuc", "G0 A0.0000 C0.0000", 0, "not at zero at the end"),
+        ("mitsubishi", "G0 A0.0000 C0.0000", 0, "not at zero at the end"),
+        ("siemens", "G0 A0.000000 C0.000000", 0, "not at zero at the end"),
+        ("heidenhain", "L A+0.0000 C+0.0000 FMAX", 0, "not at zero at the end"),
         ("fanuc", "T1 M6", 0, "tool T1"),  # its holes belong to no tool then
         ("siemens", "M6", 0, "tool T1"),
     ],

@@ -17,9 +17,10 @@ from cornersmooth.nc_reader.word_list import WordList, WordRule
 #: state of the words that choose the zero of the part
 WORK_OFFSET: Final = "work offset"
 
-#: comments that say how a text was made, and the work offset in them
+#: comments that say how a text was made, and the work offset and the machine in them
 _MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
 _OFFSET: Final = re.compile(r"\bOFFSET=([\w.]+)", re.IGNORECASE)
+_MACHINE: Final = re.compile(r"\bMACHINE=", re.IGNORECASE)
 
 #: words beside which Z may not come down from a retract, and the rotary axes among them
 _ASIDE: Final = frozenset("XYABC")
@@ -50,6 +51,8 @@ class OwnFrame:
         self._list, self._trusted, self._at_home = listed, trusted, at_home
         self._ours = False
         self._offset = ""  # that the head names
+        self._machine = False  # the head names one: its rotary axes have words
+        self._swivelled = False  # the control has turned them since the last of these words
         self._retracts = any(rule.high and not shadowed(listed, rule) for rule in listed.words)
         self._state: dict[str, tuple[str, WordRule]] = {}
         self._said: set[int] = set()  # rules of words so far, by identity
@@ -63,6 +66,7 @@ class OwnFrame:
         """Take note of how the text was made, if a comment says so."""
         if not self._moved and _MADE.match(text):
             self._ours = True
+            self._machine |= _MACHINE.search(text) is not None
             offset = _OFFSET.search(text)
             self._offset = offset[1] if offset and not self._offset else self._offset
 
@@ -88,6 +92,7 @@ class OwnFrame:
                 if not (rule.first or rule.off) and rule.state not in self._used:
                     self._used.add(rule.state)
                     yield from self._unsaid("used", word, rule.state) if self._asked else ()
+            self._swivelled |= rule.turns
             if rule.turned and self._high:  # elsewhere the axes stand where the last motion left them
                 self._turned = dict(self._angles)
             if rule.retract:
@@ -112,6 +117,7 @@ class OwnFrame:
     def angles(self, angles: Mapping[str, float]) -> None:
         """Take note of where the rotary axes are, as far as that is said."""
         self._angles = dict(angles)
+        self._swivelled &= not angles
 
     def moved(self, words: Mapping[str, float]) -> Iterator[str]:
         """Look at the words of a motion, the first behind a retract or behind words that are no motion."""
@@ -148,8 +154,8 @@ class OwnFrame:
         if not self._asked or not self._moved:
             return
         away = [name for name in sorted(self._angles) if abs(self._angles[name]) > _SAME]
-        if away and not self._at_home:
-            yield f"{' and '.join(away)} not at zero at the end"
+        if (away or self._swivelled and self._machine) and not self._at_home:
+            yield f"{' and '.join(away) or 'the rotary axes'} not at zero at the end"
 
 
 def shadowed(listed: WordList, rule: WordRule) -> bool:

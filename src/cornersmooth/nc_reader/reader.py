@@ -88,6 +88,8 @@ class Reader:
         #: the tilted plane that is on, and what has been said of it
         self.plane: TiltedPlane | None = None
         self._said_of_planes: set[str] = set()
+        #: whether a plane that is off again has left the rotary axes where no word says
+        self._left_turned = False
         #: the last element that was given out, if any
         self.given: list[Elements] = []
         #: elements up to a rapid along the tool before a retract that nobody asked for
@@ -181,6 +183,7 @@ class Reader:
                 self.problems += limit_problems(table, run, rotary.machine, rotary.angle_step)
                 run = replace(run, second=rotary.unwrapped(run.second, before.second))
                 self.problems += turn_problems(run, before.second, rotary.machine)
+                self._check_turned(run)
                 if self.dialect.retracts:
                     self._check_swings(rotary.swung(run, start), run)
                 run = rotary.resolve(run, start, inverse_time=before.inverse_time)
@@ -213,7 +216,7 @@ class Reader:
         if self.tip_control:
             self.wrong("CS506", line, f"a tilted plane under {self.tip_control}")
         self._above(line, "a tilted plane where the tool is not retracted")
-        self.plane, self._said_of_planes = plane, set()
+        self.plane, self._said_of_planes, self._left_turned = plane, set(), False
         self.way_back.open = True
         self.modal = self.modal.but(tip=(math.nan,) * 3)
         if plane.turned:
@@ -236,6 +239,17 @@ class Reader:
             self.wrong("CS506", line, f"the end of a tilted plane under {self.tip_control}")
         self._above(line, "a tilted plane ends where the tool is not retracted")
         self.modal, self.plane = self.plane.left(self.modal, rotary=self.rotary is not None), None
+        self._left_turned = True
+
+    def _check_turned(self, run: Executed) -> None:
+        """Complain of motion behind a plane where no word has said since how the rotary axes stand."""
+        assert self.rotary is not None
+        if self._left_turned:
+            unknown = np.isnan(run.second[:, : len(self.rotary.names)]).any(axis=1)
+            self._left_turned = False
+            if unknown.any():
+                text = "motion behind a tilted plane, and no word says how the rotary axes stand"
+                self.problems.append(Problem("CS506", 0, int(run.line[np.argmax(unknown)]), text))
 
     def _above(self, line: Line, text: str) -> None:
         """Complain where the tool is not above a retract."""
