@@ -10,8 +10,10 @@ from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
+from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from cornersmooth.verify import verify
 from nc.writing import codes, lines_of, text_of_cl
 
 HEAD = ["%", "O0001", "G21 G90 G94 G17 G40 G49 G80", "G91 G28 Z0.", "G90"]
@@ -37,9 +39,11 @@ def said(cl: str, *, start: str = "UNITS/MM\n") -> tuple[list[str], dict[str, in
         ("SPINDL/1200", ["S1200 M3"]),
         ("SPINDL/1200,CCLW\nSPINDL/OFF\nSPINDL/ON", ["S1200 M4", "M5", "M4"]),
         ("SPINDL/0,RPM", ["M5"]),
-        ("SPINDL/1200,RPM,CLW,RANGE,2", ["S1200 M3"]),
-        ("SPINDL/RANGE,HIGH,1200,RPM", ["S1200 M3"]),
+        ("SPINDL/1200,RPM,CLW,RANGE,2", ["S1200 M3", "(SPINDL/1200,RPM,CLW,RANGE,2)"]),  # what no block says
+        ("SPINDL/RANGE,HIGH,1200,RPM", ["S1200 M3", "(SPINDL/RANGE,HIGH,1200,RPM)"]),
         ("SPINDL/LOCK", ["M19"]),
+        ("SPINDL/LOCK,0.0", ["M19"]),
+        ("SPINDL/ORIENT,0", ["M19"]),
         # coolant
         ("COOLNT/ON\nCOOLNT/MIST\nCOOLNT/OFF", ["M8", "M7", "M9"]),
         ("COOLNT/FLOOD", ["M8"]),
@@ -52,7 +56,9 @@ def said(cl: str, *, start: str = "UNITS/MM\n") -> tuple[list[str], dict[str, in
         ("LOADTL/         1", ["T1 M6"]),
         ("LOADTL/T12", ["T12 M6"]),
         ("LOAD/TOOL,13", ["T13 M6"]),
-        ("TURRET/1,OSETNO,1,SETOOL,0.,0.,0.", ["T1 M6"]),
+        ("TURRET/1,OSETNO,1,SETOOL,0.,0.,0.", ["T1 M6", "(TURRET/1,OSETNO,1,SETOOL,0.,0.,0.)"]),
+        ("LOADTL/2,LENGTH,95", ["T2 M6", "(LOADTL/2,LENGTH,95)"]),
+        ("LOAD/TOOL,2,ADJUST,2", ["T2 M6"]),
         ("TOOLNO/2,10.0\nLOADTL/2", ["(TOOLNO/2,10.0)", "T2 M6"]),
         ("TOOLNO/3,10.0", ["T3 M6"]),
         ("LOAD/TOOL,13\nSELECT/TOOL,16\nLOAD/TOOL,16", ["T13 M6", "T16", "T16 M6"]),
@@ -90,6 +96,7 @@ def test_what_is_understood(cl: str, blocks: list[str]) -> None:
     [
         "SPINDL/500,FAST",
         "SPINDL/500,600,RPM",
+        "SPINDL/LOCK,90",
         "SPINDL/500,SFM,CLW",  # no cutter, no revolutions
         "CUTTER/0.8\nSPINDL/500,SMM,CLW",  # the nose of a lathe tool is no diameter
         "COOLNT/",  # a parameter of the CAM system that was left empty
@@ -132,6 +139,71 @@ def test_cutting_speed_becomes_revolutions_at_the_diameter_of_a_mill() -> None:
         assert findings == {"CS322": 1}
     lines, _ = text_of_cl("UNITS/INCHES\nCUTTER/0.5,0,0.25\nSPINDL/100,SFM\nRAPID\nGOTO/0,0,0\nFINI\n")
     assert "S764 M3" in lines
+
+
+def test_a_spindle_that_is_not_stopped_where_it_should_goes_off_at_the_next_tool() -> None:
+    cl = "UNITS/MM\nLOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/0,0,9\nSPINDL/LOCK,90\nLOADTL/2\nRAPID\nGOTO/0,0,9\nFINI\n"
+    lines = text_of_cl(cl)[0]
+    assert "M5" in lines[: lines.index("T2 M6")]
+
+
+def test_a_dwell_under_feed_per_revolution_is_warned_of_where_it_may_count_turns() -> None:
+    cl = "LOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/0,0,9\nFEDRAT/0.1,MMPR\nGOTO/0,0,0\nDELAY/2\nGOTO/9,0,0\nFINI\n"
+    for control, count in (("fanuc", 1), ("mitsubishi", 1), ("siemens", 0), ("generic", 1)):
+        result = postprocess(cl.encode(), io.BytesIO(), Settings(), form=choose_form(control))
+        codes = [finding.code for finding in result.findings]
+        assert codes.count("CS383") == count, control
+        slow = cl.replace("0.1,MMPR", "90,MMPM").encode()
+        result = postprocess(slow, io.BytesIO(), Settings(), form=choose_form(control))
+        assert "CS383" not in [finding.code for finding in result.findings]
+
+
+THROUGH = """LOADTL/1
+SPINDL/900,RPM,CLW
+COOLNT/THRU
+RAPID
+GOTO/0,0,50
+FEDRAT/100,MMPM
+GOTO/0,0,0
+COOLNT/FLOOD
+GOTO/9,0,0
+COOLNT/THRU
+GOTO/9,9,0
+COOLNT/OFF
+GOTO/20,9,0
+COOLNT/THRU
+GOTO/20,30,0
+RAPID
+GOTO/20,30,50
+LOADTL/2
+RAPID
+GOTO/0,0,50
+GOTO/0,0,0
+RAPID
+GOTO/0,0,50
+FINI
+"""
+
+
+def test_coolant_through_the_spindle_of_haas_has_its_own_end() -> None:
+    stream = io.BytesIO()
+    form = choose_form("haas", machine=load_machine("table-bc"))
+    postprocess(THROUGH.encode(), stream, Settings(), form=form)
+    lines = stream.getvalue().decode().splitlines()
+    coolant = [line for line in lines if line in ("M8", "M9", "M88", "M89")]
+    assert coolant == ["M88", "M89", "M8", "M9", "M88", "M89", "M88", "M89", "M88", "M89"]
+    assert lines[lines.index("T2 M6") + 1 :][:2] == ["S900 M3", "M88"]  # the spindle first
+    program = read(THROUGH.encode(), name="through.cls")
+    for k, line in enumerate(lines):
+        if line not in coolant:
+            continue
+        for other in ([], [{"M89": "M9", "M9": "M89"}.get(line, "M7")]):
+            text = "\n".join([*lines[:k], *other, *lines[k + 1 :]]) + "\n"
+            if line != "M9" or not other:
+                found = verify(
+                    program, text.encode(), tolerance=0.01, axis_length=10, control="haas", machine=form.machine
+                )
+                assert found.problems, (k, line, other)
 
 
 def test_insert_with_nc_words_is_not_passed_through() -> None:
@@ -251,7 +323,7 @@ def test_what_a_tool_change_stops_goes_on_behind_it() -> None:
     )
     change = lines.index("T3 M6")
     assert [line for line in lines[:change] if line in ("M9", "M5")] == ["M9", "M5"]
-    assert lines[change + 1 : change + 3] == ["M8", "S500 M3"]
+    assert lines[change + 1 : change + 3] == ["S500 M3", "M8"]
     assert [line for line in lines[change:] if line in ("M9", "M5")] == ["M9", "M5"]
     assert codes(written) == {"CS331": 1}
 

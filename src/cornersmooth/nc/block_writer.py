@@ -189,8 +189,12 @@ class BlockWriter:
     def feed_mode(self, mode: int) -> list[str]:
         """Block that selects a feed mode, where it is another than in force."""
         blocks = [self.statements.words.feed_mode[mode]] if mode != self._mode else []
-        self._mode = mode
+        self._take_mode(mode)
         return blocks
+
+    def _take_mode(self, mode: int) -> None:
+        self._mode = mode
+        self.statements.per_revolution = mode == FeedMode.PER_REVOLUTION
 
     def feed_word(self, feed: float, mode: int) -> str:
         """Number of a feed in mm/min or mm/rev, as it is written."""
@@ -205,7 +209,7 @@ class BlockWriter:
             self._share.end()
         if self._mode != FeedMode.PER_MINUTE:
             blocks += [words.feed_mode[key] for key in (int(FeedMode.PER_MINUTE),) if key in words.feed_mode]
-            self._mode = FeedMode.PER_MINUTE
+            self._take_mode(FeedMode.PER_MINUTE)
         if self.statements.plane != FIRST_PLANE:
             blocks += [words.plane[key] for key in (FIRST_PLANE,) if key in words.plane]
             self.statements.plane = FIRST_PLANE
@@ -293,7 +297,7 @@ class BlockWriter:
         feeding = np.flatnonzero(~run.rapid)
         modes = run.mode[feeding]
         for place in np.flatnonzero(np.diff(modes, prepend=self._mode)).tolist():
-            self._mode = int(modes[place])
+            self._take_mode(int(modes[place]))
             if self._mode == FeedMode.PER_REVOLUTION and not self.statements.speed:
                 text = "feed per revolution while no spindle speed is given; controls stop there or stand still"
                 self._refuse(int(run.move[feeding[place]]), text, "give the spindle its speed in the CL file")
@@ -420,7 +424,7 @@ class BlockWriter:
             chosen[row] = len(table)
             table.append(end + given_feed + others)
         if run.dwell is not None and run.dwell.any():
-            blocks = self.statements.dwell(dwell)
+            blocks = self.statements.dwell(dwell, self.statements.cycle_line)
             chosen[run.dwell] += len(table)
             table += [end + "".join(block + "\n" for block in blocks).encode() for end in table]
             self.blocks += int(np.count_nonzero(run.dwell)) * len(blocks)

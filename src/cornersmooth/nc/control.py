@@ -38,8 +38,12 @@ class Words:
         Whether tool tip control must be off where a speed is given.
     coolant : mapping
         Blocks by CL word; other words are not translated.
+    coolant_off : mapping
+        Blocks that switch off, by CL word, what ``coolant.OFF`` leaves on.
     dwell : tuple of str
         With ``{milliseconds}`` or ``{seconds}``.
+    dwell_turns : str
+        What makes a dwell count revolutions of the spindle under feed per revolution; empty for nothing.
     compensation_left, compensation_right : tuple of str
         Cutter compensation, with ``{register}``.
     compensation_entry : bool
@@ -59,7 +63,9 @@ class Words:
     spindle_off: Blocks = ()
     spindle_orient: Blocks = ()
     coolant: Mapping[str, Blocks] = field(default_factory=dict)
+    coolant_off: Mapping[str, Blocks] = field(default_factory=dict)
     dwell: Blocks = ()
+    dwell_turns: str = ""
     stop: Blocks = ()
     optional_stop: Blocks = ()
     compensation_left: Blocks = ()

@@ -90,6 +90,7 @@ _TABLES = (
     "layout.units",
     "words",
     "words.coolant",
+    "words.coolant_off",
     "words.plane",
     "words.feed_mode",
     "motion",
@@ -272,17 +273,19 @@ def _layout(table: Table) -> TextStyle:
 
 def _words(table: Table) -> Words:
     _SHELF.check_keys(table, tuple(item.name for item in fields(Words)), "words.")
-    special = {"coolant", "plane", "feed_mode"}
+    special = {"coolant", "coolant_off", "plane", "feed_mode"}
     words = _record(Words, {key: value for key, value in table.items() if key not in special}, "words")
-    coolant = {
-        word.upper(): _blocks(blocks, f"words.coolant.{word}") for word, blocks in table.get("coolant", {}).items()
-    }
+    coolant, coolant_off = (
+        {word.upper(): _blocks(blocks, f"words.{key}.{word}") for word, blocks in table.get(key, {}).items()}
+        for key in ("coolant", "coolant_off")
+    )
     planes = _strings(table.get("plane", {}), "words.plane", tuple(_PLANES))
     modes = _strings(table.get("feed_mode", {}), "words.feed_mode", tuple(_FEED_MODES))
     return Words(
         **{
             **vars(words),
             "coolant": coolant,
+            "coolant_off": coolant_off,
             "plane": {_PLANES[key]: block for key, block in planes.items()},
             "feed_mode": {_FEED_MODES[key]: block for key, block in modes.items()},
         }

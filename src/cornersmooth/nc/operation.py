@@ -76,7 +76,7 @@ class Operation:
         """Blocks before the next motion of a tool; what a tool change stopped goes on again."""
         self._moved = self._used = self.begun = True
         own = self.mode.begin
-        blocks = [block for was_on in self._stopped.values() for block in was_on]
+        blocks = [block for what in ("spindle", "coolant") for block in self._stopped.get(what, ())]
         if self._stopped:
             text = f"{' and '.join(self._stopped)} not given again behind a tool change: on as before"
             self.findings.add("CS331", "warning", self._stopped_line, text)
@@ -196,6 +196,20 @@ class Operation:
         self.coolant = blocks
         self._stopped.pop("coolant", None)
 
+    def coolant_end(self) -> Blocks:
+        """Blocks that stop the coolant that flows."""
+        words = self.form.table.words
+        own = [
+            off for kind, off in words.coolant_off.items() if self.coolant and words.coolant.get(kind) == self.coolant
+        ]
+        return own[0] if own else words.coolant.get("OFF", ())
+
+    def coolant_before(self, blocks: Blocks) -> Blocks:
+        """Blocks before those of another kind of coolant: where one of both has its own end, the other would go on."""
+        words = self.form.table.words
+        own = {words.coolant.get(kind) for kind in words.coolant_off}
+        return self.coolant_end() if self.coolant not in ((), blocks) and {self.coolant, blocks} & own else ()
+
     def _expand(self, steps: Sequence[str], rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
         """Blocks of steps; what is no step is a block itself."""
         given = {f"{{{name}}}": blocks for name, blocks in (*self.texts.items(), *rotary.items())}
@@ -290,7 +304,7 @@ class Operation:
         return self._stop("spindle", self.form.table.words.spindle_off)
 
     def _coolant_off(self) -> list[str]:
-        return self._stop("coolant", self.form.table.words.coolant.get("OFF", ()))
+        return self._stop("coolant", self.coolant_end())
 
     def _stop(self, what: str, blocks: Blocks) -> list[str]:
         was_on: Blocks = getattr(self, what)

@@ -38,6 +38,9 @@ _DESCRIBING = frozenset(
 #: words that say nothing beside what the NC text shows anyway
 _SILENT = frozenset({"END-OF-PATH", "FINI", "REWIND"})
 
+#: words of SPINDL about gears and limits of the speed
+_GEARS = frozenset(("RANGE", "MAXRPM", "HIGH", "LOW", "MEDIUM"))
+
 _NC_WORDS = re.compile(r"\s*(?:[A-Z][+-]?(?:\d+\.?\d*|\.\d+)\s*)+[$%]?\s*", re.IGNORECASE)
 
 
@@ -68,13 +71,14 @@ class StatementWriter:
     cycle: Cycle | None = None  #: the hole cycle in force, None where it is not understood
     speed: float | None = None  #: of the spindle, revolutions per minute
     compensated: bool = False
+    per_revolution: bool = False  #: the feed in force, kept by who writes the motion
     tool: int | None = None  #: loaded last
     _direction: str = "clockwise"
     _diameter: float = 0.0
     _last_cycle: Cycle | None = None
     _cycle_args: tuple[float | str, ...] = ()
     _in_cycle: bool = False
-    _cycle_line: int = 0
+    cycle_line: int = 0  #: of the last CYCLE
     words: Words = field(init=False)
     toolno_loads: bool = field(init=False)
     _ahead_of_tools: frozenset[int] = field(init=False)
@@ -92,7 +96,7 @@ class StatementWriter:
         if handler is not None:
             written = handler(self, statement)
             if written is not None:
-                return written
+                return [*written, *(self.comment(statement.text) if self._says_more(statement) else ())]
             self._not_understood(statement)
         elif word in _TEXT_WORDS:
             return self.comment(spoken_text(statement))
@@ -101,6 +105,15 @@ class StatementWriter:
         elif word not in _DESCRIBING:
             self._not_understood(statement)
         return self.comment(statement.text or word)
+
+    @staticmethod
+    def _says_more(statement: Statement) -> bool:
+        """Whether a statement that is understood has words that no block says: gears, lengths, holders."""
+        words = set(words_of(statement))
+        if statement.word == "SPINDL":
+            return bool(words & _GEARS)
+        loads = statement.word in TOOL_WORDS and any(isinstance(value, str) for value in statement.args[1:])
+        return loads and not words <= {"TOOL", "ADJUST", "OSETNO"}
 
     def only_counted(self, statement: Statement) -> bool:
         """Whether a statement says nothing to the control; it has been counted then."""
@@ -188,14 +201,16 @@ class StatementWriter:
         for word in ("RANGE", "MAXRPM"):  # gears and limits are the control's own affair
             if word in words:
                 following = number_after(statement, word)
-                words = [other for other in words if other not in (word, "HIGH", "LOW", "MEDIUM")]
+                words = [other for other in words if other not in _GEARS]
                 for number in following:
                     numbers.remove(number)
         if not set(words) <= {"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "LOCK", "ORIENT", "NOMORE"}:
             return None
         if "LOCK" in words or "ORIENT" in words:
+            if numbers not in ([], [0.0]) or not self.words.spindle_orient:
+                return None
             self.operation.turn(())
-            return None if numbers else list(self.words.spindle_orient) or None
+            return list(self.words.spindle_orient)
         if "OFF" in words or "NOMORE" in words or numbers == [0.0]:
             self.operation.turn(())
             return list(self.words.spindle_off) or None
@@ -242,15 +257,17 @@ class StatementWriter:
         if numbers_of(statement) or len(kinds) != 1:
             return None
         if "OFF" in words or kinds == ["NOMORE"]:
+            off = self.operation.coolant_end()
             self.operation.cool(())
-            return list(self.words.coolant.get("OFF", ())) or None
+            return list(off) or None
         blocks = self.words.coolant.get(kinds[0])
         if blocks is None:
             return None
         if not self.operation.coolant and id(statement) in self._ahead_of_tools:
             return self.operation.later("coolant", blocks)
+        before = self.operation.coolant_before(blocks)
         self.operation.cool(blocks)
-        return list(blocks)
+        return [*before, *blocks]
 
     def halt(self, blocks: Blocks) -> list[str]:
         """STOP and OPSTOP."""
@@ -265,11 +282,14 @@ class StatementWriter:
         time = milliseconds(numbers[0], "REV" in words, self.speed)
         if time is None:
             return None
-        return self.dwell(time) if self.words.dwell else None
+        return self.dwell(time, statement.line) if self.words.dwell else None
 
-    def dwell(self, time: int) -> list[str]:
-        """Blocks that wait for so many milliseconds."""
+    def dwell(self, time: int, line: int) -> list[str]:
+        """Blocks that wait for so many milliseconds, for a line of the CL file."""
         seconds = format_number(time / 1000.0, 3, trim=True)
+        if time and self.per_revolution and self.words.dwell_turns:
+            text = f"a dwell under feed per revolution: it counts turns of the spindle {self.words.dwell_turns}"
+            self.findings.add("CS383", "warning", line, text)
         return [block.format(milliseconds=time, seconds=seconds) for block in self.words.dwell] if time else []
 
     def compensation(self, statement: Statement) -> list[str] | None:
@@ -340,7 +360,7 @@ class StatementWriter:
         if words == ["ON"]:
             self.cycle = self._last_cycle
         elif words != ["INIT"]:  # SolidWorks announces a cycle by it
-            self._cycle_line, self._cycle_args = statement.line, statement.args
+            self.cycle_line, self._cycle_args = statement.line, statement.args
             self._read_cycle()
             self._refuse_tap(words)
         if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
@@ -366,7 +386,7 @@ class StatementWriter:
             f"a tap, which is not written, as {reason}: plain moves cannot turn the spindle with the feed",
             "give --skip-taps, and put the control's own cycle where the text says NOT DRILLED",
             file=self.program.source.name,
-            line=self._cycle_line,
+            line=self.cycle_line,
         )
 
     def end(self, statement: Statement) -> list[str]:

@@ -93,6 +93,8 @@ class OwnFrame:
                     self._used.add(rule.state)
                     yield from self._unsaid("used", word, rule.state) if self._asked else ()
             self._swivelled |= rule.turns
+            if rule.bars and self._ours and (held := self._state.get(rule.bars)) and held[1].tidy:
+                yield f"{word} under {held[0]}"
             if rule.turned and self._high:  # elsewhere the axes stand where the last motion left them
                 self._turned = dict(self._angles)
             if rule.retract:
@@ -154,7 +156,7 @@ class OwnFrame:
         if not self._asked or not self._moved:
             return
         away = [name for name in sorted(self._angles) if abs(self._angles[name]) > _SAME]
-        if (away or self._swivelled and self._machine) and not self._at_home:
+        if (away or (self._swivelled and self._machine)) and not self._at_home:
             yield f"{' and '.join(away) or 'the rotary axes'} not at zero at the end"
 
 

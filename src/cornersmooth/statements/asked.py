@@ -97,7 +97,7 @@ class Asking:
         if not set(words) <= known | gears or len(numbers) > 1 or any(number < 0 for number in numbers):
             return
         if {"LOCK", "ORIENT"} & set(words):
-            if not numbers:
+            if numbers in ([], [0.0]):
                 self.say("spindle", 19.0)
             return
         if {"OFF", "NOMORE"} & set(words) or numbers == [0.0]:

@@ -62,8 +62,8 @@ def of_m(value: float, place: float, line: int) -> list[Token]:
     """Token of an M word other than M6."""
     if value in (3, 4, 5, 19):
         return [Token("spindle", value, place, line)]
-    if value in (7, 8, 9, 88):
-        return [Token("coolant", value, place, line)]
+    if value in (7, 8, 9, 88, 89):
+        return [Token("coolant", 9.0 if value == 89 else value, place, line)]
     if value in (0, 1):
         return [Token("stop", value, place, line)]
     return [Token("auxiliary", value, place, line)]
