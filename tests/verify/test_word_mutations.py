@@ -40,7 +40,7 @@ def test_a_sample_of_the_mutants_is_judged_rightly(control: str) -> None:
 
 def test_every_control_asks_for_a_head() -> None:
     for control in CONTROLS:
-        heads = word_list(control).heads()
+        heads = word_list(control).heads
         assert set(heads) >= ({"units", "positions", "plane"} if control != "heidenhain" else set())
 
 

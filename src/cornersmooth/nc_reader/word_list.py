@@ -45,7 +45,7 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 from typing import Any, Final
 
@@ -114,6 +114,7 @@ class WordList:
     words: tuple[WordRule, ...] = ()
     blocks: tuple[WordRule, ...] = field(default=())
 
+    @cached_property
     def heads(self) -> dict[str, list[WordRule]]:
         """Words of which one must be said before the first motion, by state."""
         found: dict[str, list[WordRule]] = {}

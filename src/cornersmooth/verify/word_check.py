@@ -413,7 +413,7 @@ class WordCheck:
         self._dropped = {}
         if self._first is None:
             self._first, self._deferred = {state: word for state, (word, _) in self._state.items()}, late
-            for state, rules in self.list.heads().items():
+            for state, rules in self.list.heads.items():
                 spoken = {word for word in self._said if any(rule.pattern.fullmatch(word) for rule in rules)}
                 if not spoken and state not in self._left:
                     wanted = " or ".join(shown(rule.pattern) for rule in rules)
