@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import os
 import re
@@ -170,6 +171,53 @@ def test_the_numbers_of_the_readme_are_those_that_come_out() -> None:
     made.append(numbers.seconds_after(0.01, nc, None))
     assert told[:5] == pytest.approx(made, rel=0.05)
     assert f"| {numbers.seconds_before(None):.0f}." in re.sub(r"\.\d s", ". s", rows["as it was"])
+
+
+def parts_of(source: Path) -> set[str]:
+    """Packages and modules at the top."""
+    found = {path.stem for path in source.iterdir() if path.is_dir() or path.suffix == ".py"}
+    return {name for name in found if not name.startswith("_")}
+
+
+def test_the_page_of_the_architecture_names_what_is_there() -> None:
+    source, text = ROOT / "src" / "cornersmooth", (ROOT / "docs" / "architecture.md").read_text()
+    tables = text[text.index("## Every package") : text.index("## Where tests are")]
+    packages, _, places = tables.partition("## Where would I add")
+    told = {
+        name for cell in re.findall(r"^\| (`.*?) \|", packages, re.MULTILINE) for name in re.findall(r"`(\w+)`", cell)
+    }
+    assert told == parts_of(source)
+    named = set(re.findall(r"`([\w/.]*(?:/|\.py|\.md|\.toml))`", places.replace("NAME", "fanuc")))
+    assert len(named) > 20
+    folders = (ROOT, ROOT / "docs", ROOT / "tests", *(path for path in source.rglob("*") if path.is_dir()), source)
+    unknown = {name for name in named if not any((folder / name).exists() for folder in folders)}
+    # `fanuc` stands for any name: it has tables of a control, and none of a machine
+    assert unknown == {"kinematics/machines/fanuc.toml"}
+
+
+def test_dependencies_point_the_way_that_the_page_says() -> None:
+    source, text = ROOT / "src" / "cornersmooth", (ROOT / "docs" / "architecture.md").read_text()
+    (order,) = re.findall(r"Dependencies point one way: (.*?)\n\(a test", text, re.DOTALL)
+    level = {name: k for k, names in enumerate(order.split("→")) for name in re.findall(r"`(\w+)`", names)}
+    assert parts_of(source) == set(level)
+    back = set()
+    for path in source.rglob("*.py"):
+        package = path.relative_to(source).with_suffix("").parts[0]
+        if package in level:
+            back |= {(path.name, other) for other in imported(path) if level[other] < level[package]}
+    assert back == set()
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Packages and modules of cornersmooth that a file imports, but for what only types need."""
+    tree = ast.parse(path.read_text())
+    for_types = [node for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)]
+    left_out = {id(inside) for node in for_types for inside in ast.walk(node)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module and id(node) not in left_out:
+            first, *below = node.module.split(".")
+            names = below[:1] or [alias.name for alias in node.names]
+            yield from (name for name in names if first == "cornersmooth" and not name.startswith("_"))
 
 
 def test_links_lead_somewhere() -> None:

@@ -10,7 +10,7 @@ import re
 import numpy as np
 
 from cornersmooth import Settings
-from cornersmooth.page import result_page
+from cornersmooth.page import page_and_saving
 from cornersmooth.pipeline import Result, postprocess
 
 #: a zigzag with corners of several kinds: rounded ones, a reversal, a turn of the axis alone
@@ -58,7 +58,7 @@ def smoothed(
 
 def page_of(result: Result, **more: object) -> str:
     """Page of a run."""
-    return result_page(result, source=b"part", **more)  # type: ignore[arg-type]
+    return page_and_saving(result, source=b"part", **more)[0]  # type: ignore[arg-type]
 
 
 def values_of(page: str) -> tuple[dict[str, object], dict[str, np.ndarray]]:

@@ -14,9 +14,9 @@ from scipy.spatial import cKDTree
 import cornersmooth
 from cornersmooth.feedrate import Limits, direct
 from cornersmooth.page.document import document
-from cornersmooth.page.motions import original_path, written_path
 from cornersmooth.page.pages import read_written
-from cornersmooth.page.thinning import thinned
+from cornersmooth.report.paths import original_path, written_path
+from cornersmooth.report.thinning import thinned
 from oracle.command import run
 from page.making import HOSTILE, PATH, page_of, smoothed, values_of
 
@@ -272,7 +272,7 @@ def test_commands_write_pages(tmp_path):
 
 def test_the_time_of_long_paths_is_estimated(tmp_path):
     source, nc = tmp_path / "long.cls", tmp_path / "long.nc"
-    rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(401))
+    rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(301))
     source.write_text(f"TOOL PATH/LONG,TOOL,T\nFEDRAT/MMPM,1500.0\n{rows}END-OF-PATH\n")
     verdicts = []
     for more in ((), ("-v",), ("-q",), ("--report", tmp_path / "long.html")):
@@ -280,7 +280,7 @@ def test_the_time_of_long_paths_is_estimated(tmp_path):
         assert done.returncode == 0, done.stderr
         verdicts.append(done.stderr.decode().split("\n")[0])
     opening = "OK: within 0.02 mm everywhere; no corner stays sharp; "
-    about = re.fullmatch(opening + r"saves about (\d+) s of (\d+) s \(estimated from 49.9 % of the path\)", verdicts[0])
+    about = re.fullmatch(opening + r"saves about (\d+) s of (\d+) s \(estimated from 66.4 % of the path\)", verdicts[0])
     planned = re.fullmatch(opening + r"saves (\d+\.\d) s of (\d+\.\d) s", verdicts[1])
     for found, right in zip(about.groups(), planned.groups(), strict=True):
         assert float(found) == pytest.approx(float(right), rel=0, abs=0.5 + 0.02 * float(right))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cornersmooth.page.document import page
-from cornersmooth.page.pages import BEGINNING, result_page, surface_text, times_page, verified_page
+from cornersmooth.page.pages import BEGINNING, page_and_saving, surface_text, times_page, verified_page
 from cornersmooth.page.scene import Story, Subject
 
-__all__ = ["BEGINNING", "Story", "Subject", "page", "result_page", "surface_text", "times_page", "verified_page"]
+__all__ = ["BEGINNING", "Story", "Subject", "page", "page_and_saving", "surface_text", "times_page", "verified_page"]

@@ -31,15 +31,15 @@ if TYPE_CHECKING:
 BEGINNING = b"<!doctype html>\n<!-- cornersmooth page -->\n"
 
 
-def result_page(
+def page_and_saving(
     result: Result,
     *,
     source: bytes = b"",
     frame: Frame | None = None,
     limits: Limits | None = None,
     tool: Tool | None = None,
-) -> str:
-    """Page of a file that was smoothed, written and verified.
+) -> tuple[str, Saving | None]:
+    """Page of a file that was smoothed, written and verified, and the times that its verdict tells.
 
     Parameters
     ----------
@@ -53,18 +53,6 @@ def result_page(
     tool : Tool, optional
         Instead of that of the file.
     """
-    return page_and_saving(result, source=source, frame=frame, limits=limits, tool=tool)[0]
-
-
-def page_and_saving(
-    result: Result,
-    *,
-    source: bytes = b"",
-    frame: Frame | None = None,
-    limits: Limits | None = None,
-    tool: Tool | None = None,
-) -> tuple[str, Saving | None]:
-    """Page of a file that was smoothed, as `result_page` makes it, and the times that its verdict tells."""
     smoothed, form, settings = result.smoothed, result.form, result.smoothed.settings
     nc = read_written(result, frame)
     limits = Limits() if limits is None else limits

@@ -13,7 +13,7 @@ from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine, endless, with_dynamics
 from cornersmooth.model import Floats, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
-from cornersmooth.page.motions import OriginalPath, WrittenPath
+from cornersmooth.report.paths import OriginalPath, WrittenPath
 from cornersmooth.rotary import rapid_moves, rotary_angles
 from cornersmooth.settings import Settings
 

@@ -5,16 +5,10 @@ Needs matplotlib, which only the extra ``cornersmooth[plot]`` installs.
 
 from __future__ import annotations
 
-from io import BytesIO
-from typing import Any
-
 import numpy as np
 
-from cornersmooth.errors import SettingsError
-from cornersmooth.extras import install_hint
 from cornersmooth.report.along import Distribution
-
-FORMATS = ("png", "svg", "pdf")
+from cornersmooth.report.picture import new_figure, saved
 
 #: points drawn along the path: of more, the largest of each group is kept
 _POINTS = 20_000
@@ -37,12 +31,7 @@ def draw_deviation(found: Distribution, tolerance: float, form: str) -> bytes:
     SettingsError
         CS262: matplotlib is not installed.
     """
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError as missing:
-        raise SettingsError("CS262", "pictures need matplotlib", install_hint("plot")) from missing
-    figure = Figure(figsize=(8.0, 6.0), layout="constrained")
+    figure = new_figure(8.0, 6.0)
     path, classes = figure.subplots(2, 1)
     group = max(-(-len(found) // _POINTS), 1)
     starts = np.arange(0, len(found), group)
@@ -59,9 +48,4 @@ def draw_deviation(found: Distribution, tolerance: float, form: str) -> bytes:
     path.legend()
     for graph in (path, classes):
         graph.grid(visible=True, linewidth=0.3)
-    stream = BytesIO()
-    # same input, same bytes: no date, and names of parts that do not change
-    metadata: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
-    with mpl.rc_context({"svg.hashsalt": "cornersmooth"}):
-        figure.savefig(stream, format=form, metadata=metadata)
-    return stream.getvalue()
+    return saved(figure, form)

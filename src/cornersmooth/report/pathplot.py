@@ -11,9 +11,9 @@ import numpy as np
 
 from cornersmooth.model import Floats, Program, SmoothProgram, Status
 from cornersmooth.nc_reader import NcProgram
-from cornersmooth.page.motions import original_path, written_path
-from cornersmooth.page.thinning import thinned
+from cornersmooth.report.paths import original_path, written_path
 from cornersmooth.report.picture import new_figure, saved
+from cornersmooth.report.thinning import thinned
 
 #: points drawn of each path
 _POINTS = 20_000

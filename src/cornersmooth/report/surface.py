@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.page.thinning import thinned
 from cornersmooth.report.picture import new_figure, saved
+from cornersmooth.report.thinning import thinned
 from cornersmooth.surface import SurfaceMap
 
 CSV_COLUMNS = ("cl_line", "station", "level", "side", "x", "y", "z", "nx", "ny", "nz", "off_mm")

@@ -6,16 +6,12 @@ Needs matplotlib, which only the extra ``cornersmooth[plot]`` installs.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 
-from cornersmooth.errors import SettingsError
-from cornersmooth.extras import install_hint
 from cornersmooth.feedrate.timelaw import TimeLaw
-
-FORMATS = ("png", "svg", "pdf")
+from cornersmooth.report.picture import new_figure, saved
 
 #: points drawn per law: more cannot be told apart
 _POINTS = 20_000
@@ -33,14 +29,9 @@ def draw(laws: Mapping[str, TimeLaw], form: str) -> bytes:
     Raises
     ------
     SettingsError
-        matplotlib is not installed.
+        CS262: matplotlib is not installed.
     """
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError as missing:
-        raise SettingsError("CS262", "pictures need matplotlib", install_hint("plot")) from missing
-    figure = Figure(figsize=(6.0 * len(laws), 6.0), layout="constrained")
+    figure = new_figure(6.0 * len(laws), 6.0)
     graphs: Any = figure.subplots(2, len(laws), sharex=True, sharey="row", squeeze=False)
     for column, (title, law) in enumerate(laws.items()):
         times = law.every_period()
@@ -55,10 +46,4 @@ def draw(laws: Mapping[str, TimeLaw], form: str) -> bytes:
                 graph.set_ylabel(label)
         graphs[0, column].set_title(f"{title}: {law.total:.3f} s")
         graphs[1, column].set_xlabel("time, s")
-    stream = BytesIO()
-    # same input, same bytes: no date, and names of parts that do not change
-    with mpl.rc_context({"svg.hashsalt": "cornersmooth"}):
-        figure.savefig(
-            stream, format=form, dpi=120, metadata={"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
-        )
-    return stream.getvalue()
+    return saved(figure, form)

@@ -1,7 +1,6 @@
 """Rotary angles along a path: one solution for every pose, points where angles need them, curves of angles."""
 
 from cornersmooth.rotary.angle_path import RotaryPath, rapid_moves, rotary_angles, still_poses
-from cornersmooth.rotary.axis_findings import axis_rates
 from cornersmooth.rotary.insertion import FilledPath, Insertions, fill, insertions
 from cornersmooth.rotary.rewinding import rewound_angles
 
@@ -9,7 +8,6 @@ __all__ = [
     "FilledPath",
     "Insertions",
     "RotaryPath",
-    "axis_rates",
     "fill",
     "insertions",
     "rapid_moves",

@@ -17,17 +17,6 @@ NO_TURN = 1e-6
 CHUNK = 1 << 15
 
 
-def axis_rates(angles: Floats, tip: Floats) -> Floats:
-    """How fast rotary axes turn along a path: (n, 2) degrees, (n, 3) mm -> (n-1, 2) degrees per mm.
-
-    Infinite where the tip stands still while the axis turns.
-    """
-    turn = np.abs(np.diff(angles, axis=0))
-    length = np.linalg.norm(np.diff(tip, axis=0), axis=1)[:, None]
-    moving = length > 0
-    return np.where(moving, turn / np.where(moving, length, 1.0), np.where(turn > NO_TURN, np.inf, 0.0))
-
-
 def reach_error(machine: Machine, axis: Floats, beyond: float, line: int, file: str | None) -> InputError:
     """Say that no rotary angles give this axis."""
     vector = ", ".join(f"{number:.6f}" for number in axis)

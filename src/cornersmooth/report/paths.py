@@ -1,4 +1,4 @@
-"""The two motions that a page shows: the original path, and the written one with its deviation at every point."""
+"""The two motions that pages and pictures show: the original path, and the written one with its deviations."""
 
 from __future__ import annotations
 
