@@ -119,6 +119,54 @@ def test_a_text_with_another_work_offset_says_so(control: str, offset: str, othe
     assert any(f"was made for {offset}" in problem for problem in _problems(control, back))
 
 
+#: one tool, cut once: what is lost is said nowhere else
+_ONE_TOOL = """UNITS/MM
+LOADTL/1
+SPINDL/3000,RPM,CLW
+RAPID
+GOTO/0,0,60,0.1,0.2,0.97468
+FEDRAT/800,MMPM
+GOTO/0,0,0,0.1,0.2,0.97468
+GOTO/10,2,0,0.15,0.2,0.96825
+GOTO/20,0,1,0.2,0.15,0.96825
+RAPID
+GOTO/20,0,60,0.2,0.15,0.96825
+FINI
+"""
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "machine", "tcp", "block", "left"),
+    [
+        ("siemens", None, None, True, "D1", ""),
+        ("siemens", "bspline", "table-ac", True, "D1", ""),
+        ("siemens", None, "head-ac", False, "D1", ""),
+        ("siemens", None, None, True, "ORIWKS ORIVECT", ""),
+        ("siemens", None, None, True, "ORIWKS ORIVECT", "ORIWKS"),
+        ("siemens", None, "table-ac", True, "ORIMKS ORIAXES", "ORIAXES"),
+        ("heidenhain", None, "table-ac", True, "M126", ""),
+        ("heidenhain", "spl", "head-ac", True, "M126", ""),
+        ("fanuc", "g6.2", None, True, "G43 H1.*", ""),
+        ("fanuc", None, "table-ac", True, "G0 A0.* C0.*", "G0 C0.0000"),
+        ("mitsubishi", None, "table-ac", True, "G0 A0.* C0.*", "G0 A0.0000"),
+    ],
+)
+def test_what_the_only_tool_of_a_text_needs_is_found_where_it_is_lost(
+    control: str, form: str | None, machine: str | None, tcp: bool, block: str, left: str
+) -> None:
+    """Tool edge, meaning and ways of rotary words, length of the tool, one of two axes that go to zero."""
+    chosen = choose_form(control, form, machine=machine and load_machine(machine), tcp=tcp)
+    stream = io.BytesIO()
+    postprocess(_ONE_TOOL.encode(), stream, Settings(tolerance=0.05), form=chosen)
+    how = {"control": control, "machine": chosen.machine, "tcp": tcp, "tolerance": 0.05}
+    program, text = read(_ONE_TOOL.encode()), stream.getvalue()
+    assert verify(program, text, **how).passed
+    lines = text.decode().splitlines()
+    at = next(k for k, line in enumerate(lines) if re.fullmatch(rf"(\d+ )?{block}", line))
+    lines[at : at + 1] = [left] if left else []
+    assert not verify(program, "\n".join(lines).encode(), **how).passed
+
+
 @pytest.mark.parametrize("control", MACHINES)
 def test_texts_that_do_not_say_how_they_were_made_have_their_own_habits(control: str) -> None:
     lines = [line for line in _text(control).splitlines() if "CORNERSMOOTH 0" not in line]

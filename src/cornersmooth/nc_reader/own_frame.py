@@ -59,8 +59,10 @@ class OwnFrame:
         self._used: set[str] = set()  # states that something has been switched on in
         self._angles: dict[str, float] = {}
         self._turned: dict[str, float] | None = None  # angles at which tip control came on, until the tool moves
+        self._zeroed: dict[str, float] | None = None  # the same where they must be zero
         self._lost: list[str] | None = None  # what was missing before the first retract; the head is read behind it
         self._high = self._moved = False
+        self._above = False  # Z has not moved since a retract
 
     def comment(self, text: str) -> None:
         """Take note of how the text was made, if a comment says so."""
@@ -97,10 +99,13 @@ class OwnFrame:
                 yield f"{word} under {held[0]}"
             if rule.turned and self._high:  # elsewhere the axes stand where the last motion left them
                 self._turned = dict(self._angles)
+            if rule.zero:
+                self._zeroed = dict(self._angles)
+            self._state.pop(rule.drops, None)
             if rule.retract:
                 if self._lost is None:
                     self._lost = list(self._unsaid("first", word))
-                self._high = True
+                self._high = self._above = True
         if changes_tool and self._ours:
             yield from (f"{text_of(words)} under {word}" for word in self._running())
 
@@ -125,6 +130,9 @@ class OwnFrame:
         """Look at the words of a motion, the first behind a retract or behind words that are no motion."""
         high, self._high = self._high, False
         turned, self._turned = self._turned, None
+        zeroed, self._zeroed = self._zeroed, None
+        comes_down = self._above and "Z" in words
+        self._above &= not comes_down
         first, self._moved = not self._moved, True
         if not self._asked:
             return
@@ -134,9 +142,24 @@ class OwnFrame:
         off = [name for name in rotary if not abs((turned or {}).get(name, math.nan) - words[name]) <= _SAME]
         if off:
             yield f"tool tip control comes on before {' and '.join(off)} stands where the next motion has it"
+        unknown = [] if zeroed is None else [name for name in sorted(_ROTARY & words.keys()) if name not in zeroed]
+        if unknown:
+            yield f"tool tip control comes on before {' and '.join(unknown)} stands at zero"
+        if comes_down:
+            yield from self._not_in_force()
         if first:
             yield from self._lost or ()
             yield from self._wrong_offset()
+
+    def _not_in_force(self) -> Iterator[str]:
+        """What the tool may not come down without."""
+        in_force = [word for word, rule in self._state.values() if not rule.off]
+        for rule in self._list.words:
+            held = self._state.get(rule.state)
+            if rule.down is None or (held and not held[1].off) or shadowed(self._list, rule):
+                continue
+            if any(rule.down.fullmatch(word) for word in in_force):
+                yield f"the tool comes down from a retract without {shown(rule.pattern)}"
 
     def _wrong_offset(self) -> Iterator[str]:
         """What is wrong with the work offset, one for the whole text."""

@@ -34,7 +34,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     In texts of our own (`own_frame`): ``first``: it must be said before the first retract (``"first"``), or before
     another word of its state (``"used"``). ``bars``: a state of which no ``tidy`` word may hold where it is said.
     ``tidy``: it must be switched off before another tool and at the end. ``turned``: the rotary axes must stand as the
-    next motion has them. ``preset``: the one that is meant where the head names none.
+    next motion has them. ``preset``: the one that is meant where the head names none. ``down``: one of its
+    state must hold where the tool comes down from a retract while a word like this holds.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.
@@ -50,7 +51,7 @@ from importlib.resources import files
 from typing import Any, Final
 
 #: keys of a word that are regular expressions
-_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind"))
+_PATTERNS: Final = frozenset(("is", "needs", "must", "after", "then", "behind", "down"))
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,7 @@ class WordRule:
     turned: bool = False
     preset: str = ""
     bars: str = ""
+    down: re.Pattern[str] | None = None
 
 
 @dataclass(frozen=True)
