@@ -10,6 +10,8 @@ from cornersmooth.cl import read
 from cornersmooth.verify import verify
 from cornersmooth.verify.in_order import passage
 from oracle.share import how_many
+from verify.random_programs import trial
+from verify.sweep import judged
 from verify.writing import simple_text
 
 Floats = NDArray[np.float64]
@@ -133,3 +135,10 @@ def test_every_turn_must_be_passed_in_its_order(cl: list[float], order: list[flo
     assert not in_order(cl, order, tolerance)
     # within a wider tolerance nothing of it is missing
     assert in_order(cl, order, 3.0 * tolerance)
+
+
+@pytest.mark.parametrize("seed", [600796, 600961])
+def test_tips_and_axis_points_each_in_order_pass_where_no_pose_is_near_both(seed: int) -> None:
+    """`zhang2016`: where a window begins, the tip or the axis point is off the place of both by more than ε."""
+    one = trial(seed)
+    assert judged(one, read(one.cl.encode()), oracle=False) == ("passed", "")

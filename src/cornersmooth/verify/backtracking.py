@@ -12,7 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.verify.distances import Distances, Reached, own_gaps_of_original, own_gaps_of_written
 from cornersmooth.verify.findings import Findings
-from cornersmooth.verify.in_order import Window, Windows, passage
+from cornersmooth.verify.in_order import MOST_PAIRS, Window, Windows, passage
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import distance_between, nearest_places
 from cornersmooth.verify.rapids import ARITHMETIC
@@ -25,9 +25,6 @@ _STRAIGHT = 1.2
 
 #: how many times `Match.near` a vertex is from its path that is on it nowhere, in six dimensions
 _OFF = 2.0
-
-#: pairs of a written and an original segment that are looked at for a vertex, at most
-_MOST_PAIRS = 100_000
 
 #: vertices of a batch that run backwards after which all that seem to are taken to
 _MOST_WRONG = 512
@@ -93,10 +90,7 @@ def written_backwards(match: Match, written: Reached, windows: Windows) -> Found
             found.append(row)
     if not found:
         return None
-    original = match.original
-    move = original.trail.owner[match.segment[vertex[found]] + 1]
-    nc_line = match.nc.line[match.written.trail.owner[vertex[found]]]
-    return held[found], original.program.line[original.pose[move]], nc_line, gain[found]
+    return _told(match, vertex[found], gain[found])
 
 
 def written_elsewhere(match: Match, written: Reached, windows: Windows) -> Found | None:
@@ -121,11 +115,7 @@ def written_elsewhere(match: Match, written: Reached, windows: Windows) -> Found
             found.append(row)
     if not found:
         return None
-    vertex = written.vertex[found]
-    original = match.original
-    move = original.trail.owner[match.segment[vertex] + 1]
-    nc_line = match.nc.line[match.written.trail.owner[vertex]]
-    return match.place[vertex], original.program.line[original.pose[move]], nc_line, away[found]
+    return _told(match, written.vertex[found], away[found])
 
 
 def turned_elsewhere(distances: Distances) -> Found | None:
@@ -154,11 +144,15 @@ def turned_elsewhere(distances: Distances) -> Found | None:
             found.append(row)
     if not found:
         return None
-    vertices = written.vertex[found]
+    return _told(match, written.vertex[found], away[found])
+
+
+def _told(match: Match, vertex: Ints, amount: Floats) -> Found:
+    """Where written vertices are that are run in a wrong order."""
     original = match.original
-    move = original.trail.owner[match.segment[vertices] + 1]
-    nc_line = match.nc.line[match.written.trail.owner[vertices]]
-    return match.place[vertices], original.program.line[original.pose[move]], nc_line, away[found]
+    move = original.trail.owner[match.segment[vertex] + 1]
+    nc_line = match.nc.line[match.written.trail.owner[vertex]]
+    return match.place[vertex], original.program.line[original.pose[move]], nc_line, amount
 
 
 def _curved(match: Match, window: Window) -> bool:
@@ -244,7 +238,7 @@ def _in_order(match: Match, vertex: Ints) -> bool:
     ends = _on(match.path.six, place)
     inner = slice(int(place[0]) + 1, int(np.ceil(place[1])))
     own, path = match.six[vertex], np.vstack((ends[:1], match.path.six[inner], ends[1:]))
-    if len(own) * len(path) > _MOST_PAIRS:
+    if len(own) * len(path) > MOST_PAIRS:
         return False
     around = match.path.six[max(inner.start - 1 - _REACH, 0) : inner.stop + 1 + _REACH]
     radius = max(_off(own, around), _off(path, own)) + match.slack / 2.0

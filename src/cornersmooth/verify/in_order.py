@@ -16,6 +16,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.match import Match
+from cornersmooth.verify.nearest import nearest_places
 
 #: how far on either side of a vertex the motions are followed, in `Match.near`; halved so often if that is too much
 AROUND: Final = 32.0
@@ -25,7 +26,7 @@ _HALVED: Final = 6
 _ANCHORS: Final = 32
 
 #: pairs of a written and an original segment that are looked at, at most
-_MOST_PAIRS: Final = 100_000
+MOST_PAIRS: Final = 100_000
 
 #: windows of a batch that may be out of order before no more are looked at: the text is off then
 _MOST_FAILED: Final = 8
@@ -106,7 +107,7 @@ class Windows:
             last = self._anchor(begin + int(np.searchsorted(own, high, side="right")), vertex, end)
             segment = int(match.segment[first])
             stop = max(int(np.ceil(match.segment[last] + match.fraction[last])), segment + 1)
-            if (last - first) * (stop - segment) <= _MOST_PAIRS:
+            if (last - first) * (stop - segment) <= MOST_PAIRS:
                 break
             around /= 2.0
         else:
@@ -126,8 +127,12 @@ class Windows:
         match = self.match
         own = match.six[window.vertex : window.vertex + len(window.low)]
         path = match.path.six[window.segment : window.segment + window.low.shape[1] + 1]
+        ends = np.array([0, len(path) - 2])
         for column in ((0, 1, 2, 0, 1, 2), (3, 4, 5, 3, 4, 5)):
-            low, _ = passage(own[:, column], path[:, column], window.places, match.tolerance + match.slack)
+            mine, theirs = own[:, column], path[:, column]
+            _, at, square = nearest_places(mine[[0, -1]], theirs, ends, 0, ends, ends)
+            off = float(np.sqrt(square.max() / 2.0))
+            low, _ = passage(mine, theirs, (at[0], ends[1] + at[1]), max(match.tolerance, off) + match.slack)
             if np.isnan(low).all(axis=1).any():
                 return False
         return True
