@@ -238,3 +238,14 @@ def test_what_planes_need_around_them_is_found_where_it_is_lost(
     text = "\n".join([*lines[:at], *lines[at + 1 :], ""]).encode()
     found = verify(read(_PLANES.encode(), name="planes.cls"), text, **_how(control))
     assert any(said in problem.text.replace("\\", "") for problem in found.problems), found.problems
+
+
+def test_a_tool_without_direction_on_the_way_back_is_a_problem() -> None:
+    """U V W at the tip itself: an axis of no length has no straight back."""
+    form, program, stream = choose_form("fanuc", "g6.2"), read(_ONE_TOOL.encode()), io.BytesIO()
+    postprocess(_ONE_TOOL.encode(), stream, Settings(tolerance=0.05), form=form)
+    lines = stream.getvalue().decode().splitlines()
+    for k, line in enumerate(lines):
+        if line.startswith(("G43", "G0 X")):
+            lines[k] = re.sub(r"X(\S+) Y(\S+) Z(\S+) U.*", r"X\1 Y\2 Z\3 U\1 V\2 W\3", line)
+    assert not verify(program, "\n".join(lines).encode(), control="fanuc", tolerance=0.05).passed

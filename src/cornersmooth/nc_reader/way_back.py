@@ -133,7 +133,7 @@ class WayBack:
 def is_above(ends: Elements, above: int, below: int) -> bool:
     """Whether a tip is straight back along the tool from another, with the same axis."""
     axis = ends.second if ends.second_is == "vector" else ends.second - ends.tip
-    axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     way = ends.tip[above] - ends.tip[below]
     height = float(way @ axis[below])
     aside = float(np.linalg.norm(way - height * axis[below]))
