@@ -380,6 +380,7 @@ def test_two_inputs_never_share_an_output(several: list[Path], tmp_path: Path) -
     for args, said in (
         ([several[0], twin], f"{several[0]} and {twin} would both be written to "),
         ([several[0], several[0]], f"{several[0]} is named twice"),
+        ([several[0], os.path.relpath(several[0])], f"{several[0]} is named twice"),
         ([several[0], "--report", "r.json", "--report", "r.json"], "r.json is the name of two outputs"),
     ):
         result = run("smooth", *args, "-d", tmp_path / "out")

@@ -259,7 +259,7 @@ def _check_targets(jobs: list[Job]) -> None:
 def _refuse_clash(one: Job, other: Job, path: str) -> NoReturn:
     if one is other:
         raise click.UsageError(f"{path} is the name of two outputs; give each its own")
-    if one.source == other.source:
+    if os.path.realpath(one.source) == os.path.realpath(other.source):
         raise click.UsageError(f"{one.source} is named twice; name it once")
     raise click.UsageError(
         f"{one.source} and {other.source} would both be written to {path}; rename one, or give each a -d of its own"

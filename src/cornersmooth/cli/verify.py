@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -22,6 +22,7 @@ from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.model import Program
+    from cornersmooth.nc_reader import NcProgram
     from cornersmooth.report.along import Distribution
     from cornersmooth.verify import Verification, Where
 
@@ -108,19 +109,12 @@ def command(source: str, text: str, **given: Any) -> int:
     )
     _write_reports(program, found, [path for path in given["reports"] if path not in pages])
     if pages:
-        from cornersmooth.nc_reader import read_nc
         from cornersmooth.page import verified_page
-        from cornersmooth.verify.task import length_of
 
-        how_read = {**reader, "tolerance": given["tolerance"], "axis_length": given["axis_length"]}
-        if given["axis_tolerance"] is not None:
-            how_read["axis_length"] = length_of(given["tolerance"], given["axis_tolerance"])
-        page = verified_page(
-            program, read_nc(nc, **how_read), found, source=data, machine=how["machine"], tool=given["tool"]
-        ).encode("utf-8")
+        text_read = _read_for_page(nc, given, reader)
+        page = verified_page(program, text_read, found, source=data, machine=how["machine"], tool=given["tool"])
         for path in pages:
-            with open_output(target_of(path)) as output:
-                output.stream.write(page)
+            _write(path, [page])
     if given["plot"]:
         from cornersmooth.report.deviationplot import draw_deviation
 
@@ -220,10 +214,24 @@ def _write_reports(program: Program, found: Verification, paths: list[str]) -> N
     from cornersmooth.report.verification import verification_csv, verification_json
 
     for path in paths:
-        parts = verification_csv(program, found) if path.lower().endswith(".csv") else [verification_json(found)]
-        with open_output(target_of(path)) as output:
-            for part in parts:
-                output.stream.write(part.encode("utf-8"))
+        _write(path, verification_csv(program, found) if path.lower().endswith(".csv") else [verification_json(found)])
+
+
+def _write(path: str, parts: Iterable[str]) -> None:
+    with open_output(target_of(path)) as output:
+        for part in parts:
+            output.stream.write(part.encode("utf-8"))
+
+
+def _read_for_page(nc: bytes | str | os.PathLike[str], given: dict[str, Any], reader: dict[str, Any]) -> NcProgram:
+    """Read the text as verification did."""
+    from cornersmooth.nc_reader import read_nc
+    from cornersmooth.verify.task import length_of
+
+    axis_length = given["axis_length"]
+    if given["axis_tolerance"] is not None:
+        axis_length = length_of(given["tolerance"], given["axis_tolerance"])
+    return read_nc(nc, **reader, tolerance=given["tolerance"], axis_length=axis_length)
 
 
 def _problems(found: Verification, name: str, text: str, verbose: int) -> Iterator[str]:

@@ -171,13 +171,7 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
     if len(curves):
         _check_starts(run, modal, code[rows[curved]] == NURBS)
     if is_arc.any():
-        element = np.flatnonzero(kind == Element.ARC)
-        own = rows[element]
-        part = Table(table.line[own], {name: column[own] for name, column in table.columns.items()})
-        run.arc_element = element
-        run.arc_centre, run.arc_normal, run.arc_sweep = circles(
-            part, np.vstack((modal.tip, run.tip))[element], run.tip[element], code[own] == 3, modal.plane, problems
-        )
+        _add_arcs(run, modal, table, rows, code)
     after = modal.but(
         code=float(code[-1]),
         tip=tuple(tip[-1].tolist()),
@@ -186,6 +180,16 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
         points=points,
     )
     return run, after
+
+
+def _add_arcs(run: Executed, modal: Modal, table: Table, rows: Ints, code: Floats) -> None:
+    """Give the arcs of a run their circles; `rows` are the blocks of its elements, `code` the G word of each block."""
+    run.arc_element = np.flatnonzero(run.kind == Element.ARC)
+    own = rows[run.arc_element]
+    part = Table(table.line[own], {name: column[own] for name, column in table.columns.items()})
+    start, end = np.vstack((modal.tip, run.tip))[run.arc_element], run.tip[run.arc_element]
+    found = circles(part, start, end, code[own] == 3, modal.plane, run.problems)
+    run.arc_centre, run.arc_normal, run.arc_sweep = found
 
 
 class _Held:
