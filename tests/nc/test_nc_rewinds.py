@@ -106,6 +106,36 @@ def test_the_tool_goes_up_before_an_axis_turns_back(control: str, name: str, for
     assert "CS537" in {problem.code for problem in wrong}
 
 
+@pytest.mark.parametrize("control", ["fanuc", "mitsubishi", "siemens"])
+@pytest.mark.parametrize("lines", ["dense", "long"])
+def test_turns_of_the_tools_before_are_left_where_the_axes_go_to_zero(control: str, lines: str) -> None:
+    rings = [*ring(0, 30), "RAPID", ring(20, 30)[-1], "RAPID", ring(20, 30)[0]]
+    tool = ["SPINDL/8000,RPM,CLW", "RAPID", ring(20, 30)[0], "FEDRAT/500,MMPM", *rings, *rings]
+    cl = ["UNITS/MM", "LOADTL/2", *tool, "LOADTL/3", *tool, "GOHOME", *tool, "FINI"]
+    machine = load_machine("table-ac")
+    form = choose_form(control, "g1", machine=machine)
+    settings = fit_settings(Settings(tolerance=EPS, lines=lines), form, "mm")
+    program = read("\n".join(cl).encode(), name="rings.cls")
+    stream = io.BytesIO()
+    write(smooth(program, settings), stream, form=form)
+    text = stream.getvalue().decode().splitlines()
+    assert not problems(program, text, control, machine)
+    high, first, most = True, [], 0.0
+    for line in text:
+        high |= re.search("G28|SUPA", line) is not None
+        turn = re.search(r"^G[01] X.* C([-\d.]+)", line)
+        if turn and high:
+            first.append(float(turn[1]))
+        high &= not turn
+        most = max(most, abs(float(turn[1]))) if turn else most
+    assert len(first) == 3
+    if control == "siemens":  # its axes go where the next motion has them
+        assert most > 1500
+    else:
+        assert all(abs(angle) <= 180.0 for angle in first)
+        assert most < 1000
+
+
 def test_an_upright_tool_may_turn_where_it_is() -> None:
     machine = short("table-ac")
     program, lines, found = text_of("fanuc", machine, lean=0.0)

@@ -13,6 +13,7 @@ import numpy as np
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, Program
+from cornersmooth.nc.cycle_blocks import tool_starts
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.vectors import dot
@@ -80,6 +81,39 @@ def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findin
     text = "retract before a rapid in which rotary axes swing the tilted tool: they turn at its height"
     findings.add("CS341", "note", int(line[rows[0]]), text, len(rows))
     return rows
+
+
+def from_zero(form: Form, program: Program, angles: Floats, move: Ints, rapid: Bools) -> Floats:
+    """Angles without the whole turns of the tools before, where the rotary axes begin at zero behind a retract.
+
+    Parameters
+    ----------
+    form : Form
+        With rotary words.
+    program : Program
+    angles : (r, 2) float64, degrees
+    move : (r,) int64
+        Ascending.
+    rapid : (r,) bool
+    """
+    machine, table = form.machine, form.table.program
+    assert machine is not None
+    begin = table.begin if form.mode.begin is None else form.mode.begin
+    endless = np.array([axis.limits is None and not axis.modulo for axis in machine.axes])
+    if not (table.retract and "{rotary_zero}" in begin and endless.any()):
+        return angles
+    homes = [one.pose for one in program.statements if one.word == "GOHOME" and not one.args]
+    starts = np.unique([*tool_starts(program)[1:], *homes]).astype(np.int64)
+    rows = np.searchsorted(move, starts)
+    there = rows < len(move)
+    starts, rows = starts[there], rows[there]
+    rows = rows[(move[rows] == starts) & rapid[rows]]  # a pose that repeats the one before is no row
+    if not len(rows):
+        return angles
+    turns = np.zeros_like(angles)
+    for row, end in zip(rows.tolist(), [*rows[1:].tolist(), len(move)], strict=True):
+        turns[row:end, endless] = np.round(angles[row, endless] / 360.0)
+    return angles - 360.0 * turns
 
 
 def refuse_compensated(program: Program, pose: int) -> NoReturn:

@@ -22,6 +22,7 @@ from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Smo
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import corner_blends, line_limits
+from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
 from cornersmooth.rotary import (
     FilledPath,
@@ -239,7 +240,7 @@ def _way(
         path = rotary_angles(machine, tip, axis, **how)
     for finding in path.findings:
         findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
-    return _Way(tip, axis, move, path.angles, rapid, left)
+    return _Way(tip, axis, move, from_zero(form, program, path.angles, move, rapid), rapid, left)
 
 
 @dataclass
