@@ -249,3 +249,19 @@ def test_a_tool_without_direction_on_the_way_back_is_a_problem() -> None:
         if line.startswith(("G43", "G0 X")):
             lines[k] = re.sub(r"X(\S+) Y(\S+) Z(\S+) U.*", r"X\1 Y\2 Z\3 U\1 V\2 W\3", line)
     assert not verify(program, "\n".join(lines).encode(), control="fanuc", tolerance=0.05).passed
+
+
+def test_a_new_speed_under_tcpm_is_found() -> None:
+    cl = (
+        "LOADTL/1\nSPINDL/1000,RPM,CLW\nRAPID\nGOTO/0,0,50,0,0,1\nFEDRAT/100,MMPM\nGOTO/0,0,0,0,0,1\n"
+        "SPINDL/2000,RPM,CLW\nGOTO/20,0,0,0,0.1,0.99498744\nGOTO/40,0,0,0,0.1,0.99498744\nSPINDL/OFF\nFINI\n"
+    )
+    form = choose_form(load_control("heidenhain"), None, machine=load_machine("table-ac"))
+    stream = io.BytesIO()
+    postprocess(cl.encode(), stream, Settings(tolerance=0.01, axis_length=10.0), form=form)
+    lines = stream.getvalue().decode("ascii").splitlines()
+    at = next(k for k, line in enumerate(lines) if line.endswith("FUNCTION RESET TCPM"))
+    assert lines[at + 1].endswith("TOOL CALL Z S2000")
+    text = "\n".join([*lines[:at], *lines[at + 1 :], ""]).encode()
+    found = verify(read(cl.encode(), name="speed.cls"), text, **_how("heidenhain"))
+    assert any("TOOL CALL Z S2000 under FUNCTION TCPM" in problem.text for problem in found.problems)
