@@ -328,6 +328,55 @@ def test_what_a_tool_change_stops_goes_on_behind_it() -> None:
     assert codes(written) == {"CS331": 1}
 
 
+HALTED = """LOADTL/1
+SPINDL/900,RPM,CLW
+COOLNT/ON
+RAPID
+GOTO/0,0,50
+FEDRAT/100,MMPM
+GOTO/0,0,0
+STOP
+GOTO/9,0,0
+STOP
+SPINDL/700,RPM,CLW
+GOTO/20,0,0
+OPSTOP
+COOLNT/OFF
+GOTO/30,0,0
+RAPID
+GOTO/30,0,50
+OPSTOP
+CYCLE/DRILL,FEDTO,5,MMPM,90,RAPTO,3,RTRCTO,50
+GOTO/30,0,0
+CYCLE/OFF
+OPSTOP
+LOADTL/2
+SPINDL/500,RPM,CLW
+RAPID
+GOTO/0,0,50
+GOTO/0,0,0
+FINI
+"""
+
+
+def test_what_a_stop_ends_is_said_again_before_the_tool_moves() -> None:
+    stream = io.BytesIO()
+    form = choose_form("fanuc", machine=load_machine("table-ac"))
+    postprocess(HALTED.encode(), stream, Settings(), form=form, frame=Frame(cycles="native"))
+    lines = stream.getvalue().decode().splitlines()
+    stops = [k for k, line in enumerate(lines) if line in ("M0", "M1")]
+    behind = [[line for line in lines[k + 1 : k + 4] if not line.startswith(("G", "(", "T"))] for k in stops]
+    assert behind == [["S900 M3", "M8"], ["S700 M3", "M8"], ["M9", "S700 M3"], ["S700 M3"], []]  # M5 behind the retract
+    assert lines[lines.index("T2 M6") + 1] == "S500 M3"
+    program = read(HALTED.encode(), name="halted.cls")
+    for k in stops[:3]:
+        for j in range(k + 1, k + 3):
+            if lines[j] in ("S900 M3", "S700 M3", "M8"):
+                text = "\n".join([*lines[:j], *lines[j + 1 :]]) + "\n"
+                how = {"control": "fanuc", "machine": form.machine, "tolerance": 0.01, "axis_length": 10}
+                assert verify(program, text.encode(), **how).problems, lines[j]
+
+
 def test_what_is_switched_on_ahead_of_the_tool_waits_for_it() -> None:
     cl = (
         "UNITS/MM\n{}COOLNT/ON\n{}LOADTL/2\nRAPID\nGOTO/0,0,9\nFEDRAT/100,MMPM\nGOTO/0,0,0\n"

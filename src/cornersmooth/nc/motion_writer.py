@@ -348,6 +348,7 @@ class MotionWriter:
                 yield from self._blocks(table.off if said else ())
                 said = ()
                 yield from self._emit(self._moving(replace(above, rapid=np.ones(1, np.bool_))))
+                yield from self._blocks(self.operation.go_on())
                 yield from self._blocks(writer.feed_mode(int(modes[0])))
             hole = Hole(
                 tip @ frame / unit,
@@ -419,6 +420,7 @@ class MotionWriter:
             if self.writer is self.writers.tilting:
                 self._warnings.of_tip_control(int(run.move[0]), self.writer.form)
             yield from self._blocks(self.operation.begin(self._rotary_blocks(first)))
+        yield from self._blocks(self.operation.go_on())
         if self.operation.retracted:
             self.operation.retracted = False
             yield from self._blocks(self._approaches(first, above or self.approach * bool(run.rapid[0])))

@@ -60,6 +60,7 @@ class Operation:
     _functions: bool = False
     _moved: bool = False  # the tool has been used since it was up
     _used: bool = False  # the tool has been used
+    _halted: set[str] = field(default_factory=set)  # what a stop has switched off, and nothing has said again
     _stopped: dict[str, Blocks] = field(default_factory=dict)  # what a tool change has switched off, as it was on
     _stopped_line: int = 0
 
@@ -82,6 +83,7 @@ class Operation:
             self.findings.add("CS331", "warning", self._stopped_line, text)
         self.spindle = self._stopped.get("spindle", self.spindle)
         self.coolant = self._stopped.get("coolant", self.coolant)
+        self._halted -= self._stopped.keys()
         self._stopped = {}
         steps = self.form.table.program.begin if own is None else own
         blocks += self._let_turn()
@@ -185,6 +187,20 @@ class Operation:
         """Take note of the blocks that turn the spindle, or of none where it stops."""
         self.spindle = blocks
         self._stopped.pop("spindle", None)
+        self._halted.discard("spindle")
+
+    def halt(self) -> None:
+        """Take note of a stop: most controls stop spindle and coolant with it, and start neither again."""
+        self.halted, self._halted = True, {"spindle", "coolant"}
+
+    def go_on(self) -> list[str]:
+        """Blocks before the first motion behind a stop: spindle and coolant as they were."""
+        blocks = [
+            *(self.spindle[-1:] if "spindle" in self._halted else ()),
+            *(self.coolant if "coolant" in self._halted else ()),
+        ]
+        self._halted = set()
+        return blocks
 
     def later(self, what: str, blocks: Blocks) -> list[str]:
         """Let blocks that turn the spindle, or let the coolant flow, wait for a tool change ahead of any motion."""
@@ -195,6 +211,7 @@ class Operation:
         """Take note of the blocks that let the coolant flow, or of none where it stops."""
         self.coolant = blocks
         self._stopped.pop("coolant", None)
+        self._halted.discard("coolant")
 
     def coolant_end(self) -> Blocks:
         """Blocks that stop the coolant that flows."""

@@ -271,7 +271,8 @@ class StatementWriter:
 
     def halt(self, blocks: Blocks) -> list[str]:
         """STOP and OPSTOP."""
-        self.operation.halted = bool(blocks)
+        if blocks:
+            self.operation.halt()
         return list(blocks)
 
     def delay(self, statement: Statement) -> list[str] | None:

@@ -29,6 +29,10 @@ _ROTARY: Final = frozenset("ABC")
 #: words of a second point on the axis, with which nothing can be said of a place high up
 _POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
 
+#: blocks that stop the program, and states that they end on most machines
+_STOPS: Final = frozenset(("M0", "M1", "STOP"))
+_ENDED: Final = frozenset(("spindle", "coolant", "coolant through the spindle"))
+
 #: printed digits by which angles may differ, degrees
 _SAME: Final = 1e-5
 
@@ -52,6 +56,7 @@ class OwnFrame:
         self._ours = False
         self._offset = ""  # that the head names
         self._machine = False  # the head names one: its rotary axes have words
+        self._halted: dict[str, str] = {}  # states that a stop has ended, and the stop
         self._swivelled = False  # the control has turned them since the last of these words
         self._retracts = any(rule.high and not shadowed(listed, rule) for rule in listed.words)
         self._state: dict[str, tuple[str, WordRule]] = {}
@@ -84,6 +89,9 @@ class OwnFrame:
             if rule is None:
                 continue
             self._said.add(id(rule))
+            if word in _STOPS:
+                self._halted = dict.fromkeys((state for state, said in self._state.items() if said[1].tidy), word)
+            self._halted.pop(rule.state, None)
             if rule.state:
                 beside = [
                     other
@@ -147,6 +155,10 @@ class OwnFrame:
             yield f"tool tip control comes on before {' and '.join(unknown)} stands at zero"
         if comes_down:
             yield from self._not_in_force()
+        for state, stop in self._halted.items():
+            if state in _ENDED and state not in self._trusted:
+                yield f"{stop} ends {self._state[state][0]}, and the tool moves on without it"
+        self._halted = {}
         if first:
             yield from self._lost or ()
             yield from self._wrong_offset()
