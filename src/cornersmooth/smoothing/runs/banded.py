@@ -18,6 +18,24 @@ _RIDGES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
 _PAIRS = [(a, a + o) for o in range(TAPS) for a in range(TAPS - o)]
 
+#: where the numbers of a block stand among its six, and which of the 24 numbers of a control point the 36 of its three
+#: columns are: 12d + k is the element k below the diagonal in column d, in row e of the block o with 3o + e = d + k
+_BLOCK = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
+_BELOW = np.array([6 * min((d + k) // 3, TAPS - 1) + _BLOCK[(d + k) % 3][d] for d in range(3) for k in range(3 * TAPS)])
+_BEYOND = [3 * TAPS * d + k for d in range(3) for k in range(3 * TAPS - d, 3 * TAPS)]
+
+
+def applied(first: Ints, tap: Floats, points: Floats) -> Floats:
+    """(m, d) points (c, d), times coefficients (m, 4), summed over the four from each of `first` on."""
+    return np.asarray(_rows(first, tap, len(points)) @ points)
+
+
+def _rows(first: Ints, tap: Floats, size: int) -> csr_array:
+    """Sparse matrix (m, size) with four neighbouring numbers in each row."""
+    column = (first[:, None] + np.arange(TAPS)).astype(np.int32).reshape(-1)
+    begin = np.arange(0, TAPS * len(first) + 1, TAPS, dtype=np.int32)
+    return csr_array((tap.reshape(-1), column, begin), shape=(len(first), size))
+
 
 class Gather:
     """Sums over rows (samples or spans) that belong to four neighbouring control points each.
@@ -35,11 +53,10 @@ class Gather:
     def __init__(self, first: Ints, tap: Floats, size: int) -> None:
         m = len(first)
         self.size = size
-        row = (first[:, None] + np.arange(TAPS)).astype(np.int32).reshape(-1)
-        begin = np.arange(0, TAPS * m + 1, TAPS, dtype=np.int32)
-        self._sum = csc_array((tap.reshape(-1), row, begin), shape=(size, m))
-        self._apply = csr_array((tap.reshape(-1), row, begin), shape=(m, size))
-        pair_row = np.stack([(b - a) * size + first + a for a, b in _PAIRS], axis=1).astype(np.int32)
+        self._apply = _rows(first, tap, size)
+        self._sum = self._apply.T
+        place = np.array([TAPS * a + b - a for a, b in _PAIRS])
+        pair_row = (TAPS * first[:, None] + place).astype(np.int32)
         pair_value = np.stack([tap[:, a] * tap[:, b] for a, b in _PAIRS], axis=1)
         pair_begin = np.arange(0, len(_PAIRS) * m + 1, len(_PAIRS), dtype=np.int32)
         self._pairs = csc_array((pair_value.reshape(-1), pair_row.reshape(-1), pair_begin), shape=(TAPS * size, m))
@@ -61,28 +78,28 @@ class Gather:
         return np.stack([self._sum @ row for row in values])
 
     def bands(self, weights: Floats) -> Floats:
-        """(4, c, d) diagonals of the sums of weights (m, d) times products of two coefficients.
+        """(c, 4, d) diagonals of the sums of weights (m, d) times products of two coefficients.
 
-        Row o holds the products of control points j and j + o.
+        Column o of row j holds the products of control points j and j + o.
         """
         weights = weights[:, None] if weights.ndim == 1 else weights
-        return np.asarray(self._pairs @ weights).reshape(TAPS, self.size, -1)
+        return np.asarray(self._pairs @ weights).reshape(self.size, TAPS, -1)
 
 
 def couplings(free: Bools) -> Floats:
-    """(4, c) 1 where control points j and j + o are both free, else 0."""
-    both = np.zeros((TAPS, len(free)))
-    both[0] = free
+    """(c, 4) 1 where control points j and j + o are both free, else 0."""
+    both = np.zeros((len(free), TAPS))
+    both[:, 0] = free
     for offset in range(1, TAPS):
-        both[offset, : len(free) - offset] = free[: len(free) - offset] & free[offset:]
+        both[: len(free) - offset, offset] = free[: len(free) - offset] & free[offset:]
     return both
 
 
 def solve_scalar(bands: Floats, right: Floats, free: Bools) -> Floats:
-    """Solve with diagonals (4, c) for right sides (c, d); what is not free gets 0."""
+    """Solve with diagonals (c, 4) for right sides (c, d); what is not free gets 0."""
     bands = bands * couplings(free)
-    bands[0][~free] = 1.0
-    solution = _cholesky(lambda: np.array(bands, order="F"), np.where(free[:, None], right, 0.0))
+    bands[~free, 0] = 1.0
+    solution = _cholesky(lambda: bands.copy().T, np.where(free[:, None], right, 0.0))
     return np.ascontiguousarray(solution)
 
 
@@ -91,27 +108,21 @@ def solve_blocks(bands: Floats, right: Floats, coupled: Floats) -> Floats:
 
     Parameters
     ----------
-    bands : (4, c, 6) float64
-        Symmetric blocks xx, yy, zz, xy, xz, yz; row o couples control points j and j + o.
-    coupled : (4, c) float64
+    bands : (c, 4, 6) float64
+        Symmetric blocks xx, yy, zz, xy, xz, yz; column o of row j couples control points j and j + o.
+    coupled : (c, 4) float64
         What `couplings` gives for the control points that are free.
     """
     bands *= coupled[:, :, None]
-    bands[0, :, :3] += 1.0 - coupled[0, :, None]
-    held = np.ascontiguousarray((right * coupled[0]).T).reshape(-1, 1)
+    bands[:, 0, :3] += 1.0 - coupled[:, :1]
+    held = np.ascontiguousarray((right * coupled[:, 0]).T).reshape(-1, 1)
     return np.ascontiguousarray(_cholesky(lambda: _lower(bands), held).reshape(-1, 3).T)
 
 
 def _lower(bands: Floats) -> Floats:
     """(12, 3c) the diagonals of the whole matrix from the main one down, column by column as LAPACK wants them."""
-    lower = np.empty((bands.shape[1], 3, 3 * TAPS))  # [j, d, k]: element (3j + d + k, 3j + d)
-    lower[:, 1, 3 * TAPS - 1] = 0.0
-    lower[:, 2, 3 * TAPS - 2 :] = 0.0
-    which = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
-    for offset in range(TAPS):
-        for d in range(3):
-            for e in range(d if offset == 0 else 0, 3):
-                lower[:, d, 3 * offset + e - d] = bands[offset, :, which[d][e]]
+    lower = bands.reshape(len(bands), -1).take(_BELOW, axis=1)
+    lower[:, _BEYOND] = 0.0
     return lower.reshape(-1, 3 * TAPS).T
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing.runs.banded import Gather, solve_scalar
+from cornersmooth.smoothing.runs.banded import Gather, applied, solve_scalar
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.ranges import ranges, spread
 from cornersmooth.smoothing.runs.samples import Pieces, Samples
@@ -113,11 +113,7 @@ def lines_to_control(lines: Polylines, splines: Splines) -> Floats:
 
 def deviations(samples: Samples, splines: Splines, control: Floats) -> Floats:
     """(m, 6) curve less original motion at the samples."""
-    taps = splines.span_control[samples.span]
-    off = -samples.target
-    for k in range(4):
-        off += samples.basis[:, k, None] * control[taps + k]
-    return off
+    return applied(splines.span_control[samples.span], samples.basis, control) - samples.target
 
 
 def over(off: Floats, tolerances: tuple[float, float]) -> Floats:

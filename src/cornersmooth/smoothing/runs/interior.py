@@ -72,7 +72,7 @@ class Task:
 
     @cached_property
     def coupled(self) -> Floats:
-        """(4, c) which control points are free together with their neighbours."""
+        """(c, 4) which control points are free together with their neighbours."""
         return couplings(self.free)
 
     @cached_property

@@ -21,6 +21,9 @@ from cornersmooth.smoothing.runs.splines import Splines
 #: parts that every stretch is looked at in, first and where that is not enough
 PARTS, MORE_PARTS = 2, 12
 
+#: places of the Bernstein points of a straight motion
+_THIRDS = np.arange(4) / 3.0
+
 #: stretches looked at together
 _BLOCK = 32768
 
@@ -51,20 +54,33 @@ def _bound(
 ) -> Floats:
     largest = np.zeros((len(rows), 2))
     span, segment = pieces.span[rows], pieces.segment[rows]
-    points = control[splines.span_control[span][:, None] + np.arange(4)]
+    hull = (
+        splines.bernstein(span, pieces.low[rows], pieces.high[rows])
+        @ control[splines.span_control[span][:, None] + np.arange(4)]
+    )
     start, step = lines.point[segment], lines.point[segment + 1] - lines.point[segment]
-    low, width = pieces.low[rows], pieces.high[rows] - pieces.low[rows]
-    s0, length = lines.s[segment], lines.s[segment + 1] - lines.s[segment]
+    length = lines.s[segment + 1] - lines.s[segment]
+    low, width = (pieces.low[rows] - lines.s[segment]) / length, (pieces.high[rows] - pieces.low[rows]) / length
+    original = start[:, None] + (low[:, None] + width[:, None] * _THIRDS)[:, :, None] * step[:, None]
+    whole_off, whole_levers = hull - original, original[:, :, 3:] - original[:, :, :3]
     for part in range(parts):
-        begin, end = low + width * (part / parts), low + width * ((part + 1) / parts)
-        hull = splines.bernstein(span, begin, end) @ points
-        share = ((begin - s0) / length)[:, None] + ((end - begin) / length)[:, None] * np.arange(4) / 3.0
-        original = start[:, None] + share[:, :, None] * step[:, None]
-        off = hull - original
+        cut = _cut(part / parts, (part + 1) / parts)
+        off, levers = cut @ whole_off, cut @ whole_levers
         np.maximum(largest[:, 0], _longest(off[:, :, :3]), out=largest[:, 0])
-        levers = original[:, :, 3:] - original[:, :, :3]
         np.maximum(largest[:, 1], _axis_bound(off, levers, axis_length), out=largest[:, 1])
     return largest
+
+
+def _cut(low: float, high: float) -> Floats:
+    """(4, 4): from the Bernstein points of a cubic to those of its part low..high, the blossoms at both."""
+    rows = []
+    for row in range(4):
+        values = np.eye(4)
+        for level in range(3):
+            share = high if level < row else low
+            values = (1.0 - share) * values[:-1] + share * values[1:]
+        rows.append(values[0])
+    return np.stack(rows)
 
 
 def _axis_bound(off: Floats, levers: Floats, axis_length: float) -> Floats:
