@@ -306,5 +306,11 @@ def _in_order(codes: list[tuple[str, np.ndarray]], wanted: list[tuple[int, str]]
             assert modal.get(group[code]) == code, (pose, code, remaining[:1])
         if code in group:
             modal[group[code]] = code
+        elif code in ("M0", "M1"):  # most controls stop spindle and coolant with it
+            for again in (modal.get("spindle", "M5"), modal.get("coolant", "M9")):
+                if again not in ("M5", "M9"):
+                    said, place = remaining.pop(0)
+                    assert said == again
+                    assert np.allclose(place, tip[pose], atol=1e-9)
     # what may follow is the end of the program
     assert all(code in ("M5", "M9") and np.allclose(place, tip[-1]) for code, place in remaining)

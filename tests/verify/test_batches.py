@@ -101,8 +101,8 @@ def check(program, text, used, processes=1, batches_used=True, everywhere=True, 
         return found
     for field in fields(expected):
         mine, theirs = getattr(found, field.name), getattr(expected, field.name)
-        if field.name == "pose_nc_line":  # a pose at the joint of two batches is near both
-            assert np.abs(mine - theirs).max() <= 3
+        if field.name == "pose_nc_line":  # a pose at the joint of two batches is near both; blocks may stand between
+            assert np.abs(mine - theirs).max() <= 5
         elif isinstance(theirs, np.ndarray):
             np.testing.assert_allclose(mine, theirs, atol=1e-9, rtol=0)
         elif isinstance(theirs, Where):
