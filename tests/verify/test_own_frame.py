@@ -265,3 +265,36 @@ def test_a_new_speed_under_tcpm_is_found() -> None:
     text = "\n".join([*lines[:at], *lines[at + 1 :], ""]).encode()
     found = verify(read(cl.encode(), name="speed.cls"), text, **_how("heidenhain"))
     assert any("TOOL CALL Z S2000 under FUNCTION TCPM" in problem.text for problem in found.problems)
+
+
+@pytest.mark.parametrize("control", ["fanuc", "haas", "linuxcnc"])
+def test_a_length_that_is_switched_off_in_a_cut_is_found_in_texts_with_cycles(control: str) -> None:
+    """Other words for the length may change from tool to tool there; none cuts with it off."""
+    cl = (
+        "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nRAPID\nGOTO/10,10,50,0,0,1\nCYCLE/DRILL,FEDTO,8,MMPM,180,RAPTO,3\n"
+        "GOTO/10,10,0\nCYCLE/OFF\nRAPID\nGOTO/10,10,50\nLOADTL/2\nSPINDL/3000,RPM,CLW\nRAPID\nGOTO/0,0,60,0.1,0.2,0.97468\n"
+        "FEDRAT/800,MMPM\nGOTO/0,0,0,0.1,0.2,0.97468\nGOTO/10,2,0,0.15,0.2,0.96825\nGOTO/20,0,1,0.2,0.15,0.96825\nFINI\n"
+    )
+    machine = load_machine("table-ac")
+    form, stream = choose_form(control, machine=machine, tcp=False), io.BytesIO()
+    postprocess(cl.encode(), stream, Settings(tolerance=0.05), form=form, frame=Frame(cycles="native"))
+    how = {"control": control, "machine": machine, "tcp": False, "tolerance": 0.05}
+    program, lines = read(cl.encode()), stream.getvalue().decode().splitlines()
+    assert verify(program, stream.getvalue(), **how).passed
+    cuts = [k for k, line in enumerate(lines) if line.startswith("G1") and "A" in line]
+    lines.insert(cuts[len(cuts) // 2], "G49")
+    assert not verify(program, "\n".join(lines).encode(), **how).passed
+
+
+@pytest.mark.parametrize("words", ["", " I0. J0.", " I5. J0."])
+def test_a_circle_without_a_centre_that_fits_is_no_line(words: str) -> None:
+    """G1 that has become G2: nothing about which to turn, or ends that are not as far from it."""
+    cl = "UNITS/MM\nLOADTL/1\nSPINDL/900,RPM,CLW\nRAPID\nGOTO/0,0,50\nFEDRAT/300,MMPM\nGOTO/0,0,0\nGOTO/20,0,0\nFINI\n"
+    form, stream = choose_form("fanuc", machine=load_machine("table-ac")), io.BytesIO()
+    postprocess(cl.encode(), stream, Settings(tolerance=0.05), form=form)
+    how = {"control": "fanuc", "machine": form.machine, "tolerance": 0.05}
+    program, lines = read(cl.encode()), stream.getvalue().decode().splitlines()
+    assert verify(program, stream.getvalue(), **how).passed
+    at = next(k for k, line in enumerate(lines) if line.startswith("G1 X20."))
+    lines[at] = lines[at].replace("G1", "G2") + words
+    assert "CS520" in {problem.code for problem in verify(program, "\n".join(lines).encode(), **how).problems}

@@ -11,6 +11,9 @@ from cornersmooth.nc_reader.words import Table
 _PLANE_NORMAL = {17: (0.0, 0.0, 1.0), 18: (0.0, 1.0, 0.0), 19: (1.0, 0.0, 0.0)}
 _FULL_TURN = 2 * np.pi
 
+#: how much the distances of both ends from the centre may differ: more is an alarm on most controls
+_UNLIKE = 0.01
+
 
 def circles(
     table: Table, before: Floats, end: Floats, counterclockwise: Bools, plane: int, problems: list[Problem]
@@ -26,7 +29,7 @@ def circles(
     plane : int
         17, 18 or 19.
     problems : list of Problem
-        Takes CS520, an arc that does not reach its end.
+        Takes CS520, an arc that does not reach its end, or whose ends are not as far from its centre.
 
     Returns
     -------
@@ -51,6 +54,11 @@ def circles(
     offsets = np.stack([np.nan_to_num(table.column(letter)) for letter in "IJK"], axis=1)
     offsets -= (offsets @ upright)[:, None] * upright
     centre = np.where(by_radius[:, None], centre, before + offsets)
+    first = np.linalg.norm(offsets, axis=1)
+    last = np.linalg.norm(chord - offsets, axis=1)
+    for k in np.flatnonzero(~by_radius & ((first == 0) | (np.abs(first - last) > _UNLIKE))).tolist():
+        text = f"an arc about a centre {first[k]:g} from where it begins and {last[k]:g} from where it ends"
+        problems.append(Problem("CS520", 0, int(table.line[k]), text))
     normals = sense[:, None] * upright
     return centre, normals, _sweep(before - centre, end - centre, normals, by_radius)
 

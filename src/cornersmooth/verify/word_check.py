@@ -438,7 +438,7 @@ class WordCheck:
             self._complained.add((state, line))
             before = self._first.get(state, "nothing")
             text = f"{state}: {word} where {before} holds for the whole program"
-            if any(rule.state == state and rule.tool for rule in self.list.words):
+            if any(rule.state == state and rule.tool and rule.pattern.fullmatch(word) for rule in self.list.words):
                 if self._by_tool is not None:
                     self._by_tool.append(Problem(NOT_LISTED, 0, line, text))
             else:
