@@ -73,11 +73,13 @@ class Looked:
         """Pixels (h, w, 3) of the view, without what lies over it."""
         self.settle()
         shown = self.page.evaluate(
-            """() => { const canvas = document.createElement("canvas"); const view = document.getElementById("canvas");
-            canvas.width = view.width; canvas.height = view.height; const pen = canvas.getContext("2d");
-            cornersmooth.view.draw(0, true); pen.drawImage(view, 0, 0); return [canvas.width, canvas.height,
-            btoa(Array.from(pen.getImageData(0, 0, canvas.width, canvas.height).data,
-            value => String.fromCharCode(value)).join(""))]; }"""
+            """() => new Promise(done => { const canvas = document.createElement("canvas");
+            const view = document.getElementById("canvas"); canvas.width = view.width; canvas.height = view.height;
+            const pen = canvas.getContext("2d", { willReadFrequently: true });
+            cornersmooth.view.draw(0, true); pen.drawImage(view, 0, 0);
+            const reader = new FileReader(); reader.onload = () => done([canvas.width, canvas.height,
+            reader.result.split(",")[1]]);
+            reader.readAsDataURL(new Blob([pen.getImageData(0, 0, canvas.width, canvas.height).data])); })"""
         )
         width, height, data = shown
         return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4)[..., :3]

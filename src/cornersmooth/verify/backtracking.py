@@ -111,7 +111,7 @@ def written_elsewhere(match: Match, written: Reached, windows: Windows) -> Found
             found.append(row)
             continue
         window = windows.around(int(written.vertex[row]))
-        if window is not None and not window.passed and not windows.alone(window):
+        if window is not None and not window.alone:
             found.append(row)
     if not found:
         return None
@@ -137,7 +137,7 @@ def turned_elsewhere(distances: Distances) -> Found | None:
         if any(window.inner[0] <= vertex <= window.inner[1] for window in failed):
             continue  # one problem with what was found there
         window = windows.around(vertex)
-        if window is None or window.passed or windows.alone(window):
+        if window is None or window.alone:
             continue
         failed.append(window)
         if not _curved(match, window) and not _left(distances, window):

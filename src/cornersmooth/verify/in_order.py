@@ -9,7 +9,7 @@ where they are within r of each other (Alt and Godau, "Computing the Fréchet di
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -46,6 +46,8 @@ class Window:
         Of the first and the last vertex, in segments from the first.
     low, high : (n, m) float64
         First and last fraction of a segment at which a vertex may be; NaN where it may not be on it.
+    alone : bool
+        Whether tips and axis points are each run in order within the tolerance, if only on their own.
     """
 
     vertex: int
@@ -54,6 +56,7 @@ class Window:
     places: tuple[float, float]
     low: Floats
     high: Floats
+    alone: bool = True
 
     @property
     def passed(self) -> bool:
@@ -120,14 +123,12 @@ class Windows:
         places = float(match.fraction[first]), float(match.segment[last] + match.fraction[last] - segment)
         own, path = match.six[first : last + 1], match.path.six[segment : stop + 1]
         found = passage(own, path, places, match.tolerance + match.slack)
-        return Window(first, segment, (int(inner[0]), int(inner[1])), places, *found)
+        window = Window(first, segment, (int(inner[0]), int(inner[1])), places, *found)
+        return window if window.passed else replace(window, alone=self._each_alone(own, path))
 
-    def alone(self, window: Window) -> bool:
-        """Whether tips and axis points of a piece are each run in order within the tolerance, on their own."""
-        match = self.match
-        own = match.six[window.vertex : window.vertex + len(window.low)]
-        path = match.path.six[window.segment : window.segment + window.low.shape[1] + 1]
-        ends = np.array([0, len(path) - 2])
+    def _each_alone(self, own: Floats, path: Floats) -> bool:
+        """Whether tips and axis points are each run in order within the tolerance, on their own."""
+        match, ends = self.match, np.array([0, len(path) - 2])
         for column in ((0, 1, 2, 0, 1, 2), (3, 4, 5, 3, 4, 5)):
             mine, theirs = own[:, column], path[:, column]
             _, at, square = nearest_places(mine[[0, -1]], theirs, ends, 0, ends, ends)
