@@ -55,6 +55,7 @@ PATH = [("G0", 0, 0, 5), ("G1", 10, 0, 5), ("G1", 20, 0, 5)]
         (Statement(0, 1, "LOADTL", (7.0,)), ["T7 M6", "G43.5 H7"]),
         (Statement(0, 1, "LOAD", ("TOOL", 7.0, "ADJUST", 2.0)), ["T7 M6", "G43.5 H2"]),
         (Statement(0, 1, "TURRET", (7.0, "OSETNO", 17.0)), ["T7", "M6", "G43.5 H17"]),
+        (Statement(0, 1, "LOADTL", (7.0, "LENGTH", 60.0, "OSETNO", 7.0)), ["T7 M6", "G43.5 H7"]),
         (Statement(0, 1, "SELECT", ("TOOL", 9.0)), ["T9", "G43.5 H1"]),
         (Statement(0, 1, "SPINDL", (800.0, "RPM", "CCLW")), ["S800 M4", "G43.5 H1"]),
         (Statement(0, 1, "SPINDL", ("RPM", 800.5, "CLW", "RANGE", 2.0)), ["M3 S800.5", "G43.5 H1"]),

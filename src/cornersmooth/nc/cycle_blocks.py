@@ -9,6 +9,7 @@ stays plain moves. Where cycles are asked for, a tool with cutter compensation r
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -18,11 +19,14 @@ from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Sta
 from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.holes import Cycle, read_cycle
-from cornersmooth.nc.statement_args import number_after, numbers_of, whole_number, words_of
+from cornersmooth.nc.statement_args import number_after, whole_number, words_of
 from cornersmooth.text import format_number
 
 #: words that load a tool
 TOOL_WORDS: Final = frozenset({"LOADTL", "LOAD", "TURRET"})
+
+#: words of `TOOL_WORDS` with the number of a length register
+_REGISTERS: Final = ("ADJUST", "OSETNO")
 
 #: sides of the path on which cutter compensation keeps the tool
 _SIDES: Final = (["LEFT"], ["RIGHT"])
@@ -37,14 +41,14 @@ _ALONG_Z, _SAME_PLACE = 1e-9, 1e-9
 def loaded_tool(statement: Statement) -> tuple[int, int] | None:
     """Tool and length register of LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]; None where it loads none.
 
-    A register alone, as in LOADTL/ADJUST,3, names no tool.
+    A number behind ADJUST, OSETNO or LENGTH is no tool: LOADTL/ADJUST,3 names none.
     """
-    words, numbers = words_of(statement), numbers_of(statement)
+    words = words_of(statement)
     if statement.word == "LOAD" and words[:1] != ["TOOL"]:
         return None
-    registers = [value for word in ("ADJUST", "OSETNO") for value in number_after(statement, word)]
-    for register in registers:
-        numbers.remove(register)
+    registers = [value for word in _REGISTERS for value in number_after(statement, word)]
+    behind = pairwise(("", *statement.args))
+    numbers = [value for word, value in behind if isinstance(value, float) and word not in (*_REGISTERS, "LENGTH")]
     if not numbers and statement.word == "LOADTL" and words and words[0][:1] == "T" and words[0][1:].isdigit():
         numbers = [float(words[0][1:])]
     number = whole_number(numbers[:1])

@@ -211,11 +211,11 @@ def _check_lengths(machine: Machine, program: Program) -> None:
         what = f"a tool that [tool_lengths] of {machine.name} does not have, and whose length goes into every position"
         hint = "write its length into the machine file"
         raise SettingsError("CS219", what, hint, file=program.source.name, line=missing[0].line)
-    tools = {tuple(statement.args[:2]) for statement in loads}
+    tools = set(numbers)
     if len(tools) > 1 and not known:
         what = f"{len(tools)} tools, and {machine.name} has one tool_length that goes into every position"
         hint = "write [tool_lengths] into the machine file, or let the control keep the tool tip"
-        line = next(one.line for one in loads if tuple(one.args[:2]) != tuple(loads[0].args[:2]))
+        line = next(one.line for one, number in zip(loads, numbers, strict=True) if number != numbers[0])
         raise SettingsError("CS219", what, hint, file=program.source.name, line=line)
 
 

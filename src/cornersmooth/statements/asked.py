@@ -69,8 +69,12 @@ class Asking:
         if statement.word == "LOAD" and words[:1] != ["TOOL"]:
             return
         registers = [_behind(statement, word) for word in ("ADJUST", "OSETNO")]
-        for register in filter(None, registers):  # no tool by itself
-            numbers.remove(register)
+        before = ("", *statement.args)
+        numbers = [  # what stands behind such a word is no tool
+            value
+            for k, value in enumerate(statement.args)
+            if isinstance(value, float) and before[k] not in ("ADJUST", "OSETNO", "LENGTH")
+        ]
         if not numbers and words and words[0][:1] == "T" and words[0][1:].isdigit():
             numbers = [float(words[0][1:])]
         if not numbers or not _whole(numbers[0]):
