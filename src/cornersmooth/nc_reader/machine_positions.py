@@ -31,7 +31,7 @@ class MachinePositions:
     Parameters
     ----------
     machine : Machine or None
-        Without positions, or without a machine, nothing is asked for.
+        Without positions, or without a machine, none are asked for.
     mm_per_unit : float
         Of the text.
     """
@@ -43,6 +43,8 @@ class MachinePositions:
             {axis: self._said(axis, value, mm_per_unit) for axis, value in known.items()} for known in (home, change)
         )
         self._at: dict[str, float] = {}
+        #: names of the machine's rotary axes
+        self.rotary: frozenset[str] = frozenset() if machine is None else frozenset(machine.names)
         #: rules for blocks that the control's own list need not have
         self.rules: tuple[WordRule, ...] = ()
         if home or change:

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Set
 from typing import Final
 
 from cornersmooth.nc_reader.block_texts import shown, text_of
+from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.word_list import WordList, WordRule
 
 #: state of the words that choose the zero of the part
@@ -28,6 +29,9 @@ _ROTARY: Final = frozenset("ABC")
 
 #: words of a second point on the axis, with which nothing can be said of a place high up
 _POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
+
+#: states of planes to which the control turns the rotary axes
+_PLANES: Final = ("tilted plane", "swivelled plane")
 
 #: blocks that stop the program, and states that they end on most machines
 _STOPS: Final = frozenset(("M0", "M1", "STOP"))
@@ -47,12 +51,13 @@ class OwnFrame:
     listed : WordList
     trusted : set of str
         States and kinds of words that are the user's own.
-    at_home : bool
-        Whether the machine's file says where the program ends.
+    positions : MachinePositions
+        Those of the machine's file, which may say where the program ends, and its rotary axes.
     """
 
-    def __init__(self, listed: WordList, trusted: Set[str], *, at_home: bool) -> None:
-        self._list, self._trusted, self._at_home = listed, trusted, at_home
+    def __init__(self, listed: WordList, trusted: Set[str], positions: MachinePositions) -> None:
+        self._list, self._trusted = listed, trusted
+        self._at_home, self._rotary = bool(positions.rules), positions.rotary
         self._ours = False
         self._offset = ""  # that the head names
         self._machine = False  # the head names one: its rotary axes have words
@@ -155,6 +160,7 @@ class OwnFrame:
             yield f"tool tip control comes on before {' and '.join(unknown)} stands at zero"
         if comes_down:
             yield from self._not_in_force()
+            yield from self._nowhere(words.keys())
         for state, stop in self._halted.items():
             if state in _ENDED and state not in self._trusted:
                 yield f"{stop} ends {self._state[state][0]}, and the tool moves on without it"
@@ -162,6 +168,13 @@ class OwnFrame:
         if first:
             yield from self._lost or ()
             yield from self._wrong_offset()
+
+    def _nowhere(self, words: Set[str]) -> Iterator[str]:
+        """Rotary axes that stand where something before has left them, but where the control has turned them."""
+        unknown = sorted(self._rotary - self._angles.keys() - words) if self._machine else []
+        in_plane = any(state in self._state and not self._state[state][1].off for state in _PLANES)
+        if unknown and not (self._swivelled and in_plane):
+            yield f"the tool comes down from a retract before {' and '.join(unknown)} is sent to where it belongs"
 
     def _not_in_force(self) -> Iterator[str]:
         """What the tool may not come down without."""

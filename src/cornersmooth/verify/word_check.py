@@ -83,7 +83,7 @@ class WordCheck:
         self._own = {text_of(words) for words in map(self._words_of, plain) if words}
         templates = [(self._words_of(numbers_in(block))) for block in set(trusted) - set(plain)]
         #: what texts of our own say beyond that
-        self._frame = OwnFrame(self.list, self._left, at_home=bool(self._positions.rules))
+        self._frame = OwnFrame(self.list, self._left, self._positions)
         self._own_patterns = [any_numbers(text_of(words)) for words in templates if words]
         self._blocks = 0
         self._begun = 0
@@ -169,14 +169,13 @@ class WordCheck:
         self._positions.leave(table.columns.keys())
         if (self._changed or self._high or self._retract or self._arc or self._above) and linear.any():
             row = int(np.argmax(linear))
-            down = ~np.isnan(table.column("Z"))
+            down, turned = (~np.isnan(table.column(name)) for name in ("Z", "I"))
             rows = [row, row + int(np.argmax(down[row:]))] if self._above and not down[row] and down.any() else [row]
             for row in rows:
                 given = known[known <= row]
                 self._unframe(int(table.line[row]), self._frame.moved(table.row(row)))
-                self._moved(
-                    int(table.line[row]), float(codes[given[-1]]) if len(given) else self._code, bool(down[row])
-                )
+                code = float(codes[given[-1]]) if len(given) else self._code
+                self._moved(int(table.line[row]), code, bool(down[row] or turned[row]))
         if len(known):
             self._code = float(codes[known[-1]])
         for name in _ROTARY & table.columns.keys():
@@ -259,7 +258,7 @@ class WordCheck:
         elif not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
             if not any(rule is not None and rule.cycle for rule in rules):
                 self._unframe(line.number, self._frame.moved({word.name: word.value for word in line.words}))
-            self._moved(line.number, self._code, any(word.name == "Z" for word in line.words))
+            self._moved(line.number, self._code, any(word.name in ("Z", "I") for word in line.words))
 
     # the frame of the program
 
