@@ -149,6 +149,10 @@ FINI
         ("fanuc", "g6.2", None, True, "G43 H1.*", ""),
         ("fanuc", None, "table-ac", True, "G0 A0.* C0.*", "G0 C0.0000"),
         ("mitsubishi", None, "table-ac", True, "G0 A0.* C0.*", "G0 A0.0000"),
+        ("fanuc", None, None, True, "O0001", "O0000"),
+        ("mitsubishi", None, None, True, "T1 M6", "T1 M6 M6"),
+        ("fanuc", None, None, True, "G0 X0.0.* Y0.0.* I.*", "G-0 X0. Y0. I0.0999999 J0.1999999 K0.9746795"),
+        ("linuxcnc", None, "xyzac-trt", True, "M5", "M+5"),
     ],
 )
 def test_what_the_only_tool_of_a_text_needs_is_found_where_it_is_lost(
@@ -165,6 +169,20 @@ def test_what_the_only_tool_of_a_text_needs_is_found_where_it_is_lost(
     at = next(k for k, line in enumerate(lines) if re.fullmatch(rf"(\d+ )?{block}", line))
     lines[at : at + 1] = [left] if left else []
     assert not verify(program, "\n".join(lines).encode(), **how).passed
+
+
+@pytest.mark.parametrize("control", ["fanuc", "mitsubishi"])
+def test_vectors_before_tip_control_and_an_end_in_incremental_words_are_found(control: str) -> None:
+    stream = io.BytesIO()
+    postprocess(_ONE_TOOL.encode(), stream, Settings(tolerance=0.05), form=choose_form(control))
+    lines = stream.getvalue().decode().splitlines()
+    on, last = lines.index("G43.5 H1"), max(k for k, line in enumerate(lines) if line == "G90")
+    for changed, said in (
+        ([*lines[:on], lines[on + 1], lines[on], *lines[on + 2 :]], "G43.5 where G49 holds for the whole program"),
+        ([*lines[:last], *lines[last + 1 :]], "G91 G28 Z0. still holds at the end"),
+    ):
+        found = verify(read(_ONE_TOOL.encode()), "\n".join(changed).encode(), control=control, tolerance=0.05)
+        assert [problem.text.removeprefix("tool length: ") for problem in found.problems] == [said]
 
 
 @pytest.mark.parametrize("control", MACHINES)
@@ -238,6 +256,27 @@ def test_what_planes_need_around_them_is_found_where_it_is_lost(
     text = "\n".join([*lines[:at], *lines[at + 1 :], ""]).encode()
     found = verify(read(_PLANES.encode(), name="planes.cls"), text, **_how(control))
     assert any(said in problem.text.replace("\\", "") for problem in found.problems), found.problems
+
+
+@pytest.mark.parametrize("control", ["fanuc", "mitsubishi", "siemens", "haas"])
+def test_rotary_axes_that_are_sent_nowhere_without_tip_control_are_found(control: str) -> None:
+    """With a tool along Z no motion names them: a block before the first sends them all."""
+    machine, stream = load_machine("table-bc"), io.BytesIO()
+    form = choose_form(load_control(control), None, machine=machine, tcp=False, planes=True)
+    holes = "".join(
+        f"LOADTL/{tool}\nSPINDL/900,RPM,CLW\nRAPID\nGOTO/0,0,60,{axis}\nCYCLE/DRILL,FEDTO,9,MMPM,200,RAPTO,3\n"
+        f"GOTO/0,0,0,{axis}\nCYCLE/OFF\n"
+        for tool, axis in enumerate(("0,0,1", "0.6,0,0.8"), 1)
+    )
+    program = read(f"UNITS/MM\n{holes}SPINDL/OFF\nFINI\n".encode(), name="two.cls")
+    postprocess(program, stream, Settings(tolerance=0.01), form=form, frame=Frame(cycles="native"))
+    lines = stream.getvalue().decode("ascii").splitlines()
+    first = next(k for k, line in enumerate(lines) if re.fullmatch(r"G0 B0\.0+ C0\.0+", line))
+    for left, names in (([], "B and C"), (["G0 B0.0"], "C"), ([lines[first]], "")):
+        text = "\n".join([*lines[:first], *left, *lines[first + 1 :], ""]).encode()
+        found = verify(program, text, control=control, machine=machine, tcp=False, tolerance=0.01)
+        said = [f"the tool comes down from a retract before {names} is sent to where it belongs"] if names else []
+        assert [problem.text for problem in found.problems] == said
 
 
 def test_a_tool_without_direction_on_the_way_back_is_a_problem() -> None:

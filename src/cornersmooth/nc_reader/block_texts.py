@@ -13,7 +13,7 @@ _ANY: Final = "9075301"
 
 def said(word: Word) -> str:
     """Text of a word as the list has it: blanks left out, codes without leading zeros."""
-    if word.name in ("G", "M") and word.text[:1] == word.name:
+    if word.name in ("G", "M") and word.text[:1] == word.name and not _SIGN.search(word.text):
         return f"{word.name}{word.value:g}"
     return word.text if word.name == "block" else word.text.replace(" ", "").replace("\t", "")
 
@@ -50,7 +50,11 @@ def shown(pattern: re.Pattern[str]) -> str:
     return text
 
 
+#: no code has one
+_SIGN: Final = re.compile("[-+]")
+
 _PLAIN: Final = (
+    (r"(?=\d*[1-9])", ""),
     *((old, "…") for old in (r"\d+", r"\d{1,8}", r"\d{1,5}", r"[\d.]+", r"\w+", ".*", "(\\.\\d*)?")),
     (r"\.", "."),
     ("(?:", "("),

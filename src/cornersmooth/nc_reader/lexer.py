@@ -91,7 +91,7 @@ class Lexer:
     def motion(self, line: Line) -> Columns | None:
         """Columns of a motion block; None where the line is something else."""
         given = {word.name: word for word in line.words}
-        if len(given) < len(line.words) or any(map(self.without_point, line.words)):
+        if len(given) < len(line.words) or any(map(self.without_point, line.words)) or _signed(given.get("G")):
             return None
         return self.block(given)
 
@@ -114,6 +114,11 @@ class Lexer:
             if found:
                 return found[-1] + 1
         return 0
+
+
+def _signed(code: Word | None) -> bool:
+    """Whether there is a code with a sign, which no control knows: read on its own, to be complained of."""
+    return code is not None and code.text[:1] == "G" and ("-" in code.text or "+" in code.text)
 
 
 def number_of(match: re.Match[str], group: str | int, name: str) -> Word:

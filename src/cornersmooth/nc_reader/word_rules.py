@@ -95,6 +95,7 @@ class WordRules:
             text = f"{spelt.text} without a decimal point: the control may count it in its least increment"
             yield Problem(NOT_LISTED, 0, number, text)
         names = [word.name for word in line.words if word.name not in "GM"]
+        names += [word for word in words if word[0] in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
             yield Problem(NOT_LISTED, 0, number, f"{name} stands twice in one block")
         if sum(word.name == "M" for word in line.words) > 1:
