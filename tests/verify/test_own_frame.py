@@ -171,18 +171,23 @@ def test_what_the_only_tool_of_a_text_needs_is_found_where_it_is_lost(
     assert not verify(program, "\n".join(lines).encode(), **how).passed
 
 
-@pytest.mark.parametrize("control", ["fanuc", "mitsubishi"])
-def test_vectors_before_tip_control_and_an_end_in_incremental_words_are_found(control: str) -> None:
-    stream = io.BytesIO()
-    postprocess(_ONE_TOOL.encode(), stream, Settings(tolerance=0.05), form=choose_form(control))
+@pytest.mark.parametrize(
+    ("control", "machine", "on"),
+    [("fanuc", None, "G43.5 H1"), ("mitsubishi", None, "G43.5 H1"), ("haas", "table-ac", "G234 H1")],
+)
+def test_late_tip_control_and_an_end_in_incremental_words_are_found(control: str, machine: str | None, on: str) -> None:
+    form, stream = choose_form(control, machine=machine and load_machine(machine)), io.BytesIO()
+    postprocess(_ONE_TOOL.encode(), stream, Settings(tolerance=0.05), form=form)
     lines = stream.getvalue().decode().splitlines()
-    on, last = lines.index("G43.5 H1"), max(k for k, line in enumerate(lines) if line == "G90")
-    for changed, said in (
-        ([*lines[:on], lines[on + 1], lines[on], *lines[on + 2 :]], "G43.5 where G49 holds for the whole program"),
-        ([*lines[:last], *lines[last + 1 :]], "G91 G28 Z0. still holds at the end"),
-    ):
-        found = verify(read(_ONE_TOOL.encode()), "\n".join(changed).encode(), control=control, tolerance=0.05)
-        assert [problem.text.removeprefix("tool length: ") for problem in found.problems] == [said]
+    at = lines.index(on)
+    said = [f"{on.split()[0]} behind the motion to where the tool comes down"]
+    mutants = [([*lines[:at], lines[at + 1], on, *lines[at + 2 :]], said)]
+    if "G91 G28 Z0." in lines:
+        last = max(k for k, line in enumerate(lines) if line == "G90")
+        mutants.append(([*lines[:last], *lines[last + 1 :]], ["G91 G28 Z0. still holds at the end"]))
+    for changed, said in mutants:
+        text, how = "\n".join(changed).encode(), {"control": control, "machine": form.machine, "tolerance": 0.05}
+        assert [problem.text for problem in verify(read(_ONE_TOOL.encode()), text, **how).problems] == said
 
 
 @pytest.mark.parametrize("control", MACHINES)

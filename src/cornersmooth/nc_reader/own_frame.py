@@ -23,6 +23,9 @@ _MADE: Final = re.compile(r"CORNERSMOOTH \S+: \w+=", re.IGNORECASE)
 _OFFSET: Final = re.compile(r"\bOFFSET=([\w.]+)", re.IGNORECASE)
 _MACHINE: Final = re.compile(r"\bMACHINE=", re.IGNORECASE)
 
+#: axes along which the tool is sent over its place
+_PLACE: Final = frozenset("XY")
+
 #: words beside which Z may not come down from a retract, and the rotary axes among them
 _ASIDE: Final = frozenset("XYABC")
 _ROTARY: Final = frozenset("ABC")
@@ -73,6 +76,7 @@ class OwnFrame:
         self._lost: list[str] | None = None  # what was missing before the first retract; the head is read behind it
         self._high = self._moved = False
         self._above = False  # Z has not moved since a retract
+        self._over = False  # the tool has been sent over its place since, without tip control
 
     def comment(self, text: str) -> None:
         """Take note of how the text was made, if a comment says so."""
@@ -81,6 +85,10 @@ class OwnFrame:
             self._machine |= _MACHINE.search(text) is not None
             offset = _OFFSET.search(text)
             self._offset = offset[1] if offset and not self._offset else self._offset
+
+    @property
+    def _tip_control(self) -> bool:
+        return any(rule.ends for _, rule in self._state.values())
 
     @property
     def _asked(self) -> bool:
@@ -114,11 +122,13 @@ class OwnFrame:
                 self._turned = dict(self._angles)
             if rule.zero:
                 self._zeroed = dict(self._angles)
+            if rule.ends and self._over and self._asked:
+                yield f"{word} behind the motion to where the tool comes down"
             self._state.pop(rule.drops, None)
             if rule.retract:
                 if self._lost is None:
                     self._lost = list(self._unsaid("first", word))
-                self._high = self._above = True
+                self._high, self._above, self._over = True, True, False
         if changes_tool and self._ours:
             yield from (f"{text_of(words)} under {word}" for word in self._running())
 
@@ -146,6 +156,7 @@ class OwnFrame:
         zeroed, self._zeroed = self._zeroed, None
         comes_down = self._above and "Z" in words
         self._above &= not comes_down
+        self._over = self._above and (self._over or (bool(words.keys() & _PLACE) and not self._tip_control))
         first, self._moved = not self._moved, True
         if not self._asked:
             return

@@ -169,13 +169,13 @@ class WordCheck:
         self._positions.leave(table.columns.keys())
         if (self._changed or self._high or self._retract or self._arc or self._above) and linear.any():
             row = int(np.argmax(linear))
-            down, turned = (~np.isnan(table.column(name)) for name in ("Z", "I"))
+            down = ~np.isnan(table.column("Z"))
             rows = [row, row + int(np.argmax(down[row:]))] if self._above and not down[row] and down.any() else [row]
             for row in rows:
                 given = known[known <= row]
                 self._unframe(int(table.line[row]), self._frame.moved(table.row(row)))
                 code = float(codes[given[-1]]) if len(given) else self._code
-                self._moved(int(table.line[row]), code, bool(down[row] or turned[row]))
+                self._moved(int(table.line[row]), code, bool(down[row]))
         if len(known):
             self._code = float(codes[known[-1]])
         for name in _ROTARY & table.columns.keys():
@@ -258,7 +258,7 @@ class WordCheck:
         elif not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
             if not any(rule is not None and rule.cycle for rule in rules):
                 self._unframe(line.number, self._frame.moved({word.name: word.value for word in line.words}))
-            self._moved(line.number, self._code, any(word.name in ("Z", "I") for word in line.words))
+            self._moved(line.number, self._code, any(word.name == "Z" for word in line.words))
 
     # the frame of the program
 
