@@ -160,6 +160,9 @@ def test_unreadable_text_says_where():
     with pytest.raises(InputError) as caught:
         read_nc(b"%\nG21 G90\nG1 X1.0 ?\n", name="part.nc")
     assert str(caught.value).startswith("part.nc:3: error: '?' is no NC word")
+    for block in (b"G X1.0", b"G1 X Y2.0"):  # a letter alone is no call of a program, nor zero
+        with pytest.raises(InputError, match="is no NC word"):
+            read_nc(block + b"\n", control="siemens")
     with pytest.raises(InputError, match="G68 is not understood"):
         read_nc(b"G68\n")
     with pytest.raises(SettingsError, match="unknown control"):

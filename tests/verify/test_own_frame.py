@@ -190,6 +190,20 @@ def test_late_tip_control_and_an_end_in_incremental_words_are_found(control: str
         assert [problem.text for problem in verify(read(_ONE_TOOL.encode()), text, **how).problems] == said
 
 
+@pytest.mark.parametrize("control", [*MACHINES])
+def test_what_a_stop_ends_and_nothing_says_again_is_found(control: str) -> None:
+    cl = _ONE_TOOL.replace("GOTO/20,0,1", "OPSTOP\nGOTO/20,0,1").replace("RPM,CLW", "RPM,CLW\nCOOLNT/ON")
+    form, stream = choose_form(control, machine=load_machine(MACHINES[control])), io.BytesIO()
+    postprocess(cl.encode(), stream, Settings(tolerance=0.05), form=form)
+    lines = stream.getvalue().decode().splitlines()
+    stop = next(k for k, line in enumerate(lines) if re.fullmatch(r"(\d+ )?M1", line))
+    for word in ("M3", "M8"):
+        lost = next(k for k in range(stop, len(lines)) if re.search(rf"\b{word}\b", lines[k]))
+        text = "\n".join([*lines[:lost], *lines[lost + 1 :]]).encode()
+        found = verify(read(cl.encode()), text, control=control, machine=form.machine, tolerance=0.05)
+        assert f"M1 ends {word}, and the tool moves on without it" in [problem.text for problem in found.problems]
+
+
 @pytest.mark.parametrize("control", MACHINES)
 def test_texts_that_do_not_say_how_they_were_made_have_their_own_habits(control: str) -> None:
     lines = [line for line in _text(control).splitlines() if "CORNERSMOOTH 0" not in line]

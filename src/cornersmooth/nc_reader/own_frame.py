@@ -158,6 +158,10 @@ class OwnFrame:
         self._above &= not comes_down
         self._over = self._above and (self._over or (bool(words.keys() & _PLACE) and not self._tip_control))
         first, self._moved = not self._moved, True
+        for state, stop in self._halted.items():
+            if self._ours and state in _ENDED and state not in self._trusted:
+                yield f"{stop} ends {self._state[state][0]}, and the tool moves on without it"
+        self._halted = {}
         if not self._asked:
             return
         if high and "Z" in words and words.keys() & _ASIDE and not words.keys() & _POINT:
@@ -172,10 +176,6 @@ class OwnFrame:
         if comes_down:
             yield from self._not_in_force()
             yield from self._nowhere(words.keys())
-        for state, stop in self._halted.items():
-            if state in _ENDED and state not in self._trusted:
-                yield f"{stop} ends {self._state[state][0]}, and the tool moves on without it"
-        self._halted = {}
         if first:
             yield from self._lost or ()
             yield from self._wrong_offset()

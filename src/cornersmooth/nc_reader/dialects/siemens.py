@@ -263,7 +263,7 @@ class _SiemensLexer(Lexer):
         return super().words(rest, place, number, name)
 
     def named(self, match: re.Match[str]) -> Iterable[Word] | None:
-        """Words of one match: an axis of a polynomial has several."""
+        """Words of one match: an axis of a polynomial has several; a letter without a number is none."""
         if match["axis"]:
             flag = f"{BY_WORD} {match['axis']}"
             return [number_of(match, "angle", match["axis"]), fixed(match, flag, 1.0)]
@@ -276,7 +276,7 @@ class _SiemensLexer(Lexer):
             if letter == "G":
                 return [fixed(match, "G", float(match["value"]))]
             return [number_of(match, "value", f"centre {letter}" if letter in "IJK" else letter)]
-        return [fixed(match, match["call"], 0.0)]
+        return [fixed(match, match["call"], 0.0)] if len(match["call"]) > 1 else None
 
     def block(self, given: Mapping[str, Word]) -> Columns | None:
         """Columns of a block with such words; None where they are no motion block."""
