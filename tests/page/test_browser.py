@@ -69,6 +69,11 @@ class Looked:
     def tool(self):
         return np.array(self.page.evaluate("() => cornersmooth.view.tool.group.position.toArray()"))
 
+    def check(self):
+        """Nothing went wrong in it, and nothing came from elsewhere."""
+        assert self.errors == []
+        assert [url for url in self.requests if not url.startswith(("file:", "data:", "blob:"))] == []
+
     def canvas(self):
         """Pixels (h, w, 3) of the view, without what lies over it."""
         self.settle()
@@ -102,13 +107,32 @@ def look(browser, tmp_path):
     yield open_page
     for looked in opened:
         looked.context.close()
-        assert looked.errors == []
-        assert [url for url in looked.requests if not url.startswith(("file:", "data:", "blob:"))] == []
+        looked.check()
 
 
 @pytest.fixture(scope="module")
 def text() -> str:
     return page_of(smoothed())
+
+
+@pytest.fixture(scope="module")
+def opened(browser, text, tmp_path_factory) -> Iterator[Looked]:
+    """One page for the tests that leave it as a user would: most of the time of a test is that of its loading."""
+    path = tmp_path_factory.mktemp("page") / "page.html"
+    path.write_text(text, encoding="utf-8")
+    looked = Looked(browser, path)
+    yield looked
+    looked.context.close()
+    looked.check()
+
+
+@pytest.fixture
+def looked(opened: Looked) -> Looked:
+    """The page that is opened once, looked at as a whole, from its top."""
+    opened.page.evaluate("() => scrollTo(0, 0)")
+    opened.page.locator("#fit").click()
+    opened.settle()
+    return opened
 
 
 def colours(pixels):
@@ -117,8 +141,7 @@ def colours(pixels):
     return int((counts > 20).sum())
 
 
-def test_a_page_is_drawn_and_can_be_driven(look, text):
-    looked = look(text)
+def test_a_page_is_drawn_and_can_be_driven(looked):
     page = looked.page
     first = looked.canvas()
     assert colours(first) > 8
@@ -235,8 +258,7 @@ def test_keys_charts_and_switches(look, text):
     assert np.linalg.norm(looked.tool() - before) > 0.0
 
 
-def test_a_click_on_a_marker_chooses_the_corner(look, text):
-    looked = look(text)
+def test_a_click_on_a_marker_chooses_the_corner(looked):
     x, y = looked.page.evaluate(
         """() => { const { view, arrays } = cornersmooth; const p = view.eye.controls.target.clone();
         p.set(arrays.c_tip[0], arrays.c_tip[1], arrays.c_tip[2]).project(view.eye.camera);
@@ -366,8 +388,7 @@ def test_slow_pictures_make_the_view_coarser(look, text):
     assert sorted(levels) == levels
 
 
-def test_lines_near_a_place_of_a_long_path_are_wide(look, text):
-    looked = look(text)
+def test_lines_near_a_place_of_a_long_path_are_wide(looked):
     page = looked.page
     page.locator("#rows .row").first.click()
     looked.settle()
@@ -413,8 +434,7 @@ def test_the_list_of_corners_is_filtered_and_stepped_through(look, text):
     assert "cornersmooth" in page.inner_text("#facts")
 
 
-def test_pace_of_the_drive(look, text):
-    looked = look(text)
+def test_pace_of_the_drive(looked):
     page = looked.page
     gone = []
     for pace in ("0.1", "5"):
@@ -450,8 +470,7 @@ def test_two_fingers_zoom_and_move(look, text):
     assert np.linalg.norm(looked.camera() - before) > 0.1
 
 
-def test_numbers_are_written_for_people(look, text):
-    looked = look(text)
+def test_numbers_are_written_for_people(looked):
     page = looked.page
     told = page.evaluate(
         """() => { const { drive, meta, arrays } = cornersmooth; const whole = meta.seconds; const said = [];
