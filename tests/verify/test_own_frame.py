@@ -204,6 +204,15 @@ def test_what_a_stop_ends_and_nothing_says_again_is_found(control: str) -> None:
         assert f"M1 ends {word}, and the tool moves on without it" in [problem.text for problem in found.problems]
 
 
+@pytest.mark.parametrize("control", sorted(_FOUND_IN["length on at a tool change"]))
+def test_a_length_that_is_taken_off_before_the_retract_is_found(control: str) -> None:
+    lines = _text(control).splitlines()
+    off = lines.index("G49")
+    up = max(k for k in range(off) if re.fullmatch(r"G91 G28 Z0\.|G53 G0 Z0\.?", lines[k]))
+    changed = [*lines[:up], "G49", *lines[up:off], *lines[off + 1 :]]
+    assert _problems(control, changed) == ["G49 before the retract: it may move the tool by its length"]
+
+
 @pytest.mark.parametrize("control", MACHINES)
 def test_texts_that_do_not_say_how_they_were_made_have_their_own_habits(control: str) -> None:
     lines = [line for line in _text(control).splitlines() if "CORNERSMOOTH 0" not in line]

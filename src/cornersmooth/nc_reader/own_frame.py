@@ -33,6 +33,9 @@ _ROTARY: Final = frozenset("ABC")
 #: words of a second point on the axis, with which nothing can be said of a place high up
 _POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
 
+#: state of the words that take the length of the tool into account
+_LENGTH: Final = "tool length"
+
 #: states of planes to which the control turns the rotary axes
 _PLANES: Final = ("tilted plane", "swivelled plane")
 
@@ -122,6 +125,8 @@ class OwnFrame:
                 self._turned = dict(self._angles)
             if rule.zero:
                 self._zeroed = dict(self._angles)
+            if rule.off and rule.state == _LENGTH and self._moved and not self._above and self._asked:
+                yield f"{word} before the retract: it may move the tool by its length"
             if rule.ends and self._over and self._asked:
                 yield f"{word} behind the motion to where the tool comes down"
             self._state.pop(rule.drops, None)
