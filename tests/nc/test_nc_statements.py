@@ -379,6 +379,19 @@ def test_what_a_stop_ends_is_said_again_before_the_tool_moves() -> None:
                 assert verify(program, text.encode(), **how).problems, lines[j]
 
 
+def test_the_way_back_along_the_tool_is_a_motion_behind_a_stop() -> None:
+    form = choose_form("fanuc", machine=load_machine("table-ac"))
+    lines = lines_of(form, HALTED, frame=Frame(retract=20))
+    change = lines.index("T2 M6")
+    assert [line for line in lines[:change] if line[0] != "("][-6:-1] == [
+        "S700 M3",
+        "G0 X30.0000 Y0.0000 Z70.0000 A0.0000 C0.0000",
+        "G91 G28 Z0.",
+        "G90",
+        "G49",
+    ]
+
+
 def test_what_is_switched_on_ahead_of_the_tool_waits_for_it() -> None:
     cl = (
         "UNITS/MM\n{}COOLNT/ON\n{}LOADTL/2\nRAPID\nGOTO/0,0,9\nFEDRAT/100,MMPM\nGOTO/0,0,0\n"

@@ -446,4 +446,4 @@ class MotionWriter:
         if not self.retract or self._position is None or not self.operation.can_rewind():
             return []
         self._position = self.writer.lifted(self._position, self.retract)
-        return [self.writer.rapid(self._position)]
+        return [*self.operation.go_on(), self.writer.rapid(self._position)]

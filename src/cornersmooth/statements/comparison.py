@@ -104,7 +104,7 @@ def compare(
     for kind in _NAMES:
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
         if kind in _STOPPED and _values(theirs) != _values(ours):
-            ours = _effective(_without_habits(ours, theirs, _tool_lines(found), near), kind)
+            ours = _without_habits(ours, theirs, _tool_lines(found), near)
         if kind in _STOPPED and _values(theirs) != _values(ours):
             theirs, ours = (_effective(_last_of_moments(tokens, kind), kind) for tokens in (asked_for, found))
         problems += _differences(theirs, ours, found, near)
@@ -169,7 +169,7 @@ def _without_tidying(asked_for: list[Token], found: list[Token], end: float, nea
     for kind, off in _ENDED.items():
         theirs, ours = _effective(asked_for, kind), _effective(found, kind)
         if kind in _STOPPED:  # what a tool change stops says nothing of the end
-            ours = _effective(_without_habits(ours, theirs, lines, near), kind)
+            ours = _without_habits(ours, theirs, lines, near)
         more = sum(token.value == off for token in ours) > sum(token.value == off for token in theirs)
         more |= _values(ours)[-1:] == [off] and _values(theirs)[-1:] not in ([], [off])
         if more and not tidying(theirs, kind):
@@ -195,13 +195,30 @@ def _without_habits(ours: list[Token], theirs: list[Token], changes: list[int], 
     """Tokens without those that end a state which begins again before any motion, if the CL file does not ask for them.
 
     Posts stop spindle and coolant for a tool change on their own, also where the program waits behind it; `changes` are
-    the lines of those.
+    the lines of those. What the CL file asks for is rather one whose place is certain, or, if that does not make both
+    the same, one behind which the state does not begin again.
     """
+    if not ours:
+        return []
+    ways = [
+        _effective(_without_unasked(ours, theirs, changes, near, certain_first), ours[0].kind)
+        for certain_first in (True, False)
+    ]
+    return next((kept for kept in ways if _values(kept) == _values(theirs)), ways[0])
+
+
+def _without_unasked(
+    ours: list[Token], theirs: list[Token], changes: list[int], near: _Nearness, certain_first: bool
+) -> list[Token]:
+    """Tokens without the habits, where those asked for are looked for in one of two orders."""
     unasked = [k for k, token in enumerate(ours) if token.value == _ENDED[token.kind]]
     begins_again = {k for k in unasked if k + 1 < len(ours) and _goes_on(ours[k], ours[k + 1], changes)}
     for other in theirs:
         alike = [k for k in unasked if other.value == ours[k].value and not near.away(other.place, ours[k])]
-        ranks = [(ours[k].reach > near.room, k in begins_again, abs(ours[k].place - other.place)) for k in alike]
+        ranks = []
+        for k in alike:
+            doubts = (ours[k].reach > near.room, k in begins_again)
+            ranks.append((doubts if certain_first else doubts[::-1], abs(ours[k].place - other.place)))
         if alike:
             unasked.remove(alike[ranks.index(min(ranks))])
     return [token for k, token in enumerate(ours) if k not in begins_again or k not in unasked]
