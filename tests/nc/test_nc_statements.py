@@ -371,7 +371,7 @@ def test_what_a_stop_ends_is_said_again_before_the_tool_moves() -> None:
     assert behind == [["S900 M3", "M8"], ["S700 M3", "M8"], ["M9", "S700 M3"], ["S700 M3"], []]  # M5 behind the retract
     assert lines[lines.index("T2 M6") + 1] == "S500 M3"
     program = read(HALTED.encode(), name="halted.cls")
-    for k in stops[:3]:
+    for k in stops[:4]:
         for j in range(k + 1, k + 3):
             if lines[j] in ("S900 M3", "S700 M3", "M8"):
                 text = "\n".join([*lines[:j], *lines[j + 1 :]]) + "\n"

@@ -154,8 +154,14 @@ class OwnFrame:
         self._angles = dict(angles)
         self._swivelled &= not angles
 
-    def moved(self, words: Mapping[str, float]) -> Iterator[str]:
-        """Look at the words of a motion, the first behind a retract or behind words that are no motion."""
+    def moved(self, words: Mapping[str, float], *, drills: bool = False) -> Iterator[str]:
+        """Look at the words of a motion, the first behind a retract or behind words that are no motion.
+
+        A cycle of the control `drills`: its words are no place to which the tool goes at once.
+        """
+        yield from self._ended()
+        if drills:
+            return
         high, self._high = self._high, False
         turned, self._turned = self._turned, None
         zeroed, self._zeroed = self._zeroed, None
@@ -163,10 +169,6 @@ class OwnFrame:
         self._above &= not comes_down
         self._over = self._above and (self._over or (bool(words.keys() & _PLACE) and not self._tip_control))
         first, self._moved = not self._moved, True
-        for state, stop in self._halted.items():
-            if self._ours and state in _ENDED and state not in self._trusted:
-                yield f"{stop} ends {self._state[state][0]}, and the tool moves on without it"
-        self._halted = {}
         if not self._asked:
             return
         if high and "Z" in words and words.keys() & _ASIDE and not words.keys() & _POINT:
@@ -184,6 +186,13 @@ class OwnFrame:
         if first:
             yield from self._lost or ()
             yield from self._wrong_offset()
+
+    def _ended(self) -> Iterator[str]:
+        """What a stop has ended, and nothing has said again."""
+        for state, stop in self._halted.items():
+            if self._ours and state in _ENDED and state not in self._trusted:
+                yield f"{stop} ends {self._state[state][0]}, and the tool moves on without it"
+        self._halted = {}
 
     def _nowhere(self, words: Set[str]) -> Iterator[str]:
         """Rotary axes that stand where something before has left them, but where the control has turned them."""

@@ -252,13 +252,12 @@ class WordCheck:
         self._frame.angles(self._angles)
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
-        rules = self._rules.of(words, text_of(words))
-        if any(rule is not None and rule.moves for rule in rules):
-            self._moved(line.number, 1.0, True)
-        elif not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
-            if not any(rule is not None and rule.cycle for rule in rules):
-                self._unframe(line.number, self._frame.moved({word.name: word.value for word in line.words}))
-            self._moved(line.number, self._code, any(word.name == "Z" for word in line.words))
+        rules = [rule for rule in self._rules.of(words, text_of(words)) if rule is not None]
+        moves, drills = any(rule.moves for rule in rules), any(rule.cycle for rule in rules)
+        if moves or not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
+            at = {word.name: word.value for word in line.words}
+            self._unframe(line.number, self._frame.moved(at, drills=drills))
+            self._moved(line.number, 1.0 if moves else self._code, moves or "Z" in at)
 
     # the frame of the program
 
