@@ -166,6 +166,29 @@ def test_several_holes_share_the_height_of_travel() -> None:
     assert findings == {"CS316": 3}
 
 
+@pytest.mark.parametrize(
+    ("approach", "cycle", "radii", "warned"),
+    [
+        (100.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200", [100, 53, 40, 100, 100, 53, 40, 100], 0),
+        (100.0, "CYCLE/BORE,ORIENT,RAPTO,3,FEDTO,-10,MMPM,200", [100, 100], 0),
+        (51.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200", [51, 53, 40, 53, 53, 40, 53], 1),
+        (51.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200,RTRCTO,30", [51, 80, 53, 40, 80, 80, 53, 40, 80], 0),
+    ],
+)
+def test_the_tool_turns_from_hole_to_hole_as_high_as_it_came(
+    approach: float, cycle: str, radii: list[float], warned: int
+) -> None:
+    """Between holes around a cylinder the straight way at the clearance goes through the part."""
+    lines, findings = moves(
+        f"UNITS/MM\nLOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/{approach},0,0,1,0,0\n{cycle}\nGOTO/50,0,0,1,0,0\n"
+        "GOTO/0,50,0,0,1,0\nCYCLE/OFF\nFINI\n"
+    )
+    places = [re.search(r"X([-\d.]+) Y([-\d.]+) Z", line) for line in lines]
+    found = [float(np.hypot(float(place[1]), float(place[2]))) for place in places if place]
+    np.testing.assert_allclose(found, radii, atol=1e-3)
+    assert findings.get("CS384", 0) == warned
+
+
 def test_pecks_without_depth_are_one_feed_and_a_warning() -> None:
     found, findings = heights(
         NX + "RAPID\nGOTO/0,0,50,0,0,1\nCYCLE/DRILL,DEEP,RAPTO,3.0,FEDTO,-9,MMPM,250.0\nGOTO/0,0,0\nCYCLE/OFF\n"

@@ -106,15 +106,25 @@ def test_the_tool_goes_up_before_an_axis_turns_back(control: str, name: str, for
     assert "CS537" in {problem.code for problem in wrong}
 
 
-@pytest.mark.parametrize("control", ["fanuc", "mitsubishi", "siemens"])
-@pytest.mark.parametrize("lines", ["dense", "long"])
-def test_turns_of_the_tools_before_are_left_where_the_axes_go_to_zero(control: str, lines: str) -> None:
+@pytest.mark.parametrize(
+    ("control", "name", "how"),
+    [
+        ("fanuc", "g1", {"lines": "dense"}),
+        ("mitsubishi", "g1", {"lines": "long"}),
+        ("siemens", "g1", {}),
+        ("fanuc", "g6.2", {}),
+        ("fanuc", "g6.2", {"method": "global"}),
+    ],
+)
+def test_turns_of_the_tools_before_are_left_where_the_axes_go_to_zero(
+    control: str, name: str, how: dict[str, str]
+) -> None:
     rings = [*ring(0, 30), "RAPID", ring(20, 30)[-1], "RAPID", ring(20, 30)[0]]
     tool = ["SPINDL/8000,RPM,CLW", "RAPID", ring(20, 30)[0], "FEDRAT/500,MMPM", *rings, *rings]
     cl = ["UNITS/MM", "LOADTL/2", *tool, "LOADTL/3", *tool, "GOHOME", *tool, "FINI"]
     machine = load_machine("table-ac")
-    form = choose_form(control, "g1", machine=machine)
-    settings = fit_settings(Settings(tolerance=EPS, lines=lines), form, "mm")
+    form = choose_form(control, name, machine=machine)
+    settings = fit_settings(Settings(tolerance=EPS, **how), form, "mm")
     program = read("\n".join(cl).encode(), name="rings.cls")
     stream = io.BytesIO()
     write(smooth(program, settings), stream, form=form)
@@ -134,6 +144,36 @@ def test_turns_of_the_tools_before_are_left_where_the_axes_go_to_zero(control: s
     else:
         assert all(abs(angle) <= 180.0 for angle in first)
         assert most < 1000
+
+
+@pytest.mark.parametrize(
+    ("control", "name", "machine", "how"),
+    [
+        ("fanuc", "g1", "table-ac", {}),
+        ("haas", "g1", "table-bc", {"lines": "long"}),
+        ("siemens", "bspline", "head-ac", {}),
+        ("fanuc", "g6.2", "nutated-bc", {"method": "global"}),
+    ],
+)
+def test_a_tool_that_stays_upright_has_the_free_axis_at_zero(
+    control: str, name: str, machine: str, how: dict[str, str]
+) -> None:
+    flat = ["RAPID", "GOTO/0,0,30,0,0,1", "FEDRAT/500,MMPM", "GOTO/0,0,0", "GOTO/20,0,0", "GOTO/20,20,0", "GOTO/0,30,0"]
+    cl = ["UNITS/MM", "LOADTL/2", *flat, "LOADTL/3", "RAPID", *ring(0, 30)[3:7], "GOHOME", *flat, "LOADTL/4", *flat, "FINI"]
+    own = load_machine(machine)
+    form = choose_form(control, name, machine=own)
+    settings = fit_settings(Settings(tolerance=EPS, **how), form, "mm")
+    program = read("\n".join(cl).encode(), name="flat.cls")
+    stream = io.BytesIO()
+    write(smooth(program, settings), stream, form=form)
+    text = stream.getvalue().decode().splitlines()
+    assert not problems(program, text, control, own)
+    words = [re.search(r" C=?([-\d.]+)", line) for line in text if line[:1] in "GXB"]
+    angles = [float(word[1]) for word in words if word]
+    tilted = [k for k, angle in enumerate(angles) if angle]
+    assert len(tilted) > 2
+    assert tilted[0] > 4
+    assert len(angles) - tilted[-1] > 9
 
 
 def test_an_upright_tool_may_turn_where_it_is() -> None:

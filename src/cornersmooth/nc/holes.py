@@ -251,13 +251,16 @@ def travel_of(cycle: Cycle, program: Program, poses: Ints, approach: Ints) -> tu
 def travel_height(program: Program, poses: Ints, approach: Ints) -> Floats:
     """(h,) mm: height over each hole, along its axis, of the pose from which its run of holes is approached.
 
-    Zero where there is none, or where it has another axis or lies lower.
+    A hole with another axis has the height over the first one of its run, so that the tool turns as far from the part.
+    Zero where there is no such pose, or where it has another axis than that or lies lower.
     """
     known = np.maximum(approach, 0)
-    axis = program.axis[poses]
-    same = (approach >= 0) & (dot(axis, program.axis[known]) > 1.0 - _SAME_AXIS)
-    height = dot(program.tip[known] - program.tip[poses], axis)
-    return np.where(same, np.maximum(height, 0.0), 0.0)
+    same = dot(program.axis[poses], program.axis[known]) > 1.0 - _SAME_AXIS
+    over = np.where(same, poses, np.minimum(known + 1, len(program) - 1))
+    axis = program.axis[over]
+    usable = (approach >= 0) & (dot(axis, program.axis[known]) > 1.0 - _SAME_AXIS)
+    height = dot(program.tip[known] - program.tip[over], axis)
+    return np.where(usable, np.maximum(height, 0.0), 0.0)
 
 
 def _peck_depths(cycle: Cycle) -> list[float]:

@@ -7,13 +7,17 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Floats, Move, Program
+from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
+from cornersmooth.vectors import dot
 
 #: cosine of the angle from Z beyond which a tool is tilted
 _UPRIGHT: Final = 1.0 - 1e-6
+
+#: cosine of the angle from hole to hole beyond which the tool turns between them
+_TURNED: Final = float(np.cos(np.radians(1.0)))
 
 
 @dataclass
@@ -49,6 +53,16 @@ class MotionWarnings:
             where = "down from the height of the retract" if form.table.program.retract else "from where the machine is"
             text = f"the first motion of a tool is a feed move: it feeds {where}; put a RAPID before it"
             self.findings.add("CS333", "warning", line, text)
+
+    def of_holes(self, poses: Ints, travel: Floats, clearance: Floats) -> None:
+        """Say that the tool turns from hole to hole right above them: what lies between, the CL file does not say."""
+        axis = self.program.axis[poses]
+        turned = dot(axis[1:], axis[:-1]) < _TURNED
+        low = travel <= clearance
+        rows = np.flatnonzero(turned & (low[1:] | low[:-1])) + 1
+        if len(rows):
+            text = "the tool turns from hole to hole where feeding begins; see that it is free to, or give RTRCTO"
+            self.findings.add("CS384", "warning", int(self.program.line[poses[rows[0]]]), text, len(rows))
 
     def of_tip_control(self, pose: int, form: Form) -> None:
         """Say that a tilted tool has left the rotary axes anywhere, and no words bring them back.

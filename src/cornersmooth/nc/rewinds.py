@@ -6,6 +6,7 @@ by 300 degrees leads a tool that leans by 30 degrees all the way round. The tool
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Final, NoReturn
 
 import numpy as np
@@ -20,6 +21,9 @@ from cornersmooth.vectors import dot
 
 #: degrees by which the way of the tool axis may be longer than the shortest one
 LONGEST_DETOUR: Final = 30.0
+
+#: sine of an angle at which the tool counts as parallel to a rotary axis, and degrees by which that stands
+_PARALLEL: Final = 1e-9
 
 #: places between both ends that are looked at
 _PLACES: Final = np.linspace(0.0, 1.0, 10)[1:-1]
@@ -83,37 +87,56 @@ def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findin
     return rows
 
 
-def from_zero(form: Form, program: Program, angles: Floats, move: Ints, rapid: Bools) -> Floats:
-    """Angles without the whole turns of the tools before, where the rotary axes begin at zero behind a retract.
+def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: Ints, rapid: Bools) -> Floats:
+    """What is to be added to angles so that they carry nothing over from the tools before: constant from retract to retract.
+
+    Behind a retract the axes turn as they like. A tool that stays along the pole, where the first angle is free, has
+    that at zero, not where another tool needs it. Where the rotary axes go to zero before a tool, its angles are
+    without the whole turns of the tools before.
 
     Parameters
     ----------
     form : Form
         With rotary words.
     program : Program
+    axis : (r, 3) float64
+        Tool axis of each row.
     angles : (r, 2) float64, degrees
+        NaN where there is none.
     move : (r,) int64
         Ascending.
     rapid : (r,) bool
+
+    Returns
+    -------
+    (r, 2) float64, degrees
     """
     machine, table = form.machine, form.table.program
     assert machine is not None
+    shift = np.zeros_like(angles)
+    if not table.retract:
+        return shift
     begin = table.begin if form.mode.begin is None else form.mode.begin
-    endless = np.array([axis.limits is None and not axis.modulo for axis in machine.axes])
-    if not (table.retract and "{rotary_zero}" in begin and endless.any()):
-        return angles
+    endless = np.array([each.limits is None and not each.modulo for each in machine.axes])
+    endless &= "{rotary_zero}" in begin
     homes = [one.pose for one in program.statements if one.word == "GOHOME" and not one.args]
-    starts = np.unique([*tool_starts(program)[1:], *homes]).astype(np.int64)
+    starts = np.unique([*tool_starts(program), *homes]).astype(np.int64)
     rows = np.searchsorted(move, starts)
     there = rows < len(move)
     starts, rows = starts[there], rows[there]
-    rows = rows[(move[rows] == starts) & rapid[rows]]  # a pose that repeats the one before is no row
-    if not len(rows):
-        return angles
-    turns = np.zeros_like(angles)
-    for row, end in zip(rows.tolist(), [*rows[1:].tolist(), len(move)], strict=True):
-        turns[row:end, endless] = np.round(angles[row, endless] / 360.0)
-    return angles - 360.0 * turns
+    # a pose that repeats the one before is no row
+    rows = rows[(move[rows] == starts) & rapid[rows] & ~np.isnan(angles[rows]).any(axis=1)]
+    for row, end in pairwise([*rows.tolist(), len(move)]):
+        shift[row:end, endless] = -360.0 * np.round(angles[row, endless] / 360.0)
+        if len(machine.names) == 2 and _along_pole(machine, axis[row:end], angles[row:end, 0]):
+            shift[row:end, 0] = np.clip(0.0, *machine.limits[0]) - angles[row, 0]
+    return shift
+
+
+def _along_pole(machine: Machine, axis: Floats, first: Floats) -> bool:
+    """Whether the tool is parallel to the first rotary axis all the while, and that stands."""
+    across = axis - dot(axis, np.broadcast_to(machine.axes[0].unit, axis.shape))[:, None] * machine.axes[0].unit
+    return bool(np.abs(across).max() <= _PARALLEL and np.nanmax(first) - np.nanmin(first) <= _PARALLEL)
 
 
 def refuse_compensated(program: Program, pose: int) -> NoReturn:

@@ -12,6 +12,8 @@ from cornersmooth.kinematics.travel import check_travel
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.rewinds import from_zero
+from cornersmooth.rotary import rapid_moves
 from cornersmooth.rotary.angle_curves import RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.rotary.nurbs_knots import CurveGroup
 from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
@@ -59,7 +61,10 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
         findings.add("CS367", "note", int(program.line[found.inserted.segment.min()]), text, len(found.inserted))
     if any(len(group) for group in found.groups):
         warn_of_curves(form, findings)
+    angles, rapid = found.pose_angles, rapid_moves(program.kind)
+    shift = from_zero(form, program, program.axis, angles, np.arange(len(program)), rapid)
     for chunk in _Table(smoothed, found).chunks():
+        chunk.other[:] += shift[chunk.move]
         check_travel(machine, chunk.tip, chunk.other, program.line[chunk.move], program.source.name)
         yield chunk
 

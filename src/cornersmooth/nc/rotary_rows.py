@@ -240,7 +240,8 @@ def _way(
         path = rotary_angles(machine, tip, axis, **how)
     for finding in path.findings:
         findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
-    return _Way(tip, axis, move, from_zero(form, program, path.angles, move, rapid), rapid, left)
+    angles = path.angles + from_zero(form, program, axis, path.angles, move, rapid)
+    return _Way(tip, axis, move, angles, rapid, left)
 
 
 @dataclass

@@ -18,6 +18,7 @@ from cornersmooth.model import Bools, Floats, Ints, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_curve_rows import warn_of_curves
+from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.nc.rotary_rows import CHUNK, LARGEST_TURN, InsertedPoints, whole_rows
 from cornersmooth.parts import some_runs
 from cornersmooth.rotary import fill, insertions, rapid_moves, rotary_angles, still_poses
@@ -118,8 +119,9 @@ def rotary_run_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> 
     )
     for finding in found.findings:
         findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
-    check_travel(machine, tip, found.angles, program.line[move], file)
-    path = _Path(tip, axis, found.angles, move, rapid, np.full(len(move), -1))
+    angles = found.angles + from_zero(form, program, axis, found.angles, move, rapid)
+    check_travel(machine, tip, angles, program.line[move], file)
+    path = _Path(tip, axis, angles, move, rapid, np.full(len(move), -1))
     runs, rows = _followed(smoothed, runs, path)
     sections = None
     if len(runs):
