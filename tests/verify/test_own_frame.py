@@ -24,6 +24,17 @@ MACHINES = {
     "generic": "table-ac",
 }
 
+#: angles of a block
+_TURN = re.compile(r"[AB]\S+ C\S+")
+
+TILTED = b"""LOAD/TOOL,6
+SPINDL/RPM,6000,CLW
+COOLNT/FLOOD
+RAPID
+GOTO/0.0000,0.0000,80.0000,0.2588190,0.2588190,0.9305700
+GOTO/9.0000,0.0000,70.0000
+"""
+
 #: controls with a retract
 _HIGH = MACHINES.keys() - {"generic"}
 
@@ -63,7 +74,10 @@ def _how(control: str) -> dict[str, object]:
 
 @cache
 def _program():
-    return read((SAMPLES / "two_tools.cls").read_bytes(), name="two_tools.cls")
+    """The sample, whose last tool stands upright, with one more that does not: its axes must go back at the end."""
+    data = (SAMPLES / "two_tools.cls").read_bytes().replace(b"END-OF-PATH\nFINI", TILTED + b"END-OF-PATH\nFINI")
+    assert TILTED in data
+    return read(data, name="two_tools.cls")
 
 
 @cache
@@ -90,6 +104,10 @@ def test_a_block_of_the_frame_that_is_lost_or_changed_is_found(control: str, mut
     places = [k for k, line in enumerate(lines) if re.fullmatch(rf"(\d+ )?({pattern})", line)]
     assert places
     for k in places:
+        turn = _TURN.search(lines[k])
+        before = [found[0] for found in map(_TURN.search, lines[:k]) if found]
+        if mutant == "axes not turned" and turn and before[-1:] == [turn[0]]:
+            continue  # they stand there
         block = [changed(lines[k])] if changed else []
         problems = _problems(control, [*lines[:k], *block, *lines[k + 1 :]])
         assert any(re.search(said, text) for text in problems), (lines[k], problems)
