@@ -132,6 +132,7 @@ def test_own_tables_are_taken_from_files(tmp_path: Path) -> None:
             "method zhang2016 has no curves in rotary",
         ),
         (("--program-name", "PART7"), 2, "fanuc takes no program name 'PART7'; use one like O0001"),
+        (("--program-name", "O0000"), 2, "fanuc takes no program name 'O0000'; use one like O0001"),
         (("-f", "g6.2", "--no-tcp"), 2, "fanuc form g6.2 cannot run without tool tip control"),
         (
             ("--control", "heidenhain", "--no-tcp"),

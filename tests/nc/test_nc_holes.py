@@ -173,6 +173,7 @@ def test_several_holes_share_the_height_of_travel() -> None:
         (100.0, "CYCLE/BORE,ORIENT,RAPTO,3,FEDTO,-10,MMPM,200", [100, 100], 0),
         (51.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200", [51, 53, 40, 53, 53, 40, 53], 1),
         (51.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200,RTRCTO,30", [51, 80, 53, 40, 80, 80, 53, 40, 80], 0),
+        (-100.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200", [100, 53, 40, 53, 53, 40, 53], 2),
     ],
 )
 def test_the_tool_turns_from_hole_to_hole_as_high_as_it_came(
@@ -180,7 +181,7 @@ def test_the_tool_turns_from_hole_to_hole_as_high_as_it_came(
 ) -> None:
     """Between holes around a cylinder the straight way at the clearance goes through the part."""
     lines, findings = moves(
-        f"UNITS/MM\nLOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/{approach},0,0,1,0,0\n{cycle}\nGOTO/50,0,0,1,0,0\n"
+        f"UNITS/MM\nLOADTL/1\nSPINDL/900,CLW\nRAPID\nGOTO/{approach},0,0,{np.sign(approach)},0,0\n{cycle}\nGOTO/50,0,0,1,0,0\n"
         "GOTO/0,50,0,0,1,0\nCYCLE/OFF\nFINI\n"
     )
     places = [re.search(r"X([-\d.]+) Y([-\d.]+) Z", line) for line in lines]

@@ -159,7 +159,8 @@ def test_a_tool_that_stays_upright_has_the_free_axis_at_zero(
     control: str, name: str, machine: str, how: dict[str, str]
 ) -> None:
     flat = ["RAPID", "GOTO/0,0,30,0,0,1", "FEDRAT/500,MMPM", "GOTO/0,0,0", "GOTO/20,0,0", "GOTO/20,20,0", "GOTO/0,30,0"]
-    cl = ["UNITS/MM", "LOADTL/2", *flat, "LOADTL/3", "RAPID", *ring(0, 30)[3:7], "GOHOME", *flat, "LOADTL/4", *flat, "FINI"]
+    tilted = ["LOADTL/3", "RAPID", *ring(0, 30)[3:7], "GOHOME"]
+    cl = ["UNITS/MM", "LOADTL/2", *flat, *tilted, *flat, "LOADTL/4", *flat, "FINI"]
     own = load_machine(machine)
     form = choose_form(control, name, machine=own)
     settings = fit_settings(Settings(tolerance=EPS, **how), form, "mm")

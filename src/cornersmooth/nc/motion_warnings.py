@@ -54,14 +54,25 @@ class MotionWarnings:
             text = f"the first motion of a tool is a feed move: it feeds {where}; put a RAPID before it"
             self.findings.add("CS333", "warning", line, text)
 
-    def of_holes(self, poses: Ints, travel: Floats, clearance: Floats) -> None:
-        """Say that the tool turns from hole to hole right above them: what lies between, the CL file does not say."""
+    def of_holes(self, poses: Ints, before: int, travel: Floats, clearance: Floats) -> None:
+        """Say that the tool turns on its way to holes right above them: what lies there, the CL file does not say.
+
+        Parameters
+        ----------
+        poses : (h,) int64
+        before : int
+            Pose that the tool comes from; -1 for none.
+        travel, clearance : (h,) float64, mm
+            Heights over the holes to which the tool comes, and from which it feeds.
+        """
         axis = self.program.axis[poses]
-        turned = dot(axis[1:], axis[:-1]) < _TURNED
+        come = self.program.axis[np.concatenate(([max(before, 0)], poses[:-1]))]
+        turned = dot(axis, come) < _TURNED
+        turned[0] &= before >= 0
         low = travel <= clearance
-        rows = np.flatnonzero(turned & (low[1:] | low[:-1])) + 1
+        rows = np.flatnonzero(turned & (low | np.concatenate(([False], low[:-1]))))
         if len(rows):
-            text = "the tool turns from hole to hole where feeding begins; see that it is free to, or give RTRCTO"
+            text = "the tool turns on its way to a hole to where feeding begins; see that it is free to, or give RTRCTO"
             self.findings.add("CS384", "warning", int(self.program.line[poses[rows[0]]]), text, len(rows))
 
     def of_tip_control(self, pose: int, form: Form) -> None:

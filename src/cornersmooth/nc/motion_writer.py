@@ -298,7 +298,8 @@ class MotionWriter:
             yield from self._cycles(cycle, kind, poses, approach)
             return
         self.findings.add("CS316", "note", line, "hole of a cycle written as plain moves", len(poses))
-        self._warnings.of_holes(poses, *travel_of(cycle, program, poses, approach[poses]))
+        before = -1 if self.operation.comes_first else int(poses[0]) - 1
+        self._warnings.of_holes(poses, before, *travel_of(cycle, program, poses, approach[poses]))
         moves = hole_moves(cycle, program, poses, approach[poses])
         move = poses[moves.hole]
         ticks = self._shifted(rows, part, moves.tip, moves.hole)

@@ -88,7 +88,7 @@ def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findin
 
 
 def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: Ints, rapid: Bools) -> Floats:
-    """What is to be added to angles so that they carry nothing over from the tools before: constant from retract to retract.
+    """What is to be added to angles so that none carries over what a tool before has left; constant between retracts.
 
     Behind a retract the axes turn as they like. A tool that stays along the pole, where the first angle is free, has
     that at zero, not where another tool needs it. Where the rotary axes go to zero before a tool, its angles are

@@ -17,8 +17,8 @@ from cornersmooth.kinematics import Machine, check_travel
 from cornersmooth.model import Bools, Floats, Ints, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.rotary_curve_rows import warn_of_curves
 from cornersmooth.nc.rewinds import from_zero
+from cornersmooth.nc.rotary_curve_rows import warn_of_curves
 from cornersmooth.nc.rotary_rows import CHUNK, LARGEST_TURN, InsertedPoints, whole_rows
 from cornersmooth.parts import some_runs
 from cornersmooth.rotary import fill, insertions, rapid_moves, rotary_angles, still_poses

@@ -254,7 +254,7 @@ class WordCheck:
         self._code = codes[-1] if codes else self._code
         rules = [rule for rule in self._rules.of(words, text_of(words)) if rule is not None]
         moves, drills = any(rule.moves for rule in rules), any(rule.cycle for rule in rules)
-        if moves or not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words):
+        if moves or (not self._rules.stands(words) and any(word.name in _LINEAR for word in line.words)):
             at = {word.name: word.value for word in line.words}
             self._unframe(line.number, self._frame.moved(at, drills=drills))
             self._moved(line.number, 1.0 if moves else self._code, moves or "Z" in at)
