@@ -50,6 +50,7 @@ NX = ",0.0600,0.5000,10.0000,0.0000"
         ("CIRCLE/0,0,0,0,0,-1.", [HALF, -HALF, 0]),
         ("MOVARC/0, 0, 0, 0, 0, 1, 1, ANGLE, 270", [-HALF, HALF, 0]),  # HSM: right
         ("MOVARC/0, 0, 0, 0, 0, -1, 1, ANGLE, 90", [HALF, -HALF, 0]),
+        ("MOVARC/ CENTER, 0, 0, 0, AXIS, 0, 0, 1, RADIUS, 1", [-HALF, HALF, 0]),  # MfgSuite: right
     ],
 )
 def test_sense_of_rotation(circle: str, middle: list[float]) -> None:

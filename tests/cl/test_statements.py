@@ -328,8 +328,12 @@ def test_coordinate_changes_that_change_nothing(text: str) -> None:
     assert len(result.statements) == 1
 
 
+#: positions are in these systems: CAMplete, DMG MORI MfgSuite
+TURNED = ["MCS/1,0,0,0,0,1,0,-1,0,0,0,0", "MCSYS/NUM,1,POINT,0,0,0,VECTOR,1,0,0,VECTOR,0,0,1"]
+
+
 @pytest.mark.parametrize(
-    "text", ["TRANS/1,0,0", "TRACUT/M1", "ROTABL/90,CLW", "COPY/1,TRANSL,1,0,0,5", "TRNTYP/LOCAL,0"]
+    "text", ["TRANS/1,0,0", "TRACUT/M1", "ROTABL/90,CLW", "COPY/1,TRANSL,1,0,0,5", "TRNTYP/LOCAL,0", *TURNED]
 )
 def test_coordinate_changes_are_refused(text: str) -> None:
     with pytest.raises(InputError, match="changes the coordinates"):
@@ -342,6 +346,21 @@ def test_several_systems_are_pointed_out() -> None:
         "MSYS/0,0,0,1,0,0,0,1,0\nGOTO/0,0,0\nMSYS/0,0,0,1,0,0,0,1,0\nGOTO/1,0,0\nMSYS/0,0,5,1,0,0,0,1,0\nGOTO/2,0,0\n"
     )
     assert codes(program(text)) == {"CS146": 1}
+    text = "MCS/1,0,0,0,1,0,0,0,1,0,0,0\nGOTO/0,0,0\nMCS/1,0,0,0,1,0,0,0,1,0,0,5\nGOTO/1,0,0\n"
+    assert codes(program(text)) == {"CS146": 1}
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("GOTO/1,0,0\nFROM/5,0,0\nGOTO/6,0,0\nGOTO/7,0,0\nFROM/0,0,0\nFROM/0,9,0\nGOTO/1,0,0", 2),
+        ("FROM/5,0,0\nGOTO/6,0,0", 0),  # where the first tool comes from
+        ("GOTO/1,0,0\nFROM/5,0,0\nRAPID\nGOTO/6,0,0\nFROM/9,0,0", 0),
+        ("GOTO/1,0,0\nFROM/1,0,0\nGOTO/6,0,0", 0),
+    ],
+)
+def test_a_feed_from_where_the_tool_is_not_is_said(text: str, count: int) -> None:
+    assert codes(program(f"{text}\n")).get("CS185", 0) == count
 
 
 def test_fini_ends_the_file() -> None:

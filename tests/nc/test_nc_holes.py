@@ -42,6 +42,8 @@ def heights(cl: str) -> tuple[list[str], dict[str, int]]:
     ("cycle", "expected"),
     [
         ("CYCLE/DRILL,FEDTO,10,MMPM,250,RAPTO,3", ["G0 30", "G0 3", "G1 -10", "G0 30"]),
+        ("CYCLE/DRILL,DEPTH,10,PERMIN,250,CLEAR,30,RETURN,30,RAPTO,3", ["G0 30", "G0 3", "G1 -10", "G0 30"]),
+        ("CYCLE/DRILL,DEPTH,4.6,PERREV,0.08,CLEAR,2,RETURN,0", ["G0 30", "G0 2", "G1 -4.6", "G0 30"]),
         ("CYCLE/DRILL,DEPTH,4.6,MMPR,0.08,CLEAR,2,RETURN,0", ["G0 30", "G0 2", "G1 -4.6", "G0 30"]),
         ("CYCLE/DRILL,FEDTO,10,RAPTO,3,RTRCTO,50,MMPM,250", ["G0 50", "G0 3", "G1 -10", "G0 50"]),
         ("CYCLE/DRILL,FEDTO,10,RAPTO,3,RTRCTO,AUTO,MMPM,250", ["G0 30", "G0 3", "G1 -10", "G0 30"]),

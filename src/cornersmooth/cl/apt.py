@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.cl import arcs as arc_geometry
 from cornersmooth.cl.arcs import ArcRule
@@ -16,7 +17,7 @@ from cornersmooth.cl.interpret import end, obey, plain
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.errors import Finding
-from cornersmooth.model import MM_PER_UNIT, Arcs, Keep, Move, Program, Source, Units
+from cornersmooth.model import MM_PER_UNIT, Arcs, Floats, Ints, Keep, Move, Program, Source, Units
 
 #: what stands between plain GOTO lines is often the same (RAPID; PAINT/COLOR,31): gaps of up to so many lines are
 #: taken apart once, and no more than so many different ones remembered
@@ -143,6 +144,8 @@ def _program(state: ReaderState, asked: Units | None) -> Program:
     keep[resolved.kept - 1] = Keep.CONTRADICTION
     turned = np.abs(axis[resolved.arcs.pose] - axis[resolved.arcs.pose - 1]).max(axis=1, initial=0) > AXIS_NOISE
     along = [finding("CS147", int(line[resolved.arcs.pose[turned]][0]), int(turned.sum()))] if turned.any() else []
+    fed = _fed_from_elsewhere(tip, kind)
+    jumps = [finding("CS185", int(line[fed[0]]), len(fed))] if len(fed) else []
     for index in state.unitless_feeds:
         builder.feed.value[index] *= scale
     arcs = Arcs(resolved.arcs.pose, resolved.arcs.centre * scale, resolved.arcs.normal, resolved.arcs.sweep)
@@ -158,8 +161,19 @@ def _program(state: ReaderState, asked: Units | None) -> Program:
         statements=tuple(state.statements),
         units=units,
         source=Source(state.file, "apt", state.dialect.name),
-        findings=(*said, *state.findings, *axis_findings, *resolved.findings, *along),
+        findings=(*said, *state.findings, *axis_findings, *resolved.findings, *along, *jumps),
     )
+
+
+def _fed_from_elsewhere(tip: Floats, kind: NDArray[np.uint8]) -> Ints:
+    """Poses of FROM that name another place than the tool's, which then feeds on: nothing says how it gets there."""
+    poses = np.arange(len(kind))
+    stated = kind == Move.FROM
+    stands = np.maximum.accumulate(np.where(stated, -1, poses))
+    feeds = np.zeros(len(kind), np.bool_)
+    feeds[:-1] = np.isin(kind[1:], (Move.LINEAR, Move.ARC))
+    away = np.abs(tip - tip[stands]).max(axis=1, initial=0.0) > 0.0
+    return np.flatnonzero(stated & feeds & away & (stands >= 0))
 
 
 def _units(state: ReaderState, asked: Units | None) -> tuple[Units, list[Finding]]:

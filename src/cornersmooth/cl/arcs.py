@@ -49,6 +49,10 @@ MOST_TURNS: Final = 10_000
 NORMAL_TOLERANCE: Final = 1e-2
 
 
+#: words before centre, normal and radius
+_PARTS_OF_MOVARC: Final = ("CENTER", "AXIS", "RADIUS")
+
+
 @dataclass(frozen=True, slots=True)
 class Arc:
     """A circular move before its ends are known; lengths as written, the rotation right-handed about `normal`."""
@@ -85,6 +89,8 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
         CS106, CS113, CS120, CS124, CS125, CS127
     """
     words = [value for value in record.args if isinstance(value, str)]
+    if record.word == "MOVARC" and record.args[:9:4] == _PARTS_OF_MOVARC:  # DMG MORI MfgSuite
+        words = words[3:]
     for word in words:
         if word not in ("TIMES", "ANGLE"):
             raise error("CS106", file, record.line, word=record.word, token=word)
@@ -92,8 +98,10 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
     count = len(values)
     turns, sweep = 1.0, math.nan
     if record.word == "MOVARC":
+        named = len(words) < sum(isinstance(value, str) for value in record.args)
         wanted, fits = "x,y,z,i,j,k,r,ANGLE,a", count == 8 and words == ["ANGLE"]
         sweep = math.radians(values[-1]) if fits else sweep
+        fits = fits or (named and count == 7 and not words)
     else:
         wanted = "x,y,z,i,j,k (and r), or 11 numbers and TIMES,n"
         fits = (count in (6, 7, 11) and not words) or (count == 12 and words == ["TIMES"])

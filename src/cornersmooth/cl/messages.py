@@ -79,6 +79,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS147": ("warning", "the tool axis turns along an arc; how it turns is not defined"),
     "CS148": ("warning", "FEDRAT without a unit is read in the unit of the file"),
     "CS149": ("note", "GOHOME without coordinates is kept as a statement"),
+    "CS185": ("warning", "FROM is where the tool is not: it feeds on from where it is; put a RAPID behind the FROM"),
     "CS180": ("warning", "the feeds are in {feeds} per minute, the positions are read in {units} as asked for"),
 }
 

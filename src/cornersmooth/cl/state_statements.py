@@ -29,6 +29,9 @@ UNIT_NAMES: Final[dict[str, Units]] = {
     **dict.fromkeys(("IN", "INCH", "INCHES"), "inch"),
 }
 
+#: by how much axes of a coordinate system may be off those of the part
+_TURNED: Final = 1e-6
+
 #: first words of CYCLE and CUTCOM that end them
 _ENDS: Final = frozenset({"OFF", "NOMORE"})
 
@@ -124,6 +127,20 @@ def _msys(state: ReaderState, record: Record) -> None:
     state.keep(record)
 
 
+def _mcs(state: ReaderState, record: Record) -> None:
+    """MCS/ of CAMplete, MCSYS/NUM,n,POINT,...,VECTOR,...,VECTOR,... of MfgSuite: positions are in this system."""
+    values = [value for value in record.args if isinstance(value, float)]
+    axes = values[:6] if record.word == "MCS" else values[4:10]
+    if len(axes) == 6 and max(abs(a - b) for a, b in zip(axes, (1, 0, 0, 0, 1, 0), strict=True)) > _TURNED:
+        _frame(state, record)
+    elif state.system not in (None, record.args):
+        state.note("CS146", record.line, word=record.word)
+        state.keep(record)
+    else:
+        state.keep(record)
+    state.system = record.args
+
+
 def _cutcom(state: ReaderState, record: Record) -> None:
     option = record.args[0] if record.args else ""
     if option in ("LEFT", "RIGHT", "ON") and "LENGTH" not in record.args:
@@ -200,6 +217,8 @@ HANDLERS: Final[dict[str, Callable[[ReaderState, Record], None]]] = {
     "TOOL PATH": _tool_path,
     "CSYS": _csys,
     "MSYS": _msys,
+    "MCS": _mcs,
+    "MCSYS": _mcs,
     "CUTCOM": _cutcom,
     "CYCLE": _cycle,
     "SET": _set,

@@ -48,11 +48,14 @@ _DEPTHS = ("FEDTO", "DEPTH")
 _RETURNS = ("RTRCTO", "RETURN")
 _STEPS = ("STEP", "INCR", "1STPECK", "SUBPECK")
 _DISTANCES = {*_DEPTHS, *_RETURNS, *_STEPS, "RAPTO", "CLEAR"}
+#: millimetres per unit of the feed, None for the unit of the file, and what it is per
 _FEEDS = {
     "MMPM": (1.0, FeedMode.PER_MINUTE),
     "IPM": (25.4, FeedMode.PER_MINUTE),
+    "PERMIN": (None, FeedMode.PER_MINUTE),
     "MMPR": (1.0, FeedMode.PER_REVOLUTION),
     "IPR": (25.4, FeedMode.PER_REVOLUTION),
+    "PERREV": (None, FeedMode.PER_REVOLUTION),
 }
 
 
@@ -148,7 +151,7 @@ def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | N
     )
     for word, (per_unit, mode) in _FEEDS.items():
         if word in values:
-            cycle = replace(cycle, feed=values[word][0] * per_unit, feed_mode=mode)
+            cycle = replace(cycle, feed=values[word][0] * (per_unit or scale), feed_mode=mode)
     return cycle
 
 

@@ -12,7 +12,15 @@ from cornersmooth.statements.asked import Asking
 _PLAIN = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
 _AT_FEED = {"REAM", "BORE"}
 _DEPTH = ("FEDTO", "DEPTH")
-_FEEDS = {"MMPM": (1.0, False), "IPM": (25.4, False), "MMPR": (1.0, True), "IPR": (25.4, True)}
+#: feed words with the number of millimetres in their unit (0: that of the file) and whether they are per revolution
+_FEEDS = {
+    "MMPM": (1.0, False),
+    "IPM": (25.4, False),
+    "PERMIN": (0.0, False),
+    "MMPR": (1.0, True),
+    "IPR": (25.4, True),
+    "PERREV": (0.0, True),
+}
 _RETURNS = ("RTRCTO", "RETURN")
 _OTHER = {"RAPTO", "CLEAR", *_RETURNS, "STEP", "INCR", "1STPECK", "SUBPECK", "DWELL"}
 
@@ -91,7 +99,8 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
         depth = abs(depth)
     if depth < 0:
         return Drilling()
-    feeds = [(values[name] * scale, turn) for name, (scale, turn) in _FEEDS.items() if name in values]
+    unit = program.mm_per_unit
+    feeds = [(values[name] * (scale or unit), turn) for name, (scale, turn) in _FEEDS.items() if name in values]
     feed, per_revolution = feeds[0] if len(feeds) == 1 else (math.nan, False)
     dwell = values.get("DWELL", 0.0)
     if in_turns and (not speed or not dwell):
