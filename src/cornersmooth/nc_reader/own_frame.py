@@ -56,7 +56,7 @@ class OwnFrame:
     ----------
     listed : WordList
     trusted : set of str
-        States and kinds of words that are the user's own.
+        States, kinds of words and blocks that are the user's own.
     positions : MachinePositions
         Those of the machine's file, which may say where the program ends, and its rotary axes.
     """
@@ -146,8 +146,8 @@ class OwnFrame:
 
     def _running(self) -> list[str]:
         """Words in force that are switched off behind the last motion of a tool."""
-        held = [(state, *said) for state, said in self._state.items() if state not in self._trusted]
-        return [word for _, word, rule in held if rule.tidy]
+        held = [said for state, said in self._state.items() if not {state, said[0]} & self._trusted]
+        return [word for word, rule in held if rule.tidy]
 
     def angles(self, angles: Mapping[str, float]) -> None:
         """Take note of where the rotary axes are, as far as that is said."""

@@ -83,7 +83,7 @@ class WordCheck:
         self._own = {text_of(words) for words in map(self._words_of, plain) if words}
         templates = [(self._words_of(numbers_in(block))) for block in set(trusted) - set(plain)]
         #: what texts of our own say beyond that
-        self._frame = OwnFrame(self.list, self._left, self._positions)
+        self._frame = OwnFrame(self.list, self._left | self._own, self._positions)
         self._own_patterns = [any_numbers(text_of(words)) for words in templates if words]
         self._blocks = 0
         self._begun = 0
