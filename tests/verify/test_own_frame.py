@@ -325,6 +325,17 @@ def test_rotary_axes_that_are_sent_nowhere_without_tip_control_are_found(control
         assert [problem.text for problem in found.problems] == said
 
 
+@pytest.mark.parametrize("control", MACHINES)
+def test_rotary_axes_sent_to_zero_right_before_a_cycle_of_the_control_are_seen(control: str) -> None:
+    """Heidenhain's L A0 C0 is a motion block like those that follow it, and read with them."""
+    machine, stream = load_machine(MACHINES[control]), io.BytesIO()
+    cl = "UNITS/MM\nLOADTL/1\nRAPID\nGOTO/0,0,60\nCYCLE/DRILL,FEDTO,9,MMPM,200,RAPTO,3\nGOTO/0,0,0\nCYCLE/OFF\nFINI\n"
+    form = choose_form(control, machine=machine)
+    done = postprocess(cl.encode(), stream, Settings(tolerance=0.05), form=form, frame=Frame(cycles="native"))
+    assert done.verification is not None
+    assert done.verification.passed
+
+
 def test_a_tool_without_direction_on_the_way_back_is_a_problem() -> None:
     """U V W at the tip itself: an axis of no length has no straight back."""
     form, program, stream = choose_form("fanuc", "g6.2"), read(_ONE_TOOL.encode()), io.BytesIO()

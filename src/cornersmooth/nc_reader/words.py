@@ -85,6 +85,11 @@ class Table:
         found = self.columns.get(letter)
         return np.full(len(self), np.nan) if found is None else found
 
+    def last_before(self, row: int, letters: Iterable[str]) -> dict[str, float]:
+        """Words of some letters that stand last before a row."""
+        given = {letter: self.columns[letter][:row] for letter in letters if letter in self.columns}
+        return {letter: float(part[~np.isnan(part)][-1]) for letter, part in given.items() if not np.isnan(part).all()}
+
     def rows_with(self, letters: Iterable[str], code: float) -> Ints:
         """Rows with any of some words, but for arcs, whose I J K are no vector; `code` is the G word before the run."""
         given = np.any([~np.isnan(self.column(letter)) for letter in letters], axis=0)

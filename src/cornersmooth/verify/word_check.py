@@ -173,15 +173,13 @@ class WordCheck:
             rows = [row, row + int(np.argmax(down[row:]))] if self._above and not down[row] and down.any() else [row]
             for row in rows:
                 given = known[known <= row]
+                self._frame.angles(self._angles | table.last_before(row, _ROTARY))
                 self._unframe(int(table.line[row]), self._frame.moved(table.row(row)))
                 code = float(codes[given[-1]]) if len(given) else self._code
                 self._moved(int(table.line[row]), code, bool(down[row]))
         if len(known):
             self._code = float(codes[known[-1]])
-        for name in _ROTARY & table.columns.keys():
-            values = table.columns[name][~np.isnan(table.columns[name])]
-            if len(values):
-                self._angles[name] = float(values[-1])
+        self._angles |= table.last_before(len(table), _ROTARY)
         self._frame.angles(self._angles)
 
     def _block(self, line: Line) -> Line:
