@@ -231,6 +231,19 @@ def test_a_length_that_is_taken_off_before_the_retract_is_found(control: str) ->
     assert _problems(control, changed) == ["G49 before the retract: it may move the tool by its length"]
 
 
+@pytest.mark.parametrize(
+    ("control", "off", "up"),
+    [("siemens", "TRAFOOF", "SUPA G0 Z0 D0"), ("heidenhain", r"\d+ FUNCTION RESET TCPM", r"\d+ L Z-1 R0 FMAX M91")],
+)
+def test_a_retract_under_tip_control_is_found(control: str, off: str, up: str) -> None:
+    lines = _text(control).splitlines()
+    places = [k for k in range(9, len(lines)) if re.fullmatch(off, lines[k]) and re.fullmatch(up, lines[k + 1])]
+    assert len(places) > 1
+    for k in places:
+        problems = _problems(control, [*lines[:k], lines[k + 1], lines[k], *lines[k + 2 :]])
+        assert [re.sub(r" under .*", "", text) for text in problems] == [re.sub(r"^\d+ ", "", lines[k + 1])]
+
+
 @pytest.mark.parametrize("control", MACHINES)
 def test_texts_that_do_not_say_how_they_were_made_have_their_own_habits(control: str) -> None:
     lines = [line for line in _text(control).splitlines() if "CORNERSMOOTH 0" not in line]

@@ -119,7 +119,8 @@ class OwnFrame:
                     self._used.add(rule.state)
                     yield from self._unsaid("used", word, rule.state) if self._asked else ()
             self._swivelled |= rule.turns
-            if rule.bars and self._ours and (held := self._state.get(rule.bars)) and held[1].tidy:
+            held = self._state.get(rule.bars)
+            if held and self._ours and (held[1].tidy or held[1].ends):
                 yield f"{word} under {held[0]}"
             if rule.turned and self._high:  # elsewhere the axes stand where the last motion left them
                 self._turned = dict(self._angles)

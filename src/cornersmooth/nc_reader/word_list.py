@@ -32,10 +32,10 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     it, and that must be said behind it. ``moves``: the tool moves, though the block names no axis.
 
     In texts of our own (`own_frame`): ``first``: it must be said before the first retract (``"first"``), or before
-    another word of its state (``"used"``). ``bars``: a state of which no ``tidy`` word may hold where it is said.
-    ``tidy``: it must be switched off before another tool and at the end. ``turned``: the rotary axes must stand as the
-    next motion has them. ``preset``: the one that is meant where the head names none. ``down``: one of its
-    state must hold where the tool comes down from a retract while a word like this holds.
+    another word of its state (``"used"``). ``bars``: a state of which no word that is ``tidy`` or ``ends`` may hold
+    where it is said. ``tidy``: it must be switched off before another tool and at the end. ``turned``: the rotary axes
+    must stand as the next motion has them. ``preset``: the one that is meant where the head names none. ``down``: one
+    of its state must hold where the tool comes down from a retract while a word like this holds.
 ``[[block]]``
     A block that counts as a whole. ``retract``: it moves the tool away, which no motion may follow but an approach, in
     which work offset or tool length are said again.

@@ -441,7 +441,7 @@ class HoleSearch:
                     text = f"the feed is {self.ahead.nc.feed[k - self.ahead.base]:g}, the cycle says {cycle.feed:g}"
                     problems.append(Problem("CS541", cl_line, line, text))
                 down = height.get(k - 1, np.inf) > height[k]
-                if alone and down and drilled > self.room and self.room < -height[k] <= drilled + self.room:
+                if alone and down and drilled > self.room and self.room < -height[k] <= drilled + ARITHMETIC:
                     problems.append(Problem("CS562", cl_line, line, "a hole is drilled again"))
                 drilled = max(drilled, -height[k])
         if height[group[-1]] < -self.room:
