@@ -244,6 +244,24 @@ def test_a_retract_under_tip_control_is_found(control: str, off: str, up: str) -
         assert [re.sub(r" under .*", "", text) for text in problems] == [re.sub(r"^\d+ ", "", lines[k + 1])]
 
 
+@pytest.mark.parametrize("control", ["fanuc", "haas", "mitsubishi", "siemens"])
+def test_rotary_axes_that_turn_under_tip_control_behind_the_last_retract_are_found(control: str) -> None:
+    lines = _text(control).splitlines()
+    off = max(k for k, line in enumerate(lines) if re.fullmatch("G49|TRAFOOF", line))
+    turn = next(k for k in range(off, len(lines)) if re.match(r"G0 [ABC]", lines[k]))
+    changed = [*lines[:off], *lines[off + 1 : turn + 1], lines[off], *lines[turn + 1 :]]
+    assert any(text.startswith("the rotary axes turn under ") for text in _problems(control, changed))
+
+
+def test_another_name_at_the_end_than_at_the_beginning_is_found() -> None:
+    lines = _text("heidenhain").splitlines()
+    for name, other in (("CORNERSMOOTH", "2"), (" MM", " INCH")):
+        changed = lines[-1].replace(name, other)
+        assert changed != lines[-1]
+        problems = _problems("heidenhain", [*lines[:-1], changed])
+        assert [text.split(" ends ")[0] for text in problems] == [re.sub(r"^\d+ ", "", changed)]
+
+
 @pytest.mark.parametrize("control", MACHINES)
 def test_texts_that_do_not_say_how_they_were_made_have_their_own_habits(control: str) -> None:
     lines = [line for line in _text(control).splitlines() if "CORNERSMOOTH 0" not in line]

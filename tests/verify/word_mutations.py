@@ -120,7 +120,8 @@ class Mutant:
         """Whether what is named is what should be."""
         if self.where is None:
             return not named
-        return any(self.where[0] <= line <= self.where[1] for line, _ in named)
+        lines = [int(line) for place, text in named for line in (place, *re.findall(r"of line (\d+)", text))]
+        return any(self.where[0] <= line <= self.where[1] for line in lines)
 
 
 @dataclass

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Collection, Iterator, Mapping, Set
 from typing import Final
 
 from cornersmooth.nc_reader.block_texts import shown, text_of
@@ -29,6 +29,9 @@ _PLACE: Final = frozenset("XY")
 #: words beside which Z may not come down from a retract, and the rotary axes among them
 _ASIDE: Final = frozenset("XYABC")
 _ROTARY: Final = frozenset("ABC")
+
+#: words of the linear axes, without which a block turns the rotary axes alone
+_LINEAR: Final = frozenset("XYZ")
 
 #: words of a second point on the axis, with which nothing can be said of a place high up
 _POINT: Final = frozenset(("U", "V", "W", "XH", "YH", "ZH"))
@@ -154,6 +157,11 @@ class OwnFrame:
         """Take note of where the rotary axes are, as far as that is said."""
         self._angles = dict(angles)
         self._swivelled &= not angles
+
+    def turns(self, words: Collection[str]) -> Iterator[str]:
+        """Look at the words of a block that may turn the rotary axes alone, where a retract has left the tool."""
+        if self._asked and self._above and _ROTARY & set(words) and not _LINEAR & set(words):
+            yield from (f"the rotary axes turn under {word}" for word, rule in self._state.values() if rule.ends)
 
     def moved(self, words: Mapping[str, float], *, drills: bool = False) -> Iterator[str]:
         """Look at the words of a motion, the first behind a retract or behind words that are no motion.

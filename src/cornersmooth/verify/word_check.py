@@ -32,7 +32,6 @@ _LINEAR: Final = frozenset("XYZ")
 #: words of rotary axes
 _ROTARY: Final = frozenset("ABC")
 
-
 #: name of the blocks around the motion, among what is left to the user
 FRAME: Final = "program frame"
 
@@ -86,7 +85,7 @@ class WordCheck:
         self._frame = OwnFrame(self.list, self._left | self._own, self._positions)
         self._own_patterns = [any_numbers(text_of(words)) for words in templates if words]
         self._blocks = 0
-        self._begun = 0
+        self._begun, self._opening = 0, ""
         self._tail: list[tuple[int, str]] = []
         self._state: dict[str, tuple[str, int]] = {}
         self._first: dict[str, str] | None = None
@@ -166,6 +165,7 @@ class WordCheck:
         linear = ~np.all([np.isnan(table.column(name)) for name in sorted(_LINEAR)], axis=0)
         if linear.any():
             self._spindle_at_motion()
+        self._unframe(int(table.line[0]), self._frame.turns(table.row(0)))
         self._positions.leave(table.columns.keys())
         if (self._changed or self._high or self._retract or self._arc or self._above) and linear.any():
             row = int(np.argmax(linear))
@@ -248,6 +248,7 @@ class WordCheck:
         """Keep the motion of a block on its own."""
         self._angles |= {word.name: word.value for word in line.words if word.name in _ROTARY}
         self._frame.angles(self._angles)
+        self._unframe(line.number, self._frame.turns({word.name for word in line.words}))
         codes = [word.value for word in line.words if word.name == "G" and word.value in (0.0, 1.0, 2.0, 3.0)]
         self._code = codes[-1] if codes else self._code
         rules = [rule for rule in self._rules.of(words, text_of(words)) if rule is not None]
@@ -271,6 +272,7 @@ class WordCheck:
             if place is None:
                 self._begun = len(self.list.begin)
             else:
+                self._opening = self._opening or text
                 self._begun += place + 1
                 return True
         if any(pattern.fullmatch(text) for pattern in self.list.end):
@@ -293,12 +295,14 @@ class WordCheck:
             self._unframed(
                 NOT_LISTED, self._tail[0][0] if self._tail else self._line, f"the program must end with {wanted}, once"
             )
+        elif self._opening.partition(" ")[2] != texts[-1].partition(" ")[2]:
+            self._unframed(NOT_LISTED, self._tail[-1][0], f"{texts[-1]} ends what {self._opening} began")
         last = self._tail[0][0] if self._tail else self._line
         off = {rule.state for rule in self.list.words if rule.off}
         for state in sorted(off & self._state.keys()):
-            word, _ = self._state[state]
+            word, line = self._state[state]
             if not self._is_off(state, word):
-                self._unframed(NOT_ESTABLISHED, last, f"{state}: {word} still holds at the end")
+                self._unframed(NOT_ESTABLISHED, last, f"{state}: {word} of line {line} still holds at the end")
         if not self._high and any(rule.high for rule in self.list.words if not shadowed(self.list, rule)):
             self._unframed(NOT_ESTABLISHED, last, "the tool is not retracted at the end")
         self._unframe(last, self._frame.end())
