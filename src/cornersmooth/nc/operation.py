@@ -79,7 +79,9 @@ class Operation:
         own = self.mode.begin
         blocks = [block for what in ("spindle", "coolant") for block in self._stopped.get(what, ())]
         if self._stopped:
-            text = f"{' and '.join(self._stopped)} not given again behind a tool change: on as before"
+            text = (
+                f"{' and '.join(self._stopped)} not given again in translated words behind a tool change: on as before"
+            )
             self.findings.add("CS331", "warning", self._stopped_line, text)
         self.spindle = self._stopped.get("spindle", self.spindle)
         self.coolant = self._stopped.get("coolant", self.coolant)
