@@ -25,10 +25,9 @@ from cornersmooth.cl import read
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.feedrate import Limits
 from cornersmooth.model import Move, Program
-from cornersmooth.nc import Form, Frame, fit_settings, write
+from cornersmooth.nc import Form, Frame, fit_settings
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from nc.cases import CHOSEN, Case
 from nc.grammars import reader
@@ -57,10 +56,8 @@ def texts(
     frame = Frame(cycles="native" if native else "moves")
     fitted = fit_settings(settings, form, program.units)
     stream = io.BytesIO()
-    if planned:
-        postprocess(program, stream, settings, form=form, frame=frame, plan_feeds=Limits(), verify=False)
-    else:
-        write(smooth(program, fitted), stream, form=form, frame=frame)
+    limits = Limits() if planned else None
+    postprocess(program, stream, settings, form=form, frame=frame, plan_feeds=limits, verify=False)
     return stream.getvalue(), fitted
 
 

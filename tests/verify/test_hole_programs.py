@@ -59,6 +59,7 @@ REFUSED_ONCE = {
     11598: "coolant off and on between holes at the end of the path",
     20624: "holes that are not drilled, the last of them higher, and a rapid to the height of the first",
     21188: "coolant off and on behind the last motion, where the neutral form ends it for two tool changes, too",
+    1000659: "a feed down along the hole, past the pose that it is tapped from, and up to it",
     10006: "a feed to and fro above a hole, as fast as the hole's",
 }
 

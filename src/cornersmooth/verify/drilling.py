@@ -87,7 +87,7 @@ class Holes:
             cycles = all_cycles[used : used + stop - first]
             used += stop - first
             if first > move and not self._search.stands(move, first, element):
-                for begin, found in self._search.starts(move, first, element, cycles[0].if_drilled):
+                for begin, found in self._search.starts(move, first, element, cycles[0]):
                     yield Between(move, first - 1, element, begin, found)
                     element = begin
                     ahead.forget(element - _KEPT)
@@ -120,9 +120,8 @@ class Holes:
                     self.element_move.setdefault(one, first + k)
                     self.latest_move.setdefault(one, self._latest(one, first + k, stop, groups[k:]))
             again = search.repeats(first, stop, first + k)
-            if not (
-                k and np.isnan(cycles[k].depth) and set(group) & set(groups[k - 1])
-            ):  # that hole's, looked at there
+            shared = k and np.isnan(cycles[k].depth) and set(group) & set(groups[k - 1])
+            if not shared:  # looked at there
                 self.problems += search.check(first + k, group, cycles[k], alone=not again)
             if group and cycles[k].dwell:
                 self.dwells.append((first + k, cycles[k].dwell))

@@ -159,7 +159,7 @@ class HoleSearch:
         found = elements[self.exact(move, elements)].tolist()
         return [k for k in found if not self.feeds([k])] if self.comes_in_rapid(move) else found
 
-    def starts(self, move: int, hole: int, element: int, cycle: Drilling) -> Iterator[tuple[int, bool]]:
+    def starts(self, move: int, hole: int, element: int, asked: Drilling) -> Iterator[tuple[int, bool]]:
         """Look for the first element of a run of holes, and say how far it is not yet met, and where it is.
 
         It is behind the pose before it, where the text goes over to the first hole. There need be nothing at a hole
@@ -170,7 +170,7 @@ class HoleSearch:
         """
         reached: int | None = None
         doubtful: int | None = None
-        begin = given = element
+        cycle, begin, given = asked.if_drilled, element, element
         while self.ahead.has(begin) and self.of_its_tool(hole)[0] == NEVER:  # the tool is still to come
             begin = min(begin + _WINDOW, self.ahead.count)
             if begin - given >= _TOGETHER:
@@ -184,8 +184,7 @@ class HoleSearch:
             yield begin, True
             return
         visits, seen, before = self.visits(move, hole), 0, -2
-        unknown = bool(np.isnan(cycle.depth))
-        left_out = unknown and not cycle.tap
+        left_out = bool(np.isnan(cycle.depth)) and not cycle.tap
         stays = left_out and self.in_line(hole, hole - 1)  # then nothing need be over it
         while self.ahead.has(begin + _WINDOW) or self.ahead.has(begin):
             window = np.arange(begin, min(begin + _WINDOW, self.ahead.count, self.of_its_tool(hole)[1]))
@@ -196,7 +195,9 @@ class HoleSearch:
                 if seen < visits:
                     continue
                 reached = k if reached is None or k == reached + 1 else reached
-                if stays or (unknown and cycle.tap and k > reached) or not self.over(hole, k + 1):
+                if stays or not self.over(hole, k + 1):
+                    continue
+                if cycle.tap and k > reached and not self.tapped(hole, k + 1, asked):
                     continue
                 if left_out:
                     yield k + 1, True
@@ -210,7 +211,7 @@ class HoleSearch:
             begin += len(window)
             if doubtful is not None and begin - doubtful > _DOUBTFUL:
                 break
-            if reached is not None and unknown and (stays or cycle.tap):
+            if reached is not None and (stays or cycle.tap):
                 break
             if reached is not None and begin - reached > _UNDECIDED:
                 reached = None
