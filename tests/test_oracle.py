@@ -212,8 +212,11 @@ def walk(original: Original, parameter: np.ndarray) -> Path:
     return Path(tip, point, np.zeros(len(tip), np.int64))
 
 
+FINE = 16  # parts of a segment
+
+
 def fine(original: Original) -> np.ndarray:
-    return np.linspace(0, len(original) - 1, 40 * (len(original) - 1) + 1)
+    return np.linspace(0, len(original) - 1, FINE * (len(original) - 1) + 1)
 
 
 EPS = 0.05  # mm, the limit asked for
@@ -240,9 +243,10 @@ def test_finds_a_doubled_piece() -> None:
     """Every point of either path lies on the other; only the order tells."""
     original = zigzag()
     parameter = fine(original)
-    doubled = np.concatenate((parameter[:500], parameter[420:]))  # two segments run forward, back and again
+    end, begin = 12 * FINE + FINE // 2, 10 * FINE + FINE // 2
+    doubled = np.concatenate((parameter[:end], parameter[begin:]))  # two segments run forward, back and again
     path = walk(original, doubled)
-    back = np.concatenate((parameter[:500], parameter[500:420:-1], parameter[420:]))
+    back = np.concatenate((parameter[:end], parameter[end:begin:-1], parameter[begin:]))
     assert deviation(path, original, H, EPS).worst > 0.5
     assert deviation(walk(original, back), original, H, EPS).worst > 0.5
 
