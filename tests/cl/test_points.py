@@ -79,6 +79,19 @@ def test_decimal_commas(separator: str):
     check(read("x;y;z;i;j;k;f\n" + text))
 
 
+@pytest.mark.parametrize("comma", [False, True])
+def test_cells_in_quotes(comma: bool):
+    """As spreadsheets and `csv.QUOTE_ALL` write them."""
+    lines = rows(TIPS, AXES, np.full(4, 1200.5)).splitlines()
+    quoted = "".join(",".join(f'"{cell}"' for cell in line.split(",")) + "\n" for line in lines)
+    text = quoted.replace(".", ",") if comma else quoted
+    program = read(text)
+    assert looks_like_points(text.encode())
+    check(read('"x","y","z","i","j","k","f"\n' + text))
+    check(program)
+    assert program.feed.tolist() == [1200.5] * 4
+
+
 def test_decimal_commas_that_start_late_and_whole_numbers():
     program = read("0;0;0;0;0;1\n1;2;3;0;0;1\n1,5;2;3;0;0,6;0,8\n")
     assert program.tip[2].tolist() == [1.5, 2, 3]

@@ -24,6 +24,9 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+(?:,\d+)?(?:[Ee][+-]?\d+)?", re.ASCII)
 _SEPARATOR = re.compile(r"\s*,\s*|\s+")
+#: a cell in quotes, and a number with a decimal comma in them
+_QUOTED = re.compile(rb'"([^",;\n]*)"')
+_QUOTED_COMMA = re.compile(rb'"([+-]?\d+),(\d+)"')
 _FIRST_ROW = re.compile(rb"[^\n]*[^\s,;][^\n]*")
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
@@ -87,6 +90,8 @@ def clean(data: bytes, file: str) -> PointText:
         raise error("CS161", file, data.count(b"\n", 0, data.index(b"\0")) + 1)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if b'"' in data:
+        data = _QUOTED.sub(rb"\1", _QUOTED_COMMA.sub(rb"\1.\2", data))
     header, header_line, certain, start = _head(data)
     body, first_line = data[start:], data.count(b"\n", 0, start) + 1
     if any(mark in body for mark in (b"#", b"%", b"//")):
@@ -160,7 +165,7 @@ def careful(chunk: bytes, columns: Columns, first_line: int, file: str) -> tuple
 
 def is_row(line: str) -> bool:
     """Whether a line holds nothing but numbers, three at least."""
-    cells = re.split(r"[\s,;]+", line.strip(" \t,;"))
+    cells = re.split(r"[\s,;]+", line.replace('"', "").strip(" \t,;"))
     return len(cells) >= 3 and all(_NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell) for cell in cells)
 
 
