@@ -306,6 +306,8 @@ def _provenance(
     elif not isinstance(source, Program):
         with open(source, "rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
+    # on more knots, as angles of rotary axes need them, the same curves have other weights, but where all are 1
+    any_weights = settings.shape == "auto" or (form.rotary and set(settings.weights) != {1.0})
     return Provenance(
         version=__version__,
         tolerance=settings.tolerance,
@@ -318,8 +320,7 @@ def _provenance(
         tcp=form.orientation != "machine",
         source=program.source.name,
         sha256=digest,
-        # on more knots, as angles of rotary axes need them, the same curves have other weights
-        weights=None if settings.shape == "auto" or form.rotary else (1.0, *settings.weights),
+        weights=None if any_weights else (1.0, *settings.weights),
     )
 
 

@@ -166,7 +166,7 @@ def named_in(case: Case, lines: list[str], end: str = "\n") -> list[tuple[int, s
             control=case.control,
             machine=case.choose().machine,
             tcp=case.tcp,
-            weights=weights_of(case),
+            weights=(1.0,),
         )
     except InputError as error:
         return [(error.line, f"{error.code} {error.what}")]
@@ -178,18 +178,13 @@ def named_by_words(case: Case, lines: list[str], end: str = "\n") -> list[tuple[
     data = (end.join(lines) + end).encode("latin-1")
     options = options_of(case)
     reader = Reader(None, options, options.steps(data))
-    check = WordCheck(options.control, options.dialect.lexer, EPS, weights=weights_of(case))
+    check = WordCheck(options.control, options.dialect.lexer, EPS, weights=(1.0,))
     try:
         for _ in reader.chunks(check.watch(read_lines(data, None, options.dialect.lexer))):
             pass
     except InputError as error:
         return [(error.line, error.what)]
     return [(problem.nc_line, problem.text) for problem in (*check.problems, *reader.problems)]
-
-
-def weights_of(case: Case) -> tuple[float, ...] | None:
-    """Weights that the head of a text names: on the knots of rotary angles curves have others."""
-    return None if case.choose().rotary else (1.0,)
 
 
 @cache
