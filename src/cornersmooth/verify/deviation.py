@@ -164,7 +164,7 @@ def check_exact_poses(distances: Distances, found: Findings) -> None:
     amount, nearest = np.full(len(rows), np.inf), owner
     for step in range(-2, 2):
         element = np.clip(owner + step, first, first + len(trail.last) - 1)
-        same, off = digit_errors(match.nc, element, tip, axis, match.axis_length)
+        same, off = digit_errors(match.nc, element, tip, axis, match.task.axis_length)
         exact |= same
         nearest = np.where(off < amount, element, nearest)
         amount = np.minimum(amount, off)
@@ -196,4 +196,4 @@ def _passed_elsewhere(distances: Distances, row: int, tip: Floats, axis: Floats)
     ends = ends[distance_between(match.six[ends], match.path.six[pose]) <= match.near]
     ends = ends[[window.may_be_at(end, pose)[0] for end in ends.tolist()]]
     element = trail.owner[ends]
-    return bool(digit_errors(match.nc, element, tip, axis, match.axis_length)[0].any())
+    return bool(digit_errors(match.nc, element, tip, axis, match.task.axis_length)[0].any())

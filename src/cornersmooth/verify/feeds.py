@@ -118,7 +118,7 @@ def _alike(match: Match, element: int, start: int, end: int) -> Ints:
     Digits do not tell apart what poses a digit apart lie between, and near the pole the axis turns ahead of time.
     """
     nc, six = match.nc, match.path.six
-    pole = match.axis_length * float(nc.second_room[element - 1 : element + 1].max()) if nc.rotary else 0.0
+    pole = match.task.axis_length * float(nc.second_room[element - 1 : element + 1].max()) if nc.rotary else 0.0
     room = 2 * match.margin + pole  # a pose is a rounding off, and its place as far from it as the margin
     if np.linalg.norm(match.six[end] - match.six[start]) < _TINY:
         room = max(room, _TINY)

@@ -138,7 +138,7 @@ def _plain_corners(match: Match, group: CurveGroup, end: Ints) -> Bools:
         return np.zeros(len(points), np.bool_)
     # second points at any distance from the tip, all of a curve as many times as far as the axis points
     lever = points[..., 3:] - points[..., :3]
-    share = match.axis_length / np.linalg.norm(lever[:, 2], axis=1)
+    share = match.task.axis_length / np.linalg.norm(lever[:, 2], axis=1)
     points = np.concatenate((points[..., :3], points[..., :3] + share[:, None, None] * lever), axis=2)
     corner = np.minimum(match.segment[end - 2] + 1, len(match.path.six) - 1)
     off = points[:, 2] - match.path.six.take(corner, axis=0)

@@ -16,7 +16,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import nearest_places
+from cornersmooth.verify.nearest import distance_between, nearest_places
 
 #: how far on either side of a vertex the motions are followed, in `Match.near`; halved so often if that is too much
 AROUND: Final = 32.0
@@ -102,14 +102,17 @@ class Windows:
     def _of(self, vertex: int) -> Window | None:
         match, length = self.match, self.length
         begin, end = np.flatnonzero(match.stretch == match.stretch[vertex])[[0, -1]].tolist()
-        own = length[begin : end + 1]
+        own, goal = length[begin : end + 1], int(match.high[end]) + 1
         around = AROUND * match.near
         for _ in range(_HALVED):
             low, high = length[vertex] - around, length[vertex] + around
             first = self._anchor(begin + int(np.searchsorted(own, low)) - _ANCHORS, begin, vertex)
             last = self._anchor(begin + int(np.searchsorted(own, high, side="right")), vertex, end)
-            segment = int(match.segment[first])
-            stop = max(int(np.ceil(match.segment[last] + match.fraction[last])), segment + 1)
+            segment, place = int(match.segment[first]), float(match.place[last])
+            if last == end and match.until == np.inf:  # with it the way ends, wherever else it may be near
+                off = distance_between(match.six[[last]], match.path.six[[goal]])[0]
+                place = float(goal) if off <= match.near else place
+            stop = max(int(np.ceil(place)), segment + 1)
             if (last - first) * (stop - segment) <= MOST_PAIRS:
                 break
             around /= 2.0
@@ -120,7 +123,7 @@ class Windows:
         inner = begin + np.searchsorted(own, [length[vertex] - around / 2.0, length[vertex] + around / 2.0])
         inner[0] = begin if first == begin else max(inner[0], first)
         inner[1] = end if last == end else min(inner[1], last)
-        places = float(match.fraction[first]), float(match.segment[last] + match.fraction[last] - segment)
+        places = float(match.fraction[first]), place - segment
         own, path = match.six[first : last + 1], match.path.six[segment : stop + 1]
         found = passage(own, path, places, match.tolerance + match.slack)
         window = Window(first, segment, (int(inner[0]), int(inner[1])), places, *found)

@@ -88,11 +88,6 @@ class Match:
         """ε, mm."""
         return self.task.tolerance
 
-    @property
-    def axis_length(self) -> float:
-        """H, mm."""
-        return self.task.axis_length
-
     @cached_property
     def margin(self) -> float:
         """Distance that printed digits may account for, mm."""
