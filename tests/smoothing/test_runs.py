@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 from scipy.optimize import NonlinearConstraint, minimize
 
+from cornersmooth import Program, Settings, smooth
 from cornersmooth.smoothing.runs import groups
 from cornersmooth.smoothing.runs.banded import Gather, couplings, solve_blocks
 from cornersmooth.smoothing.runs.fitting import fit
@@ -303,6 +304,16 @@ def test_axis_that_does_not_turn_does_not_tremble() -> None:
     own = curves.control[: curves.splines.control_first[1]]
     np.testing.assert_allclose(own[:, 3:] - own[:, :3], [H * np.array([0.36, 0.48, 0.8])] * len(own), atol=1e-11)
     assert curves.axis_bound[0] <= 0.01
+
+
+def test_a_tip_that_stands_while_the_tool_turns_goes_on_standing() -> None:
+    lean = 0.05 * np.arange(12) + 0.02 * np.sin(np.arange(12))
+    axis = np.stack((np.sin(lean), np.zeros(12), np.cos(lean)), axis=1)
+    program = Program.from_poses(np.zeros((12, 3)), axis, feed=500.0)
+    found = smooth(program, Settings(method="global", tolerance=0.02, axis_length=H))
+    assert found.runs is not None
+    assert found.runs.count.tolist() == [12]
+    assert np.abs(found.runs.control[:, :3]).max() < 1e-6
 
 
 def test_tip_and_axis_point_deviate_to_opposite_sides_where_that_keeps_the_lever_calm() -> None:

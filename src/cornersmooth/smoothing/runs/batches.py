@@ -49,6 +49,9 @@ TIP_COUNTS = 0.3
 #: the same where the tip may go out of its way for the lever, and the tip is much faster than the lever
 OWN_WAY = 0.5
 
+#: squared ratio of the lever's speed to the tip's beyond which the tip stands
+_LARGEST_RATIO = 1e100
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -221,8 +224,9 @@ def followed(splines: Splines, windows: Windows, control: Floats) -> Floats:
     ahead, behind = windows.local + TAPS - 1, windows.local
     way, turn = (_squares(part[ahead] - part[behind]) for part in (tip, lever))
     own, others = (np.sqrt(_third_squares(splines, windows, part)) for part in (tip, lever))
-    own *= (OWN_WAY**2 * (1.0 + turn / np.maximum(way, 1e-300))) ** 1.5
-    share: Floats = others / np.maximum(own + others, 1e-300)
+    stands = turn > _LARGEST_RATIO * way  # and the tool turns: the tip follows nothing
+    own *= (OWN_WAY**2 * (1.0 + np.where(stands, 0.0, turn / np.maximum(way, 1e-300)))) ** 1.5
+    share: Floats = np.where(stands, 0.0, others / np.maximum(own + others, 1e-300))
     return share
 
 
