@@ -68,6 +68,16 @@ _OWN_REASONS = (
     ),
 )
 
+#: the same where a text has no tool tip control
+_WITHOUT_TIP_CONTROL = [
+    *((pattern, why) for _, pattern, why in _OWN_REASONS if pattern == "TRAFOOF"),
+    (
+        r"(G0|L) [AB]\+?0\.0+ C\+?0\.0+( FMAX)?",
+        "rotary axes to the angles of a tool that stays upright, and to zero at the end, high up",
+    ),
+    (r"G49", "length of the tool off, behind the retract: alone it may move by that length"),
+]
+
 #: why a line stands where it stands; the first that fits
 _REASONS = (
     (r"%", "begin and end of the tape"),
@@ -185,6 +195,7 @@ def reason(line: str, form: Form) -> str:
     """Why a line is there; what the list of words says of it where nothing more is to be said."""
     bare = re.sub(r"^\d+ ", "", line) if form.control == "heidenhain" else line
     reasons = [(pattern, why) for control, pattern, why in _OWN_REASONS if re.fullmatch(control, form.control)]
+    reasons = _WITHOUT_TIP_CONTROL if form.orientation == "machine" else reasons
     for pattern, why in (*reasons, *_REASONS):
         if re.fullmatch(pattern, bare):
             return why
