@@ -22,8 +22,8 @@ _MOST_STEPS, _AHEAD = 200, 2
 #: segments looked at on either side of a repeated pose
 _BEYOND_REPEATED = 4
 
-#: squared distance that is none, mm²
-_NOTHING = 1e-9
+#: squared distance that is none, and one by which nothing is nearer: arithmetic must not choose between ways, mm²
+_NOTHING, _TIE = 1e-9, 1e-13
 
 #: rows taken at a time, so that the work arrays stay in the cache
 _BLOCK = 16384
@@ -95,7 +95,7 @@ def nearest_places(
             if step == 0:
                 square[part], segment[part], fraction[part] = d, j, t
             else:
-                nearer = d < best
+                nearer = d < best - _TIE
                 np.copyto(best, d, where=nearer)
                 np.copyto(segment[part], j, where=nearer)
                 np.copyto(fraction[part], t, where=nearer)
@@ -177,7 +177,7 @@ def climb(
             values.reshape(j.shape)
             for values in _on_segments(np.repeat(point[rows, columns], ahead + 1, axis=0), vertices, j.ravel(), columns)
         )
-        nearer = np.column_stack((d[:, 1:] < d[:, :-1], np.zeros(len(rows), np.bool_)))
+        nearer = np.column_stack((d[:, 1:] < d[:, :-1] - _TIE, np.zeros(len(rows), np.bool_)))
         steps = np.argmin(nearer, axis=1)
         each = np.arange(len(rows))
         segment[rows], at[rows] = j[each, steps], t[each, steps]
