@@ -59,6 +59,11 @@ REFUSED_ONCE = {
     11598: "coolant off and on between holes at the end of the path",
     20624: "holes that are not drilled, the last of them higher, and a rapid to the height of the first",
     21188: "coolant off and on behind the last motion, where the neutral form ends it for two tool changes, too",
+    1000168: "feeds to and fro along a hole that is not tapped",
+    1001458: "a stop behind a hole that is not tapped, and GOHOME before it",
+    1003233: "holes that are not tapped, and others along their line",
+    1003544: "a dwell behind a hole that is not tapped",
+    800349: "a tool that does nothing but to stand over holes that are not tapped",
     1000659: "a feed down along the hole, past the pose that it is tapped from, and up to it",
     10006: "a feed to and fro above a hole, as fast as the hole's",
 }
@@ -144,3 +149,43 @@ CYCLE/DRILL,RAPTO,3,FEDTO,0,MMPM,250\nGOTO/66,0,240\nGOTO/-50,0,240\nCYCLE/OFF\n
     there = next(k for k, line in enumerate(lines) if " X66.0000" in line)
     without = "\n".join([*lines[:there], *lines[there + 1 :], ""])
     assert verify(program, without.encode(), tolerance=settings.verified_tolerance).problems
+
+
+LEFT_OUT = """UNITS/MM
+LOADTL/1
+SPINDL/500,RPM,CLW
+RAPID
+GOTO/0,0,40,0,0,1
+FEDRAT/300,MMPM
+GOTO/0,0,2,0,0,1
+GOTO/0,0,9,0,0,1
+GOTO/0,0,2,0,0,1
+CYCLE/TAP,FEDTO,12,MMPM,250,RAPTO,3,RTRCTO,20
+GOTO/0,0,9,0,0,1
+GOTO/9,0,9,0,0,1
+CYCLE/OFF
+RAPID
+GOTO/9,0,40,0,0,1
+FINI
+"""
+
+
+def test_what_a_text_leaves_out_is_said_by_its_comments_and_nothing_else_is_lost() -> None:
+    form, program, stream = choose_form("fanuc"), read(LEFT_OUT.encode()), io.BytesIO()
+    write(
+        smooth(program, fit_settings(Settings(tolerance=0.05), form, "mm")),
+        stream,
+        form=form,
+        frame=Frame(cycles="moves"),
+    )
+    lines = stream.getvalue().decode().splitlines()
+
+    def passes(changed: list[str]) -> bool:
+        return verify(program, "\n".join(changed).encode(), tolerance=0.05).passed
+
+    assert passes(lines)
+    for k in [k for k, line in enumerate(lines) if "NOT DRILLED" in line]:
+        assert not passes([*lines[:k], *lines[k + 1 :]])
+        assert not passes([*lines[:k], lines[k].replace("Z9.", "Z8."), *lines[k + 1 :]])
+    for k in [k for k, line in enumerate(lines) if line.startswith("G1 ")]:
+        assert not passes([*lines[:k], *lines[k + 1 :]])

@@ -66,6 +66,10 @@ class Source:
         if not isinstance(self._text, bytes):
             self._text.close()
 
+    def begin_again(self) -> None:
+        """Read from the beginning again."""
+        self._place = 0
+
     def head(self, size: int) -> bytes:
         """First bytes, so many unless the text is shorter; `read` begins with them, too."""
         return self._part(0, size)

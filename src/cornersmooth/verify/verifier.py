@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from inspect import signature
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, ParamSpec, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Ints, Program, Units
@@ -18,11 +17,14 @@ from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
+from cornersmooth.nc_reader.reading import read_styled
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
+from cornersmooth.signatures import taking_what
 from cornersmooth.statements.comparison import KINDS
+from cornersmooth.statements.left_out import gone_over, may_be_left_out
 from cornersmooth.verify.batches import Batch, Batches
 from cornersmooth.verify.checks import Examined, examine
 from cornersmooth.verify.findings import Findings, Largest, Poses
@@ -35,9 +37,6 @@ from cornersmooth.verify.word_places import WordPlaces
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
-
-_Given = ParamSpec("_Given")
-_Found = TypeVar("_Found")
 
 #: poses from which on it is worth while to let other processes work
 _LONG: Final = 30_000
@@ -115,7 +114,8 @@ class Verifier:
         said = () if machine is None else (word for axis in machine.axes for word in axis.clamp or ())
         self._clamps = frozenset(float(word[1:]) for word in said)
         self._options = ReadingOptions.of(control, machine, tcp=tcp, tolerance=tolerance, axis_length=axis_length)
-        self._text = nc if isinstance(nc, NcProgram) else Source(readable_twice(nc))
+        self._given = nc if isinstance(nc, NcProgram) else readable_twice(nc)
+        self._text = self._given if isinstance(self._given, NcProgram) else Source(self._given)
         self._name = None if isinstance(nc, NcProgram | bytes) else str(nc)
         self._helper: Helper | None = None
 
@@ -143,10 +143,22 @@ class Verifier:
         """
         if isinstance(self._text, Source):
             self._text.finish()
-        if self._helper is None:
-            return self._work()
-        found: Verification = self._helper.result()
-        return found
+        found: Verification = self._work() if self._helper is None else self._helper.result()
+        return found if found.passed or not may_be_left_out(self._program) else self._gone_over() or found
+
+    def _gone_over(self) -> Verification | None:
+        """What is found with holes that the text leaves out as rapids over them, if all is right then."""
+        given, program = self._given, self._program
+        nc = given if isinstance(given, NcProgram) else read_styled(given, self._options, self._name)
+        for stays in (False, True):
+            if (other := gone_over(program, nc, stays=stays)) is None:
+                break
+            self._program = other
+            if isinstance(self._text, Source):
+                self._text.begin_again()
+            if (found := self._work()).passed:
+                return found
+        return None
 
     def _work(self) -> Verification:
         """Read and measure the text as far as it goes."""
@@ -193,18 +205,7 @@ class Verifier:
         return replace(found, trusted=tuple(check.trusted), unverified=unverified, rewinds=rewinds)
 
 
-def _taking_what(kind: Callable[_Given, object]) -> Callable[[Callable[..., _Found]], Callable[_Given, _Found]]:
-    """Say of a function that it takes what another takes: type checkers and `help` show those parameters."""
-
-    def decorate(function: Callable[..., _Found]) -> Callable[_Given, _Found]:
-        own = signature(function).return_annotation
-        cast(Any, function).__signature__ = signature(kind).replace(return_annotation=own)
-        return function
-
-    return decorate
-
-
-@_taking_what(Verifier)
+@taking_what(Verifier)
 def verify(*args: Any, **how: Any) -> Verification:
     """Measure an NC text, that is whole, against the CL program it was made from.
 
