@@ -2,8 +2,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-# two more than processors: some tests wait
-WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 2)
+# one more than processors: some tests wait
+WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 
 .PHONY: run test thorough check docs packages bench controller format clean
 

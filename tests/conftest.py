@@ -16,7 +16,7 @@ __all__ = ["corpus", "large", "medium", "small"]
 
 ROOT = Path(__file__).resolve().parent.parent
 
-settings.register_profile("share", max_examples=how_many(50, 100))
+settings.register_profile("share", max_examples=how_many(30, 100))
 settings.load_profile("share")
 
 

@@ -70,7 +70,7 @@ def verified(case: Case, text: bytes | None = None, axis_tolerance: float | None
     )
 
 
-@pytest.mark.parametrize("case", share(JUDGED, 4), ids=str)
+@pytest.mark.parametrize("case", share(JUDGED, 7), ids=str)
 def test_the_oracle_finds_both_within_their_tolerances(case: tuple[str, Form, tuple[float, float]]) -> None:
     method, form, (tolerance, degrees) = case
     made = written(*case, seed=JUDGED.index(case), count=how_many(3, 120))
@@ -82,7 +82,7 @@ def test_the_oracle_finds_both_within_their_tolerances(case: tuple[str, Form, tu
         assert found.worst <= SLACK[method] + HAIR, found
 
 
-@pytest.mark.parametrize("case", share(CASES, 8, 1), ids=str)
+@pytest.mark.parametrize("case", share(CASES, 14, 1), ids=str)
 def test_random_chains_are_verified(case: tuple[str, Form, tuple[float, float]]) -> None:
     made = written(*case, seed=50 + CASES.index(case), count=how_many(8, 250))
     found = verified(made)

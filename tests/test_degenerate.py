@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from oracle.judge import judge, not_passed, runs_of
 from oracle.library import write
 from oracle.motion import unit
 from oracle.nc_text import Curve, Form, Line, Written
-from oracle.share import how_many
+from oracle.share import covering_share, how_many
 
 Floats = NDArray[np.float64]
 
@@ -116,9 +117,7 @@ def test_degenerate_chain(name: str, form: Form) -> None:
     check(CASES[name], form)
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("axis_length", [0.5, 500.0])
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(("name", "axis_length", "form"), covering_share(product(CASES, [0.5, 500.0], FORMS), 3))
 def test_degenerate_chain_at_other_axis_lengths(name: str, form: Form, axis_length: float) -> None:
     check(CASES[name], form, axis_length=axis_length, tolerance=0.05)
 

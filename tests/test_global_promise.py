@@ -20,7 +20,7 @@ from oracle.share import how_many
 
 FORMS: tuple[Form, ...] = ("g1",)
 CASES = [(form, tolerance, length) for form in FORMS for tolerance in (0.001, 0.01, 0.15) for length in (10.0, 50.0)]
-CHAINS = how_many(15, 120)
+CHAINS = how_many(10, 120)
 #: statuses of the report under which a pose need not be passed
 PASSED_BY = ("in_run", "smoothed", "duplicate")
 

@@ -31,7 +31,7 @@ TOLERANCES = (0.001, 0.01, 0.04, 0.15)
 AXIS_LENGTHS = (10.0, 50.0)
 FORMS: tuple[Form, ...] = ("g1", "g6.2")
 #: for each tolerance and axis length; half of them in either form
-CHAINS = how_many(80, 1000)
+CHAINS = how_many(60, 1000)
 #: statuses of the report under which a pose need not be passed
 ROUNDED = "smoothed"
 REPEATED = "duplicate"
@@ -201,7 +201,7 @@ def _every(names: tuple[str, ...], cases: list[tuple[Form, float, float]]) -> li
     return [(name, *case) for case in cases for name in names]
 
 
-@pytest.mark.parametrize(("name", "form", "tolerance", "axis_length"), covering_share(_every(SAMPLES, CASES), 8))
+@pytest.mark.parametrize(("name", "form", "tolerance", "axis_length"), covering_share(_every(SAMPLES, CASES), 16))
 def test_samples(name: str, form: Form, tolerance: float, axis_length: float) -> None:
     whole_file(ROOT / "samples" / name, form, tolerance, axis_length)
 
@@ -226,7 +226,7 @@ OWN_OTHERS = (
 
 @pytest.mark.parametrize(
     ("name", "form", "tolerance", "axis_length"),
-    [*covering_share(_every(OWN_FIVE_AXIS, CASES), 8), *of_corpus(covering_share(_every(FIVE_AXIS, CASES), 12))],
+    [*covering_share(_every(OWN_FIVE_AXIS, CASES), 16), *of_corpus(covering_share(_every(FIVE_AXIS, CASES), 24))],
 )
 def test_five_axis_files(name: str, form: Form, tolerance: float, axis_length: float) -> None:
     whole_file(cl_file(name), form, tolerance, axis_length)
@@ -237,7 +237,7 @@ ONCE: list[tuple[Form, float, float]] = [(form, 0.04, 10.0) for form in FORMS]
 
 @pytest.mark.parametrize(
     ("name", "form", "tolerance", "axis_length"),
-    [*covering_share(_every(OWN_OTHERS, ONCE), 2), *of_corpus(covering_share(_every(FOUR_OR_LESS, ONCE), 3, 1))],
+    [*covering_share(_every(OWN_OTHERS, ONCE), 4), *of_corpus(covering_share(_every(FOUR_OR_LESS, ONCE), 6, 1))],
 )
 def test_files_with_arcs_holes_and_fixed_axes(name: str, form: Form, tolerance: float, axis_length: float) -> None:
     whole_file(cl_file(name), form, tolerance, axis_length)

@@ -11,6 +11,7 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Arcs, Move, Program, Statement
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.saving import estimate_saving, feed_times
+from oracle.share import share
 
 
 def winding(count: int) -> Program:
@@ -64,7 +65,7 @@ def test_stretches_tell_of_the_whole(program, whole):
     assert found.direct - found.written == pytest.approx(whole.direct - whole.written, rel=0.15)
 
 
-@pytest.mark.parametrize("control", ["siemens", "heidenhain", "linuxcnc"])
+@pytest.mark.parametrize("control", share(["siemens", "heidenhain", "linuxcnc"], 2))
 def test_every_control(program, control):
     form = choose_form(control, machine=load_machine("table-ac") if control == "linuxcnc" else None)
     found = estimate_saving(program, fitted(form), form, Limits(), poses=90, stretches=3)

@@ -76,10 +76,9 @@ def test_random_chains(form: Form, tolerance: float, axis_length: float, options
         assert not feeds_out_of_place(written, path, chain.original, chain.feed, axis_length, tolerance)
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
-@pytest.mark.parametrize("name", SAMPLES)
-def test_samples(name: str, options: dict[str, Any], form: Form) -> None:
+@pytest.mark.parametrize(("name", "way", "form"), covering_share(product(SAMPLES, OPTIONS, FORMS), 4))
+def test_samples(name: str, way: str, form: Form) -> None:
+    options = OPTIONS[way]
     keeps_the_promise(ROOT / "samples" / name, form, options)
 
 

@@ -40,7 +40,7 @@ def check(program: Program, first: int, last: int, method: str, step: float) -> 
     assert 0.985 * reference <= law.total <= MOST * reference
 
 
-@pytest.mark.parametrize("piece", share(PIECES, 4), ids=str)
+@pytest.mark.parametrize("piece", share(PIECES, 4, 1), ids=str)
 def test_the_impeller(piece: tuple[int, int, str, float]) -> None:
     check(read(IMPELLER.read_bytes(), name=IMPELLER.name), *piece)
 

@@ -66,7 +66,7 @@ def test_paper_table_1(tolerance: float) -> None:
 
 
 @pytest.mark.corpus
-@pytest.mark.parametrize("case", PUBLISHED)
+@pytest.mark.parametrize("case", share(PUBLISHED, 2))
 def test_published_paths(corpus: Path, case: str) -> None:
     name, given, tolerance, height, stop, smoothed_time = PUBLISHED[case]
     units = {"units": "mm"} if name.endswith(".txt") else {}
@@ -94,7 +94,7 @@ def test_published_paths(corpus: Path, case: str) -> None:
             "nx_clsf_cutcom_arcs.cls",
             "hust_5x_PathPointsFile.cls",
         ),
-        2,
+        3,
     ),
 )
 def test_limits_on_real_files(corpus: Path, name: str) -> None:

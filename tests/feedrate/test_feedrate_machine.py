@@ -21,7 +21,7 @@ from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from oracle.files import beginning
-from oracle.share import covering_share
+from oracle.share import covering_share, share
 
 MACHINES = ("table-ac", "head-ac", "nutated-bc", "xyzbc-trt", "head-table-bc")
 IMPELLER = FilePath(__file__).resolve().parents[2] / "samples" / "impeller.cls"
@@ -92,7 +92,7 @@ def test_derivatives_are_those_of_the_kinematics(chain: Callable[[int], Program]
                 assert order[3] == pytest.approx(found, rel=1e-5, abs=1e-6 * np.abs(order).max()), (kind, element)
 
 
-@pytest.mark.parametrize(("seed", "name"), covering_share(product((1, 2, 5), MACHINES), 6))
+@pytest.mark.parametrize(("seed", "name"), covering_share(product((1, 2, 5), MACHINES), 9))
 def test_limits_hold_on_random_chains(chain: Callable[[int], Program], name: str, seed: int) -> None:
     law = plan(
         smooth(tilted(chain(seed)), Settings(tolerance=0.05)),
@@ -151,7 +151,7 @@ def test_limits_hold_on_the_impeller(name: str) -> None:
     assert peaks.max() > 0.9
 
 
-@pytest.mark.parametrize("aside", [0.3, 0.03, 0.003, 0.001])
+@pytest.mark.parametrize("aside", share([0.3, 0.03, 0.003, 0.001], 2, 1))
 def test_passing_the_pole(aside: float) -> None:
     """The nearer, the more the first axis slows the motion down; its speed is what limits it."""
     lean = np.linspace(-0.2, 0.2, 9)

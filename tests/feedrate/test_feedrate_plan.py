@@ -13,7 +13,7 @@ from cornersmooth.feedrate.grid import Resolution
 from cornersmooth.model import Arcs, Move, Program, Statement
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
-from oracle.share import how_many
+from oracle.share import how_many, share
 
 SPEED, JERK = 1.001, 1.005  # what the acceptance allows
 METHODS = ("proportional", "zhang2016")
@@ -41,7 +41,7 @@ def test_limits_hold_every_period(chain: Callable[[int], Program], seed: int, me
     assert law.kinematics(np.array([0.0, law.total]))[1] == pytest.approx(0.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", share(range(20), 2))
 def test_acceleration_of_the_positions(chain: Callable[[int], Program], seed: int) -> None:
     """Second differences of the tip, which know nothing of curvature, against both parts of the acceleration."""
     program, limits = chain(seed), Limits(accel=800.0, centripetal=300.0)

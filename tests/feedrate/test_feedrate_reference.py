@@ -22,7 +22,7 @@ def test_smoothed_paths(chain: Callable[[int], Program], seed: int) -> None:
     assert 0.995 * reference <= law.total <= 1.02 * reference
 
 
-@pytest.mark.parametrize("seed", range(1, 5))
+@pytest.mark.parametrize("seed", share(range(1, 5), 2))
 def test_direct_path_with_jumps(chain: Callable[[int], Program], seed: int) -> None:
     limits = Limits(period=0.004)
     law = direct(chain(seed), limits, "velocity_jump")

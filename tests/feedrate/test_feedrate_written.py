@@ -19,6 +19,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from oracle.command import run
 from oracle.files import beginning
+from oracle.share import share
 
 SAMPLE = Path(__file__).parents[2] / "samples" / "impeller.cls"
 LIMITS = Limits()
@@ -133,7 +134,7 @@ def curves_of(
     return smoothed, read_nc(stream.getvalue(), control=control, machine=machine), stream.getvalue()
 
 
-@pytest.mark.parametrize(("control", "form", "digits", "name"), CURVES)
+@pytest.mark.parametrize(("control", "form", "digits", "name"), share(CURVES, 2))
 def test_curves_of_a_text_with_many_digits_take_as_long_as_those_they_are_of(
     control: str, form: str, digits: str, name: str
 ) -> None:

@@ -54,7 +54,7 @@ def problems(case: Case, program, lines: list[str], tolerance: float):
     return verify(program, data, tolerance=tolerance, axis_length=H, **options).problems
 
 
-@pytest.mark.parametrize(("units", "case"), covering_share(product(["MM", "INCHES"], CASES), 3), ids=str)
+@pytest.mark.parametrize(("units", "case"), covering_share(product(["MM", "INCHES"], CASES), 6), ids=str)
 def test_rapids_along_the_tool_stand_at_both_ends(case: Case, units: str) -> None:
     program, lines, tolerance = text_of(case, units, Frame(approach=50.0, retract=100.0))
     assert problems(case, program, lines, tolerance) == ()
@@ -72,7 +72,7 @@ def test_rapids_along_the_tool_stand_at_both_ends(case: Case, units: str) -> Non
     assert np.count_nonzero(along & (np.abs(heights - 100.0) < 0.01)) == 2
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if case.tcp][::2], ids=str)
+@pytest.mark.parametrize("case", covering_share([case for case in CASES if case.tcp][::2], 4), ids=str)
 def test_ways_that_are_not_along_the_tool_are_found(case: Case) -> None:
     program, lines, tolerance = text_of(case, "MM", Frame(approach=50.0, retract=100.0))
     bare = {unnumbered(line) for line in text_of(case, "MM", Frame())[1]}

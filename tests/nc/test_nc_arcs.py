@@ -6,7 +6,7 @@ import cmath
 import math
 import re
 from collections.abc import Callable
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cornersmooth.model import Program
 from nc.writing import codes, one_arc, text_of, text_of_cl
 from oracle.files import cl_file, of_corpus
-from oracle.share import how_many
+from oracle.share import covering_share, how_many
 
 Floats = NDArray[np.float64]
 
@@ -77,8 +77,7 @@ def arc_about(number: int, seed: int) -> tuple[Program, Callable[[float], Floats
     return one_arc(at(0), at(1), centre, normal, sweep, axis=rng.normal(size=3)), at
 
 
-@pytest.mark.parametrize("number", [0, 1, 2])
-@pytest.mark.parametrize("tolerance", [0.01, 0.0005])
+@pytest.mark.parametrize(("tolerance", "number"), covering_share(product([0.01, 0.0005], [0, 1, 2]), 4))
 def test_circles_keep_the_tolerance(number: int, tolerance: float) -> None:
     """At equal shares of the way, so both ways and in order."""
     for seed in range(how_many(10, 40)):
@@ -157,8 +156,7 @@ def test_turning_tool_axis_becomes_lines_with_the_axis_spread() -> None:
     np.testing.assert_allclose(vectors[-1], (0.6, 0.0, 0.8))
 
 
-@pytest.mark.parametrize("form", ["g1", "g6.2"])
-@pytest.mark.parametrize("chord", [None, 0.05])
+@pytest.mark.parametrize(("chord", "form"), covering_share(product([None, 0.05], ["g1", "g6.2"]), 3))
 def test_lines_for_an_arc_stay_within_the_tolerance(form: str, chord: float | None) -> None:
     """Even where lines on curves may be coarser than the tolerance."""
     normal = np.array([0.0, 0.6, 0.8])

@@ -12,6 +12,7 @@ from cornersmooth.kinematics import parse_machine
 from cornersmooth.nc import Frame, choose_form
 from cornersmooth.verify import verify
 from nc.writing import lines_of
+from oracle.share import share
 
 MACHINE = parse_machine(
     'like = "table-bc"\n[[axis]]\nname = "B"\nclamp = ["M12", "M13"]\n[[axis]]\nname = "C"\nclamp = ["M10", "M11"]\n'
@@ -85,7 +86,7 @@ def test_axes_are_free_where_they_turn_and_held_in_cycles_and_at_the_end(control
     assert problems(control, lines) == []
 
 
-@pytest.mark.parametrize("control", CONTROLS[:4])
+@pytest.mark.parametrize("control", share(CONTROLS[:4], 2))
 def test_a_clamp_word_too_few_is_found(control: str) -> None:
     lines = text_of(control)
     places = [k for k, line in enumerate(without_numbers(lines)) if re.fullmatch(r"M1[0-3]", line)]

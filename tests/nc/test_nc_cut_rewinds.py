@@ -184,7 +184,7 @@ def test_what_goes_wrong_there_is_found(control: str, name: str, tcp: bool) -> N
     lines, _ = text_of(control, name, tcp)
     passed = []
     first = CASES.index((control, name, tcp))
-    for what, wrong in share(mutants(lines, control).items(), 6 if first else 1, first):
+    for what, wrong in share(mutants(lines, control).items(), 8 if first else 2, first):
         assert wrong != list(lines), what
         try:
             if found(wrong, control, name, tcp).passed:

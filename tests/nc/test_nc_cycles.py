@@ -161,7 +161,7 @@ def test_every_cycle_in_the_words_of_its_control(case: Case) -> None:
     assert problems(case, lines) == []
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if case.machine], ids=str)
+@pytest.mark.parametrize("case", share([case for case in CASES if case.machine], 2), ids=str)
 def test_a_tool_along_z_runs_without_tool_tip_control_behind_a_tilted_one(case: Case) -> None:
     lines = text_of(case, TILTED)
     assert [match[1] for match in map(_CYCLE.fullmatch, lines) if match] == EXPECTED[case.control].splitlines()
@@ -285,7 +285,7 @@ def mutants(lines: list[str]) -> Iterator[Mutant]:
 def test_mutants_of_cycles_are_found(case: Case) -> None:
     every = list(mutants(text_of(case)))
     assert len(every) > 40
-    chosen = share(every, 10, CASES.index(case))
+    chosen = share(every, 18, CASES.index(case))
     assert [mutant.kind for mutant in chosen if not problems(case, list(mutant.lines))] == []
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from itertools import product
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
-from oracle.share import share
+from oracle.share import covering_share, share
 
 EPS = 0.02
 WORD = re.compile(r"([A-Z])(?:=)?([-+]?\d+\.?\d*)")
@@ -90,9 +91,12 @@ def test_one_axis_gives_the_tool_axis_and_the_position(name: str) -> None:
     assert found.beyond.max() < 1e-9
 
 
-@pytest.mark.parametrize("control", CONTROLS)
-@pytest.mark.parametrize(("name", "tcp"), [("table A", True), ("table B", False), ("head B", True)])
-def test_words_of_one_axis(control: str, name: str, tcp: bool) -> None:
+@pytest.mark.parametrize(
+    ("arranged", "control"),
+    covering_share(product([("table A", True), ("table B", False), ("head B", True)], CONTROLS), 3),
+)
+def test_words_of_one_axis(arranged: tuple[str, bool], control: str) -> None:
+    name, tcp = arranged
     machine, word = FOUR[name], FOUR[name].names[0]
     if control == "heidenhain" and not tcp:
         return
@@ -172,8 +176,7 @@ def test_no_axis_and_a_tool_along_z(control: str) -> None:
 ROUND = ["GOTO/0,0,0,0,0,1", "GOTO/30,0,0", "CIRCLE/30,10,0,0,0,1,10", "GOTO/40,10,0", "CIRCLE/50,10,0,0,0,-1,10"]
 
 
-@pytest.mark.parametrize("control", CONTROLS)
-@pytest.mark.parametrize("last", ["GOTO/50,20,0", "GOTO/50,20,2"])
+@pytest.mark.parametrize(("last", "control"), covering_share(product(["GOTO/50,20,0", "GOTO/50,20,2"], CONTROLS), 3))
 def test_arcs_of_a_machine_without_rotary_axes_are_circular_blocks(control: str, last: str) -> None:
     program, form = program_of([*ROUND, last]), choose_form(control, machine=THREE)
     lines = text_of(program, form).decode().splitlines()

@@ -189,7 +189,7 @@ def test_own_files_are_accepted(machine: str, tcp: bool, tmp_path: Path) -> None
         accepted(written(path.read_bytes(), machine, tcp=tcp, tolerance=0.02, endless=True), tmp_path)
 
 
-@pytest.mark.parametrize(("machine", "tcp"), of_corpus(ARRANGED))
+@pytest.mark.parametrize(("machine", "tcp"), of_corpus(share(ARRANGED, 3)))
 def test_real_files_are_accepted(machine: str, tcp: bool, corpus: Path, tmp_path: Path) -> None:
     taken = 0
     for path in share(sorted(corpus.iterdir()), 4, ARRANGED.index((machine, tcp))):
@@ -245,7 +245,7 @@ def test_an_error_is_seen(tmp_path: Path) -> None:
         accepted("G21\nG43.5 H1\nM2\n", tmp_path)
 
 
-@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 1.3), (1.5, 0.5), (3.0, 0.2)])
+@pytest.mark.parametrize("weights", share([(1.0, 1.0), (0.7, 1.3), (1.5, 0.5), (3.0, 0.2)], 2, 1))
 def test_its_splines_are_our_curves(weights: tuple[float, float], tmp_path: Path) -> None:
     """G5.2 with L4 has our knots, and runs in the plane: each projection of both curves is a program of its own."""
     rng = np.random.default_rng(5)

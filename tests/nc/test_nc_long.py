@@ -23,7 +23,7 @@ LONG = [case for case in CHOSEN if case.choose().long_lines]
 LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
 
 
-@pytest.mark.parametrize(("seed", "case"), covering_share(product([0, 1], LONG), 4), ids=str)
+@pytest.mark.parametrize(("seed", "case"), covering_share(product([0, 1], LONG), 8), ids=str)
 def test_random_chains_keep_the_tolerance(case: Case, seed: int) -> None:
     tolerance, axis_length = LIMITS[(len(str(case)) + seed) % 3]
     settings = Settings(tolerance=tolerance, axis_length=axis_length, lines="long")
@@ -31,7 +31,7 @@ def test_random_chains_keep_the_tolerance(case: Case, seed: int) -> None:
     assert found.deviation.worst <= tolerance, found
 
 
-@pytest.mark.parametrize("case", covering_share(LONG, 4, 1), ids=str)
+@pytest.mark.parametrize("case", covering_share(LONG, 7, 1), ids=str)
 def test_sample_keeps_the_tolerance(case: Case) -> None:
     program = without_holes(read((SAMPLES / "impeller.cls").read_bytes(), name="impeller.cls"))
     settings = Settings(tolerance=0.02, axis_length=20.0, lines="long")

@@ -54,7 +54,7 @@ def followed(case: Case, hint: str) -> Case:
     return case
 
 
-@pytest.mark.parametrize("case", covering_share(RUNNABLE, 4), ids=str)
+@pytest.mark.parametrize("case", covering_share(RUNNABLE, 8), ids=str)
 def test_what_runs_is_text_of_the_control(case: Case) -> None:
     for feed, units in share(product(FEEDS, ("mm", "inch")), 2, RUNNABLE.index(case)):
         found = read_back(case, feed, units)
@@ -103,7 +103,7 @@ MODES = {"heidenhain": ("M137", "M136", None)}
 
 
 @pytest.mark.parametrize(
-    "case", covering_share([case for case in RUNNABLE if case.machine in ("", "table-ac")], 4), ids=str
+    "case", covering_share([case for case in RUNNABLE if case.machine in ("", "table-ac")], 8), ids=str
 )
 def test_feeds_mean_what_the_file_says(case: Case) -> None:
     """F of the first cut in the words of each control; Heidenhain counts tenths of an inch per minute."""
@@ -116,7 +116,7 @@ def test_feeds_mean_what_the_file_says(case: Case) -> None:
         assert (first.mode, first.feed) == (revolution, 0.1)
 
 
-@pytest.mark.parametrize("case", covering_share([case for case in RUNNABLE if not case.tcp], 5), ids=str)
+@pytest.mark.parametrize("case", covering_share([case for case in RUNNABLE if not case.tcp], 9), ids=str)
 def test_inverse_time_gives_the_tip_its_feed(case: Case) -> None:
     """1/F minutes for every block: the tip runs with 800 mm/min along the part, whatever the axes do."""
     timed = [piece for piece in read_back(case, "per minute").pieces if not piece.rapid]

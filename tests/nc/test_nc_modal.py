@@ -22,6 +22,7 @@ from cornersmooth.smoothing import smooth
 from cornersmooth.text import RowFormat
 from nc.cases import Case
 from nc.test_nc_linuxcnc import accepted, positions
+from oracle.share import share
 
 #: moves along one axis, turns of the tool alone, arcs, dwells, holes, two feeds, a statement between
 CL = """UNITS/MM
@@ -140,7 +141,7 @@ def test_only_what_repeats_is_left_out(case: Case) -> None:
         assert len(vectors) in (0, 3)
 
 
-@pytest.mark.parametrize("case", [CASES[0], CASES[3], CASES[6], CASES[8]], ids=str)
+@pytest.mark.parametrize("case", share([CASES[0], CASES[3], CASES[6], CASES[8]], 2), ids=str)
 def test_programs_with_cycles_planned_feeds_and_planes_are_verified(case: Case) -> None:
     machine = load_machine(case.machine) if case.machine else None
     planes = case.control != "linuxcnc"

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from nc.cases import Case
-from oracle.share import share
+from oracle.share import covering_share, share
 
 EPS, H = 0.02, 10.0
 
@@ -153,8 +154,7 @@ def problems(case: Case, lines: list[str], cl: str = CL, eps: float = EPS) -> li
     return [f"{problem.code} {problem.text}" for problem in found.problems]
 
 
-@pytest.mark.parametrize("cycles", ["native", "moves"])
-@pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.parametrize(("cycles", "case"), covering_share(product(["native", "moves"], CASES), 2), ids=str)
 def test_texts_in_planes_are_right(case: Case, cycles: str) -> None:
     lines, said = text_of(case, cycles=cycles)
     on, off, _ = words_of(case)
@@ -597,7 +597,7 @@ def mutants(case: Case) -> Iterator[tuple[str, list[str]]]:
 def test_mutants_of_planes_are_found(case: Case) -> None:
     every = list(mutants(case))
     assert len(every) > 20
-    chosen = share(every, 7, CASES.index(case))
+    chosen = share(every, 12, CASES.index(case))
     assert [kind for kind, lines in chosen if not problems(case, lines)] == []
 
 

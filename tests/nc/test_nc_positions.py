@@ -14,6 +14,7 @@ from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
+from oracle.share import share
 
 HOME = {"X": -200.0, "Y": 150.5, "Z": -0.5, "A": 0.0, "C": 10.0}
 CHANGE = {"X": 0.0, "Y": 180.0, "Z": -25.0}
@@ -108,7 +109,7 @@ def test_the_axes_go_where_the_file_says(control: str) -> None:
     assert codes(program, lines, control, parse_machine(machine_table("table-ac"))) & {"CS571", "CS503"}
 
 
-@pytest.mark.parametrize("control", ["fanuc", "siemens", "heidenhain"])
+@pytest.mark.parametrize("control", share(["fanuc", "siemens", "heidenhain"], 2))
 def test_what_is_elsewhere_is_found(control: str) -> None:
     machine = machine_of()
     program, lines = text_of(control, machine)

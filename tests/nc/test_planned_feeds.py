@@ -59,7 +59,7 @@ def made(form: Form, units: str = "mm", *, planned: bool = True) -> bytes:
 
 @pytest.mark.parametrize(
     ("control", "form", "machine", "tcp", "units"),
-    covering_share([(*case, units) for units in ("mm", "inch") for case in CASES], 5),
+    covering_share([(*case, units) for units in ("mm", "inch") for case in CASES], 9),
 )
 def test_blocks_have_the_mean_speed_of_the_plan(control: str, form: str, machine: str, tcp: bool, units: str) -> None:
     chosen = form_of(control, form, machine, tcp)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from cornersmooth.nc_reader import block_tables
 from cornersmooth.nc_reader.dialects import dialect_of
 from cornersmooth.nc_reader.line_patterns import LinePatterns, lines_of
 from cornersmooth.nc_reader.words import Table
-from oracle.share import how_many
+from oracle.share import covering_share, how_many
 
 NUMBERS = ["0.", "-0.", "5.", ".5", "-.25", "12.3456", "-123.4567", "0.3956870", "-1.0000000", "1234.5678", "7", "-42"]
 NUMBERS += ["123.456789", "-1234.567891", "-9876543.2104567", "99.99999999", "-0.10000001"]
@@ -69,9 +70,9 @@ def read(call):
     return found, ""
 
 
-@pytest.mark.parametrize("odd", [None, *ODD])
-@pytest.mark.parametrize("seed", range(how_many(1, 3)))
-@pytest.mark.parametrize("control", SHAPES)
+@pytest.mark.parametrize(
+    ("control", "seed", "odd"), covering_share(product(SHAPES, range(how_many(1, 3)), [None, *ODD]), 3)
+)
 def test_fast_path_is_the_careful_path(control, seed, odd):
     data, lexer = text(control, seed, odd), dialect_of(control).lexer
     patterns = LinePatterns(lexer)

@@ -18,6 +18,7 @@ from cornersmooth.page.pages import read_written
 from cornersmooth.report.paths import original_path, written_path
 from cornersmooth.report.thinning import thinned
 from oracle.command import run
+from oracle.share import share
 from page.making import HOSTILE, PATH, page_of, smoothed, values_of
 
 
@@ -107,7 +108,7 @@ def test_planned_times_and_speeds_agree_with_the_laws(page, result):
     assert np.nanmin(arrays["way_speed_written"][at - 4 : at + 4]) < 100.0
 
 
-@pytest.mark.parametrize(("control", "form"), [("fanuc", "g1"), ("fanuc", "g6.2"), ("siemens", "bspline")])
+@pytest.mark.parametrize(("control", "form"), share([("fanuc", "g1"), ("fanuc", "g6.2"), ("siemens", "bspline")], 2))
 def test_the_written_law_is_that_of_the_text(control, form):
     from cornersmooth.feedrate import plan_text
     from cornersmooth.nc import choose_form

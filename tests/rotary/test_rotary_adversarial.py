@@ -19,7 +19,7 @@ from cornersmooth.kinematics import (
 )
 from cornersmooth.kinematics.poses import angle_between
 from cornersmooth.rotary import FilledPath, fill, insertions, rotary_angles
-from oracle.share import how_many
+from oracle.share import how_many, share
 
 TOLERANCE = 0.02  # degrees
 CASES = how_many(45, 200)
@@ -103,7 +103,7 @@ def walk_error(machine: Machine, path: FilledPath, cut: np.ndarray) -> float:
     return float(off.max(initial=0.0))
 
 
-@pytest.mark.parametrize("part", range(5))
+@pytest.mark.parametrize("part", share(range(5), 2))
 def test_words_are_right_or_refused(part: int):
     """Right: within limits and tolerance, and on cuts continuous, as the points that make them so can be found."""
     outcomes: dict[str, int] = {}

@@ -436,7 +436,7 @@ def test_sharp_corners_rapids_and_repeated_poses():
 @pytest.mark.parametrize(
     ("name", "aside"),
     covering_share(
-        product([name for name in machine_names() if name != "nutated-bc"], [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 0.01]), 8
+        product([name for name in machine_names() if name != "nutated-bc"], [0.0, 1e-15, 1e-12, 1e-8, 1e-4, 0.01]), 14
     ),
 )
 def test_axis_that_turns_over(name: str, aside: float):

@@ -25,7 +25,7 @@ from nc.cases import MACHINES, Case
 from nc.promise import random_verdict
 from nc.rotations import machine_letters, tool_direction
 from oracle.motion import unit
-from oracle.share import covering_share, how_many
+from oracle.share import covering_share, how_many, share
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 FORMS = {"fanuc": "g6.2", "siemens": "bspline", "heidenhain": "spl"}
@@ -237,7 +237,7 @@ def mutants(lines: list[str], at: int, letter: str) -> dict[str, list[str]]:
     return {name: [*lines[:at], *pair, *lines[at + 2 :]] for name, pair in found.items()}
 
 
-@pytest.mark.parametrize("control", ["fanuc", "siemens"])
+@pytest.mark.parametrize("control", share(["fanuc", "siemens"], 2, 1))
 def test_faults_in_control_points_of_angles_are_found(control: str) -> None:
     program, form = waves(9), form_of(control, "table-ac")
     lines = text_of(program, form)[0].splitlines()

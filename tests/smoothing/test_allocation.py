@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,6 +14,7 @@ from cornersmooth.model import LimitedBy, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.segments import segments_of
+from oracle.share import covering_share
 from smoothing.paths import grid_program, random_program, simultaneous_deviation
 
 FAIR = Settings(allocation="fair")
@@ -32,8 +35,7 @@ def shares_taken(corners) -> np.ndarray:
     return (corners.trim_out[:-1] + corners.trim_in[1:])[neighbours]
 
 
-@pytest.mark.parametrize("tolerance", [0.01, 0.3, 5.0])
-@pytest.mark.parametrize("shape", ["paper", "auto"])
+@pytest.mark.parametrize(("tolerance", "shape"), covering_share(product([0.01, 0.3, 5.0], ["paper", "auto"]), 3))
 def test_transitions_never_overlap_and_keep_the_tolerance(tolerance, shape):
     smoothed = smooth(random_program(5, 2000, wobble=0.1), FAIR.but(tolerance=tolerance, shape=shape))
     corners = smoothed.corners

@@ -146,7 +146,7 @@ def test_moving_turning_scaling_and_reversing_the_path_commute_with_smoothing():
     assert turned.status[::-1].tolist() == plain.status.tolist()
 
 
-@pytest.mark.parametrize(("wobble", "axis_length"), covering_share(product([0.02, 0.3, 1.0], [10.0, 50.0]), 5))
+@pytest.mark.parametrize(("wobble", "axis_length"), covering_share(product([0.02, 0.3, 1.0], [10.0, 50.0]), 6, 1))
 def test_tip_and_axis_point_keep_the_tolerance_at_one_common_parameter(wobble, axis_length):
     smoothed = smooth(random_program(11, 3000, wobble=wobble), Settings(tolerance=0.04, axis_length=axis_length))
     corners = smoothed.corners

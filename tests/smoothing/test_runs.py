@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,7 +23,7 @@ from cornersmooth.smoothing.runs.samples import Pieces, Samples
 from cornersmooth.smoothing.runs.solving import RunCurves, solve_runs
 from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.smoothing.runs.windows import Windows
-from oracle.share import how_many
+from oracle.share import covering_share, how_many
 from smoothing.runs_oracle import deviation, random_runs, spline_of, through
 
 H = 10.0
@@ -107,8 +109,7 @@ def test_straight_run_stays_a_line() -> None:
     )
 
 
-@pytest.mark.parametrize("tolerance", [0.001, 0.01, 0.15])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("seed", "tolerance"), covering_share(product(range(4), [0.001, 0.01, 0.15]), 5))
 def test_every_run_is_within_its_bounds(seed: int, tolerance: float) -> None:
     lines = random_runs(seed, 24, 14, H)
     curves = solve_runs(lines, (tolerance, tolerance), H)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from cornersmooth.settings import LARGEST_CHORD, Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.verify import verify
-from oracle.share import how_many, share
+from oracle.share import covering_share, how_many, share
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 
@@ -51,8 +51,9 @@ def room(step: float) -> float:
     return math.sqrt(3) / 2 * step + 1e-6
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("name", ["paper_table1.csv", "impeller.cls", "impeller.aptsource"])
+@pytest.mark.parametrize(
+    ("name", "form"), covering_share(product(["paper_table1.csv", "impeller.cls", "impeller.aptsource"], FORMS), 3)
+)
 def test_samples(name: str, form: str) -> None:
     program = read((SAMPLES / name).read_bytes(), name=name)
     for tolerance, axis_length in LIMITS:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from cornersmooth.cl import read
 from cornersmooth.verify import verify
 from cornersmooth.verify.in_order import passage
-from oracle.share import how_many
+from oracle.share import how_many, share
 from verify.random_programs import trial
 from verify.sweep import judged
 from verify.writing import simple_text
@@ -137,7 +137,7 @@ def test_every_turn_must_be_passed_in_its_order(cl: list[float], order: list[flo
     assert in_order(cl, order, 3.0 * tolerance)
 
 
-@pytest.mark.parametrize("seed", [600796, 600961])
+@pytest.mark.parametrize("seed", share([600796, 600961], 2))
 def test_tips_and_axis_points_each_in_order_pass_where_no_pose_is_near_both(seed: int) -> None:
     """`zhang2016`: where a window begins, the tip or the axis point is off the place of both by more than ε."""
     one = trial(seed)

@@ -31,13 +31,13 @@ def several(form, program, lines, runs):
 def test_every_mutant_that_matters_is_found(form, seed):
     program, lines, changed = mutants(form, seed)
     assert named_in(program, lines) == []
-    changed = share_of_kinds(changed, lambda mutant: mutant.kind, 9)
+    changed = share_of_kinds(changed, lambda mutant: mutant.kind, 12)
     score = judge(program, lines, changed, lambda _: several(form, program, lines, RUNS), named_in)
     judged = score.judged
     print(f"\n{form}: " + ", ".join(f"{kind} {judged[kind, True]}" for kind in sorted({kind for kind, _ in judged})))
     print(f"{form}: {score}")
     assert score.missed == []
-    assert sum(judged.values()) >= how_many(40, 100)
+    assert sum(judged.values()) >= how_many(30, 100)
 
 
 # ---------------------------------------------------------------- how they share texts

@@ -13,7 +13,7 @@ from cornersmooth.nc import Frame, choose_form, load_control
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from oracle.files import SAMPLES
-from oracle.share import share_of_kinds
+from oracle.share import covering_share, share_of_kinds
 
 MACHINES = {
     "fanuc": "table-ac",
@@ -97,7 +97,9 @@ def _problems(control: str, lines: list[str]) -> list[str]:
 
 @pytest.mark.parametrize(
     ("control", "mutant"),
-    [(control, name) for control in MACHINES for name in _MUTANTS if control in _FOUND_IN.get(name, {control})],
+    covering_share(
+        ((control, name) for control in MACHINES for name in _MUTANTS if control in _FOUND_IN.get(name, {control})), 2
+    ),
 )
 def test_a_block_of_the_frame_that_is_lost_or_changed_is_found(control: str, mutant: str) -> None:
     pattern, changed, said = _MUTANTS[mutant]

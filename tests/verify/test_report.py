@@ -20,6 +20,7 @@ from cornersmooth.report.verification import (
 )
 from cornersmooth.verify import verify
 from cornersmooth.verify.polyline import original_motion, written_at
+from oracle.share import share
 
 from .writing import encode, job
 
@@ -133,7 +134,7 @@ def test_distribution_along_the_path():
     assert histogram_lines(over)[-1].lstrip().startswith("over 0.01 mm")
 
 
-@pytest.mark.parametrize("form", ["png", "svg"])
+@pytest.mark.parametrize("form", share(["png", "svg"], 2))
 def test_picture(form):
     pytest.importorskip("matplotlib")
     from cornersmooth.report.deviationplot import draw_deviation

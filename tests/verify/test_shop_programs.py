@@ -15,7 +15,7 @@ from oracle.share import how_many
 from verify.shop_programs import outcome, shop_trial, with_forms, with_options
 
 
-@pytest.mark.parametrize("seed", range(how_many(5, 120)))
+@pytest.mark.parametrize("seed", range(how_many(3, 120)))
 def test_random_programs_for_these_machines(seed: int) -> None:
     one = shop_trial(seed)
     word, why, _ = outcome(one)
@@ -28,14 +28,14 @@ def test_blocks_are_not_merged_past_a_corner_of_two_parameters() -> None:
     assert outcome(shop_trial(251151))[0] == "passed"
 
 
-@pytest.mark.parametrize("seed", range(how_many(6, 60)))
+@pytest.mark.parametrize("seed", range(how_many(4, 60)))
 def test_random_programs_with_options_of_all_kinds(seed: int) -> None:
     one = with_options(shop_trial(seed))
     word, why, _ = outcome(one)
     assert word in ("passed", "refused"), f"{one}: {why}"
 
 
-@pytest.mark.parametrize("seed", range(how_many(5, 60)))
+@pytest.mark.parametrize("seed", range(how_many(3, 60)))
 def test_random_programs_in_curves_and_neutral_text(seed: int) -> None:
     one = with_forms(shop_trial(seed))
     word, why, _ = outcome(one)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.model import Arcs, Move, Program
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.verify import verify
+from oracle.share import covering_share
 
 from .writing import HEAD, TAIL, corners, encode, job, place_g1, rapid, simple_text, unit
 
@@ -192,8 +194,7 @@ def test_arc_against_arc_and_against_chords(as_arc):
         assert found.max_tip_deviation_mm == pytest.approx(sagitta, rel=0.05)
 
 
-@pytest.mark.parametrize("form", ["g1", "g6.2"])
-@pytest.mark.parametrize("size", [70, 300])
+@pytest.mark.parametrize(("size", "form"), covering_share(product([70, 300], ["g1", "g6.2"]), 3))
 def test_one_long_chain_that_is_cut_is_the_same_as_whole(form, size, monkeypatch):
     from cornersmooth.verify import batches
 

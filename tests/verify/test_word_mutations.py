@@ -28,7 +28,7 @@ from .word_mutations import judged, named_in, options_of, text_of
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONTROLS = ("fanuc", "mitsubishi", "haas", "linuxcnc", "generic", "siemens", "heidenhain")
 #: mutants of each control
-SAMPLE = how_many(3, 10)
+SAMPLE = how_many(2, 10)
 
 
 @pytest.mark.parametrize("control", CONTROLS)
