@@ -85,16 +85,18 @@ def reference_time(law: TimeLaw, limits: Limits, step: float) -> float:
             right += [np.ones(own.shape[0])] * 2
         gain = 0.5 * (h[1:] + h[:-1]) * z**-0.5
         bounds = np.stack((np.full(n, 1.0 / reach), np.minimum(upper / z, reach)), axis=1)
-        result: Any = linprog(
-            -gain / gain.mean(),
-            A_ub=vstack(matrices, format="csr"),  # type: ignore[call-overload]  # sparse matrices are taken, and meant
-            b_ub=np.concatenate(right),
-            bounds=bounds,
-            method="highs-ipm",
-        )
-        if result.x is None:
-            raise ArithmeticError(f"the linear programme has no solution: {result.message}")
-        z, time, reach = after_step(z, result.x * z, h, time, reach)
+        problem: dict[str, Any] = {
+            "c": -gain / gain.mean(),
+            "A_ub": vstack(matrices, format="csr"),
+            "b_ub": np.concatenate(right),
+            "bounds": bounds,
+        }
+        # the interior-point method is the faster one; it may give up on a programme that the simplex method solves
+        results = (linprog(**problem, method=method) for method in ("highs-ipm", "highs-ds"))
+        found: Any = next((result.x for result in results if result.x is not None), None)
+        if found is None:
+            raise ArithmeticError("the linear programme has no solution")
+        z, time, reach = after_step(z, found * z, h, time, reach)
         if reach < NARROWEST:
             break
     return time

@@ -67,6 +67,7 @@ REFUSED_ONCE = {
     800349: "a tool that does nothing but to stand over holes that are not tapped",
     1000659: "a feed down along the hole, past the pose that it is tapped from, and up to it",
     10006: "a feed to and fro above a hole, as fast as the hole's",
+    1005030: "the CL file's own rapid into a hole that is drilled behind it",
 }
 
 

@@ -28,9 +28,7 @@ def measure_continuity(distances: Distances, found: Findings) -> None:
     ends = trail.last[chosen]
     six = match.six[ends] if len(ends) < len(match.six) else match.six
     step = six[1:] - six[:-1]
-    square = np.maximum(
-        np.einsum("ij,ij->i", step[:, :3], step[:, :3]), np.einsum("ij,ij->i", step[:, 3:], step[:, 3:])
-    )
+    square = np.maximum(*(np.einsum("ij,ij->i", part, part) for part in (step[:, :3], step[:, 3:])))
     square[(square == 0) | ~match.on[ends[1:]] | ~match.on[ends[:-1]]] = np.inf
     square[match.stretch[ends[1:]] != match.stretch[ends[:-1]]] = np.inf
     if len(square):

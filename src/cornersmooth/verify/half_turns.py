@@ -20,13 +20,8 @@ def half_turns(program: Program) -> list[Problem]:
         2.0 * np.arctan2(np.linalg.norm(axis[1:] - axis[:-1], axis=1), np.linalg.norm(axis[1:] + axis[:-1], axis=1))
     )
     poses = 1 + np.flatnonzero(fed & (turn > FLIP_ANGLE + 1e-9))
-    return [
-        Problem(
-            "CS526",
-            int(program.line[pose]),
-            0,
-            f"the tool axis turns by {turn[pose - 1]:.4g} deg in one move; which way a control turns is not defined",
-            float("nan"),
-        )
-        for pose in poses.tolist()
-    ]
+    problems = []
+    for pose in poses.tolist():
+        text = f"the tool axis turns by {turn[pose - 1]:.4g} deg in one move; which way a control turns is not defined"
+        problems.append(Problem("CS526", int(program.line[pose]), 0, text))
+    return problems

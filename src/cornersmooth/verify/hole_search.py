@@ -425,13 +425,13 @@ class HoleSearch:
             problems.append(Problem("CS562", cl_line, self.nc_line(deepest), text, abs(off)))
         behind = [k for k in group if k > deepest][:1]
         if cycle.feed_out and behind and not self.feeds(behind):
-            text = "a rapid leaves a hole that the tool is to leave at feed"
-            problems.append(Problem("CS563", cl_line, self.nc_line(behind[0]), text))
+            line = self.nc_line(behind[0])
+            problems.append(Problem("CS563", cl_line, line, "a rapid leaves a hole that the tool is to leave at feed"))
         drilled = 0.0
         for k in group:
             line = self.nc_line(k)
             if not self.feeds([k]):
-                if height[k] < -drilled - self.room:
+                if height[k] < -drilled - self.room and not self._own_rapid(move, k):
                     amount = -drilled - height[k]
                     text = f"a rapid goes {amount:.4f} mm into the uncut hole"
                     problems.append(Problem("CS563", cl_line, line, text, amount))
@@ -449,3 +449,11 @@ class HoleSearch:
             text = "the tool leaves a hole sideways"
             problems.append(Problem("CS563", cl_line, self.nc_line(group[-1]), text, -height[group[-1]]))
         return problems
+
+    def _own_rapid(self, move: int, element: int) -> bool:
+        """Whether the CL file itself goes there in rapid just before the hole, wherever that is."""
+        while move > 0 and self.kind[move - 1] == Move.RAPID:
+            move -= 1
+            if self.stays(move, element):
+                return True
+        return False
