@@ -256,7 +256,9 @@ def _newton_from_knot(
 def search_elements(
     match: Match, elements: Ints, point: Floats, column: slice = slice(0, 6)
 ) -> tuple[Floats, Floats, Floats]:
-    """Nearest poses on single path elements by sampling and zooming in; for few rows.
+    """Nearest poses on path elements by sampling and zooming in; for few rows.
+
+    Each element is searched by itself: the chords of one in which the tool turns far may be nearer than it is.
 
     Parameters
     ----------
@@ -271,58 +273,42 @@ def search_elements(
     tip, axis : (k, 3) float64
     distance : (k,) float64
     """
-    nc, six_of = match.nc, match.task.six
     rows, width = elements.shape
-    here = np.arange(rows)
+    element = elements.reshape(-1, 1)
+    target = np.repeat(point, width, axis=0)[:, None, column]
+    each = np.arange(len(element))
 
-    def look(place: Floats) -> tuple[Floats, Floats, Floats]:
-        """Poses at places (k, m): which of a row's elements, plus the fraction of it; and their distances."""
-        which = np.minimum(place.astype(np.int64), width - 1)
-        element = np.take_along_axis(elements, which, axis=1)
-        tip, axis = written_at(nc, element.ravel(), (place - which).ravel())
-        six = six_of(tip, axis).reshape(*place.shape, 6)
-        off = six[..., column] - point[:, None, column]
-        return (
-            tip.reshape(*place.shape, 3),
-            axis.reshape(*place.shape, 3),
-            np.sqrt(np.einsum("...i,...i->...", off, off)),
-        )
+    def look(place: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Poses at fractions (m, p) of the elements, what counts of them, and their distances."""
+        tip, axis = written_at(match.nc, np.repeat(element, place.shape[1]), place.ravel())
+        counts = match.task.six(tip, axis).reshape(*place.shape, 6)[..., column]
+        off = counts - target
+        distance = np.sqrt(np.einsum("...i,...i->...", off, off))
+        return tip.reshape(*place.shape, 3), axis.reshape(*place.shape, 3), counts, distance
 
-    grid = np.linspace(0.0, width, width * (_SAMPLES - 1) + 1)
+    grid = np.linspace(0.0, 1.0, _SAMPLES)
     step = grid[1]
-    # elements may be of very different length: the nearest sample may lie on a short one beside a long one that passes
-    # nearer, so chords are what is compared; between elements that do not follow one another there is none
-    which = np.minimum(grid.astype(np.int64), width - 1)
-    tip, axis, near = look(np.broadcast_to(grid, (rows, len(grid))))
-    share, off = _on_chords(six_of(tip, axis)[..., column], point[:, column])
-    follows = (np.diff(elements[:, which], axis=1) == 1) | (np.diff(which) == 0)
-    share, off = np.where(follows, share, 0.0), np.where(follows, off, near[:, :-1])
+    share, off = _on_chords(look(np.broadcast_to(grid, (len(element), _SAMPLES)))[2], target)
     chord = np.argmin(off, axis=1)
-    at = grid[chord] + share[here, chord] * step
+    at = grid[chord] + share[each, chord] * step
     for _ in range(_ROUNDS):
-        place = np.clip(at[:, None] + np.linspace(-step, step, _ZOOM), 0.0, width)
-        at = place[here, np.argmin(look(place)[2], axis=1)]
+        place = np.clip(at[:, None] + np.linspace(-step, step, _ZOOM), 0.0, 1.0)
+        at = place[each, np.argmin(look(place)[3], axis=1)]
         step *= 2.0 / (_ZOOM - 1)
-    # so close together the motion is straight, but for a joint: project on both sides
-    joint = np.round(at)
-    split = np.where(np.abs(joint - at) < step, joint, at)
-    ends = np.clip(np.stack((at - step, split, at + step), axis=1), 0.0, width)
-    tip, axis, _ = look(ends)
-    six = six_of(tip, axis)[..., column]
-    way = np.diff(six, axis=1)
-    size = np.einsum("kmi,kmi->km", way, way)
-    share = np.einsum("kmi,kmi->km", point[:, None, column] - six[:, :-1], way)
-    share = np.clip(np.divide(share, size, out=np.full((rows, 2), 0.5), where=size > 0), 0.0, 1.0)
-    tip, axis, distance = look(np.hstack((ends[:, :-1] + share * np.diff(ends, axis=1), at[:, None])))
-    best = np.argmin(distance, axis=1)
-    return tip[here, best], axis[here, best], distance[here, best]
+    ends = np.clip(np.stack((at - step, at + step), axis=1), 0.0, 1.0)  # so close together the motion is straight
+    share, _ = _on_chords(look(ends)[2], target)
+    tip, axis, _, distance = look(np.hstack((ends[:, :1] + share * np.diff(ends, axis=1), at[:, None])))
+    both = 2 * width
+    best = (np.arange(rows), np.argmin(distance.reshape(rows, both), axis=1))
+    poses = tip.reshape(rows, both, 3), axis.reshape(rows, both, 3)
+    return poses[0][best], poses[1][best], distance.reshape(rows, both)[best]
 
 
 def _on_chords(points: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Of rows (k, m, d) of points: shares (k, m − 1) of the chords nearest to the targets (k, d), and the distances."""
+    """Of rows (k, m, d) of points: shares (k, m − 1) of the chords nearest to targets (k, 1, d), and the distances."""
     way = np.diff(points, axis=1)
     size = np.einsum("kmi,kmi->km", way, way)
-    from_start = target[:, None] - points[:, :-1]
+    from_start = target - points[:, :-1]
     share = np.einsum("kmi,kmi->km", from_start, way)
     share = np.clip(np.divide(share, size, out=np.full(size.shape, 0.5), where=size > 0), 0.0, 1.0)
     off = from_start - share[..., None] * way
