@@ -255,10 +255,8 @@ class Search:
             windows = doubtful_windows(doubtful, self.number, around, most_windows + 1)
             if around > ROUNDS[0][0] and len(windows) > most_windows:
                 return  # no mishap of the search: the text is off everywhere
-            # those with few doubts first: others may be futile
-            for first, last in sorted(
-                windows[:most_windows], key=lambda ends: self._doubts(slice(ends[0], ends[1] + 1))
-            ):
+            # those in which places are lost first, and of these those with few doubts: others may be futile
+            for first, last in sorted(windows[:most_windows], key=lambda ends: self._rank(slice(ends[0], ends[1] + 1))):
                 part = slice(first, last + 1)
                 before = self._doubts(part)
                 self._assign(first, last, most_pairs, doubtful, wide=around > ROUNDS[0][0])
@@ -342,6 +340,11 @@ class Search:
     def _doubts(self, part: slice) -> int:
         """How many vertices are too far away or in the wrong order."""
         return int(np.count_nonzero(self.backward[part]) + np.count_nonzero(self.distance[part] > self.far))
+
+    def _rank(self, part: slice) -> tuple[bool, int]:
+        """What windows are sorted by: whether no vertex is too far away, and how many are in doubt."""
+        away = self.distance[part]
+        return not (np.isfinite(away) & (away > self.far)).any(), self._doubts(part)
 
     def _assign(
         self, first: int, last: int, most_pairs: int, doubtful: Bools, *, wide: bool, scale: float | None = None
