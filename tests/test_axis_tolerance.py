@@ -73,7 +73,7 @@ def verified(case: Case, text: bytes | None = None, axis_tolerance: float | None
 @pytest.mark.parametrize("case", share(JUDGED, 7), ids=str)
 def test_the_oracle_finds_both_within_their_tolerances(case: tuple[str, Form, tuple[float, float]]) -> None:
     method, form, (tolerance, degrees) = case
-    made = written(*case, seed=JUDGED.index(case), count=how_many(3, 120))
+    made = written(*case, seed=JUDGED.index(case), count=how_many(2, 120))
     paths = runs_of(parse(made.text, form), 10.0, tolerance)
     moving = [c for c in made.chains if np.ptp(c.tip, axis=0).any() or np.ptp(c.axis, axis=0).any()]
     assert len(paths) == len(moving)

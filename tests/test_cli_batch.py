@@ -151,7 +151,7 @@ def test_summaries_have_a_row_for_each_file(tree: Path, tmp_path: Path) -> None:
 
 def test_a_batch_that_was_interrupted_goes_on_where_it_was(tmp_path: Path) -> None:
     """Whatever the moment, a run again makes what is missing and leaves the rest as it is."""
-    bench = Bench(tmp_path, single=0, several=150)
+    bench = Bench(tmp_path, single=0, several=60)
     out = tmp_path / "out"
     words = [word for word in bench.words(True, out) if word != "--force"]
     for moment in share((0.5, 0.7), 2):

@@ -19,7 +19,7 @@ from oracle.share import THOROUGH
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    return Bench(tmp_path_factory.mktemp("bench"), single=31_000, several=1_000)
+    return Bench(tmp_path_factory.mktemp("bench"), single=31_000, several=500)
 
 
 #: each way to interrupt, of single files and of batches in turn

@@ -348,18 +348,21 @@ def test_klartext_arcs_go_round_as_they_should() -> None:
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [
-        (r"DR\+", "DR-"),
-        (r"DR-", "DR+"),
-        (r"R\+10\.0000", "R+10.5000"),
-        (r"R\+10\.0000", "R-10.0000"),
-        (r" R\+10\.0000", ""),
-        (r" DR[-+]", ""),
-        (r"(CR X\S+ Y\S+)", r"\1 Z+1.0000"),
-        (r"CR X(\S+)", r"CR X\g<1>1"),
-        ("CR ", "C "),
-        ("CR ", "L "),
-    ],
+    share(
+        [
+            (r"DR\+", "DR-"),
+            (r"DR-", "DR+"),
+            (r"R\+10\.0000", "R+10.5000"),
+            (r"R\+10\.0000", "R-10.0000"),
+            (r" R\+10\.0000", ""),
+            (r" DR[-+]", ""),
+            (r"(CR X\S+ Y\S+)", r"\1 Z+1.0000"),
+            (r"CR X(\S+)", r"CR X\g<1>1"),
+            ("CR ", "C "),
+            ("CR ", "L "),
+        ],
+        2,
+    ),
 )
 def test_mutants_of_klartext_arcs_are_found(old: str, new: str) -> None:
     cl = arcs(1.0)

@@ -18,6 +18,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
 from nc.cases import Case
 from nc.promise import written
+from oracle.share import share
 from verify.random_programs import Trial
 from verify.sweep import judged
 
@@ -622,8 +623,9 @@ ALARMS = {
 }
 
 
-@pytest.mark.parametrize("alarm", ALARMS.values(), ids=ALARMS.keys())
-def test_what_is_written_passes(alarm: Alarm) -> None:
+@pytest.mark.parametrize("name", share(ALARMS, 2))
+def test_what_is_written_passes(name: str) -> None:
+    alarm = ALARMS[name]
     assert alarm.verified(alarm.text).problems == ()
 
 

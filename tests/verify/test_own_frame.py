@@ -118,16 +118,19 @@ def test_a_block_of_the_frame_that_is_lost_or_changed_is_found(control: str, mut
 
 @pytest.mark.parametrize(
     ("control", "offset", "other"),
-    [
-        ("fanuc", "G55", "G54"),
-        ("fanuc", "G54.1 P48", "G54.1 P47"),
-        ("mitsubishi", "G54.1 P3", "G54"),
-        ("haas", "G154 P20", "G154 P2"),
-        ("siemens", "G55", "G54"),
-        ("siemens", "G599", "G505"),
-        ("heidenhain", "2", "1"),
-        ("linuxcnc", "G59.3", "G59.1"),
-    ],
+    covering_share(
+        [
+            ("fanuc", "G55", "G54"),
+            ("fanuc", "G54.1 P48", "G54.1 P47"),
+            ("mitsubishi", "G54.1 P3", "G54"),
+            ("haas", "G154 P20", "G154 P2"),
+            ("siemens", "G55", "G54"),
+            ("siemens", "G599", "G505"),
+            ("heidenhain", "2", "1"),
+            ("linuxcnc", "G59.3", "G59.1"),
+        ],
+        8,
+    ),
 )
 def test_a_text_with_another_work_offset_says_so(control: str, offset: str, other: str) -> None:
     text = _text(control, offset)
