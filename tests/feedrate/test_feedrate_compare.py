@@ -89,9 +89,9 @@ def test_published_paths(corpus: Path, case: str) -> None:
     share(
         (
             "hust_5x_impeller_yelun.cls",
-            "hecc_flank_nx.cls",
-            "nx_clsf_varcontour5x_ust_a.cls",
             "nx_clsf_cutcom_arcs.cls",
+            "nx_clsf_varcontour5x_ust_a.cls",
+            "hecc_flank_nx.cls",
             "hust_5x_PathPointsFile.cls",
         ),
         3,

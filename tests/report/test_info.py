@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ import pytest
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.model import Arcs, Move, Program, Source, Statement
 from cornersmooth.report.info import Spread, describe, info_json
+from oracle.loops import bytecodes
 
 UP = (0.0, 0.0, 1.0)
 
@@ -128,10 +128,10 @@ def test_settings_out_of_bounds_are_refused():
         describe(square(), 0.0, 10.0)
 
 
-def test_a_hundred_thousand_poses_take_no_loop():
+def test_poses_are_described_without_a_loop_over_them():
     u = np.linspace(0, 300, 100_000)
     tip = np.stack((u, 20 * np.sin(u), np.cos(u)), axis=1)
     axis = np.stack((np.sin(u / 10) / 2, np.cos(u / 10) / 2, np.ones_like(u)), axis=1)
-    start = time.process_time()
-    assert describe(Program.from_poses(tip, axis), 0.01, 10).corners.count == 99_998
-    assert time.process_time() - start < 2
+    program = Program.from_poses(tip, axis)
+    assert describe(program, 0.01, 10).corners.count == 99_998
+    assert bytecodes(lambda: describe(program, 0.01, 10)) < len(program)

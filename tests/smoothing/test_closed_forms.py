@@ -11,7 +11,7 @@ from scipy.interpolate import BSpline
 from cornersmooth.model import LimitedBy, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
-from oracle.share import covering_share
+from oracle.share import covering_share, how_many
 from smoothing.paths import plane_corner, random_program, simultaneous_deviation
 
 TABLE_1 = (
@@ -148,7 +148,8 @@ def test_moving_turning_scaling_and_reversing_the_path_commute_with_smoothing():
 
 @pytest.mark.parametrize(("wobble", "axis_length"), covering_share(product([0.02, 0.3, 1.0], [10.0, 50.0]), 6, 1))
 def test_tip_and_axis_point_keep_the_tolerance_at_one_common_parameter(wobble, axis_length):
-    smoothed = smooth(random_program(11, 3000, wobble=wobble), Settings(tolerance=0.04, axis_length=axis_length))
+    program = random_program(11, how_many(1000, 3000), wobble=wobble)
+    smoothed = smooth(program, Settings(tolerance=0.04, axis_length=axis_length))
     corners = smoothed.corners
     rows = np.flatnonzero(corners.smoothed)
     tip, top = simultaneous_deviation(smoothed, rows, np.linspace(0, 1, 401))

@@ -17,7 +17,7 @@ from cornersmooth.smoothing import nurbs, smooth
 from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
 from cornersmooth.smoothing.sampling import dense_rows
 from cornersmooth.smoothing.segments import lines_per_half
-from oracle.share import covering_share
+from oracle.share import covering_share, how_many
 from smoothing.paths import grid_program, plane_corner, random_program, simultaneous_deviation
 
 AUTO = Settings(shape="auto")
@@ -115,7 +115,7 @@ def test_auto_goes_with_no_other_choice_of_weights():
 )
 def test_tip_and_axis_point_keep_the_tolerance(wobble, axis_length, allocation):
     settings = AUTO.but(tolerance=0.04, axis_length=axis_length, allocation=allocation)
-    smoothed = smooth(random_program(17, 1500, wobble=wobble), settings)
+    smoothed = smooth(random_program(17, how_many(500, 1500), wobble=wobble), settings)
     corners = smoothed.corners
     rows = np.flatnonzero(corners.smoothed)
     tip, top = simultaneous_deviation(smoothed, rows, np.linspace(0, 1, 401))
