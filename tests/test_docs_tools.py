@@ -23,6 +23,7 @@ import pytest
 
 from interruptions import cl_text
 from oracle.command import SCRIPT, SMALL, environment
+from oracle.share import share
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -187,6 +188,7 @@ def test_savings_are_printed_as_a_table(
     (tmp_path / "small.cls").write_bytes(SMALL)
     monkeypatch.setattr(savings, "FILES", ("small.cls",))
     monkeypatch.setattr(savings, "SAMPLE", tmp_path / "small.cls")
+    monkeypatch.setattr(savings, "TEXTS", tuple(share(savings.TEXTS, 4)))
     assert savings.main([str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 2 + 3 + len(savings.TEXTS)

@@ -314,7 +314,7 @@ def test_picture_of_the_path(tmp_path):
     pytest.importorskip("matplotlib")
     source = tmp_path / "part.cls"
     source.write_text(PATH.format(name="PART", comment="none"))
-    for suffix, start in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")):
+    for suffix, start in share((("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")), 3, 1):
         picture = tmp_path / f"part.{suffix}"
         done = run("smooth", source, "-e", "0.02", "-o", tmp_path / f"{suffix}.nc", "--plot", picture, "-q")
         assert done.returncode == 0, done.stderr

@@ -203,7 +203,7 @@ def winding(seed: int) -> tuple[Machine, np.ndarray, np.ndarray]:
 def test_no_choice_rewinds_less():
     """Chains are refused only if nothing fits, and an axis is rewound only where nothing else helps."""
     outcomes = []
-    for seed in range(how_many(30, 60)):
+    for seed in range(how_many(20, 60)):
         machine, axis, rapid = winding(seed)
         n = len(axis)
         tip, line = np.arange(3.0 * n).reshape(n, 3), np.arange(n) + 1
