@@ -14,6 +14,7 @@ from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, direct
 from cornersmooth.kinematics import Machine, machine_position, parse_machine, solutions, tip_position, tool_axis
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
+from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
@@ -89,6 +90,25 @@ def test_one_axis_gives_the_tool_axis_and_the_position(name: str) -> None:
     found = solutions(machine, tool_axis(machine, angles))
     np.testing.assert_allclose(found.angles[:, 0], angles, atol=1e-9)
     assert found.beyond.max() < 1e-9
+
+
+@pytest.mark.parametrize("name", FOUR)
+@pytest.mark.parametrize("tolerance", [0.002, 0.02, 0.2])
+def test_curves_of_whole_runs_turn_the_tool_no_further_than_the_axis_does(name: str, tolerance: float) -> None:
+    machine = FOUR[name]
+    noisy, rng = rows("X" if machine.names[0] == "A" else "Y", count=40, step=2.0), np.random.default_rng(7)
+    for k, line in enumerate(noisy):  # off the circle to all sides
+        place = [float(word) for word in line[5:].split(",")]
+        place[:3] += rng.uniform(-0.5, 0.5, 3)
+        noisy[k] = "GOTO/" + ",".join(f"{value:.7f}" for value in place)
+    form = choose_form("fanuc", machine=machine)
+    result = postprocess(
+        program_of(noisy), io.BytesIO(), Settings(method="global", tolerance=tolerance), form=form, processes=1
+    )
+    assert result.verification is not None
+    assert result.verification.passed
+    assert result.smoothed.runs is not None
+    assert result.smoothed.runs.count.sum() >= 40
 
 
 @pytest.mark.parametrize(

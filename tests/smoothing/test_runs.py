@@ -13,7 +13,7 @@ from scipy.optimize import NonlinearConstraint, minimize
 
 from cornersmooth import Program, Settings, smooth
 from cornersmooth.smoothing.runs import groups
-from cornersmooth.smoothing.runs.banded import Gather, couplings, solve_blocks
+from cornersmooth.smoothing.runs.banded import Gather, couplings, keep_in_planes, solve_blocks
 from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.groups import solve_groups
 from cornersmooth.smoothing.runs.interior import COLD, Task, smoothest
@@ -92,6 +92,17 @@ def test_banded_sums_and_solutions_are_those_of_full_matrices() -> None:
     np.testing.assert_allclose(gather.sum_rows(off.T), gather.sums(off).T, atol=1e-12)
     found = solve_blocks(gather.bands(six), np.ascontiguousarray(right.T), couplings(free))
     np.testing.assert_allclose(found.T, expected, rtol=1e-8, atol=1e-10)
+    # in a plane: as in the coordinates of the plane, and free control points without one are not touched
+    normal = np.array([0.6, 0.0, 0.8])
+    inside = np.kron(np.eye(free.sum()), np.array([[0.0, 1.0, 0.0], [0.8, 0.0, -0.6]]).T)
+    expected[free] = (inside @ np.linalg.solve(inside.T @ matrix @ inside, inside.T @ right[free].ravel())).reshape(
+        -1, 3
+    )
+    for plane in (normal, np.zeros(3)):
+        bands, held = gather.bands(six), np.ascontiguousarray(right.T)
+        keep_in_planes(bands, held, np.tile(plane, (size, 1)))
+        in_plane = solve_blocks(bands, held, couplings(free)).T
+        np.testing.assert_allclose(in_plane, expected if plane.any() else found.T, rtol=1e-8, atol=1e-10)
 
 
 def rng_like(size: int) -> np.ndarray:
@@ -305,6 +316,24 @@ def test_axis_that_does_not_turn_does_not_tremble() -> None:
     own = curves.control[: curves.splines.control_first[1]]
     np.testing.assert_allclose(own[:, 3:] - own[:, :3], [H * np.array([0.36, 0.48, 0.8])] * len(own), atol=1e-11)
     assert curves.axis_bound[0] <= 0.01
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-7])
+def test_axes_in_a_plane_stay_in_it(noise: float) -> None:
+    """Within the digits of a CL file, which leave the plane a little."""
+    points, normal = winding(400, seed=4), np.array([0.8, -0.6, 0.0])
+    rng = np.random.default_rng(2)
+    points[:, 3:] += H * noise * rng.uniform(-1.0, 1.0, (400, 1)) * normal
+    turning = random_runs(5, 1, 12, H).point
+    curves = solve_runs(through(points, turning), (0.01, 0.01), H)
+    assert curves.kept.all()
+    assert max(deviation(curves, 0, H)) <= 0.01
+    own = curves.control[: curves.splines.control_first[1]]
+    across = np.abs((own[:, 3:] - own[:, :3]) @ normal).max()
+    assert across <= 4 * H * noise + 1e-11
+    # the tip goes out of the plane as it likes
+    off = own[:, :3] @ normal
+    assert np.ptp(off) > 1.0
 
 
 def test_a_tip_that_stands_while_the_tool_turns_goes_on_standing() -> None:

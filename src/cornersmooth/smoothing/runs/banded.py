@@ -21,6 +21,7 @@ _PAIRS = [(a, a + o) for o in range(TAPS) for a in range(TAPS - o)]
 #: where the numbers of a block stand among its six, and which of the 24 numbers of a control point the 36 of its three
 #: columns are: 12d + k is the element k below the diagonal in column d, in row e of the block o with 3o + e = d + k
 _BLOCK = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
+_ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _BELOW = np.array([6 * min((d + k) // 3, TAPS - 1) + _BLOCK[(d + k) % 3][d] for d in range(3) for k in range(3 * TAPS)])
 _BEYOND = [3 * TAPS * d + k for d in range(3) for k in range(3 * TAPS - d, 3 * TAPS)]
 
@@ -101,6 +102,33 @@ def solve_scalar(bands: Floats, right: Floats, free: Bools) -> Floats:
     bands[~free, 0] = 1.0
     solution = _cholesky(lambda: bands.copy().T, np.where(free[:, None], right, 0.0))
     return np.ascontiguousarray(solution)
+
+
+def keep_in_planes(bands: Floats, right: Floats, normal: Floats) -> None:
+    """Change a system so that its solution does not go along the normals; in place.
+
+    With P = I − n·nᵀ the blocks K become P·K·P, and those of the main diagonal get n·nᵀ besides. Control points that
+    are coupled have the same normal.
+
+    Parameters
+    ----------
+    bands : (c, 4, 6) float64
+    right : (3, c) float64
+    normal : (c, 3) float64
+        Of length 1, or 0 where the solution is free.
+    """
+    rows = np.flatnonzero(normal.any(axis=1))
+    if not len(rows):
+        return
+    blocks, n = np.ascontiguousarray(bands[rows].T), normal[rows].T.copy()
+    pushed = [sum(blocks[_BLOCK[d][e]] * n[e] for e in range(3)) for d in range(3)]  # K·n
+    twice = sum(pushed[d] * n[d] for d in range(3))
+    twice[0] += blocks[:3, 0].sum(axis=0) / 3.0  # as stiff as the others
+    pushed = [pushed[d] - 0.5 * twice * n[d] for d in range(3)]
+    for k, (d, e) in enumerate(_ENTRIES):
+        blocks[k] -= n[d] * pushed[e] + pushed[d] * n[e]
+    bands[rows] = blocks.T
+    right[:, rows] -= (right[:, rows] * n).sum(axis=0) * n
 
 
 def solve_blocks(bands: Floats, right: Floats, coupled: Floats) -> Floats:

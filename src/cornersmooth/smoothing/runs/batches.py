@@ -6,11 +6,15 @@ deviate to opposite sides the lever has twice the room. At constant H the axis p
 is off across the axis O, and by what the tip is off along it; what the axis point's curve does along the axis does not
 show. So the tip leaves along the axis at least what the fit needs across it, and the axis point may use across the axis
 what the tip has left.
+
+Where all axes of a run lie in one plane the lever does not leave it: a machine may have no rotary axis that goes there,
+and another one would tremble. Across the plane the axis point then is off by what the tip is, so there, too, the tip
+leaves the axis point its part.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -42,6 +46,9 @@ NEIGHBOURS, POWER, LEAST_MEAN = 1, 0.75, 1e-12
 
 #: levers that differ by less than this part of the coordinates are the same
 STILL = 1e-14
+
+#: axes of a run lie in a plane where their axis points are off it by at most this share of their tolerance
+FLAT = 0.01
 
 #: what the third derivative of the tip counts beside that of the lever: rotary axes have less jerk to give
 TIP_COUNTS = 0.3
@@ -99,6 +106,16 @@ class Problem:
         still: Bools = np.bincount(run, off, minlength=len(self.lines.count)) == 0
         return still
 
+    @cached_property
+    def normal(self) -> Floats:
+        """(runs, 3) normal of the plane that all axes of a run lie in; 0 where there is none, or one axis alone."""
+        lever = self.lines.point[:, 3:] - self.lines.point[:, :3]
+        first = self.lines.first[:-1]
+        normal = np.linalg.eigh(np.add.reduceat(lever[:, :, None] * lever[:, None, :], first)).eigenvectors[:, :, 0]
+        off = np.maximum.reduceat(np.abs(dot(lever, normal[spread(self.lines.count)[0]])), first)
+        flat = (off <= FLAT * self.tolerances[1]) & ~self.still
+        return np.where(flat[:, None], normal, 0.0)
+
 
 def solve_windows(
     problem: Problem, windows: Windows, control: Floats, tight: Floats, gaps: tuple[float, ...], *, near: bool
@@ -119,17 +136,22 @@ def solve_windows(
     moved = control[windows.control].copy()
     there = _Places.of(problem, windows, tight)
     width = problem.splines.width[windows.span]
+    rough = problem.rough[windows.control]
+    normal = problem.normal[problem.splines.control_run[windows.control]]
     for gap in gaps:
         weight = width * even_weights(problem.splines, windows, moved)
         for part, tolerance in enumerate(problem.tolerances):
             own = slice(3 * part, 3 * part + 3)
+            if part:  # across its plane the lever stays that of the fit
+                moved[:, own] += across(normal, rough[:, 3:] - rough[:, :3] - moved[:, 3:] + moved[:, :3])
             off = there.deviation(moved, part)
             task = there.axis_task(weight, there.deviation(moved, 0)) if part else there.tip_task(weight)
             jerk = task.smooth.apply(moved[:, own])
             if part:
                 jerk -= task.smooth.apply(moved[:, :3])
             elif near:
-                jerk -= followed(problem.splines, windows, moved)[:, None] * task.smooth.apply(moved[:, 3:])
+                free = moved[:, 3:] - across(normal, moved[:, 3:])
+                jerk -= followed(problem.splines, windows, moved)[:, None] * task.smooth.apply(free)
             jerk /= tolerance
             moved[:, own] += tolerance * smoothest(task, off, jerk, gap, WARM if near else COLD)
         still = problem.still[problem.splines.control_run[windows.control]]
@@ -151,6 +173,7 @@ class _Places:
     short: Floats  # length of the lever over H
     limit: Floats  # (m, 2)
     rough: Floats  # (m, 6)
+    normal: Floats  # (m, 3) of the plane of the axes, or 0
     sample_window: Ints
     span_window: Ints
 
@@ -172,8 +195,10 @@ class _Places:
         span_window = np.repeat(np.arange(len(windows.count)), windows.count)
         rough = (near.apply(problem.rough[windows.control]) - samples.target) / np.repeat(problem.tolerances, 3)
         axis, short = lever / length[:, None], length / problem.axis_length
+        normal = problem.normal[splines.span_run[windows.span[span]]]
+        window = span_window[span]
         return cls(
-            problem, windows, samples.target, near, smooth, axis, short, limit, rough, span_window[span], span_window
+            problem, windows, samples.target, near, smooth, axis, short, limit, rough, normal, window, span_window
         )
 
     def deviation(self, moved: Floats, part: int) -> Floats:
@@ -183,27 +208,39 @@ class _Places:
         return off
 
     def tip_task(self, weight: Floats) -> Task:
-        """The tip; |across|² + (1 + k)·along² ≤ r² leaves the axis point its part."""
+        """The tip; |across|² + (1 + k)·along² ≤ r² leaves the axis point its part.
+
+        Where the lever stays in a plane, what is across that counts as what is along the axis. Left is one direction,
+        in the plane and across the axis, so there is one metric for both: I + k·O·Oᵀ, with that direction as O.
+        """
         off, (tip, axis) = self.rough[:, 3:], self.limit.T
-        across = np.sqrt(np.maximum(dot(off, off) - dot(self.axis, off) ** 2, 0.0)) / self.short + ROOM
-        left = np.clip(across / axis, LEAST_LEFT, MOST_LEFT)
+        off = off - across(self.normal, off)
+        wide = np.sqrt(np.maximum(dot(off, off) - dot(self.axis, off) ** 2, 0.0)) / self.short + ROOM
+        left = np.clip(wide / axis, LEAST_LEFT, MOST_LEFT)
         unit = self.problem.tolerances[0] / self.problem.tolerances[1]
         stretch = np.maximum((tip * unit / axis) ** 2 / (1.0 - left**2) - 1.0, 0.0)
-        return self._task(weight, stretch, np.maximum(tip, _size(self.axis, stretch, self.rough[:, :3]) + ROOM))
+        flat = np.asarray(self.normal.any(axis=1))
+        direction = np.where(flat[:, None], np.cross(self.normal, self.axis), self.axis)
+        radius = np.where(flat, tip / np.sqrt(1.0 + stretch), tip)
+        stretch = np.where(flat, 1.0 / (1.0 + stretch) - 1.0, stretch)
+        radius = np.maximum(radius, _size(direction, stretch, self.rough[:, :3]) + ROOM)
+        return self._task(weight, direction, stretch, radius)
 
     def axis_task(self, weight: Floats, tip_off: Floats) -> Task:
         """The axis point, from the deviation (m, 3) of the tip."""
         along = dot(self.axis, tip_off) * self.problem.tolerances[0] / self.problem.tolerances[1]
         radius = self.short * np.sqrt(np.maximum(self.limit[:, 1] ** 2 - along**2, 0.0))
         stretch = np.full(len(radius), ALONG - 1.0)
-        return self._task(weight, stretch, np.maximum(radius, _size(self.axis, stretch, self.rough[:, 3:]) + ROOM))
+        radius = np.maximum(radius, _size(self.axis, stretch, self.rough[:, 3:]) + ROOM)
+        normal = self.problem.normal[self.problem.splines.control_run[self.windows.control]]
+        return replace(self._task(weight, self.axis, stretch, radius), normal=normal)
 
-    def _task(self, weight: Floats, stretch: Floats, radius: Floats) -> Task:
+    def _task(self, weight: Floats, axis: Floats, stretch: Floats, radius: Floats) -> Task:
         return Task(
             near=self.near,
             smooth=self.smooth,
             weight=weight,
-            axis=self.axis,
+            axis=axis,
             stretch=stretch,
             radius=radius,
             free=self.windows.free,
@@ -212,6 +249,11 @@ class _Places:
             control_window=self.windows.window,
             windows=len(self.windows.count),
         )
+
+
+def across(normal: Floats, vectors: Floats) -> Floats:
+    """(m, 3) the parts of vectors across planes; nothing where the normal is 0."""
+    return dot(normal, vectors)[:, None] * normal
 
 
 def followed(splines: Splines, windows: Windows, control: Floats) -> Floats:

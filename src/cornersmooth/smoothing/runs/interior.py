@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing.runs.banded import Gather, couplings, solve_blocks
+from cornersmooth.smoothing.runs.banded import Gather, couplings, keep_in_planes, solve_blocks
 
 #: steps at most, and the share of the way to the bounds that each may go
 STEPS, BACK_OFF = 40, 0.95
@@ -51,6 +51,8 @@ class Task:
     free : (c,) bool
     sample_window, span_window, control_window : int64
     windows : int
+    normal : (c, 3) float64, optional
+        Control points do not move along it; 0 where they move as they like.
     """
 
     near: Gather
@@ -64,6 +66,7 @@ class Task:
     span_window: Ints
     control_window: Ints
     windows: int
+    normal: Floats | None = None
 
     @cached_property
     def columns(self) -> Floats:
@@ -133,6 +136,8 @@ def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float
         right = -task.smooth.sum_rows(weight * jerk) - task.near.sum_rows(barrier * pull)
         bands = task.near.bands(_bend(task, force, bent, pull))
         bands[..., :3] += stiff
+        if task.normal is not None:
+            keep_in_planes(bands, right, task.normal)
         step = solve_blocks(bands, right, task.coupled)
         step_off, step_jerk = task.near.apply_rows(step), task.smooth.apply_rows(step)
         step_pull = task.pull(step_off)
