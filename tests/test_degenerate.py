@@ -117,7 +117,7 @@ def test_degenerate_chain(name: str, form: Form) -> None:
     check(CASES[name], form)
 
 
-@pytest.mark.parametrize(("name", "axis_length", "form"), covering_share(product(CASES, [0.5, 500.0], FORMS), 3))
+@pytest.mark.parametrize(("name", "axis_length", "form"), covering_share(product(CASES, [0.5, 500.0], FORMS), 5))
 def test_degenerate_chain_at_other_axis_lengths(name: str, form: Form, axis_length: float) -> None:
     check(CASES[name], form, axis_length=axis_length, tolerance=0.05)
 

@@ -31,7 +31,7 @@ TOLERANCES = (0.001, 0.01, 0.04, 0.15)
 AXIS_LENGTHS = (10.0, 50.0)
 FORMS: tuple[Form, ...] = ("g1", "g6.2")
 #: for each tolerance and axis length; half of them in either form
-CHAINS = how_many(60, 1000)
+CHAINS = how_many(40, 1000)
 #: statuses of the report under which a pose need not be passed
 ROUNDED = "smoothed"
 REPEATED = "duplicate"
@@ -237,7 +237,7 @@ ONCE: list[tuple[Form, float, float]] = [(form, 0.04, 10.0) for form in FORMS]
 
 @pytest.mark.parametrize(
     ("name", "form", "tolerance", "axis_length"),
-    [*covering_share(_every(OWN_OTHERS, ONCE), 4), *of_corpus(covering_share(_every(FOUR_OR_LESS, ONCE), 6, 1))],
+    [*covering_share(_every(OWN_OTHERS, ONCE), 6), *of_corpus(covering_share(_every(FOUR_OR_LESS, ONCE), 9, 1))],
 )
 def test_files_with_arcs_holes_and_fixed_axes(name: str, form: Form, tolerance: float, axis_length: float) -> None:
     whole_file(cl_file(name), form, tolerance, axis_length)

@@ -32,7 +32,7 @@ LIMITS = ((0.002, 10.0), (0.05, 50.0), (0.01, 10.0))
 )
 def test_random_chains_keep_the_tolerance(case: Case, tolerance: float, axis_length: float, units: str) -> None:
     settings = Settings(tolerance=tolerance, axis_length=axis_length)
-    count = how_many(3, 24) if case.tcp else how_many(3, 6)  # without tool tip control every line becomes many
+    count = how_many(2, 24) if case.tcp else how_many(2, 6)  # without tool tip control every line becomes many
     found = random_verdict(case, settings, len(str(case)), count, units)
     assert found.deviation.worst <= tolerance, found
 

@@ -66,7 +66,7 @@ def _is_block(line: str) -> bool:
     return bool(bare) and bare != "%" and bare[0] not in "(;"
 
 
-@pytest.mark.parametrize("case", CHOSEN, ids=str)
+@pytest.mark.parametrize("case", covering_share(CHOSEN, 2), ids=str)
 def test_motion_is_that_of_the_independent_readers(case: Case) -> None:
     form = case.choose()
     settings = Settings(tolerance=0.02, axis_length=10.0)
@@ -120,7 +120,7 @@ OWN = ["nx_blade.cls", "nx_holes.cls", "nx_pocket.cls", "creo_plate.ncl", "solid
 def test_no_false_alarm_on_files(name: str, number: int, third: int) -> None:
     """Each file in each control and form at one of three tolerances, in turn: `verify.sweep` does all."""
     tolerance = (0.001, 0.04, 0.15)[(number + third) % 3]
-    for case in share(CHOSEN[third::3], 16, number):
+    for case in share(CHOSEN[third::3], 24, number):
         _passes_on(case, name, cl_file(name).read_bytes(), tolerance)
 
 

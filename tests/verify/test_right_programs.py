@@ -15,7 +15,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.settings import Settings
 from nc.cases import Case
-from oracle.share import THOROUGH
+from oracle.share import THOROUGH, share
 from verify.random_programs import Trial
 from verify.sweep import judged
 
@@ -36,7 +36,7 @@ def load(path: Path) -> Trial:
 
 
 @pytest.mark.parametrize(
-    "path", [path for path in FILES if THOROUGH or path.stem not in LONG], ids=lambda path: path.stem
+    "path", share([path for path in FILES if THOROUGH or path.stem not in LONG], 2), ids=lambda path: path.stem
 )
 def test_text_passes(path: Path) -> None:
     """And the oracle agrees, in a thorough run."""
