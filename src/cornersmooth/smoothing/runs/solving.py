@@ -106,7 +106,7 @@ def solve_runs(
         if not len(failed) or number == MENDINGS:
             break
         over = proven[failed] / limits
-        factor = np.where(over > 1.0, 0.985 / over, 1.0)
+        factor = np.where(over > 1.0, 0.985 / np.maximum(over, 1.0), 1.0)
         if number:  # the axis point at constant H hangs on both
             factor[:, 0] = factor.min(axis=1)
         tight[failed] = np.maximum(tight[failed] * factor, LEAST_SHARE)
