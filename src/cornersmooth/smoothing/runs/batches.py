@@ -14,7 +14,7 @@ leaves the axis point its part.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -91,26 +91,28 @@ class Problem:
         return starts(np.bincount(self.pieces.span, minlength=len(self.splines.span_run)))
 
     @cached_property
+    def lever(self) -> Floats:
+        """(poses, 3) mm: from tip to axis point."""
+        return self.lines.point[:, 3:] - self.lines.point[:, :3]
+
+    @cached_property
     def first_lever(self) -> Floats:
-        """(runs, 3) mm: from tip to axis point at the start of each run."""
-        first = self.lines.point[self.lines.first[:-1]]
-        return first[:, 3:] - first[:, :3]
+        """(runs, 3) mm: that at the start of each run."""
+        return self.lever[self.lines.first[:-1]]
 
     @cached_property
     def still(self) -> Bools:
         """(runs,) bool: the axis does not turn at all; it must not tremble then, least of all at a machine's pole."""
-        lever = self.lines.point[:, 3:] - self.lines.point[:, :3]
         run = spread(self.lines.count)[0]
         size = np.abs(self.lines.point).max(axis=1)
-        off = np.abs(lever - self.first_lever[run]).max(axis=1) > STILL * np.maximum(size, self.axis_length)
+        off = np.abs(self.lever - self.first_lever[run]).max(axis=1) > STILL * np.maximum(size, self.axis_length)
         still: Bools = np.bincount(run, off, minlength=len(self.lines.count)) == 0
         return still
 
     @cached_property
     def normal(self) -> Floats:
         """(runs, 3) normal of the plane that all axes of a run lie in; 0 where there is none, or one axis alone."""
-        lever = self.lines.point[:, 3:] - self.lines.point[:, :3]
-        first = self.lines.first[:-1]
+        lever, first = self.lever, self.lines.first[:-1]
         normal = np.linalg.eigh(np.add.reduceat(lever[:, :, None] * lever[:, None, :], first)).eigenvectors[:, :, 0]
         off = np.maximum.reduceat(np.abs(dot(lever, normal[spread(self.lines.count)[0]])), first)
         flat = (off <= FLAT * self.tolerances[1]) & ~self.still
@@ -137,7 +139,8 @@ def solve_windows(
     there = _Places.of(problem, windows, tight)
     width = problem.splines.width[windows.span]
     rough = problem.rough[windows.control]
-    normal = problem.normal[problem.splines.control_run[windows.control]]
+    run = problem.splines.control_run[windows.control]
+    normal, still = problem.normal[run], problem.still[run]
     for gap in gaps:
         weight = width * even_weights(problem.splines, windows, moved)
         for part, tolerance in enumerate(problem.tolerances):
@@ -145,7 +148,7 @@ def solve_windows(
             if part:  # across its plane the lever stays that of the fit
                 moved[:, own] += across(normal, rough[:, 3:] - rough[:, :3] - moved[:, 3:] + moved[:, :3])
             off = there.deviation(moved, part)
-            task = there.axis_task(weight, there.deviation(moved, 0)) if part else there.tip_task(weight)
+            task = there.axis_task(weight, there.deviation(moved, 0), normal) if part else there.tip_task(weight)
             jerk = task.smooth.apply(moved[:, own])
             if part:
                 jerk -= task.smooth.apply(moved[:, :3])
@@ -154,8 +157,7 @@ def solve_windows(
                 jerk -= followed(problem.splines, windows, moved)[:, None] * task.smooth.apply(free)
             jerk /= tolerance
             moved[:, own] += tolerance * smoothest(task, off, jerk, gap, WARM if near else COLD)
-        still = problem.still[problem.splines.control_run[windows.control]]
-        moved[still, 3:] = moved[still, :3] + problem.first_lever[problem.splines.control_run[windows.control[still]]]
+        moved[still, 3:] = moved[still, :3] + problem.first_lever[run[still]]
         near = True
     return moved
 
@@ -226,16 +228,17 @@ class _Places:
         radius = np.maximum(radius, _size(direction, stretch, self.rough[:, :3]) + ROOM)
         return self._task(weight, direction, stretch, radius)
 
-    def axis_task(self, weight: Floats, tip_off: Floats) -> Task:
-        """The axis point, from the deviation (m, 3) of the tip."""
+    def axis_task(self, weight: Floats, tip_off: Floats, normal: Floats) -> Task:
+        """The axis point, from the deviation (m, 3) of the tip; control points do not go along the normals (c, 3)."""
         along = dot(self.axis, tip_off) * self.problem.tolerances[0] / self.problem.tolerances[1]
         radius = self.short * np.sqrt(np.maximum(self.limit[:, 1] ** 2 - along**2, 0.0))
         stretch = np.full(len(radius), ALONG - 1.0)
         radius = np.maximum(radius, _size(self.axis, stretch, self.rough[:, 3:]) + ROOM)
-        normal = self.problem.normal[self.problem.splines.control_run[self.windows.control]]
-        return replace(self._task(weight, self.axis, stretch, radius), normal=normal)
+        return self._task(weight, self.axis, stretch, radius, normal)
 
-    def _task(self, weight: Floats, axis: Floats, stretch: Floats, radius: Floats) -> Task:
+    def _task(
+        self, weight: Floats, axis: Floats, stretch: Floats, radius: Floats, normal: Floats | None = None
+    ) -> Task:
         return Task(
             near=self.near,
             smooth=self.smooth,
@@ -248,6 +251,7 @@ class _Places:
             span_window=self.span_window,
             control_window=self.windows.window,
             windows=len(self.windows.count),
+            normal=normal,
         )
 
 
