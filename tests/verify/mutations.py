@@ -148,7 +148,7 @@ def motion_mutants(form, lines, rng):
         if lines[i + 1][:2] != "G1" or not is_motion(lines[i - 1]) or " F" in lines[i] + lines[i + 1]:
             continue
         a, b = place(lines[i], form)[0], place(lines[i + 1], form)[0]
-        if np.linalg.norm(b - a) > EPS:  # to and fro by less may be within ε in order
+        if np.linalg.norm(b - a) > 5e-3:
             yield Mutant("swapped", [*lines[:i], lines[i + 1], lines[i], *lines[i + 2 :]], (i, i + 4))
     # a piece run twice, or left out
     for _ in range(40):
