@@ -50,7 +50,10 @@ JUDGED = [case for case in CASES if case[:2] != ("global", "g6.2")]
 
 
 def written(method: str, form: Form, pair: tuple[float, float], seed: int, count: int) -> Case:
-    chains = random_chains(seed, count, corners=6)
+    return of_chains(random_chains(seed, count, corners=6), method, form, pair)
+
+
+def of_chains(chains: list[Chain], method: str, form: Form, pair: tuple[float, float]) -> Case:
     program = cornersmooth.read(cl_text(chains)[0], name="chains.cls")
     chosen = choose_form("fanuc", form)
     settings = cornersmooth.fit_settings(
@@ -93,6 +96,13 @@ def test_random_chains_are_verified(case: tuple[str, Form, tuple[float, float]])
         assert found.orientation.value > 0.5 * case[2][1] or found.tip.value > 0.9 * case[2][0]
         half = verified(made, axis_tolerance=0.5 * found.orientation.value)
         assert {problem.code for problem in half.problems} == {"CS527"}
+
+
+def test_an_axis_that_is_off_where_it_turns_back_is_not_in_a_wrong_order() -> None:
+    """It is followed in order, if not within its tolerance."""
+    made = of_chains(random_chains(312, 8, corners=6)[2:], "global", "g1", (0.01, 0.5))
+    assert verified(made).passed
+    assert {problem.code for problem in verified(made, axis_tolerance=0.1).problems} == {"CS527"}
 
 
 def turned(text: bytes, block: int, degrees: float) -> bytes:

@@ -44,7 +44,9 @@ class Shares:
 
 def shares(path: Path, original: Original, axis_length: float, tolerance: float, degrees: float) -> Shares:
     """Largest shares of a run, both ways."""
-    at = match_samples(path, original, match_poses(path, original, axis_length, tolerance), axis_length)
+    # points on the axis may be off by what their axis may
+    limit = max(tolerance, axis_length * math.radians(degrees))
+    at = match_samples(path, original, match_poses(path, original, axis_length, limit), axis_length)
     axis = unit(path.point - path.tip)
 
     def of_original(place: Floats) -> tuple[Floats, Floats]:

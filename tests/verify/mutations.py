@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from oracle.frechet import frechet_distance
+
 from .writing import job, number
 
 EPS, H = 0.02, 10.0
@@ -65,7 +67,26 @@ def distance_to_chord(a, p, b):
     return np.linalg.norm(a + t * d - p)
 
 
-def motion_mutants(form, lines, rng):
+def goes_back(tip, path):
+    """Whether four tips are farther from the CL path in order with the inner two swapped, by more than a digit."""
+    part = piece(path, tip[0], tip[3])
+    return frechet_distance(tip[[0, 2, 1, 3]], part) > frechet_distance(tip, part) + 1e-4
+
+
+def piece(path, start, end):
+    """Of a polyline (n, 3), from where it is nearest to one point to where it is nearest to another."""
+    feet = []
+    for point in (start, end):
+        d = np.diff(path, axis=0)
+        t = np.clip(((point - path[:-1]) * d).sum(1) / np.maximum((d * d).sum(1), 1e-30), 0, 1)
+        foot = path[:-1] + t[:, None] * d
+        k = int(np.linalg.norm(foot - point, axis=1).argmin())
+        feet.append((k + t[k], foot[k]))
+    (first, a), (last, b) = feet
+    return np.vstack((a, path[int(first) + 1 : int(np.ceil(last))], b))
+
+
+def motion_mutants(form, lines, path, rng):
     motion = [i for i, line in enumerate(lines) if is_motion(line)]
     straight = [i for i in motion if lines[i].startswith("G1 ")]
     letters = "XYZIJK" if form == "g1" else "XYZUVW"
@@ -147,9 +168,10 @@ def motion_mutants(form, lines, rng):
         i = int(rng.choice(straight))
         if lines[i + 1][:2] != "G1" or not is_motion(lines[i - 1]) or " F" in lines[i] + lines[i + 1]:
             continue
-        a, b = place(lines[i], form)[0], place(lines[i + 1], form)[0]
-        if np.linalg.norm(b - a) > 5e-3:
-            yield Mutant("swapped", [*lines[:i], lines[i + 1], lines[i], *lines[i + 2 :]], (i, i + 4))
+        tip = np.array([place(line, form)[0] for line in lines[i - 1 : i + 3]])
+        if np.linalg.norm(tip[2] - tip[1]) > 5e-3:
+            seen = goes_back(tip, path)
+            yield Mutant("swapped", [*lines[:i], lines[i + 1], lines[i], *lines[i + 2 :]], (i, i + 4) if seen else None)
     # a piece run twice, or left out
     for _ in range(40):
         i = int(rng.choice(straight[:-14]))
@@ -271,7 +293,7 @@ def mutants(form, seed):
     """Program and mutants of one base text."""
     program, lines = job(form, EPS, H, seed)
     rng = np.random.default_rng(1000 + seed)
-    found = [*motion_mutants(form, lines, rng), *word_mutants(lines, rng)]
+    found = [*motion_mutants(form, lines, program.tip, rng), *word_mutants(lines, rng)]
     if form == "g6.2":
         found += curve_mutants(lines, rng)
     return program, lines, found

@@ -69,9 +69,8 @@ def written_backwards(match: Match, written: Reached, windows: Windows) -> Found
     wrong = (gain > match.slack) & (free < held) & (off <= _OFF * match.near)
     straight = _way(path.length, free, held) <= _STRAIGHT * distance_between(_on(path.six, held), _on(path.six, free))
     rows = np.flatnonzero(wrong & straight)
-    ends = np.flatnonzero(match.on & _ends_blocks(match) if match.nc.rotary else match.on)
-    rows = rows[np.isin(vertex[rows], ends)]
-    length = path.length_at(match.segment[ends], match.fraction[ends])
+    ends = _block_ends(match)
+    rows = rows[np.isin(vertex[rows], ends[0])]
     begin = path.length_at(segment[rows], at[rows])
     stop = path.length_at(match.segment[vertex[rows]], match.fraction[vertex[rows]])
     found: list[int] = []
@@ -79,17 +78,11 @@ def written_backwards(match: Match, written: Reached, windows: Windows) -> Found
         if found and (vertex[row] == vertex[found[-1]] + 1 or len(found) > _MOST_WRONG):
             found.append(row)  # one problem with the vertex before it, or the text is off everywhere
             continue
-        mine = np.searchsorted(match.stretch[ends], match.stretch[vertex[row]] + np.arange(2))
-        around = 2.0 * max(float(off[row]), match.slack)
-        first, last = np.searchsorted(length, [low - around, high + around])
-        first, last = max(int(first) - 1, int(mine[0])), min(int(last), int(mine[1]) - 1)
-        if _in_order(match, ends[first : last + 1]):
+        if _followed(match, ends, int(vertex[row]), low, high, float(off[row])):
             continue
         window = windows.around(int(vertex[row])) if _turns_back(match, low, high) else None
         if window is None or not window.passed:
             found.append(row)
-    if not found:
-        return None
     return _told(match, vertex[found], gain[found])
 
 
@@ -102,19 +95,25 @@ def written_elsewhere(match: Match, written: Reached, windows: Windows) -> Found
     -------
     As `written_backwards`; the amount is how far vertices are from their places.
     """
-    away = match.distance[written.vertex]
+    away, path = match.distance[written.vertex], match.path
     lost = np.isfinite(away) & (away > np.sqrt(2.0) * match.near) & (written.gap.larger <= match.near)
     rows = np.flatnonzero(lost)
+    if not len(rows):
+        return None
+    ends = _block_ends(match)
     found: list[int] = []
     for row in rows.tolist():
-        if found and (written.vertex[row] == written.vertex[found[-1]] + 1 or len(found) > _MOST_WRONG):
+        vertex = int(written.vertex[row])
+        if found and (vertex == written.vertex[found[-1]] + 1 or len(found) > _MOST_WRONG):
             found.append(row)
             continue
-        window = windows.around(int(written.vertex[row]))
-        if window is not None and not window.alone:
+        window = windows.around(vertex)
+        if window is None or window.alone:
+            continue
+        place = np.sort([written.place[row], match.place[vertex]])
+        low, high = path.length_at(*_segments(path.six, place)).tolist()
+        if not _followed(match, ends, vertex, low, high, float(written.gap.larger[row])):
             found.append(row)
-    if not found:
-        return None
     return _told(match, written.vertex[found], away[found])
 
 
@@ -142,13 +141,13 @@ def turned_elsewhere(distances: Distances) -> Found | None:
         failed.append(window)
         if not _curved(match, window) and not _left(distances, window):
             found.append(row)
-    if not found:
-        return None
     return _told(match, written.vertex[found], away[found])
 
 
-def _told(match: Match, vertex: Ints, amount: Floats) -> Found:
-    """Where written vertices are that are run in a wrong order."""
+def _told(match: Match, vertex: Ints, amount: Floats) -> Found | None:
+    """Where written vertices are that are run in a wrong order, if there are any."""
+    if not len(vertex):
+        return None
     original = match.original
     move = original.trail.owner[match.segment[vertex] + 1]
     nc_line = match.nc.line[match.written.trail.owner[vertex]]
@@ -232,6 +231,15 @@ def _segments(six: Floats, place: Floats) -> tuple[Ints, Floats]:
     return segment, place - segment
 
 
+def _followed(match: Match, ends: tuple[Ints, Floats], vertex: int, low: float, high: float, off: float) -> bool:
+    """Whether both are in order from one path length to another within what they are off there (a vertex by `off`)."""
+    mine = np.searchsorted(match.stretch[ends[0]], match.stretch[vertex] + np.arange(2))
+    beyond = 2.0 * max(off, match.slack)
+    first, last = np.searchsorted(ends[1], [low - beyond, high + beyond])
+    first, last = max(int(first) - 1, int(mine[0])), min(int(last), int(mine[1]) - 1)
+    return _in_order(match, ends[0][first : last + 1])
+
+
 def _in_order(match: Match, vertex: Ints) -> bool:
     """Whether vertices are in order within what they and the path between them are off each other."""
     place = match.place[vertex[[0, -1]]]
@@ -265,13 +273,14 @@ def _off(points: Floats, path: Floats) -> float:
     return float(np.sqrt(np.maximum(away[..., :3].sum(axis=2), away[..., 3:].sum(axis=2)).min(axis=1).max()))
 
 
-def _ends_blocks(match: Match) -> Bools:
-    """(v,) whether a vertex is more than a point of the straight motion of the axes in one block."""
+def _block_ends(match: Match) -> tuple[Ints, Floats]:
+    """Vertices (e,) that have a place, but none inside a straight motion of rotary axes, and path lengths there."""
     nc, owner = match.nc, match.written.trail.owner
     following = np.minimum(owner + 1, len(nc.line) - 1)
-    goes_on = (nc.line[following] == nc.line[owner]) & (following > owner)
-    ends: Bools = ~(goes_on & match.written.straight[owner - match.written.first])
-    return ends
+    inside = (nc.line[following] == nc.line[owner]) & (following > owner)
+    inside &= match.written.straight[owner - match.written.first]
+    ends = np.flatnonzero(match.on & ~inside if nc.rotary else match.on)
+    return ends, match.path.length_at(match.segment[ends], match.fraction[ends])
 
 
 def original_backwards(match: Match, theirs: Reached, windows: Windows) -> Found | None:
