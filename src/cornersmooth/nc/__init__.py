@@ -33,6 +33,7 @@ from cornersmooth.nc.planes import Planes, plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
 from cornersmooth.nc.rewound_curve_rows import curve_rows_of, rewound_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
+from cornersmooth.nc.run_writer import RunWriter
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
 from cornersmooth.nc.writers import Writers
@@ -197,12 +198,14 @@ def write(
     writer = BlockWriter(chosen, program, statements, findings, circles, stretch, values["blend"], modal=frame.modal)
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
     writers = Writers(writer, upright, planes)
-    motion = MotionWriter(program, writers, statements, operation, findings, approach, frame.retract, native)
+    runs = RunWriter(program, writers, statements, operation, findings, approach, frame.retract)
+    motion = MotionWriter(runs, native)
+    of_rows = Findings()  # rows are made in a thread of their own: what is said of them comes last, whenever it is met
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
         text.write_blocks(operation.start())
         chunks = (
-            (rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, planes, findings)
+            (rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, planes, of_rows)
         )
         for rows, ticks in _one_ahead(chunks):
             for lines in motion.write(rows, ticks):
@@ -212,7 +215,8 @@ def write(
         for lines in motion.finish():
             text.write(lines)
         text.write_blocks(motion.end())
-    return Written(text.blocks + motion.written, findings.all())
+    findings.take(of_rows)
+    return Written(text.blocks + runs.written, findings.all())
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes, findings: Findings) -> Iterator[Rows]:

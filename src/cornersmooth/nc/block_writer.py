@@ -424,7 +424,7 @@ class BlockWriter:
             chosen[row] = len(table)
             table.append(end + given_feed + others)
         if run.dwell is not None and run.dwell.any():
-            blocks = self.statements.dwell(dwell, self.statements.cycle_line)
+            blocks = self.statements.dwell(dwell, self.statements.cycles.line)
             chosen[run.dwell] += len(table)
             table += [end + "".join(block + "\n" for block in blocks).encode() for end in table]
             self.blocks += int(np.count_nonzero(run.dwell)) * len(blocks)

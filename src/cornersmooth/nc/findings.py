@@ -19,6 +19,11 @@ class Findings:
         new = Finding(code, severity, line, text, count) if old is None else replace(old, count=old.count + count)
         self._found[code, text] = new
 
+    def take(self, other: Findings) -> None:
+        """Count what was noticed elsewhere, behind what was noticed here."""
+        for finding in other.all():
+            self.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
+
     def all(self) -> tuple[Finding, ...]:
         """Everything that was noticed."""
         return tuple(self._found.values())

@@ -7,20 +7,18 @@ is not understood becomes a comment and a counted warning, never an NC word by g
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NoReturn
 
-from cornersmooth.errors import InputError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
+from cornersmooth.nc.compensation import begin_compensation
 from cornersmooth.nc.control import Blocks, Words
 from cornersmooth.nc.cycle_blocks import TOOL_WORDS, ahead_of_tools, loaded_tool
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.holes import Cycle, read_cycle
+from cornersmooth.nc.hole_cycles import HoleCycles
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.spindle import milliseconds, revolutions
 from cornersmooth.nc.statement_args import number_after, numbers_of, spoken_text, whole_number, words_of
@@ -68,23 +66,20 @@ class StatementWriter:
     skip_taps: bool = True  #: whether taps are left out with a warning
     plane: int = 17  #: the plane selected, kept by who writes the motion
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
-    cycle: Cycle | None = None  #: the hole cycle in force, None where it is not understood
     speed: float | None = None  #: of the spindle, revolutions per minute
     compensated: bool = False
     per_revolution: bool = False  #: the feed in force, kept by who writes the motion
     tool: int | None = None  #: loaded last
     _direction: str = "clockwise"
     _diameter: float = 0.0
-    _last_cycle: Cycle | None = None
-    _cycle_args: tuple[float | str, ...] = ()
-    _in_cycle: bool = False
-    cycle_line: int = 0  #: of the last CYCLE
+    cycles: HoleCycles = field(init=False)
     words: Words = field(init=False)
     toolno_loads: bool = field(init=False)
     _ahead_of_tools: frozenset[int] = field(init=False)
 
     def __post_init__(self) -> None:
         self.words = self.form.table.words
+        self.cycles = HoleCycles(self.program, self.findings, skip_taps=self.skip_taps)
         said = {statement.word for statement in self.program.statements}
         self.toolno_loads = not TOOL_WORDS & said
         self._ahead_of_tools = ahead_of_tools(self.program)
@@ -234,7 +229,7 @@ class StatementWriter:
             self.operation.turn((direction,))
             return [direction]
         self.speed = self.speed if speed is None else speed
-        self._read_cycle()
+        self.cycles.read(self.speed)
         digits = format_number(self.speed or 0.0, self.form.table.digits.speed, trim=True).rstrip(".")
         turning = tuple(block.format(speed=digits, direction=direction) for block in self.words.spindle_speed)
         if not self.operation.spindle and id(statement) in self._ahead_of_tools:
@@ -295,100 +290,26 @@ class StatementWriter:
 
     def compensation(self, statement: Statement) -> list[str] | None:
         """CUTCOM/LEFT|RIGHT[,plane][,n] and CUTCOM/OFF."""
-        words, numbers = words_of(statement), numbers_of(statement)
-        if words[:1] in (["OFF"], ["NOMORE"]):
+        if words_of(statement)[:1] in (["OFF"], ["NOMORE"]):
             self.compensated = False
             return list(self.words.compensation_off) or None
-        if not self.words.compensation_left and words[:1] in (["LEFT"], ["RIGHT"]):
-            raise InputError(
-                "CS336",
-                f"{self.form.control} is given no cutter compensation, and the path would be cut without it",
-                "let the CAM system put the cutter's radius into the path",
-                file=self.program.source.name,
-                line=statement.line,
-            )
-        planes = {"XYPLAN": 17, "ZXPLAN": 18, "YZPLAN": 19}
-        side = {"LEFT": self.words.compensation_left, "RIGHT": self.words.compensation_right}.get((words or [""])[0])
-        register = whole_number(numbers or [float(self.operation.offset)])
-        if not side or len(words) > 2 or not set(words[1:]) <= planes.keys() or register is None:
-            return None
-        self._check_entry(statement)
-        tip = self.operation.mode is not self.form.upright and self.form.orientation not in ("fixed", "machine")
-        where = "it may be used with tool tip control (--cycles native does without, along Z), and that " if tip else ""
-        self.findings.add(
-            "CS319",
-            "warning",
-            statement.line,
-            "cutter compensation is left to the control, which offsets the path in the plane and not along the tool; "
-            f"see that {where}the register holds what the CAM system meant",
+        begun = begin_compensation(
+            statement, self.form, self.program, self.operation, self.findings, diameter=self._diameter
         )
-        self.compensated = True
-        blocks = []
-        plane = planes[words[1]] if len(words) > 1 else 17
-        if plane != self.plane:
-            self.plane = plane
-            blocks += [self.words.plane[plane]] if plane in self.words.plane else []
-        return [*blocks, *(block.format(register=register) for block in side)]
-
-    def _check_entry(self, statement: Statement) -> None:
-        """Refuse a first move that is too short for cutter compensation to begin on, where the control does."""
-        pose, tip = statement.pose, self.program.tip
-        if not self.words.compensation_entry or not 0 < pose < len(tip):
-            return
-        length = math.hypot(*(tip[pose] - tip[pose - 1])[:2])
-        if not length > 0.0:
-            raise InputError(
-                "CS344",
-                "cutter compensation begins on a move without any way in the plane, which the control refuses",
-                "let the CAM system lead in on a line, or put the cutter's radius into the path",
-                file=self.program.source.name,
-                line=statement.line,
-            )
-        if length <= self._diameter / 2.0:
-            text = (
-                f"cutter compensation begins on a move of {length:g} mm in the plane: the control refuses it where the "
-                "register holds the whole radius of the tool"
-            )
-            self.findings.add("CS345", "warning", statement.line, text)
+        if begun is None:
+            return None
+        plane, blocks = begun
+        change = [self.words.plane[plane]] if plane != self.plane and plane in self.words.plane else []
+        self.compensated, self.plane = True, plane
+        return [*change, *blocks]
 
     def hole_cycle(self, statement: Statement) -> list[str]:
         """CYCLE: kept for the holes that follow."""
-        words = words_of(statement)
-        if words[:1] in (["OFF"], ["NOMORE"]):
-            self.cycle, self._in_cycle = None, False
+        if words_of(statement)[:1] in (["OFF"], ["NOMORE"]):
+            self.cycles.end()
             return []
-        self._in_cycle |= words != ["INIT"]
-        if words == ["ON"]:
-            self.cycle = self._last_cycle
-        elif words != ["INIT"]:  # SolidWorks announces a cycle by it
-            self.cycle_line, self._cycle_args = statement.line, statement.args
-            self._read_cycle()
-            self._refuse_tap(words)
-        if self.cycle is not None and self.cycle.pecking and not self.cycle.steps:
-            text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
-            self.findings.add("CS321", "warning", statement.line, text)
+        self.cycles.say(statement, self.speed)
         return self.comment(statement.text)
-
-    def _read_cycle(self) -> None:
-        """Read the last cycle at the speed of now: a dwell may count in revolutions."""
-        if self._cycle_args:
-            self._last_cycle = read_cycle(self._cycle_args, self.program, self.speed)
-            self.cycle = self._last_cycle if self._in_cycle else None
-
-    def _refuse_tap(self, words: list[str]) -> None:
-        """A tap cannot be written as moves, and a hole without its thread is nothing to be silent about."""
-        if "TAP" in words and self.cycle is None and not self.skip_taps:
-            self.refuse_tap("its words are not understood")
-
-    def refuse_tap(self, reason: str) -> NoReturn:
-        """Give up at a tap that the control's cycle cannot do."""
-        raise InputError(
-            "CS342",
-            f"a tap, which is not written, as {reason}: plain moves cannot turn the spindle with the feed",
-            "give --skip-taps, and put the control's own cycle where the text says NOT DRILLED",
-            file=self.program.source.name,
-            line=self.cycle_line,
-        )
 
     def end(self, statement: Statement) -> list[str]:
         """END: the end of the text; in the middle of the path a stop."""

@@ -1,0 +1,147 @@
+"""Holes of the motion: as cycles of the control, as plain moves, or only gone over.
+
+Python runs per run of holes; per hole where the control has a cycle for it, or nobody understands it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cornersmooth.model import FeedMode, Floats, Ints
+from cornersmooth.nc.cycle_blocks import Hole, first_of_hole, hole_blocks, hole_feeds, kind_of
+from cornersmooth.nc.holes import Cycle, approaches, hole_moves, travel_height, travel_of
+from cornersmooth.nc.run import Run
+from cornersmooth.nc.run_writer import RunWriter
+from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.text import format_number
+
+
+@dataclass
+class HoleWriter:
+    """Writes the holes of a program.
+
+    Parameters
+    ----------
+    runs : RunWriter
+        What the moves over holes and into them are written by.
+    native : bool
+        Whether holes are cycles of the control, where they can be.
+    """
+
+    runs: RunWriter
+    native: bool = False
+
+    @cached_property
+    def _approach(self) -> Ints:
+        return approaches(self.runs.program)
+
+    def write(self, rows: Rows, part: slice) -> Iterator[bytes]:
+        """Holes of one cycle, of the control or as plain moves; those not understood are only approached."""
+        runs = self.runs
+        cycle, program, poses = runs.statements.cycles.now, runs.program, rows.move[part]
+        approach = self._approach[poses]
+        line = int(program.line[poses[0]])
+        kind = self._cycle_of_control(cycle, poses)
+        if cycle is not None and cycle.tap and not kind:
+            if not runs.statements.cycles.skip_taps:
+                runs.statements.cycles.refuse_tap(self._why_no_tap(cycle, poses))
+            cycle = None
+        if cycle is None:
+            text = "hole of a cycle that is not understood; it is not drilled, the tool only goes over it"
+            runs.findings.add("CS315", "warning", line, text, len(poses))
+            yield from self._over_holes(rows, part, travel_height(program, poses, approach))
+            return
+        if kind:
+            yield from self._cycles(cycle, kind, poses, approach)
+            return
+        runs.findings.add("CS316", "note", line, "hole of a cycle written as plain moves", len(poses))
+        before = -1 if runs.operation.comes_first else int(poses[0]) - 1
+        runs.warnings.of_holes(poses, before, *travel_of(cycle, program, poses, approach))
+        moves = hole_moves(cycle, program, poses, approach)
+        move = poses[moves.hole]
+        ticks = runs.ticks_at(rows, part, moves.tip, moves.hole)
+        run = replace(Run.straight(program, ticks, move), rapid=moves.rapid, dwell=moves.dwell)
+        if not np.isnan(cycle.feed):
+            run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
+        yield from runs.emit_above(runs.moving(run), cycle.dwell)
+
+    def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> str:
+        """Cycle of the control that drills holes, as `kind_of` names it; empty for none."""
+        if cycle is None or not self.runs.writers.takes_cycles(self.runs.writer) or not (self.native or cycle.tap):
+            return ""
+        if cycle.tap and not self._can_thread():
+            return ""
+        return kind_of(cycle, self.runs.writer.form, self.runs.program, poses)
+
+    def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
+        """Why the control's cycle cannot do a tap, in words."""
+        if not kind_of(cycle, self.runs.writer.form, self.runs.program, poses):
+            return "the control has no such cycle for it"
+        if not self._can_thread():
+            return "it takes a spindle that turns clockwise at a known speed"
+        return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
+
+    def _can_thread(self) -> bool:
+        """Whether the spindle turns as a thread needs it."""
+        return bool(self.runs.statements.clockwise and self.runs.statements.speed and self.runs.operation.turning)
+
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, approach: Ints) -> Iterator[bytes]:
+        """Holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
+        runs, program, writer = self.runs, self.runs.program, self.runs.writer
+        line, unit = int(program.line[poses[0]]), program.mm_per_unit
+        runs.findings.add("CS347", "note", line, "hole written as a cycle of the control", len(poses))
+        if kind == "tap":
+            text = "a tap is left to the control's cycle: see that it turns the spindle with the feed"
+            runs.findings.add("CS348", "warning", line, text, len(poses))
+        runs.warnings.of_cut(int(poses[0]), turning=runs.operation.turning)
+        feeds, modes = hole_feeds(cycle, program, poses)
+        travel, clearance = travel_of(cycle, program, poses, approach)
+        speed, table = runs.statements.speed or 0.0, writer.form.table.cycles
+        once = first_of_hole(getattr(table, kind))
+        frame = np.eye(3) if writer.plane is None else writer.plane.frame
+        said: tuple[str, ...] = ()
+        for k, pose in enumerate(poses.tolist()):
+            tip = program.tip[pose]
+            over = writer.ticks((tip + travel[k] * frame[:, 2])[None], program.axis[[pose]])
+            above = Run.straight(program, over, poses[[k]])
+            level = above.ticks[0, 2]
+            if not said or runs.position is None or runs.position[2] != level:
+                yield from runs.text(table.off if said else ())
+                said = ()
+                yield from runs.emit(runs.moving(replace(above, rapid=np.ones(1, np.bool_))))
+                yield from runs.text(runs.operation.go_on())
+                yield from runs.text(writer.feed_mode(int(modes[0])))
+            hole = Hole(
+                tip @ frame / unit,
+                travel[k] / unit,
+                clearance[k] / unit,
+                cycle.depth / unit,
+                writer.feed_word(feeds[k], int(modes[k])),
+            )
+            pitch = float(feeds[k]) / unit / (1.0 if modes[k] == FeedMode.PER_REVOLUTION or not speed else speed)
+            blocks = hole_blocks(hole, cycle, kind, writer.form, speed, pitch, unit)
+            yield from runs.text(blocks[once:] if said == blocks[:once] and said else blocks)
+            said = blocks[:once] or blocks
+            runs.position = runs.last = above.ticks[0]
+        yield from runs.text(table.off)
+        writer.forget_feed()
+
+    def _over_holes(self, rows: Rows, part: slice, height: Floats) -> Iterator[bytes]:
+        runs, program = self.runs, self.runs.program
+        decimals = runs.writer.form.tip_decimals(program.units)
+        poses = rows.move[part]
+        tips = program.tip[poses] + height[:, None] * program.axis[poses]
+        ticks = runs.ticks_at(rows, part, tips, np.arange(len(poses)))
+        for index, pose in enumerate(poses.tolist()):
+            tip = (program.tip[pose] / program.mm_per_unit).tolist()
+            place = " ".join(
+                f"{letter}{format_number(value, decimals)}" for letter, value in zip("XYZ", tip, strict=True)
+            )
+            yield from runs.text(runs.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
+            run = Run.straight(program, ticks[index : index + 1], poses[index : index + 1])
+            run = replace(run, rapid=np.ones(1, np.bool_))
+            yield from runs.emit_above(runs.moving(run))
