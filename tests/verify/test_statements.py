@@ -7,6 +7,7 @@ import pytest
 
 from cornersmooth.model import Move, Program, Source, Statement
 from cornersmooth.nc_reader import block_tables, reader
+from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.verify import hole_search, verify
 
 from .writing import HEAD, TAIL, encode
@@ -226,10 +227,8 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     for name, value in (("_WINDOW", 2), ("_TOGETHER", 4), ("_UNDECIDED", 8)):
         monkeypatch.setattr(hole_search, name, value)
     held = []
-    part = hole_search.Ahead.part
-    monkeypatch.setattr(
-        hole_search.Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1]
-    )
+    part = Ahead.part
+    monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])
     assert codes(program, text("G43.5 H1", *lines)) == []
     assert max(held) < 200
     assert "CS562" in codes(program, text("G43.5 H1", *lines[:403], ("G1", 0, 0, -7), *lines[404:]))

@@ -24,8 +24,8 @@ margin            what printed digits account for, mm; *slack* is that and what 
 Where is what:
 
 - what is measured against: `task`, `polyline`
-- elements to batches: `batches`, with `rapids`, `drilling` (`hole_search`, tool changes of `statements`), and `guide`
-  for long stretches
+- elements to batches: `batches`, with `rapids`, `drilling` (`hole_lines`, `hole_search`, `hole_check`, tool changes of
+  `statements`), and `guide` for long stretches
 - where everything is: `match`, found by `search` with `nearest` and `assignment`
 - checks (`checks` lists them): `deviation`, `backtracking`, `feeds`, `continuity`; they share `distances`, with
   `wide_search`, `hull_bounds`; what they find is in `findings`

@@ -14,7 +14,8 @@ from cornersmooth.verify.distances import Distances, Reached, own_gaps_of_origin
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.in_order import MOST_PAIRS, Window, Windows, passage
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import distance_between, nearest_places
+from cornersmooth.verify.nearest import distance_between, foot_share, larger_square, nearest_places
+from cornersmooth.verify.polyline import points_on
 from cornersmooth.verify.rapids import ARITHMETIC
 
 #: segments looked at on either side
@@ -29,6 +30,7 @@ _OFF = 2.0
 #: vertices of a batch that run backwards after which all that seem to are taken to
 _MOST_WRONG = 512
 
+#: place on the original, CL line, NC line and mm of each that is found, (k,); None stands for none
 Found = tuple[Floats, Ints, Ints, Floats]
 
 
@@ -51,11 +53,6 @@ def written_backwards(match: Match, written: Reached, windows: Windows) -> Found
     twice is off by nothing and yet out of order, while what is off its path by so much tells only within that how far
     along it it is. Where the path turns back nearby, the tolerance is what counts. Blocks in rotary words may bend: how
     far the tool has come the ends of blocks tell, not what lies between them.
-
-    Returns
-    -------
-    place, cl_line, nc_line, amount
-        (k,) place on the original, lines, and mm gained; None where there are none.
     """
     vertex = written.vertex[match.backward[written.vertex]]
     if not len(vertex):
@@ -91,9 +88,7 @@ def written_elsewhere(match: Match, written: Reached, windows: Windows) -> Found
 
     Unless both motions are in order around them, be it tips and axis points each on their own.
 
-    Returns
-    -------
-    As `written_backwards`; the amount is how far vertices are from their places.
+    The amount is how far vertices are from their places.
     """
     away, path = match.distance[written.vertex], match.path
     lost = np.isfinite(away) & (away > np.sqrt(2.0) * match.near) & (written.gap.larger <= match.near)
@@ -123,9 +118,7 @@ def turned_elsewhere(distances: Distances) -> Found | None:
     Every turn is near the other motion, and so is every vertex; but not one after the other. Where one is not, that is
     said already. Near curves nothing is said.
 
-    Returns
-    -------
-    As `written_backwards`; the amount is how far the motions are apart in the order of their places.
+    The amount is how far the motions are apart in the order of their places.
     """
     match, written, windows = distances.match, distances.written, distances.windows
     away = _apart_in_order(match, written)
@@ -196,7 +189,7 @@ def _apart_in_order(match: Match, written: Reached) -> Floats:
     np.add.at(edges, np.maximum(np.searchsorted(length, at - 2.0 * match.near) - 1, 0), 1)
     np.add.at(edges, np.searchsorted(length, at + 2.0 * match.near, side="right"), -1)
     rows = np.flatnonzero((np.cumsum(edges)[:-1] > 0)[:-1] & (np.diff(match.stretch[vertex]) == 0))
-    away[rows] = _farther(match.six[vertex[rows]], _on(path.six, place[rows]))
+    away[rows] = np.sqrt(larger_square(match.six[vertex[rows]] - _on(path.six, place[rows])))
     # vertices of the path between the places of a block's ends are passed on it, one after the other
     begin, end = np.floor(place[rows]).astype(np.int64) + 1, np.ceil(place[rows + 1]).astype(np.int64)
     count = np.maximum(end - begin, 0)
@@ -204,18 +197,9 @@ def _apart_in_order(match: Match, written: Reached) -> Floats:
     passed = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
     start = match.six[vertex[row]]
     way = match.six[vertex[row] + 1] - start
-    size = np.einsum("ij,ij->i", way, way)
-    share = np.einsum("ij,ij->i", path.six[passed] - start, way)
-    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
-    share = np.maximum.accumulate(row + share) - row
-    np.maximum.at(away, row, _farther(path.six[passed], start + share[:, None] * way))
+    share = np.maximum.accumulate(row + foot_share(path.six[passed] - start, way)) - row
+    np.maximum.at(away, row, np.sqrt(larger_square(path.six[passed] - start - share[:, None] * way)))
     return away
-
-
-def _farther(points: Floats, others: Floats) -> Floats:
-    """(k,) the larger of the distances of tips and of axis points of points (k, 6) taken pairwise."""
-    off = points - others
-    return np.maximum(distance_between(off[:, :3], 0.0), distance_between(off[:, 3:], 0.0))
 
 
 def _turns(six: Floats) -> Bools:
@@ -265,11 +249,8 @@ def _turns_back(match: Match, low: float, high: float) -> bool:
 def _off(points: Floats, path: Floats) -> float:
     """Largest distance of points (k, 6) from a path (m + 1, 6)."""
     start, way = path[:-1], path[1:] - path[:-1]
-    size = np.einsum("ij,ij->i", way, way)
     rest = points[:, None] - start
-    share = np.einsum("kmi,mi->km", rest, way)
-    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
-    away = (rest - share[..., None] * way) ** 2
+    away = (rest - foot_share(rest, way)[..., None] * way) ** 2
     return float(np.sqrt(np.maximum(away[..., :3].sum(axis=2), away[..., 3:].sum(axis=2)).min(axis=1).max()))
 
 
@@ -287,10 +268,6 @@ def original_backwards(match: Match, theirs: Reached, windows: Windows) -> Found
     """Neighbouring original vertices that the text clearly passes in reverse: part of the path, beyond ε, is missing.
 
     Nothing is, where both are run in order within the tolerance all around.
-
-    Returns
-    -------
-    As `written_backwards`.
     """
     falls = np.flatnonzero((np.diff(theirs.place) < 0) & (np.diff(theirs.vertex) == 1)) + 1
     if not len(falls):
@@ -337,10 +314,7 @@ def _cost(match: Match, vertex: Ints, free: Floats, bound: Floats, *, forward: b
 
 def _on(six: Floats, place: Floats) -> Floats:
     """(k, 6) points of a trail at segment plus fraction."""
-    segment, fraction = _segments(six, place)
-    start = six[segment]
-    point: Floats = start + fraction[:, None] * (six[segment + 1] - start)
-    return point
+    return points_on(six, *_segments(six, place))
 
 
 def _way(length: Floats, start: Floats, end: Floats) -> Floats:

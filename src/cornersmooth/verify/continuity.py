@@ -10,6 +10,7 @@ from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.verify.distances import Distances
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
+from cornersmooth.verify.nearest import larger_square
 
 
 def measure_continuity(distances: Distances, found: Findings) -> None:
@@ -27,8 +28,7 @@ def measure_continuity(distances: Distances, found: Findings) -> None:
     chosen = np.flatnonzero(np.append(lines[1:] != lines[:-1], True))
     ends = trail.last[chosen]
     six = match.six[ends] if len(ends) < len(match.six) else match.six
-    step = six[1:] - six[:-1]
-    square = np.maximum(*(np.einsum("ij,ij->i", part, part) for part in (step[:, :3], step[:, 3:])))
+    square = larger_square(six[1:] - six[:-1])
     square[(square == 0) | ~match.on[ends[1:]] | ~match.on[ends[:-1]]] = np.inf
     square[match.stretch[ends[1:]] != match.stretch[ends[:-1]]] = np.inf
     if len(square):

@@ -18,7 +18,7 @@ from cornersmooth.nc_reader.elements import Element
 from cornersmooth.verify.in_order import Windows
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import Gap, Metric, climb, distance_between, nearest_places
-from cornersmooth.verify.polyline import directions, written_at
+from cornersmooth.verify.polyline import directions, points_on, written_at
 from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.wide_search import look_farther, nearest_alone
 
@@ -134,7 +134,7 @@ def from_original(match: Match) -> Reached:
     segment, at, _ = nearest_places(point, match.six, middle, 1, low, high)
     climb(point, match.six, middle, low, high, segment, at)
     look_farther(match, vertex, low, high, segment, at)
-    tip = _on(match.written.trail.tip, segment, at)
+    tip = points_on(match.written.trail.tip, segment, at)
     axis = _unit_on(match.written.trail.axis, segment, at)
     owner = match.written.trail.owner[segment + 1]
     bent = np.flatnonzero(~match.written.straight[owner - match.written.first])
@@ -174,17 +174,8 @@ _MANY, _FAR_OFF, _MOST_SEARCHED = 512, 10.0, 4096
 _LEAST = 1e-300
 
 
-def _on(values: Floats, segment: Ints, at: Floats) -> Floats:
-    start = values.take(segment, axis=0)
-    between: Floats = values.take(segment + 1, axis=0)
-    between -= start
-    between *= at[:, None]
-    between += start
-    return between
-
-
 def _unit_on(values: Floats, segment: Ints, at: Floats) -> Floats:
-    between = _on(values, segment, at)
+    between = points_on(values, segment, at)
     size = np.sqrt(np.einsum("ij,ij->i", between, between))
     between /= np.maximum(size, _LEAST, out=size)[:, None]
     return between
@@ -213,7 +204,8 @@ def _on_bent(match: Match, point: Floats, segment: Ints, at: Floats) -> tuple[Fl
             open_rows[rows] = False
     rest = np.flatnonzero(open_rows)
     if len(rest) > _MANY:  # of what is far off anyway the polyline tells enough
-        tip[rest], axis[rest] = _on(trail.tip, segment[rest], at[rest]), _unit_on(trail.axis, segment[rest], at[rest])
+        tip[rest] = points_on(trail.tip, segment[rest], at[rest])
+        axis[rest] = _unit_on(trail.axis, segment[rest], at[rest])
         away = point[rest, :3] - tip[rest]
         near = np.einsum("ij,ij->i", away, away) <= (_FAR_OFF * match.tolerance) ** 2
         rest = rest[near][:_MOST_SEARCHED]
@@ -393,7 +385,7 @@ def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Fl
         near, at, _ = nearest_places(point, match.six, segment, REACH * match.parts, low, high, metric)
         climb(point, match.six, segment, low, high, near, at, metric)
         elements = elements_around(match, near)
-        values = np.minimum(known, distance_between(_on(match.six, near, at)[:, column], point[:, column]))
+        values = np.minimum(known, distance_between(points_on(match.six, near, at)[:, column], point[:, column]))
         bent = np.flatnonzero(~match.written.straight[elements - match.written.first].all(axis=1))
         if metric == "axis point":  # which runs a little off its chords where the tool turns
             bent = np.arange(len(rows))

@@ -18,6 +18,7 @@ from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
+from cornersmooth.verify.hole_check import check_hole
 from cornersmooth.verify.hole_search import HoleSearch
 from cornersmooth.verify.polyline import Original
 
@@ -122,7 +123,7 @@ class Holes:
             again = search.repeats(first, stop, first + k)
             shared = k and np.isnan(cycles[k].depth) and set(group) & set(groups[k - 1])
             if not shared:  # looked at there
-                self.problems += search.check(first + k, group, cycles[k], alone=not again)
+                self.problems += check_hole(search, first + k, group, cycles[k], alone=not again)
             if group and cycles[k].dwell:
                 self.dwells.append((first + k, cycles[k].dwell))
             if cycles[k].tap and not np.isnan(cycles[k].depth):

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.verify.nearest import nearest_from
+from cornersmooth.verify.nearest import foot_share, nearest_from
 from cornersmooth.verify.polyline import Polyline
 
 #: of so many vertices the place of one is found first
@@ -137,10 +137,8 @@ def places_on_each(point: Floats, path: Polyline, low: int, high: int) -> tuple[
     """Path lengths of the nearest places on each of some segments, and the squared distances."""
     start = path.six[low : high + 1]
     way = path.six[low + 1 : high + 2] - start
-    size = np.einsum("ij,ij->i", way, way)
     away = point - start
-    share = np.einsum("ij,ij->i", away, way)
-    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+    share = foot_share(away, way)
     away -= share[:, None] * way
     begin = path.length[low : high + 1]
     place = begin + share * (path.length[low + 1 : high + 2] - begin)

@@ -1,4 +1,4 @@
-"""Where holes are in a text: which elements are over them, in them, and do what their cycles ask for."""
+"""Where holes are in a text: the first element of a run of holes, those of each hole, and what follows them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints, Move
-from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Element, Problem
+from cornersmooth.model import Move
 from cornersmooth.statements.cycles import Drilling
-from cornersmooth.statements.tool_changes import NEVER, ToolChanges
-from cornersmooth.verify.polyline import Original, directions
-from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
+from cornersmooth.statements.tool_changes import NEVER
+from cornersmooth.verify.hole_lines import HoleLines
 
 #: elements looked through at a time for the beginning of a run
 _WINDOW = 512
@@ -23,141 +20,12 @@ _UNDECIDED = 1 << 16
 #: elements in which it is looked for what a cycle asks for, where the text first goes over its hole
 _DOUBTFUL = 1 << 12
 
-#: moves behind a hole in which the next feed move or hole is looked for
-_NEXT = 16
-
 #: elements between runs of holes that are given out together
 _TOGETHER = 1 << 14
 
-#: last printed digits that a point may be beside its hole
-_STEPS = 1.0
 
-
-class HoleSearch:
-    """Looks for holes in the text.
-
-    Parameters
-    ----------
-    original : Original
-    ahead : Ahead
-    axis_length : float, mm
-    changes : ToolChanges
-    """
-
-    def __init__(self, original: Original, ahead: Ahead, axis_length: float, changes: ToolChanges) -> None:
-        self.ahead, self.axis_length = ahead, axis_length
-        self._changes, self._pose = changes, original.pose
-        program = original.program
-        self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]
-        self.line, self.kind = program.line[original.pose], program.kind[original.pose]
-
-    @property
-    def room(self) -> float:
-        """Distance that the printed digits account for, mm."""
-        nc = self.ahead.nc
-        return _STEPS * (nc.tip_step + nc.second_step * (self.axis_length if nc.second_is == "vector" else 1.0))
-
-    def of_its_tool(self, move: int) -> tuple[int, int]:
-        """First element that a move may have, and the first behind those, as far as tool changes tell."""
-        return self._changes.elements_of(int(self._pose[move]))
-
-    def first_of_tool(self, move: int) -> int:
-        """First move behind the last tool change before a move, or the first of all."""
-        return int(np.searchsorted(self._pose, self._changes.pose_of(int(self._pose[move]))))
-
-    def has(self, move: int, element: int) -> bool:
-        """Whether there is such an element, and no tool change parts it from a move."""
-        if not self.ahead.has(element):
-            return False
-        stop = self.of_its_tool(move)[1]
-        return element < stop or (element == stop and self.stands_still(element))
-
-    def stands_still(self, element: int) -> bool:
-        """Whether an element is a rapid that leads nowhere, as one that is left out of the path."""
-        nc, at = self.ahead.nc, element - self.ahead.base
-        if at < 1 or nc.kind[at] != Element.RAPID:
-            return False
-        return bool((nc.tip[at] == nc.tip[at - 1]).all() and (nc.second[at] == nc.second[at - 1]).all())
-
-    def exact(self, move: int, elements: Ints) -> Bools:
-        """(k,) whether elements end exactly at a move's pose; none that are not at hand, as behind the last."""
-        at = elements - self.ahead.base
-        same = (at >= 0) & (at < len(self.ahead.nc))
-        tip, axis = (np.broadcast_to(values[move], (int(same.sum()), 3)) for values in (self.tip, self.axis))
-        same[same] = digit_errors(self.ahead.nc, at[same], tip, axis, self.axis_length)[0]
-        return same
-
-    def heights(self, move: int, elements: Ints) -> Floats:
-        """(k,) mm above the hole's pose at the ends of elements; NaN beside the hole or with another axis."""
-        nc, own = self.ahead.nc, elements - self.ahead.base
-        away = nc.tip[own] - self.tip[move]
-        height = away @ self.axis[move]
-        beside = np.linalg.norm(away - height[:, None] * self.axis[move], axis=1)
-        turned = np.linalg.norm(directions(nc, nc.tip[own], nc.second[own]) - self.axis[move], axis=1)
-        # what the printed angles of a tilted plane leave open
-        lean = np.where(nc.tip_room[own] > 0.0, nc.second_room[own], 0.0)
-        on = beside <= self.room + lean * np.abs(height)
-        on &= turned * self.axis_length <= 2 * self.room + lean * self.axis_length
-        return np.where(on, height, np.nan)
-
-    def stands(self, move: int, hole: int, element: int) -> bool:
-        """Whether the moves before a hole lead nowhere: the tool is there, and goes on over the hole if it goes on.
-
-        Behind it may come the end of the text or another tool, where the hole is not drilled.
-        """
-        if not element or element < self.of_its_tool(hole)[0]:
-            return False
-        if self.has(hole, element) and not self.over(hole, element):
-            return False
-        return all(self.exact(k, np.array([element - 1]))[0] for k in range(move, hole))
-
-    def same_hole(self, one: int, other: int) -> bool:
-        """Whether two moves are to the same hole."""
-        return bool(self.near(one, slice(other, other + 1))[0])
-
-    def goes_on(self, move: int) -> bool:
-        """Whether the next move of the CL file that is no rapid, too, is along the line of a hole."""
-        others = np.flatnonzero(self.kind[move + 1 : move + 1 + _NEXT] != Move.RAPID)
-        if not len(others):
-            return False
-        return self.in_line(move, move + 1 + int(others[0]))
-
-    def in_line(self, move: int, other: int) -> bool:
-        """Whether the pose of another move is in the line of a hole, as far as the digits show."""
-        away, turned = (values[other] - values[move] for values in (self.tip, self.axis))
-        beside = np.linalg.norm(away - (away @ self.axis[move]) * self.axis[move])
-        return bool(beside <= self.room and np.linalg.norm(turned) * self.axis_length <= 2 * self.room)
-
-    def near(self, move: int, others: slice) -> Bools:
-        """(k,) whether others are to the pose of a move, as far as the digits show."""
-        apart, turned = (np.linalg.norm(values[others] - values[move], axis=1) for values in (self.tip, self.axis))
-        same: Bools = (apart <= self.room) & (turned * self.axis_length <= 2 * self.room)
-        return same
-
-    def over(self, move: int, element: int) -> bool:
-        """Whether there is such an element, and it ends in the line of the hole."""
-        return self.has(move, element) and not np.isnan(self.heights(move, np.array([element]))[0])
-
-    def visits(self, move: int, hole: int) -> int:
-        """How often the moves before a hole, from one on, come to the pose before it and must pass it exactly."""
-        here = self.near(hole - 1, slice(move, hole)) & (self.kind[move:hole] != Move.HOLE)
-        if self.comes_in_rapid(hole - 1):
-            here &= self.kind[move:hole] == Move.RAPID
-        ends = np.append(self.kind[move + 1 : hole] != Move.LINEAR, True) | (self.kind[move:hole] == Move.RAPID)
-        ends[0] |= move == 0  # the first pose of all
-        begins = here & ~np.append(False, here[:-1])
-        return max(len(np.unique(np.cumsum(begins)[here & ends])), 1)
-
-    def comes_in_rapid(self, move: int) -> bool:
-        """Whether a move is a rapid that leads somewhere, from a pose that the text knows."""
-        if move < 1 or self.kind[move] != Move.RAPID or self.kind[move - 1] == Move.HOLE:
-            return False
-        return not self.near(move - 1, slice(move, move + 1))[0]
-
-    def passes(self, move: int, elements: Ints) -> list[int]:
-        """Elements among some that may be a move: they end exactly at its pose, in rapid where it comes so."""
-        found = elements[self.exact(move, elements)].tolist()
-        return [k for k in found if not self.feeds([k])] if self.comes_in_rapid(move) else found
+class HoleSearch(HoleLines):
+    """Looks for holes in the text."""
 
     def starts(self, move: int, hole: int, element: int, asked: Drilling) -> Iterator[tuple[int, bool]]:
         """Look for the first element of a run of holes, and say how far it is not yet met, and where it is.
@@ -223,55 +91,15 @@ class HoleSearch:
             return
         yield (max(given, self.of_its_tool(hole)[0]) if reached is None else reached + 1), True
 
-    def first_feed(self, move: int, element: int) -> int | None:
-        """The first feed along a hole, from an element on; None where the text leaves it before."""
-        while self.over(move, element):
-            if self.feeds([element]):
-                return element
-            element += 1
-        return None
-
-    def feeds_above(self, move: int, element: int) -> bool:
-        """Whether the first feed along a hole, from an element on, stays above its pose, as no cycle does."""
-        fed = self.first_feed(move, element)
-        return fed is not None and bool(self.heights(move, np.array([fed]))[0] >= -self.room)
-
-    def last_above(self, hole: int, element: int, cycle: Drilling) -> int:
-        """Last feed, from an element on, to the pose before a hole, if any, before the text goes into it.
-
-        What is fed to the pose of a hole of no depth may drill that.
-        """
-        found = element
-        while self.over(hole, element) and self.heights(hole, np.array([element]))[0] >= -self.room:
-            if self.kind[hole - 1] != Move.RAPID and self.feeds([element]) and not cycle.depth <= self.room:
-                found = element if self.exact(hole - 1, np.array([element]))[0] else found
-            element += 1
-        return found
-
-    def drills(self, move: int, element: int, cycle: Drilling) -> bool:
-        """Whether the text drills a hole from an element on: to its depth, no farther, at the cycle's feeds."""
-        while self.over(move, element):
-            if self.feeds([element]):
-                height = self.heights(move, np.array([element]))[0]
-                if self.wrong_feed(element, cycle) or height < -cycle.depth - self.room:
-                    return False
-                if height <= self.room - cycle.depth:
-                    return True
-            element += 1
-        return False
-
-    def wrong_feed(self, element: int, cycle: Drilling) -> bool:
-        """Whether the feed of an element is not that of a cycle."""
-        nc, own = self.ahead.nc, element - self.ahead.base
-        return bool(
-            not np.isnan(cycle.feed)
-            and (
-                np.isnan(nc.feed[own])
-                or abs(nc.feed[own] - cycle.feed) > 2 * abs(nc.feed_room[own])
-                or (np.isnan(nc.feed_room[own]) and nc.feed[own] > cycle.feed + ARITHMETIC)
-                or nc.per_revolution[own] != cycle.per_revolution
-            )
-        )
+    def visits(self, move: int, hole: int) -> int:
+        """How often the moves before a hole, from one on, come to the pose before it and must pass it exactly."""
+        here = self.near(hole - 1, slice(move, hole)) & (self.kind[move:hole] != Move.HOLE)
+        if self.comes_in_rapid(hole - 1):
+            here &= self.kind[move:hole] == Move.RAPID
+        ends = np.append(self.kind[move + 1 : hole] != Move.LINEAR, True) | (self.kind[move:hole] == Move.RAPID)
+        ends[0] |= move == 0  # the first pose of all
+        begins = here & ~np.append(False, here[:-1])
+        return max(len(np.unique(np.cumsum(begins)[here & ends])), 1)
 
     def consume(
         self, first: int, stop: int, element: int, cycles: list[Drilling], *, again: bool
@@ -319,23 +147,6 @@ class HoleSearch:
                 group = before[~np.isnan(self.heights(move, before))].tolist()
             groups.append(group)
         return groups, element
-
-    def tapped(self, move: int, element: int, cycle: Drilling) -> bool:
-        """Whether the first feed in a hole, from an element on, is that of its thread."""
-        fed = self.first_feed(move, element)
-        if fed is None:
-            return False
-        nc, own = self.ahead.nc, fed - self.ahead.base
-        near = abs(nc.feed[own] - cycle.feed) <= 2 * abs(nc.feed_room[own])
-        return bool(nc.per_revolution[own] and near)
-
-    def feeds(self, group: list[int]) -> list[int]:
-        """Elements of a group that are no rapids."""
-        return [k for k in group if self.ahead.nc.kind[k - self.ahead.base] != Element.RAPID]
-
-    def nc_line(self, element: int) -> int:
-        """NC line of an element."""
-        return int(self.ahead.nc.line[element - self.ahead.base])
 
     def give_back(self, move: int, group: list[int], cycle: Drilling, end: int) -> tuple[list[int], int, int]:
         """Elements of the last hole, and the first of what follows and its move: the way out may be the CL file's own.
@@ -395,65 +206,3 @@ class HoleSearch:
                 return move
             move += 1
         return move
-
-    def stays(self, move: int, element: int) -> bool:
-        """Whether a move ends where an element has left the tool."""
-        return bool(self.exact(move, np.array([element]))[0])
-
-    def repeats(self, first: int, stop: int, move: int) -> bool:
-        """Whether a neighbour in a run of holes is the same hole."""
-        return any(first <= other < stop and self.same_hole(move, other) for other in (move - 1, move + 1))
-
-    def check(self, move: int, group: list[int], cycle: Drilling, *, alone: bool) -> list[Problem]:
-        """Depth, feeds and rapids of one hole; `alone`: it is drilled once."""
-        cl_line, feeds = int(self.line[move]), self.feeds(group)
-        known = not np.isnan(cycle.depth)
-        if not feeds:
-            if known and cycle.depth > self.room:
-                near = self.nc_line(group[0]) if group else 0
-                return [Problem("CS561", cl_line, near, "a hole of the CL file is not drilled")]
-            return []
-        if not known:
-            return [Problem("CS564", cl_line, self.nc_line(feeds[0]), "the cycle does not say what is fed here")]
-        problems = []
-        height = dict(zip(group, self.heights(move, np.array(group)).tolist(), strict=True))
-        before = self.heights(move, np.array([max(group[0] - 1, 0)]))[0]
-        deepest = min(feeds, key=lambda k: height[k])
-        off = height[deepest] + cycle.depth
-        if abs(off) > self.room:
-            text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
-            problems.append(Problem("CS562", cl_line, self.nc_line(deepest), text, abs(off)))
-        behind = [k for k in group if k > deepest][:1]
-        if cycle.feed_out and behind and not self.feeds(behind):
-            line = self.nc_line(behind[0])
-            problems.append(Problem("CS563", cl_line, line, "a rapid leaves a hole that the tool is to leave at feed"))
-        drilled = 0.0
-        for k in group:
-            line = self.nc_line(k)
-            if not self.feeds([k]):
-                if height[k] < -drilled - self.room and not self._own_rapid(move, k):
-                    amount = -drilled - height[k]
-                    text = f"a rapid goes {amount:.4f} mm into the uncut hole"
-                    problems.append(Problem("CS563", cl_line, line, text, amount))
-            else:
-                if k == group[0] and np.isnan(before):
-                    problems.append(Problem("CS563", cl_line, line, "a feed move enters a hole from the side"))
-                if self.wrong_feed(k, cycle):
-                    text = f"the feed is {self.ahead.nc.feed[k - self.ahead.base]:g}, the cycle says {cycle.feed:g}"
-                    problems.append(Problem("CS541", cl_line, line, text))
-                down = height.get(k - 1, np.inf) > height[k]
-                if alone and down and drilled > self.room and self.room < -height[k] <= drilled + ARITHMETIC:
-                    problems.append(Problem("CS562", cl_line, line, "a hole is drilled again"))
-                drilled = max(drilled, -height[k])
-        if height[group[-1]] < -self.room:
-            text = "the tool leaves a hole sideways"
-            problems.append(Problem("CS563", cl_line, self.nc_line(group[-1]), text, -height[group[-1]]))
-        return problems
-
-    def _own_rapid(self, move: int, element: int) -> bool:
-        """Whether the CL file itself goes there in rapid just before the hole, wherever that is."""
-        while move > 0 and self.kind[move - 1] == Move.RAPID:
-            move -= 1
-            if self.stays(move, element):
-                return True
-        return False

@@ -12,7 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.verify.common_place import axis_off_at
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import nearest_places
+from cornersmooth.verify.nearest import foot_share, larger_square, nearest_places
 from cornersmooth.verify.polyline import directions, unit, written_at
 
 #: samples between two knots where the hull alone does not settle it
@@ -161,11 +161,5 @@ def _off(match: Match, six: Floats, vertex: Ints) -> Floats:
     way = match.path.six.take(segment + 1, axis=0)
     way -= start
     away = six - start
-    size = np.einsum("ij,ij->i", way, way)
-    t = np.einsum("ij,ij->i", away, way)
-    t = np.clip(np.divide(t, size, out=np.zeros_like(t), where=size > 0), 0.0, 1.0)
-    away -= t[:, None] * way
-    off: Floats = np.sqrt(
-        np.maximum(np.einsum("ij,ij->i", away[:, :3], away[:, :3]), np.einsum("ij,ij->i", away[:, 3:], away[:, 3:]))
-    )
-    return off
+    away -= foot_share(away, way)[:, None] * way
+    return np.sqrt(larger_square(away))

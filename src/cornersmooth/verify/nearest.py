@@ -57,6 +57,21 @@ def distance_between(points: Floats, others: Floats | float) -> Floats:
     return distance
 
 
+def larger_square(away: Floats) -> Floats:
+    """(k,) the larger of the squares of both halves, tip and axis point, of differences (k, 6)."""
+    tip, point = away[:, :3], away[:, 3:]
+    square: Floats = np.maximum(np.einsum("ij,ij->i", tip, tip), np.einsum("ij,ij->i", point, point))
+    return square
+
+
+def foot_share(away: Floats, way: Floats) -> Floats:
+    """(...,) fractions of segments (..., d) at which they are nearest to points, `away` (..., d) from their starts."""
+    size = np.einsum("...i,...i->...", way, way)
+    share: Floats = np.einsum("...i,...i->...", away, way)
+    np.divide(share, size, out=share, where=size > 0)
+    return np.clip(share, 0.0, 1.0, out=share)
+
+
 def nearest_places(
     point: Floats, vertices: Floats, middle: Ints, reach: int, low: Ints, high: Ints, metric: Metric = "both"
 ) -> tuple[Ints, Floats, Floats]:

@@ -26,6 +26,16 @@ ARC_SHARE = 0.025
 _STEEPEST = 1e-6
 
 
+def points_on(vertices: Floats, segment: Ints, fraction: Floats) -> Floats:
+    """(k, d) points of a polyline (v, d) at fractions (k,) of segments (k,)."""
+    start = vertices.take(segment, axis=0)
+    point: Floats = vertices.take(segment + 1, axis=0)
+    point -= start
+    point *= fraction[:, None]
+    point += start
+    return point
+
+
 @dataclass(frozen=True)
 class Trail:
     """Vertices of a motion, v of them.
@@ -85,12 +95,7 @@ class Polyline:
 
     def point_at(self, segment: Ints, fraction: Floats) -> Floats:
         """(k, 6) points at places."""
-        start = self.six.take(segment, axis=0)
-        point: Floats = self.six.take(segment + 1, axis=0)
-        point -= start
-        point *= fraction[:, None]
-        point += start
-        return point
+        return points_on(self.six, segment, fraction)
 
     def place_at(self, length: float) -> tuple[int, float]:
         """Return segment and fraction at a path length."""

@@ -13,7 +13,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.assignment import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.guide import LONG, STRIDE, guide
-from cornersmooth.verify.nearest import Metric, distance_between, nearest_from, nearest_places
+from cornersmooth.verify.nearest import Metric, distance_between, larger_square, nearest_from, nearest_places
 from cornersmooth.verify.polyline import Polyline
 from cornersmooth.verify.task import Task
 
@@ -245,10 +245,7 @@ class Search:
             # both together may be so far, but not one of them alone
             rows = np.flatnonzero(known & ~doubtful & (self.distance > limit))
             away = self.six[rows] - self.path.point_at(self.segment[rows], self.fraction[rows])
-            square = np.maximum(
-                np.einsum("ij,ij->i", away[:, :3], away[:, :3]), np.einsum("ij,ij->i", away[:, 3:], away[:, 3:])
-            )
-            rows = rows[square > limit**2]
+            rows = rows[larger_square(away) > limit**2]
             doubtful[rows] = ~self._near_alone(rows, limit)
             doubtful[self._off_anywhere(doubtful, apart, limit)] = False
             apart = np.zeros_like(apart)  # looked at once

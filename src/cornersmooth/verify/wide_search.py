@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import COLUMNS, Metric, nearest_places
+from cornersmooth.verify.nearest import COLUMNS, Metric, foot_share, nearest_places
 from cornersmooth.verify.polyline import Polyline
 from cornersmooth.verify.rapids import ARITHMETIC
 
@@ -57,9 +57,7 @@ def look_farther(match: Match, vertex: Ints, low: Ints, high: Ints, segment: Int
         begin = six.take(among, axis=0)
         way = six.take(among + 1, axis=0) - begin
         rest = np.repeat(path.six[vertex[own]], count, axis=0) - begin
-        size = np.einsum("ij,ij->i", way, way)
-        share = np.einsum("ij,ij->i", rest, way)
-        share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+        share = foot_share(rest, way)
         rest -= share[:, None] * way
         off = np.einsum("ij,ij->i", rest, rest)
         least = np.minimum.reduceat(off, begins)
@@ -145,9 +143,7 @@ def _connected(
     end = np.where((outside | (index > high[:, None])) & behind, columns, len(offset)).min(axis=1)
     whole = (begin >= 0) & (end < len(offset))
     way = np.diff(vertex, axis=1)
-    size = np.einsum("kmi,kmi->km", way, way)
-    share = np.einsum("kmi,kmi->km", rest[:, :-1], way)
-    share = np.clip(np.divide(share, size, out=np.zeros_like(share), where=size > 0), 0.0, 1.0)
+    share = foot_share(rest[:, :-1], way)
     rest = rest[:, :-1] - share[..., None] * way
     off = np.sqrt(np.einsum("kmi,kmi->km", rest, rest))
     near = off[:, int(np.flatnonzero(offset == 0)[0])] <= radius

@@ -1,0 +1,67 @@
+"""Whether a hole is drilled as its cycle asks for: depth, feeds, and rapids above what is cut."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Move
+from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.statements.cycles import Drilling
+from cornersmooth.verify.hole_lines import HoleLines
+from cornersmooth.verify.rapids import ARITHMETIC
+
+
+def check_hole(lines: HoleLines, move: int, group: list[int], cycle: Drilling, *, alone: bool) -> list[Problem]:
+    """Depth, feeds and rapids of one hole; `alone`: it is drilled once."""
+    cl_line, feeds = int(lines.line[move]), lines.feeds(group)
+    known = not np.isnan(cycle.depth)
+    if not feeds:
+        if known and cycle.depth > lines.room:
+            near = lines.nc_line(group[0]) if group else 0
+            return [Problem("CS561", cl_line, near, "a hole of the CL file is not drilled")]
+        return []
+    if not known:
+        return [Problem("CS564", cl_line, lines.nc_line(feeds[0]), "the cycle does not say what is fed here")]
+    problems = []
+    height = dict(zip(group, lines.heights(move, np.array(group)).tolist(), strict=True))
+    before = lines.heights(move, np.array([max(group[0] - 1, 0)]))[0]
+    deepest = min(feeds, key=lambda k: height[k])
+    off = height[deepest] + cycle.depth
+    if abs(off) > lines.room:
+        text = f"a hole is {abs(off):.4f} mm too {'shallow' if off > 0 else 'deep'}"
+        problems.append(Problem("CS562", cl_line, lines.nc_line(deepest), text, abs(off)))
+    behind = [k for k in group if k > deepest][:1]
+    if cycle.feed_out and behind and not lines.feeds(behind):
+        line = lines.nc_line(behind[0])
+        problems.append(Problem("CS563", cl_line, line, "a rapid leaves a hole that the tool is to leave at feed"))
+    drilled = 0.0
+    for k in group:
+        line = lines.nc_line(k)
+        if not lines.feeds([k]):
+            if height[k] < -drilled - lines.room and not _own_rapid(lines, move, k):
+                amount = -drilled - height[k]
+                text = f"a rapid goes {amount:.4f} mm into the uncut hole"
+                problems.append(Problem("CS563", cl_line, line, text, amount))
+        else:
+            if k == group[0] and np.isnan(before):
+                problems.append(Problem("CS563", cl_line, line, "a feed move enters a hole from the side"))
+            if lines.wrong_feed(k, cycle):
+                text = f"the feed is {lines.ahead.nc.feed[k - lines.ahead.base]:g}, the cycle says {cycle.feed:g}"
+                problems.append(Problem("CS541", cl_line, line, text))
+            down = height.get(k - 1, np.inf) > height[k]
+            if alone and down and drilled > lines.room and lines.room < -height[k] <= drilled + ARITHMETIC:
+                problems.append(Problem("CS562", cl_line, line, "a hole is drilled again"))
+            drilled = max(drilled, -height[k])
+    if height[group[-1]] < -lines.room:
+        text = "the tool leaves a hole sideways"
+        problems.append(Problem("CS563", cl_line, lines.nc_line(group[-1]), text, -height[group[-1]]))
+    return problems
+
+
+def _own_rapid(lines: HoleLines, move: int, element: int) -> bool:
+    """Whether the CL file itself goes there in rapid just before the hole, wherever that is."""
+    while move > 0 and lines.kind[move - 1] == Move.RAPID:
+        move -= 1
+        if lines.stays(move, element):
+            return True
+    return False
