@@ -46,8 +46,8 @@ class Run:
     memory: float  # MB at the peak
 
 
-def run(command: Sequence[str | Path]) -> Run:
-    """Run a command to its end; SystemExit with its messages if it fails."""
+def run(command: Sequence[str | Path], codes: tuple[int, ...] = (0,)) -> Run:
+    """Run a command to its end; SystemExit with its messages if it ends with none of these codes."""
     with tempfile.TemporaryFile() as messages:
         start = time.perf_counter()
         process = subprocess.Popen([str(word) for word in command], stdout=messages, stderr=messages)
@@ -65,7 +65,7 @@ def run(command: Sequence[str | Path]) -> Run:
         ended.set()
         looking.join()
         process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
+        if process.returncode not in codes:
             messages.seek(0)
             said = messages.read().decode(errors="replace")
             sys.exit(f"{Path(command[0]).name} ended with {process.returncode}:\n{said}")
