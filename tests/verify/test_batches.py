@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 import threading
 import time
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ import pytest
 from cornersmooth.errors import InputError
 from cornersmooth.model import FeedMode, Move, Program, Statement
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
-from cornersmooth.nc_reader import reader
+from cornersmooth.nc_reader import block_tables, reader
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import Verifier, Where, batches, verifier, verify
@@ -270,3 +271,32 @@ def test_text_from_a_pipe(used, tmp_path, processes):
     assert verify(program, pipe, tolerance=TOLERANCE, processes=processes).passed
     writer.join()
     assert processes > 1 or used[-1] > 4
+
+
+def _moved(line, by):
+    return re.sub(r"(?<=X)-?\d+\.\d+", lambda found: f"{float(found[0]) + by:.4f}", line)
+
+
+def test_rapids_that_miss_their_poses_one_after_another_are_those_of_their_poses(used, monkeypatch):
+    """What is at hand of the text may be fewer rapids than are looked for: the rest of them is still to come."""
+    monkeypatch.setattr(block_tables, "CHUNK", 4000)
+    program = part(count=3000, every=25)
+    lines = text_of(program).decode().splitlines()
+    rapids = [k for k, line in enumerate(lines) if re.match(r"(G0 |)X.*I", line) and "G0" in line][30:70]
+    for k in rapids:
+        lines[k] = _moved(lines[k], 0.05)
+    found = verify(program, ("\n".join(lines) + "\n").encode(), tolerance=TOLERANCE, processes=1)
+    assert used[-1] > 2
+    assert [at.nc_line for at in found.problems if at.code == "CS531"] == [k + 1 for k in rapids]
+    assert not {"CS532", "CS533", "CS535", "CS536"} & {at.code for at in found.problems}
+
+
+@pytest.mark.parametrize("processes", [1, forks])
+def test_feed_moves_without_end_behind_the_last_pose_are_said_once(used, processes):
+    program = replace(part(), kind=np.append(part().kind[:-1], Move.RAPID).astype(np.uint8))
+    lines = text_of(program).decode().splitlines()
+    last = next(k for k in reversed(range(len(lines))) if "X" in lines[k])
+    more = [_moved(line, 0.5 + 0.01 * k) for k, line in enumerate(2000 * [lines[last].replace("G0", "G1")])]
+    text = ("\n".join([*lines[: last + 1], *more, *lines[last + 1 :]]) + "\n").encode()
+    found = check(program, text, used, processes)
+    assert [(at.code, at.nc_line) for at in found.problems if at.code == "CS536"] == [("CS536", last + 2)]

@@ -226,7 +226,11 @@ class _Part:
             yield from self._flush()
         elif not len(self.waiting) and stop - 1 - self.element > BATCH + BATCH // 2:
             yield from self._flush()
-            yield from self._cut_long(stop - 1, int(self.task.original.trail.last[self.move_last]), open_end=True)
+            if self.move < self.move_last:
+                yield from self._cut_long(stop - 1, int(self.task.original.trail.last[self.move_last]), open_end=True)
+            else:  # nothing of the CL path is left for what is held: said once
+                yield from self._close(self.move, stop - 1)
+                self.element, self.continued = stop - 1, True
         first = min(self.pending[0][0] if self.pending else self.element, self.element) - 1
         if first > self.base:
             self.held, self.base = self.held.part(first - self.base, len(self.held)), first

@@ -57,12 +57,7 @@ def owner_fraction(trail_owner: Ints, trail_fraction: Floats, segment: Ints, at:
 
 @dataclass(frozen=True)
 class Distances:
-    """How far the vertices of each motion are from the other.
-
-    Parameters
-    ----------
-    match : Match
-    """
+    """How far the vertices of each motion of a match are from the other."""
 
     match: Match
 

@@ -153,9 +153,11 @@ class Rapids:
             tail = count if exact.all() else int(np.argmin(exact[::-1]))
         middle = slice(0, len(theirs) - tail), slice(0, len(ours) - tail)
         codes = _opcodes(self._tip[theirs[middle[0]]], nc, ours[middle[1]])
-        if not final:  # what comes behind the last that fits may fit something farther on
+        if not final:  # what is left behind the last that fits may fit something farther on
             while len(codes) > 1 and codes[-1][0] != "equal":
                 codes.pop()
+            tag, i0, i1, j0, j1 = codes[-1]
+            codes[-1] = tag, i0, min(i1, i0 + j1 - j0), j0, j1
         pairs: list[tuple[int, int]] = []
         used = 0
         for tag, i0, i1, j0, j1 in codes:
