@@ -15,9 +15,9 @@ from cornersmooth.model import Program
 from cornersmooth.nc import Form
 from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
+from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.settings import Settings
 from cornersmooth.verify import verify
-from cornersmooth.verify.polyline import written_at
 from nc.cases import CHOSEN, Case
 from nc.grammars import reader
 from nc.promise import tame, upright, written

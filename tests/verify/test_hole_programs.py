@@ -67,6 +67,10 @@ REFUSED_ONCE = {
     800349: "a tool that does nothing but to stand over holes that are not tapped",
     1000659: "a feed down along the hole, past the pose that it is tapped from, and up to it",
     10006: "a feed to and fro above a hole, as fast as the hole's",
+    1505976: "a rapid under the pose of the hole that follows, and GOHOME between them",
+    1507023: "a rapid that leads nowhere at the pose that a later rapid goes to before a hole",
+    1508921: "two rapids to a pose, as far as the digits of turned axes show, and coolant off between them and a hole",
+    1502841: "a feed move that leads nowhere over a hole, and later a rapid to the height above it",
     1005030: "the CL file's own rapid into a hole that is drilled behind it",
 }
 

@@ -10,6 +10,7 @@ import pytest
 
 from cornersmooth.cli import run
 from cornersmooth.nc_reader import read_nc
+from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.report.along import deviation_along
 from cornersmooth.report.verification import (
     CSV_COLUMNS,
@@ -19,7 +20,7 @@ from cornersmooth.report.verification import (
     verification_json,
 )
 from cornersmooth.verify import verify
-from cornersmooth.verify.polyline import original_motion, written_at
+from cornersmooth.verify.polyline import original_motion
 from oracle.share import share
 
 from .writing import encode, job

@@ -8,7 +8,8 @@ import pytest
 from cornersmooth.model import Move, Program, Source, Statement
 from cornersmooth.nc_reader import block_tables, reader
 from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.verify import hole_search, verify
+from cornersmooth.statements import comparison
+from cornersmooth.verify import drilling, hole_search, verify
 
 from .writing import HEAD, TAIL, encode
 
@@ -232,3 +233,46 @@ def test_path_before_holes_is_measured_as_it_is_read(monkeypatch):
     assert codes(program, text("G43.5 H1", *lines)) == []
     assert max(held) < 200
     assert "CS562" in codes(program, text("G43.5 H1", *lines[:403], ("G1", 0, 0, -7), *lines[404:]))
+
+
+def many_holes(count, dwell=()):
+    """A program of holes in a row, and the lines of its text, four of each hole with its dwell."""
+    cycle = Statement(1, 3, "CYCLE", ("DRILL", "FEDTO", 8.0, "RAPTO", 2.0, *dwell))
+    tip = [[0.0, 0, 20], *([3.0 * k, 0, 0] for k in range(count)), [0.0, 0, 30]]
+    kind = [Move.RAPID, *[Move.HOLE] * count, Move.RAPID]
+    program = said(cycle, Statement(count + 1, 4, "CYCLE", ("OFF",)), kind=kind, tip=tip)
+    lines = ["G43.5 H1", ("G0", 0, 0, 20)]
+    for x in range(0, 3 * count, 3):
+        lines += [("G0", x, 0, 2), ("G1", x, 0, -8), *(["G4 P500"] if dwell else []), ("G0", x, 0, 20)]
+    return program, [*lines, ("G0", 0, 0, 30)]
+
+
+def test_a_long_run_of_holes_is_measured_as_it_is_read(monkeypatch):
+    program, lines = many_holes(400)
+    monkeypatch.setattr(reader, "GIVEN_OUT", 4)
+    monkeypatch.setattr(block_tables, "CHUNK", 60)
+    monkeypatch.setattr(hole_search, "_WINDOW", 2)
+    monkeypatch.setattr(drilling, "_TOGETHER", 8)
+    held = []
+    part = Ahead.part
+    monkeypatch.setattr(Ahead, "part", lambda ahead, *rows: (held.append(len(ahead.nc)), part(ahead, *rows))[1])
+    assert codes(program, text(*lines)) == []
+    assert max(held) < 200
+    assert codes(program, text(*lines[:600], ("G1", lines[600][1], 0, -8.5), *lines[601:])) == ["CS562"]
+    assert codes(program, text(*lines[:602], *lines[605:])) == ["CS561"]
+
+
+@pytest.mark.parametrize("longest", [2000, 2])
+def test_one_dwell_of_many_that_is_missing_is_one_finding(longest, monkeypatch):
+    monkeypatch.setattr(comparison, "_LONGEST_SEARCH", longest)
+    program, lines = many_holes(40, ("DWELL", 0.5))
+    assert codes(program, text(*lines)) == []
+    third = [k for k, line in enumerate(lines) if line == "G4 P500"][2]
+    found = verify(program, text(*lines[:third], *lines[third + 1 :]), tolerance=0.01).problems
+    assert [(one.code, one.cl_line) for one in found] == [("CS556", 13)]  # the line of the third hole
+    found = verify(program, text(*lines[:third], "G4 P700", *lines[third + 1 :]), tolerance=0.01).problems
+    assert [(one.code, one.cl_line) for one in found] == [("CS556", 13)]
+    # several that are wrong far apart
+    last = [k for k, line in enumerate(lines) if line == "G4 P500"][30]
+    wrong = text(*lines[:third], *lines[third + 1 : last], "G4 P700", *lines[last + 1 :])
+    assert {one.code for one in verify(program, wrong, tolerance=0.01).problems} == {"CS556"}

@@ -11,11 +11,11 @@ import numpy as np
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.nc_reader.elements import NcProgram
 from cornersmooth.nc_reader.reading import read_nc
+from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.distances import from_original, owner_fraction
 from cornersmooth.verify.match import Match, match
 from cornersmooth.verify.nearest import nearest_places
-from cornersmooth.verify.polyline import written_at
 from cornersmooth.verify.task import Task
 
 if TYPE_CHECKING:

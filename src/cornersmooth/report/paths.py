@@ -9,10 +9,10 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
+from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.report.along import deviation_along
 from cornersmooth.smoothing.arcs import arc_points
 from cornersmooth.vectors import angle_between, dot, norm
-from cornersmooth.verify.polyline import written_at
 
 #: points on every line and on every curve or arc: so many in all, between the least and the most of each
 _POINTS = 6000

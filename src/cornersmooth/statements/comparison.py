@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import takewhile
 
@@ -46,6 +46,10 @@ _STOPPED = ("spindle", "coolant")
 
 #: kinds of which only changes count
 _STATES = ("tool", "offset", "spindle", "speed", "coolant", "compensation")
+
+
+#: longer lists that differ are compared one by one
+_LONGEST_SEARCH = 2000
 
 
 def way_between(here: float, there: float) -> float:
@@ -118,8 +122,11 @@ def _differences(theirs: list[Token], ours: list[Token], found: list[Token], nea
     def add(cl_line: int, nc_line: int, kind: str, text: str) -> None:
         problems.append(Problem(_NAMES[kind][0], cl_line, nc_line, text))
 
-    matcher = difflib.SequenceMatcher(None, _values(theirs), _values(ours), autojunk=False)
-    for tag, i0, i1, j0, j1 in matcher.get_opcodes():
+    head = _alike(theirs, ours, near)
+    tail = _alike(theirs[head:][::-1], ours[head:][::-1], near)
+    between = (_values(tokens[head : len(tokens) - tail]) for tokens in (theirs, ours))
+    for tag, *where in _opcodes(*between):
+        i0, i1, j0, j1 = (head + k for k in where)
         for wanted, token in zip(theirs[i0:i1], ours[j0:j1], strict=False):
             if tag != "equal":
                 text = f"{_label(token)} where the CL file asks for {_label(wanted)}"
@@ -134,6 +141,24 @@ def _differences(theirs: list[Token], ours: list[Token], found: list[Token], nea
         for token in ours[j0 + both : j1]:
             add(0, token.line, token.kind, f"{_label(token)} is nothing that the CL file asks for")
     return problems
+
+
+def _alike(theirs: list[Token], ours: list[Token], near: _Nearness) -> int:
+    """How many tokens of both are the same, and where they should be, from the first on."""
+    pairs = enumerate(zip(theirs, ours, strict=False))
+    unlike = (k for k, (one, other) in pairs if one.value != other.value or near.away(one.place, other))
+    return next(unlike, min(len(theirs), len(ours)))
+
+
+def _opcodes(theirs: list[float], ours: list[float]) -> Iterator[tuple[str, int, int, int, int]]:
+    """How values differ from others, as `difflib` says it; one by one where that would take long."""
+    if max(len(theirs), len(ours)) <= _LONGEST_SEARCH:
+        yield from difflib.SequenceMatcher(None, theirs, ours, autojunk=False).get_opcodes()
+        return
+    both = min(len(theirs), len(ours))
+    for k in range(both):
+        yield "equal" if theirs[k] == ours[k] else "replace", k, k + 1, k, k + 1
+    yield "replace", both, len(theirs), both, len(ours)
 
 
 def _label(token: Token) -> str:

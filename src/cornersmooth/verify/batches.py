@@ -6,6 +6,7 @@ cut where there is no doubt about the place of a vertex (see `guide`).
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -16,11 +17,12 @@ from numpy.typing import NDArray
 from cornersmooth.model import Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
+from cornersmooth.nc_reader.tool import directions, moving_rapids
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.drilling import Holes
 from cornersmooth.verify.guide import STRIDE, cut, guide, places_on_each
-from cornersmooth.verify.polyline import Polyline, directions
-from cornersmooth.verify.rapids import Rapids, moving_rapids
+from cornersmooth.verify.polyline import Polyline
+from cornersmooth.verify.rapids import Rapids
 from cornersmooth.verify.task import Task
 
 #: elements in a batch
@@ -79,17 +81,9 @@ class Batch:
 class Stops:
     """What is known of stops: elements of the text, and the CL path length where they are, and where they begin."""
 
-    element: list[int] = field(default_factory=list)
-    length: list[float] = field(default_factory=list)
-    begin: list[float] = field(default_factory=list)
-
-    def lengths(self) -> dict[int, float]:
-        """CL path lengths by elements."""
-        return dict(zip(self.element, self.length, strict=True))
-
-    def begins(self) -> dict[int, float]:
-        """CL path lengths where elements begin."""
-        return dict(zip(self.element, self.begin, strict=True))
+    element: array[int] = field(default_factory=lambda: array("q"))
+    length: array[float] = field(default_factory=lambda: array("d"))
+    begin: array[float] = field(default_factory=lambda: array("d"))
 
 
 class Batches:
@@ -106,10 +100,8 @@ class Batches:
         self.task, self._events = task, events
         self.problems: list[Problem] = []
         self.stops = Stops()
-        #: move of the hole that an element belongs to
-        self.holes: dict[int, int] = {}
-        #: the last move that it may belong to
-        self.latest: dict[int, int] = {}
+        #: elements of holes, as of `Holes`
+        self.holes = array("q")
         #: moves of holes at whose bottom the tool waits, and ms
         self.dwells: list[tuple[int, float]] = []
         self.taps: list[int] = []
@@ -147,8 +139,8 @@ class Batches:
             self._lacking(0, len(original.pose) - 1)
             return
         holes = Holes(original, ahead, self.task.axis_length, ToolChanges(original.program, self._events))
-        self.holes, self.dwells = holes.element_move, holes.dwells
-        self.taps, self.untapped, self.latest = holes.taps, holes.untapped, holes.latest_move
+        self.holes, self.dwells = holes.elements, holes.dwells
+        self.taps, self.untapped = holes.taps, holes.untapped
         part: _Part | None = None
         surplus: int | None = None
         for between in holes.between():

@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
+from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.verify.distances import REACH, Reached, elements_around, owner_fraction
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import nearest_places
-from cornersmooth.verify.polyline import written_at
 
 #: places looked at on every move or element, and rounds of halving around the best of them
 _PLACES: Final = np.linspace(0.0, 1.0, 17)

@@ -15,10 +15,11 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.curves import CurveGroup
 from cornersmooth.nc_reader.elements import Element
+from cornersmooth.nc_reader.tool import directions, written_at
 from cornersmooth.verify.in_order import Windows
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import Gap, Metric, climb, distance_between, nearest_places
-from cornersmooth.verify.polyline import directions, points_on, written_at
+from cornersmooth.verify.polyline import points_on
 from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.wide_search import look_farther, nearest_alone
 

@@ -8,6 +8,7 @@ above the holes. How often it retracts is its own affair. How deep they are the 
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -24,6 +25,9 @@ from cornersmooth.verify.polyline import Original
 
 #: elements held of what has been given out
 _KEPT = 16
+
+#: holes of a run that are checked together, at least
+_TOGETHER = 1 << 8
 
 
 class Between(NamedTuple):
@@ -60,10 +64,9 @@ class Holes:
     def __init__(self, original: Original, ahead: Ahead, axis_length: float, changes: ToolChanges) -> None:
         self._original, self._ahead = original, ahead
         self._search = HoleSearch(original, ahead, axis_length, changes)
-        #: move of the hole that an element belongs to
-        self.element_move: dict[int, int] = {}
-        #: the last move that it may belong to: over holes that are not drilled the tool may be there for the next
-        self.latest_move: dict[int, int] = {}
+        #: elements that belong to holes, ascending, three numbers for each: its own, the first move that it may belong
+        #: to, and the last: over holes that are not drilled the tool may be there for the next
+        self.elements = array("q")
         #: moves of the holes at whose bottom the tool waits, and for how many ms
         self.dwells: list[tuple[int, float]] = []
         #: moves of the holes to be tapped in which something is fed
@@ -111,31 +114,44 @@ class Holes:
     def _drilled(self, first: int, stop: int, start: int, cycles: list[Drilling], *, again: bool) -> int:
         """Check the holes of a run; return the first element behind them."""
         search = self._search
-        groups, element = search.consume(first, stop, start, cycles, again=again)
+        groups: list[list[int]] = []  # elements of holes that are not checked yet, and of those before them
+        begin, element = first, start
+        for group, element in search.consume(first, stop, start, cycles, again=again):
+            # no later hole has to do with those before one that is fed in
+            if len(groups) >= _TOGETHER and search.feeds(groups[-1]) and not set(group) & set(groups[-1]):
+                self._check(begin, groups, (first, stop), cycles[begin - first : begin - first + len(groups)])
+                begin, groups = begin + len(groups), []
+                self._ahead.forget(min(group, default=element) - _KEPT)
+            groups.append(group)
         self._went_on = stop
         if stop < len(self._original.pose):
             groups[-1], element, self._went_on = search.give_back(stop, groups[-1], cycles[-1], element)
-        for k, group in enumerate(groups):
-            for one in group:  # of several in one hole the first: what follows may leave nothing in the text
-                if not search.stands_still(one):
-                    self.element_move.setdefault(one, first + k)
-                    self.latest_move.setdefault(one, self._latest(one, first + k, stop, groups[k:]))
-            again = search.repeats(first, stop, first + k)
-            shared = k and np.isnan(cycles[k].depth) and set(group) & set(groups[k - 1])
-            if not shared:  # looked at there
-                self.problems += check_hole(search, first + k, group, cycles[k], alone=not again)
-            if group and cycles[k].dwell:
-                self.dwells.append((first + k, cycles[k].dwell))
-            if cycles[k].tap and not np.isnan(cycles[k].depth):
-                self.taps.append(first + k)
-            elif cycles[k].tap:
-                near = search.nc_line(group[0]) if group else 0
-                text = "a hole of the CL file is not tapped"
-                self.untapped.append(Problem("CS561", int(search.line[first + k]), near, text))
+        self._check(begin, groups, (first, stop), cycles[begin - first :])
         return element
 
-    def _latest(self, element: int, move: int, stop: int, groups: list[list[int]]) -> int:
-        """Last move that an element of a hole may belong to; `groups` are those from that hole on."""
-        while move + 1 < stop and not self._search.feeds(groups[0]) and self._search.over(move + 1, element):
-            move, groups = move + 1, groups[1:]
-        return move
+    def _check(self, begin: int, groups: list[list[int]], run: tuple[int, int], cycles: list[Drilling]) -> None:
+        """Check holes from `begin` on, of a run that has first and stop, and take down what belongs to them."""
+        search = self._search
+        for k, (group, cycle) in enumerate(zip(groups, cycles, strict=True)):
+            move, fed = begin + k, bool(search.feeds(group))
+            for one in group:  # of several in one hole the first: what follows may leave nothing in the text
+                if one > (self.elements[-3] if self.elements else -1) and not search.stands_still(one):
+                    last = move if fed else begin + self._latest(one, begin, groups, k, run[1])
+                    self.elements.extend((one, move, last))
+            shared = k and np.isnan(cycle.depth) and set(group) & set(groups[k - 1])
+            if not shared:  # looked at there
+                self.problems += check_hole(search, move, group, cycle, alone=not search.repeats(*run, move))
+            if group and cycle.dwell:
+                self.dwells.append((move, cycle.dwell))
+            if cycle.tap and not np.isnan(cycle.depth):
+                self.taps.append(move)
+            elif cycle.tap:
+                near = search.nc_line(group[0]) if group else 0
+                text = "a hole of the CL file is not tapped"
+                self.untapped.append(Problem("CS561", int(search.line[move]), near, text))
+
+    def _latest(self, element: int, begin: int, groups: list[list[int]], k: int, stop: int) -> int:
+        """Which of the holes from `begin` on is the last that an element of one may belong to."""
+        while begin + k + 1 < stop and not self._search.feeds(groups[k]) and self._search.over(begin + k + 1, element):
+            k += 1
+        return k

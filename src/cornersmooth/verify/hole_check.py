@@ -23,8 +23,8 @@ def check_hole(lines: HoleLines, move: int, group: list[int], cycle: Drilling, *
     if not known:
         return [Problem("CS564", cl_line, lines.nc_line(feeds[0]), "the cycle does not say what is fed here")]
     problems = []
-    height = dict(zip(group, lines.heights(move, np.array(group)).tolist(), strict=True))
-    before = lines.heights(move, np.array([max(group[0] - 1, 0)]))[0]
+    before, *heights = lines.heights(move, np.array([max(group[0] - 1, 0), *group])).tolist()
+    height = dict(zip(group, heights, strict=True))
     deepest = min(feeds, key=lambda k: height[k])
     off = height[deepest] + cycle.depth
     if abs(off) > lines.room:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from functools import cached_property
+
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element
+from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.statements.tool_changes import ToolChanges
-from cornersmooth.verify.polyline import Original, directions
+from cornersmooth.verify.polyline import Original
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 
 #: moves behind a hole in which the next feed move or hole is looked for
@@ -17,6 +21,9 @@ _NEXT = 16
 
 #: last printed digits that a point may be beside its hole
 _STEPS = 1.0
+
+#: elements whose heights over a hole are worked out together, as long as the text stays at that hole
+_WINDOW = 16
 
 
 class HoleLines:
@@ -36,6 +43,7 @@ class HoleLines:
         program = original.program
         self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]
         self.line, self.kind = program.line[original.pose], program.kind[original.pose]
+        self._heights: tuple[int, int, list[float]] = (-1, 0, [])  # move, first element, heights
 
     @property
     def room(self) -> float:
@@ -86,9 +94,18 @@ class HoleLines:
         on &= turned * self.axis_length <= 2 * self.room + lean * self.axis_length
         return np.where(on, height, np.nan)
 
+    def height(self, move: int, element: int) -> float:
+        """The same of one element; those behind it are worked out along with it."""
+        known, first, heights = self._heights
+        if move != known or not 0 <= element - first < len(heights):
+            stop = min(element + _WINDOW, self.ahead.count)
+            first, heights = element, self.heights(move, np.arange(element, stop)).tolist()
+            self._heights = move, first, heights
+        return heights[element - first]
+
     def over(self, move: int, element: int) -> bool:
         """Whether there is such an element, and it ends in the line of the hole."""
-        return self.has(move, element) and not np.isnan(self.heights(move, np.array([element]))[0])
+        return self.has(move, element) and not math.isnan(self.height(move, element))
 
     def stays(self, move: int, element: int) -> bool:
         """Whether a move ends where an element has left the tool."""
@@ -115,6 +132,13 @@ class HoleLines:
         same: Bools = (apart <= self.room) & (turned * self.axis_length <= 2 * self.room)
         return same
 
+    @cached_property
+    def same_as_next(self) -> Bools:
+        """(m - 1,) whether each move is to the same hole as the one behind it."""
+        apart, turned = (np.linalg.norm(np.diff(values, axis=0), axis=1) for values in (self.tip, self.axis))
+        same: Bools = (apart <= self.room) & (turned * self.axis_length <= 2 * self.room)
+        return same
+
     def in_line(self, move: int, other: int) -> bool:
         """Whether the pose of another move is in the line of a hole, as far as the digits show."""
         away, turned = (values[other] - values[move] for values in (self.tip, self.axis))
@@ -132,7 +156,7 @@ class HoleLines:
         """Whether a move is a rapid that leads somewhere, from a pose that the text knows."""
         if move < 1 or self.kind[move] != Move.RAPID or self.kind[move - 1] == Move.HOLE:
             return False
-        return not self.near(move - 1, slice(move, move + 1))[0]
+        return not self.same_as_next[move - 1]
 
     def passes(self, move: int, elements: Ints) -> list[int]:
         """Elements among some that may be a move: they end exactly at its pose, in rapid where it comes so."""
@@ -141,7 +165,8 @@ class HoleLines:
 
     def feeds(self, group: list[int]) -> list[int]:
         """Elements of a group that are no rapids."""
-        return [k for k in group if self.ahead.nc.kind[k - self.ahead.base] != Element.RAPID]
+        kind, base, rapid = self.ahead.nc.kind, self.ahead.base, int(Element.RAPID)
+        return [k for k in group if kind[k - base] != rapid]
 
     def first_feed(self, move: int, element: int) -> int | None:
         """The first feed along a hole, from an element on; None where the text leaves it before."""
@@ -154,7 +179,7 @@ class HoleLines:
     def feeds_above(self, move: int, element: int) -> bool:
         """Whether the first feed along a hole, from an element on, stays above its pose, as no cycle does."""
         fed = self.first_feed(move, element)
-        return fed is not None and bool(self.heights(move, np.array([fed]))[0] >= -self.room)
+        return fed is not None and self.height(move, fed) >= -self.room
 
     def last_above(self, hole: int, element: int, cycle: Drilling) -> int:
         """Last feed, from an element on, to the pose before a hole, if any, before the text goes into it.
@@ -162,7 +187,7 @@ class HoleLines:
         What is fed to the pose of a hole of no depth may drill that.
         """
         found = element
-        while self.over(hole, element) and self.heights(hole, np.array([element]))[0] >= -self.room:
+        while self.over(hole, element) and self.height(hole, element) >= -self.room:
             if self.kind[hole - 1] != Move.RAPID and self.feeds([element]) and not cycle.depth <= self.room:
                 found = element if self.exact(hole - 1, np.array([element]))[0] else found
             element += 1
@@ -172,7 +197,7 @@ class HoleLines:
         """Whether the text drills a hole from an element on: to its depth, no farther, at the cycle's feeds."""
         while self.over(move, element):
             if self.feeds([element]):
-                height = self.heights(move, np.array([element]))[0]
+                height = self.height(move, element)
                 if self.wrong_feed(element, cycle) or height < -cycle.depth - self.room:
                     return False
                 if height <= self.room - cycle.depth:
@@ -208,4 +233,4 @@ class HoleLines:
 
     def repeats(self, first: int, stop: int, move: int) -> bool:
         """Whether a neighbour in a run of holes is the same hole."""
-        return any(first <= other < stop and self.same_hole(move, other) for other in (move - 1, move + 1))
+        return bool(self.same_as_next[max(move - 1, first) : min(move + 1, stop - 1)].any())

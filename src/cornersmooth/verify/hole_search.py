@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -65,6 +66,8 @@ class HoleSearch(HoleLines):
                 reached = k if reached is None or k == reached + 1 else reached
                 if stays or not self.over(hole, k + 1):
                     continue
+                if self.stays(hole - 1, k + 1) and not self.feeds([k + 1]):  # a rapid that does not leave the pose
+                    continue
                 if cycle.tap and k > reached and not self.tapped(hole, k + 1, asked):
                     continue
                 if left_out:
@@ -96,6 +99,8 @@ class HoleSearch(HoleLines):
         here = self.near(hole - 1, slice(move, hole)) & (self.kind[move:hole] != Move.HOLE)
         if self.comes_in_rapid(hole - 1):
             here &= self.kind[move:hole] == Move.RAPID
+            # one that leads nowhere is not in the text
+            here[1:] &= (self.kind[move : hole - 1] == Move.HOLE) | ~self.same_as_next[move : hole - 1]
         ends = np.append(self.kind[move + 1 : hole] != Move.LINEAR, True) | (self.kind[move:hole] == Move.RAPID)
         ends[0] |= move == 0  # the first pose of all
         begins = here & ~np.append(False, here[:-1])
@@ -103,8 +108,8 @@ class HoleSearch(HoleLines):
 
     def consume(
         self, first: int, stop: int, element: int, cycles: list[Drilling], *, again: bool
-    ) -> tuple[list[list[int]], int]:
-        """Elements of each hole, and the element behind them all.
+    ) -> Iterator[tuple[list[int], int]]:
+        """Give out the elements of each hole, and the first element behind them.
 
         Where the next cycle is for the same hole, the first rapid out of it behind its depth ends this one.
 
@@ -113,15 +118,15 @@ class HoleSearch(HoleLines):
         `again`: the next run begins in the last of these holes. Where nothing is drilled in it now, only what stays
         where the cycle was entered belongs to this run.
         """
-        groups: list[list[int]] = []
         asked = tuple(cycles)
+        group: list[int] = []
         for move in range(first, stop):
-            group: list[int] = []
+            before, group = group, []
             repeated = move > first and asked[move - 1 - first] == asked[move - first]
             cycle = cycles[move - first]
             untapped = cycle.tap and not self.tapped(move, element, cycle)
             fed = untapped and self.first_feed(move, element) is not None
-            if repeated and self.same_hole(move - 1, move) and not fed:
+            if repeated and self.same_as_next[move - 1] and not fed:
                 cycles[move - first] = cycles[move - 1 - first]
             elif untapped:
                 cycles[move - first] = cycle.if_drilled
@@ -131,22 +136,20 @@ class HoleSearch(HoleLines):
             if again and np.isnan(cycles[-1].depth) and move == stop - 1 and first:
                 entered = max(float((self.tip[first - 1] - self.tip[move]) @ self.axis[move]), 0.0)
             while self.has(move, element):
-                height = self.heights(move, np.array([element]))[0]
-                if np.isnan(height) or abs(height - entered) > self.room:
+                height = self.height(move, element)
+                if math.isnan(height) or abs(height - entered) > self.room:
                     break
                 fed = bool(self.feeds([element]))
-                down = not group or height < self.heights(move, np.array(group[-1:]))[0] - self.room
-                if (left and (fed or down)) or (fed and np.isnan(depth) and self.goes_on(move)):
+                down = not group or height < self.height(move, group[-1]) - self.room
+                if (left and (fed or down)) or (fed and math.isnan(depth) and self.goes_on(move)):
                     break  # what goes on behind a hole, or is fed where nothing is drilled, is not the hole's
                 group.append(element)
                 element += 1
                 deep = deep or height <= self.room - depth
                 left = left or (deep and height > self.room)
-            if not group and groups and groups[-1]:  # the same hole again
-                before = np.array(groups[-1])
-                group = before[~np.isnan(self.heights(move, before))].tolist()
-            groups.append(group)
-        return groups, element
+            if not group:  # the same hole again
+                group = [k for k in before if not math.isnan(self.height(move, k))]
+            yield group, element
 
     def give_back(self, move: int, group: list[int], cycle: Drilling, end: int) -> tuple[list[int], int, int]:
         """Elements of the last hole, and the first of what follows and its move: the way out may be the CL file's own.

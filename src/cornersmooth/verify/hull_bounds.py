@@ -10,10 +10,10 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import CurveGroup
+from cornersmooth.nc_reader.tool import directions, unit, written_at
 from cornersmooth.verify.common_place import axis_off_at
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import foot_share, larger_square, nearest_places
-from cornersmooth.verify.polyline import directions, unit, written_at
 
 #: samples between two knots where the hull alone does not settle it
 _SAMPLES = 32

@@ -57,11 +57,12 @@ class OwnRapids:
         """
         leaves = np.array_equal(near, start)
         at_near, at_far = self._moves_to(near, step), self._moves_to(end if leaves else start, step)
+        beside = at_far + (-1 if leaves else 1)
         at_far = at_far[np.isin(at_far, self.rapids) | np.isin(at_far, self.holes)]
         one, other = (at_near, at_far) if leaves else (at_far, at_near)
         # at holes that are left out nothing moves
         asked = any(_follow(rank[one], rank[other]) for rank in self._ranks)
-        asked = asked or self._over_hole(near, at_far + (-1 if leaves else 1), step)
+        asked = asked or self._over_hole(near, beside, step)
         asked = asked or (leaves and self._over_hole(near, self.holes, step, below=True))
         return not (asked or np.isin(at_near, self.holes).all())
 

@@ -15,6 +15,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader.arcs import arc_points
 from cornersmooth.nc_reader.curves import CurveGroup, groups
 from cornersmooth.nc_reader.elements import Element, Elements
+from cornersmooth.nc_reader.tool import between, directions, unit
 
 #: how far, relative to the tolerance, a trail may stay off the motion it stands for
 CHORD_SHARE = 0.1
@@ -152,23 +153,6 @@ class Original:
         return tip, unit(axis)
 
 
-def between(values: Floats, start: Ints, end: Ints, fraction: Floats) -> Floats:
-    """Rows (k, 3) of a table on the way from some of its rows to others."""
-    first = values.take(start, axis=0)
-    way = values.take(end, axis=0)
-    way -= first
-    way *= fraction[:, None]
-    way += first
-    return way
-
-
-def unit(vectors: Floats) -> Floats:
-    """Vectors (k, 3) at length one; zero stays zero."""
-    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
-    result: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
-    return result
-
-
 def original_motion(program: Program, tolerance: float, axis_length: float) -> Original:
     """Make the trail of the CL motion."""
     stated = program.kind == Move.FROM
@@ -251,11 +235,6 @@ class Written:
     straight: Bools
 
 
-def directions(nc: Elements, tip: Floats, second: Floats) -> Floats:
-    """Unit tool vectors (k, 3) of written poses."""
-    return unit(second - tip if nc.second_is == "point" else second)
-
-
 def written_motion(nc: Elements, first: int, last: int, tolerance: float, axis_length: float) -> Written:
     """Make the trail of a stretch of the written motion."""
     part = slice(first, last + 1)
@@ -305,27 +284,3 @@ def written_motion(nc: Elements, first: int, last: int, tolerance: float, axis_l
             fraction[end - k - 1] = u
     trail = Trail(new_tip, directions(nc, new_tip, new_second), owner + first, fraction, ends)
     return Written(nc, first, trail, curve_groups, straight)
-
-
-def written_at(nc: Elements, element: Ints, fraction: Floats) -> tuple[Floats, Floats]:
-    """Tip and unit axis (k, 3) on path elements, at a fraction of each (curves: of the range of their parameter)."""
-    before = np.maximum(element - 1, 0)
-    tip = between(nc.tip, before, element, fraction)
-    second = between(nc.second, before, element, fraction)
-    kind = nc.kind[element]
-    on = np.flatnonzero(kind == Element.ARC)
-    if len(on):
-        arcs, r = nc.arcs, np.searchsorted(nc.arcs.element, element[on])
-        start, end = nc.tip[before[on]], nc.tip[element[on]]
-        tip[on] = arc_points(start, end, arcs.centre[r], arcs.normal[r], arcs.sweep[r], fraction[on])
-    on = np.flatnonzero(kind == Element.CURVE)
-    if len(on):
-        row = np.searchsorted(nc.curves.element, element[on])
-        for group in groups(nc.curves, np.unique(row)):
-            mine = np.flatnonzero(np.isin(row, group.index))
-            spans = group.spans
-            parameter = spans[0] + fraction[on[mine]] * (spans[-1] - spans[0])
-            local = np.searchsorted(group.index, row[mine])
-            point = group.at_own(local, parameter)
-            tip[on[mine]], second[on[mine]] = point[:, :3], point[:, 3:]
-    return tip, directions(nc, tip, second)

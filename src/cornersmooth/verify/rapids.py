@@ -12,8 +12,9 @@ from typing import Final
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
-from cornersmooth.nc_reader.elements import Element, Elements, Problem
-from cornersmooth.verify.polyline import Original, directions
+from cornersmooth.nc_reader.elements import Elements, Problem
+from cornersmooth.nc_reader.tool import beyond_digits, directions
+from cornersmooth.verify.polyline import Original
 
 #: slack of arithmetic on coordinates that are a million times larger, mm
 ARITHMETIC = 1e-9
@@ -208,31 +209,6 @@ def stops_of_original(original: Original, axis_length: float, step: float, first
     return np.concatenate(([first], index[moved] + first))
 
 
-def moving_rapids(nc: Elements, first: int, stop: int) -> Ints:
-    """Elements from `first` (at least 1) to `stop` (excluded) that are rapid and move the tool."""
-    index = np.flatnonzero(nc.kind[first:stop] == Element.RAPID) + first
-    ways = (values[index] - values[index - 1] for values in (nc.tip, nc.second))
-    found: Ints = index[leads_somewhere(nc, *ways)]
-    return found
-
-
-def leads_somewhere(nc: Elements, way: Floats, turn: Floats) -> Bools:
-    """Whether motions (k, 3) of the tip and of the second point or vector are any.
-
-    Two pairs of rotary angles that hold the tool alike do so up to the digits that are printed.
-    """
-    turned: Bools = np.abs(turn).max(axis=1) > (nc.second_step if nc.rotary else 0.0)
-    moved: Bools = _beyond_digits(way, nc) if nc.rotary else np.abs(way).max(axis=1) > 0.0
-    return moved | turned
-
-
-def _beyond_digits(way: Floats, nc: Elements) -> Bools:
-    """Whether ways (k, 3) of the tip are longer than printed digits show, which may be those of turned axes."""
-    large = np.linalg.norm(way, axis=1) / np.sqrt(3) if nc.rotary else np.abs(way).max(axis=1)
-    beyond: Bools = large > 1.01 * nc.tip_step
-    return beyond
-
-
 def _opcodes(theirs: Floats, nc: Elements, element: Ints) -> list[tuple[str, int, int, int, int]]:
     """How the tips of elements differ from a list of tips, in printed digits."""
     if max(len(theirs), len(element)) > _LONGEST_SEARCH:
@@ -250,7 +226,7 @@ def _opcodes(theirs: Floats, nc: Elements, element: Ints) -> list[tuple[str, int
 
 def _negligible(tip: Floats, index: int, nc: Elements) -> bool:
     """Whether a stop moves the tip by no more than printed digits show."""
-    return bool(index > 0 and not _beyond_digits((tip[index] - tip[index - 1])[None], nc)[0])
+    return bool(index > 0 and not beyond_digits(nc, (tip[index] - tip[index - 1])[None])[0])
 
 
 def _problem(

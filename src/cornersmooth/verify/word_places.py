@@ -15,15 +15,15 @@ from typing import Final
 
 import numpy as np
 
-from cornersmooth.model import Ints, Program
+from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
+from cornersmooth.nc_reader.tool import leads_somewhere
 from cornersmooth.statements.asked import asked
 from cornersmooth.statements.comparison import compare
 from cornersmooth.statements.said import said
 from cornersmooth.statements.tokens import TAP, Token
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.checks import Examined
-from cornersmooth.verify.rapids import leads_somewhere
 from cornersmooth.verify.task import Task
 from cornersmooth.verify.wide_search import way_apart
 
@@ -125,41 +125,69 @@ class _Places:
     """CL path lengths, mm, where elements of the text end and begin, as far as they are known."""
 
     def __init__(self, words: WordPlaces, batches: Batches) -> None:
-        self._task, self._still, self._holes = words.task, words._still, batches.holes
+        self._task, self._still, stops = words.task, words._still, batches.stops
         length = self._task.path.length
         self.end = float(length[-1]) if len(self._task.original.pose) else 0.0
-        self._ends = words._lengths | batches.stops.lengths()
-        self._ends |= {element: self.of_move(move) for element, move in batches.holes.items()}
-        self._known = sorted(self._ends)
-        self._begins = {element + 1: place for element, place in batches.stops.lengths().items()}
-        self._begins |= {element: self.of_move(max(move - 1, 0)) for element, move in batches.latest.items()}
-        self._begins |= batches.stops.begins()
-        self._begins[batches.elements] = self.end
+        holes = np.frombuffer(batches.holes, np.int64).reshape(-1, 3)
+        self._holes = holes[:, 0].copy()  # searched often
+        stop, there = np.frombuffer(stops.element, np.int64), np.frombuffer(stops.length)
+        known = sorted(words._lengths)
+        seen = np.array(known, np.int64), np.array([words._lengths[element] for element in known])
+        self._ends = _Lengths((self._holes, self.of_moves(holes[:, 1])), (stop, there), seen)
+        self._begins = _Lengths(
+            (np.array([batches.elements]), np.array([self.end])),
+            (stop, np.frombuffer(stops.begin)),
+            (self._holes, self.of_moves(np.maximum(holes[:, 2] - 1, 0))),
+            (stop + 1, there),
+        )
 
-    def of_move(self, move: int) -> float:
-        """Where a move of the CL file ends."""
-        return float(self._task.path.length[self._task.original.trail.last[move]])
+    def of_moves(self, moves: Ints) -> Floats:
+        """(k,) where moves of the CL file end."""
+        ends: Floats = self._task.path.length[self._task.original.trail.last[moves]]
+        return ends
 
     def standing(self, element: int) -> int:
         """The element at whose end one leaves the tool that leads nowhere, as a second rapid to the same place does."""
-        at = bisect_right(self._known, element) - 1
-        return self._known[at] if at >= 0 else element
+        return max(self._ends.up_to(element), default=element)
 
     def behind(self, event: Event) -> float:
         """Where a word stands: at the end of the element before it; that of a tap at the hole that is fed next."""
-        if (event.letter, event.value) == ("G", TAP) and event.element in self._holes:
-            return self._ends[event.element]
+        if (event.letter, event.value) == ("G", TAP) and event.element in _up_to(self._holes, event.element):
+            return self._ends.at(event.element, 0.0)
         before = event.element - 1
-        first = self._known[0] if self._known else 0
-        return self._ends.get(self.standing(before), _BEFORE if before < first else 0.0)
+        return self._ends.at(self.standing(before), 0.0 if self._ends.up_to(before) else _BEFORE)
 
     def next_begin(self, event: Event) -> float:
         """Where the next element that leads somewhere begins at the latest; -inf where that is not known.
 
         Between the two the text may have passed all that leaves nothing in it.
         """
-        following = next(k for k in count(event.element) if k not in self._still)
-        return self._begins.get(following, -math.inf)
+        return self._begins.at(next(k for k in count(event.element) if k not in self._still), -math.inf)
+
+
+class _Lengths:
+    """CL path lengths of elements: sources of both, elements ascending, of which the first that knows one counts."""
+
+    def __init__(self, *sources: tuple[Ints, Floats]) -> None:
+        self._sources = sources
+
+    def up_to(self, element: int) -> list[int]:
+        """The last element that each source knows before another, or that itself."""
+        return [last for known, _ in self._sources for last in _up_to(known, element)]
+
+    def at(self, element: int, otherwise: float) -> float:
+        """Length of an element, if it is known."""
+        for known, length in self._sources:
+            if element in _up_to(known, element):
+                return float(length[np.searchsorted(known, element, side="right") - 1])
+        return otherwise
+
+
+def _up_to(ascending: Ints, value: int) -> list[int]:
+    """The last of some values that is not larger than another, if there is one."""
+    stop = int(np.searchsorted(ascending, value, side="right"))
+    known: list[int] = ascending[stop - 1 : stop].tolist() if stop else []
+    return known
 
 
 def _statement_lengths(task: Task) -> list[float]:
@@ -183,4 +211,8 @@ def _of_holes(batches: Batches, places: _Places) -> list[Token]:
     asked_for = [("dwell", float(time), move) for move, time in batches.dwells]
     asked_for += [("tap", TAP, move) for move in batches.taps]
     line = original.program.line
-    return [Token(kind, value, places.of_move(move), int(line[original.pose[move]])) for kind, value, move in asked_for]
+    there = places.of_moves(np.array([move for _, _, move in asked_for], np.int64)).tolist()
+    return [
+        Token(kind, value, at, int(line[original.pose[move]]))
+        for (kind, value, move), at in zip(asked_for, there, strict=True)
+    ]

@@ -1,0 +1,81 @@
+"""Where the tool is on the elements of a text, where it points there, and whether a rapid moves it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.nc_reader.arcs import arc_points
+from cornersmooth.nc_reader.curves import groups
+from cornersmooth.nc_reader.elements import Element, Elements
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors (k, 3) at length one; zero stays zero."""
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    result: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    return result
+
+
+def directions(nc: Elements, tip: Floats, second: Floats) -> Floats:
+    """Unit tool vectors (k, 3) of written poses."""
+    return unit(second - tip if nc.second_is == "point" else second)
+
+
+def between(values: Floats, start: Ints, end: Ints, fraction: Floats) -> Floats:
+    """Rows (k, 3) of a table on the way from some of its rows to others."""
+    first = values.take(start, axis=0)
+    way = values.take(end, axis=0)
+    way -= first
+    way *= fraction[:, None]
+    way += first
+    return way
+
+
+def written_at(nc: Elements, element: Ints, fraction: Floats) -> tuple[Floats, Floats]:
+    """Tip and unit axis (k, 3) on path elements, at a fraction of each (curves: of the range of their parameter)."""
+    before = np.maximum(element - 1, 0)
+    tip = between(nc.tip, before, element, fraction)
+    second = between(nc.second, before, element, fraction)
+    kind = nc.kind[element]
+    on = np.flatnonzero(kind == Element.ARC)
+    if len(on):
+        arcs, r = nc.arcs, np.searchsorted(nc.arcs.element, element[on])
+        start, end = nc.tip[before[on]], nc.tip[element[on]]
+        tip[on] = arc_points(start, end, arcs.centre[r], arcs.normal[r], arcs.sweep[r], fraction[on])
+    on = np.flatnonzero(kind == Element.CURVE)
+    if len(on):
+        row = np.searchsorted(nc.curves.element, element[on])
+        for group in groups(nc.curves, np.unique(row)):
+            mine = np.flatnonzero(np.isin(row, group.index))
+            spans = group.spans
+            parameter = spans[0] + fraction[on[mine]] * (spans[-1] - spans[0])
+            local = np.searchsorted(group.index, row[mine])
+            point = group.at_own(local, parameter)
+            tip[on[mine]], second[on[mine]] = point[:, :3], point[:, 3:]
+    return tip, directions(nc, tip, second)
+
+
+def moving_rapids(nc: Elements, first: int, stop: int) -> Ints:
+    """Elements from `first` (at least 1) to `stop` (excluded) that are rapid and move the tool."""
+    index = np.flatnonzero(nc.kind[first:stop] == Element.RAPID) + first
+    ways = (values[index] - values[index - 1] for values in (nc.tip, nc.second))
+    found: Ints = index[leads_somewhere(nc, *ways)]
+    return found
+
+
+def leads_somewhere(nc: Elements, way: Floats, turn: Floats) -> Bools:
+    """Whether motions (k, 3) of the tip and of the second point or vector are any.
+
+    Two pairs of rotary angles that hold the tool alike do so up to the digits that are printed.
+    """
+    turned: Bools = np.abs(turn).max(axis=1) > (nc.second_step if nc.rotary else 0.0)
+    moved: Bools = beyond_digits(nc, way) if nc.rotary else np.abs(way).max(axis=1) > 0.0
+    return moved | turned
+
+
+def beyond_digits(nc: Elements, way: Floats) -> Bools:
+    """Whether ways (k, 3) of the tip are longer than printed digits show, which may be those of turned axes."""
+    large = np.linalg.norm(way, axis=1) / np.sqrt(3) if nc.rotary else np.abs(way).max(axis=1)
+    beyond: Bools = large > 1.01 * nc.tip_step
+    return beyond
