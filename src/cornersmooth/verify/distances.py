@@ -306,39 +306,24 @@ def _on_chords(points: Floats, target: Floats) -> tuple[Floats, Floats]:
 def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
     """Distance of chosen written vertices from the original tip path, and from its axis-point path, each on its own."""
     vertex = reached.vertex[rows]
+    six, segment, low, high = match.six[vertex], match.segment[vertex], match.low[vertex], match.high[vertex]
     trail, original = match.written.trail, match.original
     result = []
-    for metric in ("tip", "axis point"):
-        segment, at, _ = nearest_places(
-            match.six[vertex],
-            match.path.six,
-            match.segment[vertex],
-            REACH,
-            match.low[vertex],
-            match.high[vertex],
-            metric,
-        )
-        tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, segment, at))
+    ways: tuple[tuple[Metric, Floats], ...] = (
+        ("tip", reached.gap.tip[rows]),
+        ("axis point", reached.gap.axis_point[rows]),
+    )
+    for metric, known in ways:
+        near, at, _ = nearest_places(six, match.path.six, segment, REACH, low, high, metric)
+        tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, near, at))
         gap = match.task.gap(trail.tip[vertex], trail.axis[vertex], tip, axis)
-        result.append(
-            np.minimum(
-                *(
-                    (gap.tip, reached.gap.tip[rows])
-                    if metric == "tip"
-                    else (gap.axis_point, reached.gap.axis_point[rows])
-                )
-            )
-        )
-    tip, axis = result
-    ways: tuple[tuple[Floats, Metric], ...] = ((tip, "tip"), (axis, "axis point"))
-    for values, metric in ways:
+        values = np.minimum(gap.tip if metric == "tip" else gap.axis_point, known)
+        result.append(values)
         far = np.flatnonzero(values > match.tolerance + ARITHMETIC)
-        own = vertex[far]
-        near = nearest_alone(
-            match.six[own], match.path.six, match.segment[own], match.low[own], match.high[own], match.near, metric
-        )
-        values[far] = np.minimum(values[far], near[2])
-    return tip, axis
+        if len(far):
+            own = six[far], match.path.six, segment[far], low[far], high[far]
+            values[far] = np.minimum(values[far], nearest_alone(*own, match.near, metric)[2])
+    return result[0], result[1]
 
 
 #: segments looked at on either side for the distance of tip or axis point alone
@@ -385,12 +370,16 @@ def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Fl
         bent = np.flatnonzero(~match.written.straight[elements - match.written.first].all(axis=1))
         if metric == "axis point":  # which runs a little off its chords where the tool turns
             bent = np.arange(len(rows))
-        values[bent] = np.minimum(search_elements(match, elements[bent], point[bent], column=column)[2], known[bent])
+        if len(bent):
+            away = search_elements(match, elements[bent], point[bent], column=column)[2]
+            values[bent] = np.minimum(away, known[bent])
+        result.append(values)
         far = np.flatnonzero(values > match.tolerance + ARITHMETIC)
+        if not len(far):
+            continue
         own = point[far], match.six, segment[far], low[far], high[far]
         there, _, distance = nearest_alone(*own, match.near, metric)
         known_near = np.isfinite(distance)
         far, elements = far[known_near], elements_around(match, there[known_near])
         values[far] = np.minimum(values[far], search_elements(match, elements, point[far], column=column)[2])
-        result.append(values)
     return result[0], result[1]

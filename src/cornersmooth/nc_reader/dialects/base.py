@@ -123,7 +123,8 @@ class Dialect:
     def decimals(self, text: bytes) -> tuple[int, int | None]:
         """Decimals of the tip and of the second triple, from a sample of the text; None without any."""
         tip, second = 0, None
-        for _, other, fraction in self.digits.findall(_COMMENT.sub(b"", text).upper()):
+        shapes = set(text.upper().translate(_ONE_DIGIT).split(b"\n"))  # many lines differ in nothing but their digits
+        for _, other, fraction in self.digits.findall(_COMMENT.sub(b"", b"\n".join(shapes))):
             if other:
                 second = max(second or 0, len(fraction))
             else:
@@ -132,6 +133,7 @@ class Dialect:
 
 
 _COMMENT = re.compile(rb"\([^)\n]*\)|;[^\n]*")
+_ONE_DIGIT = bytes.maketrans(b"0123456789", b"0" * 10)
 
 
 def values(columns: Columns) -> dict[str, float]:
