@@ -20,7 +20,7 @@ from cornersmooth.smoothing.sampling import Rows, dense_rows
 from cornersmooth.vectors import unit
 
 #: rows handed on at a time
-_CHUNK = 32768
+_CHUNK = 1 << 17
 
 #: chord tolerance that leaves transitions with as few lines as their change of axis allows, mm
 _COARSE = 1.0

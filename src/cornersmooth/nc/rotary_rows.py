@@ -41,7 +41,7 @@ from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.vectors import norm
 
 #: rows handed on at a time
-CHUNK = 32768
+CHUNK = 1 << 17
 
 #: deg/min that no rotary axis exceeds where we time its blocks ourselves
 _FASTEST_TURN = 36_000.0
