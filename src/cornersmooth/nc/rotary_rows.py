@@ -40,8 +40,8 @@ from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.vectors import norm
 
-#: rows handed on at a time
-CHUNK = 1 << 17
+#: rows handed on at a time; of those that long lines are looked for in, where many are tested at once
+CHUNK, _LONG_CHUNK = 1 << 15, 1 << 17
 
 #: deg/min that no rotary axis exceeds where we time its blocks ourselves
 _FASTEST_TURN = 36_000.0
@@ -140,8 +140,9 @@ def rotary_rows(
     limits = line_limits(settings, form, largest_turn)
     timed = _timed_cuts(angles, move, program) if form.orientation == "machine" else None
     inserted, times = InsertedPoints(), _BlockTimes(smoothed, form, machine, limits)
-    for begin in range(0, max(len(move) - 1, 1), CHUNK):
-        here = slice(begin, begin + CHUNK + 1)  # the last row of a chunk is the start of the next
+    size = _LONG_CHUNK if long else CHUNK
+    for begin in range(0, max(len(move) - 1, 1), size):
+        here = slice(begin, begin + size + 1)  # the last row of a chunk is the start of the next
         line = program.line[move[here]]
         more = insertions(
             machine,
