@@ -276,19 +276,14 @@ def _reaches(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bool
 
 
 def _keeps(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Bools:
-    """(q,) bool: whether lines that pass rows by keep the limits at them, and halfway between them where words bend."""
-    kept = np.ones(len(start), np.bool_)
-    looks = [(start + 1, end - start - 1, False)]  # from which row on, and at how many
+    inner = end - start - 1
+    kept = _off(rows, limits, start, end, inner, halves=False) <= _USED
     if limits.rotary:  # between rotary words tool axis and tip run on bows, largest about halfway between rows
-        looks.append((start, end - start, True))
-    for first, count, halves in looks:
         left = np.flatnonzero(kept)
         if len(left):
-            lines = start[left], end[left]
-            kept[left] = _off(rows, limits, *lines, first[left], count[left], halves=halves) <= _USED
+            kept[left] = _off(rows, limits, start[left], end[left], inner[left] + 1, halves=True) <= _USED
     if rows.position is not None:
-        left = np.flatnonzero(kept)
-        kept[left] = _in_order(rows, limits, start[left], end[left])
+        kept &= _in_order(rows, limits, start, end)
     return kept
 
 
@@ -314,13 +309,11 @@ def _in_order(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Boo
     return kept
 
 
-def _off(
-    rows: Vertices, limits: LineLimits, start: Ints, end: Ints, first: Ints, count: Ints, *, halves: bool
-) -> Floats:
-    """(q,) largest share of the limits that lines use at `count` rows from `first` on, or halfway to the next rows."""
+def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints, *, halves: bool) -> Floats:
+    """(q,) largest share of the limits in use, at the `count` rows inside lines or halfway between rows."""
     line = np.repeat(np.arange(len(start)), count)
-    begun = np.cumsum(count) - count
-    row = np.arange(len(line)) + (first - begun)[line]
+    first = np.cumsum(count) - count
+    row = np.arange(len(line)) - first[line] + start[line] + (not halves)
     s, low = rows.parameter, rows.parameter[start]
     length = s[end] - low
 
@@ -340,5 +333,5 @@ def _off(
     lever = at(rows.original_axis_point) - original_tip
     lever *= (limits.axis_length / np.maximum(norm(lever), np.finfo(np.float64).tiny))[:, None]
     off = np.maximum(norm(tip - original_tip) / limits.tip, norm(axis_point - original_tip - lever) / limits.axis_point)
-    largest: Floats = np.maximum.reduceat(off, begun)
+    largest: Floats = np.maximum.reduceat(off, first)
     return largest
