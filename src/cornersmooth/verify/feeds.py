@@ -16,6 +16,7 @@ from cornersmooth.nc_reader.rotary import SHORT_STEPS
 from cornersmooth.verify.distances import Distances
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
+from cornersmooth.verify.polyline import Original
 from cornersmooth.verify.rapids import ARITHMETIC
 
 #: a rounding reaches at most so many times as far as its first vertex that is visibly off the line
@@ -45,20 +46,19 @@ def check_feeds(distances: Distances, found: Findings) -> None:
         return
     start, end = start[feeding], end[feeding]
     low, high = _touched(match, start, end)
-    feed, mode = program.feed[original.pose], program.feed_mode[original.pose] == FeedMode.PER_REVOLUTION
     said, per_revolution, room = nc.feed[element], nc.per_revolution[element], nc.feed_room[element]
     rapid = nc.kind[element] == Element.RAPID
 
     def fits(k: int, moves: Ints) -> Bools:
         """(m,) whether row k carries the feed of moves."""
-        return _same(said[k], per_revolution[k], room[k], feed, mode, moves)
+        return _same(said[k], per_revolution[k], room[k], original, moves)
 
     # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
     still = np.isnan(room) & (np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC)
-    good = _same(said, per_revolution, room, feed, mode, low) | rapid | still
+    good = _same(said, per_revolution, room, original, low) | rapid | still
     other = np.flatnonzero(~good)
     if len(other):
-        good[other] = _same(said[other], per_revolution[other], room[other], feed, mode, high[other])
+        good[other] = _same(said[other], per_revolution[other], room[other], original, high[other])
         several = np.flatnonzero(~good & (high > low + 1))
         for k in several.tolist():
             good[k] = fits(k, np.arange(low[k], high[k] + 1)).any()
@@ -74,7 +74,7 @@ def check_feeds(distances: Distances, found: Findings) -> None:
         if good[k]:
             continue
         pair = float(said[k]), float(room[k])
-        good[k] = _inside_rounding(match, off, int(start[k]), int(end[k]), int(low[k]), pair, feed)
+        good[k] = _inside_rounding(match, off, int(start[k]), int(end[k]), int(low[k]), pair)
     wrong = np.flatnonzero(~good)
     if len(wrong):
         runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
@@ -100,15 +100,15 @@ def _same(
     said: Floats | np.float64,
     per_revolution: Bools | np.bool_,
     room: Floats | np.float64,
-    feed: Floats,
-    mode: Bools,
+    original: Original,
     move: Ints,
 ) -> Bools:
-    asked = feed[move]
+    pose = original.pose[move]
+    asked, mode = original.program.feed[pose], original.program.feed_mode[pose] == FeedMode.PER_REVOLUTION
     slack = ARITHMETIC * np.maximum(np.abs(asked), 1.0)
     near = (np.abs(said - asked) <= np.abs(room) + slack) | (asked <= -_CREEPING * room)
     near |= np.isnan(room) & (said > 0.0) & (said <= asked + slack)
-    same: Bools = np.isnan(asked) | (near & (per_revolution == mode[move]))
+    same: Bools = np.isnan(asked) | (near & (per_revolution == mode))
     return same
 
 
@@ -163,10 +163,9 @@ def _inside_rounding(
     end: int,
     move: int,
     pair: tuple[float, float],
-    feed: Floats,
 ) -> bool:
     """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
-    length, trail = match.path.length, match.original.trail
+    length, trail, pose = match.path.length, match.original.trail, match.original.pose
     said, room = pair[0], abs(pair[1]) + ARITHMETIC * max(abs(pair[0]), 1.0)
     creeping, slower = -_CREEPING * pair[1], bool(np.isnan(pair[1]))
     visible = match.margin / 2
@@ -181,7 +180,7 @@ def _inside_rounding(
         """Moves beyond the pose up to the next that leads anywhere: repeated poses are rounded as one."""
         found = []
         other = move + towards
-        while 0 <= other < len(feed):
+        while 0 <= other < len(pose):
             found.append(other)
             if length[trail.last[other]] - (length[trail.last[other - 1]] if other else 0.0) > match.margin:
                 break
@@ -195,20 +194,20 @@ def _inside_rounding(
         if not low < pose_vertex <= high:
             continue
         if not any(
-            abs(feed[other] - said) <= room or feed[other] <= creeping or (slower and 0.0 < said <= feed[other])
-            for other in beyond(step)
+            abs(asked - said) <= room or asked <= creeping or (slower and 0.0 < said <= asked)
+            for asked in match.original.program.feed[pose[beyond(step)]]
         ):
             continue
-        pose = length[pose_vertex]
+        there = length[pose_vertex]
         begin, other = length[trail.last[move - 1]], length[trail.last[move]]
-        far = abs(at(vertex) - pose)
+        far = abs(at(vertex) - there)
         if far > (other - begin) / 2 + match.margin:
             continue
         reach = largest = 0.0
         walker = vertex
-        while 0 <= walker < len(off) and match.on[walker] and step * (at(walker) - pose) <= 0:
+        while 0 <= walker < len(off) and match.on[walker] and step * (at(walker) - there) <= 0:
             if off[walker] > visible:
-                reach = max(reach, abs(at(walker) - pose))
+                reach = max(reach, abs(at(walker) - there))
                 largest = max(largest, float(off[walker]))
             walker += step
         if 0 <= walker < len(off):
