@@ -20,7 +20,7 @@ import stat
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import BinaryIO, cast
+from typing import BinaryIO, Final, cast
 
 from cornersmooth.errors import OutputError, SettingsError
 
@@ -30,6 +30,8 @@ Target = str | os.PathLike[str] | BinaryIO
 #: ending of the file beside the output that holds a text which breaks its promise
 REJECTED = ".rejected"
 
+#: hash of what is written: many processors have instructions of their own for it
+_HASH: Final = "sha256"
 
 #: extended attribute that holds the mark of a file
 _MARK = "user.cornersmooth"
@@ -106,7 +108,7 @@ class HashedStream:
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
-        self._hash = hashlib.blake2b()
+        self._hash = hashlib.new(_HASH)
 
     def write(self, data: bytes, /) -> int:
         """Write the bytes."""
@@ -131,7 +133,7 @@ class HashedStream:
             CS407: somebody else has changed it.
         """
         with open(path, "rb") as file:
-            if hashlib.file_digest(file, "blake2b").hexdigest() != self.digest:
+            if hashlib.file_digest(file, _HASH).hexdigest() != self.digest:
                 raise OutputError("CS407", "somebody changed the text before it took its place", "try again", file=path)
 
 
@@ -213,7 +215,7 @@ def read_mark(path: str) -> dict[str, str] | None:
     try:
         mark = json.loads(os.getxattr(path, _MARK))
         with open(path, "rb") as file:
-            changed = hashlib.file_digest(file, "blake2b").hexdigest() != mark.pop("text")
+            changed = hashlib.file_digest(file, _HASH).hexdigest() != mark.pop("text")
     except OSError as failure:
         return None if failure.errno in (errno.ENOTSUP, errno.EPERM) else {}
     except (ValueError, KeyError, AttributeError):

@@ -6,12 +6,15 @@ data of its parent without copying it.
 
 from __future__ import annotations
 
+import mmap
 import os
+import pickle
 import signal
 import sys
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from itertools import accumulate
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -25,6 +28,10 @@ MOST_PROCESSES: Final = 4
 
 #: items taken ahead of what has been given out, whatever the number of processes: what comes out never depends on it
 _AHEAD: Final = 5
+
+#: bytes of the arrays of an item that a process gets without a copy of its own; the system gives them as they are used
+_TRAY: Final = 1 << 25
+_ALIGNED: Final = 64
 
 #: only used where the system can fork
 _CONTEXT: Final = get_context("fork" if sys.platform == "linux" else None)
@@ -107,11 +114,37 @@ def map_in_processes(work: Callable[[Item], Result], items: Iterable[Item], proc
             crew.end()
 
 
+class _Tray:
+    """Memory that two processes share: one puts the arrays of an item there, the other uses them where they lie."""
+
+    def __init__(self) -> None:
+        self._memory = mmap.mmap(-1, _TRAY)
+
+    def put(self, item: Any) -> tuple[bytes, list[int]]:
+        """What to send instead of an item: the item without its arrays, and where each of these begins and ends."""
+        arrays: list[pickle.PickleBuffer] = []
+        bare = pickle.dumps(item, protocol=5, buffer_callback=arrays.append)
+        raw = [array.raw() for array in arrays]
+        edges = [0, *accumulate(-(-array.nbytes // _ALIGNED) * _ALIGNED for array in raw)]
+        if edges[-1] > _TRAY:
+            return pickle.dumps(item, protocol=5), []
+        for array, begin in zip(raw, edges[:-1], strict=True):
+            self._memory[begin : begin + array.nbytes] = array
+        return bare, [
+            edge for array, begin in zip(raw, edges[:-1], strict=True) for edge in (begin, begin + array.nbytes)
+        ]
+
+    def take(self, bare: bytes, edges: list[int]) -> Any:
+        """The item that was put there; its arrays are gone with the next."""
+        memory = memoryview(self._memory)
+        return pickle.loads(bare, buffers=[memory[slice(*ends)] for ends in zip(edges[::2], edges[1::2], strict=True)])
+
+
 class _Member:
     """A process at the other end of a pipe, with one item at a time: a pipe full both ways would stand still."""
 
-    def __init__(self, process: BaseProcess, connection: Connection) -> None:
-        self.process, self.connection = process, connection
+    def __init__(self, process: BaseProcess, connection: Connection, tray: _Tray) -> None:
+        self.process, self.connection, self.tray = process, connection, tray
         self.given, self.found = 0, deque[Any]()
         self.fetched = 0
 
@@ -119,7 +152,7 @@ class _Member:
         """Send an item, after what was found for the one before has been taken in."""
         self.take()
         try:
-            self.connection.send(item)
+            self.connection.send(self.tray.put(item))
         except BrokenPipeError:
             raise MemoryError(_ENDED) from None
         self.given += 1
@@ -146,7 +179,8 @@ class _Crew:
         for _ in range(processes):
             ours, theirs = _CONTEXT.Pipe()
             own = [member.connection for member in self.members] + [ours]
-            self.members.append(_Member(_forked(_serve, work, theirs, own, daemon=True), ours))
+            tray = _Tray()
+            self.members.append(_Member(_forked(_serve, work, theirs, own, tray, daemon=True), ours, tray))
             theirs.close()
 
     def start(self, item: Any) -> Callable[[], Any]:
@@ -163,13 +197,13 @@ class _Crew:
         _end([member.process for member in self.members])
 
 
-def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Connection]) -> None:
+def _serve(work: Callable[[Any], Any], connection: Connection, parents: list[Connection], tray: _Tray) -> None:
     """Work on what comes until nothing more can come."""
     for other in parents:  # else the end of the parent would not be seen
         other.close()
     while True:
         try:
-            item = connection.recv()
+            item = tray.take(*connection.recv())
         except (EOFError, OSError):
             return
         _answer(connection, lambda item=item: work(item))  # type: ignore[misc]

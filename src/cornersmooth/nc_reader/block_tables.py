@@ -118,11 +118,15 @@ def _in_order(
     Asides within a run follow it.
     """
     bulk = lines.bulk()
-    written = [] if bulk.all() else chunk.split(b"\n")
+    ends = np.flatnonzero(np.frombuffer(chunk, np.uint8) == _LINE_END)
+
+    def text(row: int) -> bytes:
+        return chunk[int(ends[row - 1]) + 1 if row else 0 : int(ends[row])]
+
     within = bulk.copy()
     if lexer.aside is not None:
         others = np.flatnonzero(~bulk).tolist()
-        within[[row for row in others if lexer.aside.fullmatch(written[row])]] = True
+        within[[row for row in others if lexer.aside.fullmatch(text(row))]] = True
     edges = np.flatnonzero(np.diff(within, prepend=~within[0], append=~within[-1]))
     for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         rows = start + np.flatnonzero(bulk[start:stop])
@@ -132,12 +136,11 @@ def _in_order(
             single = single[~bulk[start:stop]]
             before = int(np.searchsorted(single, rows[0]))
             for row in single[:before].tolist():
-                yield lexer.line(written[row], number + row, name)
+                yield lexer.line(text(row), number + row, name)
             yield Table(number + rows, columns)
             single = single[before:]
-        written = written or chunk.split(b"\n")
         for row in single.tolist():
-            yield lexer.line(written[row], number + row, name)
+            yield lexer.line(text(row), number + row, name)
     return len(bulk)
 
 

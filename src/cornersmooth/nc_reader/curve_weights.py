@@ -27,6 +27,9 @@ def odd_weights(table: Table, weights: Floats) -> Iterator[tuple[int, float]]:
         if name not in table.columns:
             continue
         column = table.columns[name]
-        rows = np.flatnonzero(~np.isnan(column) & ~np.isin(codes, (2.0, 3.0)))
-        off = np.abs(column[rows, None] - weights).min(axis=1) > _ROOM
-        yield from ((int(table.line[row]), float(column[row])) for row in rows[off][:_MOST].tolist())
+        off = ~np.isnan(column)
+        for weight in weights.tolist():
+            off &= ~(np.abs(column - weight) <= _ROOM)
+        rows = np.flatnonzero(off)
+        rows = rows[~np.isin(codes[rows], (2.0, 3.0))]
+        yield from ((int(table.line[row]), float(column[row])) for row in rows[:_MOST].tolist())

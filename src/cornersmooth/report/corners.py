@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,8 +40,9 @@ Column = Floats | Ints | NDArray[np.str_]
 _CURVATURE_AT = np.array([0.2, 0.3, 0.38, 0.44, 0.48, 0.5, 0.52, 0.56, 0.62, 0.7, 0.8])
 
 
-#: corners whose errors are found together
+#: corners whose errors are found together, and those that are sorted at first
 _TOGETHER = 4096
+_SORTED = 8 * _TOGETHER
 
 
 def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bool = True) -> dict[str, Column]:
@@ -136,21 +138,27 @@ def worst_corners(smoothed: SmoothProgram, count: int = 20, *, dense: bool = Tru
     corners = smoothed.corners
     rows = np.flatnonzero(corners.rounded)
     bound = np.maximum(corners.tip_error[rows], corners.axis_error[rows])
-    order = np.argsort(-bound, kind="stable")
-    rows, bound = rows[order], bound[order]
     seen = np.zeros(0, np.int64)
     tip, axis_point, larger = np.zeros((3, 0))
-    for begin in range(0, len(rows), _TOGETHER):
+    for part in _largest_first(bound):
         least = min(
             np.sort(larger)[-count] if len(larger) >= count else -np.inf,
             tip.max(initial=-np.inf),
             axis_point.max(initial=-np.inf),
         )
-        if bound[begin] < least:
+        if bound[part[0]] < least:
             break
-        more = rows[begin : begin + _TOGETHER]
+        more = rows[part]
         more_tip, more_axis_point = path_distances(smoothed, more, dense=dense)
         seen, tip, axis_point = np.append(seen, more), np.append(tip, more_tip), np.append(axis_point, more_axis_point)
         larger = np.maximum(tip, axis_point)
     best = np.lexsort((seen, -larger))[:count]
     return WorstCorners(float(tip.max(initial=0.0)), float(axis_point.max(initial=0.0)), seen[best])
+
+
+def _largest_first(bound: Floats) -> Iterator[Ints]:
+    """Indices of bounds, the largest first and ties in order, some at a time; all are only sorted if few do not do."""
+    few = np.partition(bound, -_SORTED)[-_SORTED] if len(bound) > _SORTED else -np.inf
+    for part in (np.flatnonzero(bound >= few), np.flatnonzero(~(bound >= few))):
+        order = part[np.argsort(-bound[part], kind="stable")]
+        yield from (order[begin : begin + _TOGETHER] for begin in range(0, len(order), _TOGETHER))

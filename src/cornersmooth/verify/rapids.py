@@ -225,7 +225,7 @@ def _opcodes(theirs: Floats, nc: Elements, element: Ints) -> list[tuple[str, int
 
 
 def _negligible(tip: Floats, rows: Ints, nc: Elements) -> bool:
-    """Whether from the first to the last of rows a tip moves by no more than printed digits show; not where it begins."""
+    """Whether a tip moves by no more than printed digits show from one of two rows to the other; not if it is one."""
     return len(rows) > 1 and not beyond_digits(nc, (tip[rows[-1]] - tip[rows[0]])[None])[0]
 
 
