@@ -24,7 +24,7 @@ from cornersmooth.nc_reader.words import Line, Table
 from cornersmooth.text import NumberError, parse_numbers
 
 #: bytes read at a time
-CHUNK = 1 << 20
+CHUNK = 1 << 21
 
 #: stands for a number where only the kind of line matters: no sign or digit may stand before or behind it
 _ANY_NUMBER: Final = b"+1.5"

@@ -7,6 +7,10 @@ import numpy as np
 from cornersmooth.model import Move, Program
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.settings import FLIP_ANGLE
+from cornersmooth.vectors import dot, norm
+
+#: of a turn that is surely smaller than `FLIP_ANGLE`
+_COSINE = -0.5
 
 
 def half_turns(program: Program) -> list[Problem]:
@@ -16,12 +20,12 @@ def half_turns(program: Program) -> list[Problem]:
     """
     axis, kind = program.axis, program.kind
     fed = np.isin(kind[1:], (Move.LINEAR, Move.ARC)) & (kind[:-1] != Move.FROM)
-    turn = np.degrees(
-        2.0 * np.arctan2(np.linalg.norm(axis[1:] - axis[:-1], axis=1), np.linalg.norm(axis[1:] + axis[:-1], axis=1))
-    )
-    poses = 1 + np.flatnonzero(fed & (turn > FLIP_ANGLE + 1e-9))
+    poses = 1 + np.flatnonzero(fed & (dot(axis[1:], axis[:-1]) < _COSINE))
+    turn = 2.0 * np.arctan2(norm(axis[poses] - axis[poses - 1]), norm(axis[poses] + axis[poses - 1]))
     problems = []
-    for pose in poses.tolist():
-        text = f"the tool axis turns by {turn[pose - 1]:.4g} deg in one move; which way a control turns is not defined"
+    for pose, degrees in zip(poses.tolist(), np.degrees(turn).tolist(), strict=True):
+        if degrees <= FLIP_ANGLE + 1e-9:
+            continue
+        text = f"the tool axis turns by {degrees:.4g} deg in one move; which way a control turns is not defined"
         problems.append(Problem("CS526", int(program.line[pose]), 0, text))
     return problems

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -26,21 +27,23 @@ class OwnRapids:
     ----------
     rapids, holes : (k,) int64
         Moves that are.
-    _ranks : tuple of (m,) float64
-        Number of each move among those that lead somewhere: of all, and of those that are no holes.
     """
 
     task: Task
     rapids: Ints = field(init=False)
     holes: Ints = field(init=False)
-    _ranks: tuple[Floats, Floats] = field(init=False)
 
     def __post_init__(self) -> None:
         original = self.task.original
         kind = original.program.kind[original.pose]
         object.__setattr__(self, "rapids", np.flatnonzero(kind == Move.RAPID))
         object.__setattr__(self, "holes", np.flatnonzero(kind == Move.HOLE))
-        object.__setattr__(self, "_ranks", (self._rank(kind >= 0), self._rank(kind != Move.HOLE)))
+
+    @cached_property
+    def _ranks(self) -> tuple[Floats, Floats]:
+        """(m,) number of each move among those that lead somewhere: of all, and of those that are no holes."""
+        kind = self.task.original.program.kind[self.task.original.pose]
+        return self._rank(kind >= 0), self._rank(kind != Move.HOLE)
 
     def added(self, start: Floats, end: Floats, step: float, near: Floats) -> bool:
         """Whether the CL file has a pose at the end of a rapid nearer to the part, and does not ask for the rapid.
