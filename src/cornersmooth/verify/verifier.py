@@ -162,11 +162,14 @@ class Verifier:
 
     def _work(self) -> Verification:
         """Read and measure the text as far as it goes."""
-        options = self._options
-        task = Task.of(self._program, options.tolerance, options.axis_length, self._axis_tolerance)
-        return self._of_text(task, self._text) if isinstance(self._text, Source) else self._of_read(task, self._text)
+        return self._of_text(self._text) if isinstance(self._text, Source) else self._of_read(self._text)
 
-    def _of_read(self, task: Task, nc: NcProgram) -> Verification:
+    def _task(self) -> Task:
+        options = self._options
+        return Task.of(self._program, options.tolerance, options.axis_length, self._axis_tolerance)
+
+    def _of_read(self, nc: NcProgram) -> Verification:
+        task = self._task()
         elements, events = OwnRapids(task).left_out(nc)
         text = _Text(iter([elements.at_most() if self._slower else elements]), events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
@@ -174,9 +177,10 @@ class Verifier:
         unverified = "the words of the text: they are looked at where it is read, not afterwards"
         return replace(found, unverified=unverified, rewinds=tuple((out, back) for *_, out, back in nc.left_cuts))
 
-    def _of_text(self, task: Task, source: Source) -> Verification:
+    def _of_text(self, source: Source) -> Verification:
         options = self._options
         steps = options.steps(source.head(DIGITS_SAMPLE))
+        task = self._task()  # takes memory, which who writes may need before there is text
         rotary = options.rotary(steps)
         lever = None
         if rotary is not None:
