@@ -7,7 +7,6 @@ import numpy as np
 from cornersmooth.model import Move, Program
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.settings import FLIP_ANGLE
-from cornersmooth.vectors import dot, norm
 
 #: of a turn that is surely smaller than `FLIP_ANGLE`
 _COSINE = -0.5
@@ -20,8 +19,9 @@ def half_turns(program: Program) -> list[Problem]:
     """
     axis, kind = program.axis, program.kind
     fed = np.isin(kind[1:], (Move.LINEAR, Move.ARC)) & (kind[:-1] != Move.FROM)
-    poses = 1 + np.flatnonzero(fed & (dot(axis[1:], axis[:-1]) < _COSINE))
-    turn = 2.0 * np.arctan2(norm(axis[poses] - axis[poses - 1]), norm(axis[poses] + axis[poses - 1]))
+    poses = 1 + np.flatnonzero(fed & (np.einsum("ij,ij->i", axis[1:], axis[:-1]) < _COSINE))
+    here, before = axis[poses], axis[poses - 1]
+    turn = 2.0 * np.arctan2(np.linalg.norm(here - before, axis=1), np.linalg.norm(here + before, axis=1))
     problems = []
     for pose, degrees in zip(poses.tolist(), np.degrees(turn).tolist(), strict=True):
         if degrees <= FLIP_ANGLE + 1e-9:
