@@ -261,10 +261,8 @@ def search_elements(
     tip, axis : (k, 3) float64
     distance : (k,) float64
     """
-    rows, width = elements.shape
-    element = elements.reshape(-1, 1)
-    target = np.repeat(point, width, axis=0)[:, None, column]
-    each = np.arange(len(element))
+    element = elements.ravel()
+    target = np.repeat(point, elements.shape[1], axis=0)[:, None, column]
 
     def look(place: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Poses at fractions (m, p) of the elements, what counts of them, and their distances."""
@@ -276,9 +274,18 @@ def search_elements(
 
     grid = np.linspace(0.0, 1.0, _SAMPLES)
     step = grid[1]
-    share, off = _on_chords(look(np.broadcast_to(grid, (len(element), _SAMPLES)))[2], target)
+    points = look(np.broadcast_to(grid, (len(element), _SAMPLES)))[2]
+    share, off = _on_chords(points, target)
     chord = np.argmin(off, axis=1)
-    at = grid[chord] + share[each, chord] * step
+    each = np.arange(len(element))
+    # elements that others of their row are nearer than, by more than both may be off their chords, are out
+    least, bend = off[each, chord], np.diff(points, 2, axis=1)
+    sag = np.sqrt(np.einsum("kmi,kmi->km", bend, bend).max(axis=1))
+    most = (least + sag).reshape(elements.shape).min(axis=1)
+    kept = np.flatnonzero(~(least - sag > np.repeat(most, elements.shape[1])))
+    row, element, target = kept // elements.shape[1], element[kept], target[kept]
+    at = grid[chord[kept]] + share[kept, chord[kept]] * step
+    each = np.arange(len(element))
     for _ in range(_ROUNDS):
         place = np.clip(at[:, None] + np.linspace(-step, step, _ZOOM), 0.0, 1.0)
         at = place[each, np.argmin(look(place)[3], axis=1)]
@@ -286,10 +293,11 @@ def search_elements(
     ends = np.clip(np.stack((at - step, at + step), axis=1), 0.0, 1.0)  # so close together the motion is straight
     share, _ = _on_chords(look(ends)[2], target)
     tip, axis, _, distance = look(np.hstack((ends[:, :1] + share * np.diff(ends, axis=1), at[:, None])))
-    both = 2 * width
-    best = (np.arange(rows), np.argmin(distance.reshape(rows, both), axis=1))
-    poses = tip.reshape(rows, both, 3), axis.reshape(rows, both, 3)
-    return poses[0][best], poses[1][best], distance.reshape(rows, both)[best]
+    nearer = np.argmin(distance, axis=1)
+    distance = distance[each, nearer]
+    order = np.lexsort((distance, row))
+    best = order[np.diff(row[order], prepend=-1) > 0]  # of each row
+    return tip[best, nearer[best]], axis[best, nearer[best]], distance[best]
 
 
 def _on_chords(points: Floats, target: Floats) -> tuple[Floats, Floats]:
