@@ -58,6 +58,9 @@ __all__ = [
 ]
 
 
+#: poses from which on it saves time to compute in a thread what is written next
+_MANY = 4096
+
 #: curve styles without weights; BSPLINE takes none above 3, which the knots of rotary words may ask for
 _POLYNOMIAL = ("poly", "spl")
 
@@ -207,7 +210,7 @@ def write(
         chunks = (
             (rows, writer.ticks(rows.tip, rows.other)) for rows in _rows(smoothed, chosen, circles, planes, of_rows)
         )
-        for rows, ticks in _one_ahead(chunks):
+        for rows, ticks in chunks if len(program) < _MANY else _one_ahead(chunks):
             for lines in motion.write(rows, ticks):
                 text.write(lines)
             if progress is not None and len(rows.move):
@@ -269,9 +272,9 @@ class _BackgroundWriter:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         try:
             if kind is None:
-                self._hand_on()
-            if self._done is not None and kind is None:
-                self._done.result()
+                if self._done is not None:
+                    self._done.result()
+                self._stream.write(b"".join(self._waiting))
         finally:
             self._pool.shutdown()
 

@@ -82,7 +82,7 @@ def place_corners(
         return min(start + BATCH, k)
 
     with ThreadPoolExecutor(THREADS) as pool:  # numpy leaves the interpreter free; batches share no rows
-        for done in pool.map(settle, table.batches()):
+        for done in (pool.map if k > BATCH else map)(settle, table.batches()):
             if progress is not None:
                 progress(done, k)
     ratio = np.broadcast_to(np.float64(settings.ratio), (k,))
