@@ -25,8 +25,8 @@ _BEYOND_REPEATED = 4
 #: squared distance that is none, and one by which nothing is nearer: arithmetic must not choose between ways, mm²
 _NOTHING, _TIE = 1e-9, 1e-13
 
-#: rows taken at a time, so that the work arrays stay in the cache
-_BLOCK = 16384
+#: segments taken at a time, so that the work arrays stay in the cache
+_BLOCK = 8192
 
 
 @dataclass(frozen=True)
@@ -99,38 +99,33 @@ def nearest_places(
         Of the distance.
     """
     columns = COLUMNS[metric]
+    steps = np.array([0, *(sign * k for k in range(1, reach + 1) for sign in (-1, 1))])
     segment, fraction, square = np.empty(len(point), np.int64), np.empty(len(point)), np.empty(len(point))
-    for begin in range(0, len(point), _BLOCK):
-        part = slice(begin, begin + _BLOCK)
-        own = point[part, columns]
-        best = square[part]
-        for step in (0, *(sign * k for k in range(1, reach + 1) for sign in (-1, 1))):
-            j = np.clip(middle[part] + step, low[part], high[part])
-            t, d = _on_segments(own, vertices, j, columns)
-            if step == 0:
-                square[part], segment[part], fraction[part] = d, j, t
-            else:
-                nearer = d < best - _TIE
-                np.copyto(best, d, where=nearer)
-                np.copyto(segment[part], j, where=nearer)
-                np.copyto(fraction[part], t, where=nearer)
+    size = max(_BLOCK // len(steps), 1)
+    for begin in range(0, len(point), size):
+        part = slice(begin, begin + size)
+        j = np.clip(middle[part, None] + steps, low[part, None], high[part, None])
+        t, d = _on_segments(point[part, None, columns], vertices, j, columns)
+        best = np.argmax(d <= d.min(axis=1, keepdims=True) + _TIE, axis=1)
+        each = np.arange(len(j))
+        segment[part], fraction[part], square[part] = j[each, best], t[each, best], d[each, best]
     return segment, fraction, square
 
 
 def _on_segments(own: Floats, vertices: Floats, segment: Ints, columns: slice) -> tuple[Floats, Floats]:
-    """Fractions of the nearest places of (k, 6 or 3) points on a segment each, and the squared distances."""
+    """Fractions (k, m) of the nearest places of points (k, 1, 6 or 3) on segments (k, m), and the squared distances."""
     start, difference = vertices.take(segment, axis=0), vertices.take(segment + 1, axis=0)
     if columns != slice(0, 6):
-        start, difference = start[:, columns], difference[:, columns]
+        start, difference = start[..., columns], difference[..., columns]
     difference -= start
     away = own - start
-    size = np.einsum("ij,ij->i", difference, difference)
-    t = np.einsum("ij,ij->i", away, difference)
+    size = np.einsum("...i,...i->...", difference, difference)
+    t = np.einsum("...i,...i->...", away, difference)
     np.divide(t, size, out=t, where=size > 0)
     np.clip(t, 0.0, 1.0, out=t)
-    difference *= t[:, None]
+    difference *= t[..., None]
     away -= difference
-    return t, np.einsum("ij,ij->i", away, away)
+    return t, np.einsum("...i,...i->...", away, away)
 
 
 def nearest_from(point: Floats, path: Polyline, about: Floats, low: Ints, high: Ints) -> tuple[Ints, Floats, Floats]:
@@ -188,10 +183,7 @@ def climb(
         heading = np.sign(segment[rows] - middle[rows])
         ways = segment[rows, None] + heading[:, None] * np.arange(ahead + 1)
         j = np.clip(ways, low[rows, None], high[rows, None])
-        t, d = (
-            values.reshape(j.shape)
-            for values in _on_segments(np.repeat(point[rows, columns], ahead + 1, axis=0), vertices, j.ravel(), columns)
-        )
+        t, d = _on_segments(point[rows, None, columns], vertices, j, columns)
         nearer = np.column_stack((d[:, 1:] < d[:, :-1] - _TIE, np.zeros(len(rows), np.bool_)))
         steps = np.argmin(nearer, axis=1)
         each = np.arange(len(rows))
