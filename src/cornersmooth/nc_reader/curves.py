@@ -30,23 +30,29 @@ def basis(knot: Floats, order: int, u: Floats) -> Floats:
     (k, p) float64
         Rows sum to one.
     """
-    points = len(knot) - order
-    low, high = knot[order - 1], knot[points]
+    points, degree = len(knot) - order, order - 1
+    low, high = knot[degree], knot[points]
     u = np.clip(u, low, high)
     inside = np.flatnonzero((knot[:-1] < knot[1:]) & (knot[:-1] >= low) & (knot[1:] <= high))
+    values = np.zeros((len(u), points))
     if not len(inside):  # all knots equal: no curve, only its first point
-        values = np.zeros((len(u), points))
         values[:, 0] = 1.0
         return values
     span = inside[np.clip(np.searchsorted(knot[inside], u, side="right") - 1, 0, len(inside) - 1)]
-    values = np.zeros((len(u), len(knot) - 1))
-    values[np.arange(len(u)), span] = 1.0
-    for degree in range(1, order):
-        lower = knot[degree : len(knot) - 1] - knot[: len(knot) - 1 - degree]
-        upper = knot[degree + 1 :] - knot[1 : len(knot) - degree]
-        left = _ratio(u[:, None] - knot[None, : len(lower)], lower)
-        right = _ratio(knot[None, degree + 1 :] - u[:, None], upper)
-        values = left[:, : len(upper)] * values[:, : len(upper)] + right * values[:, 1 : len(upper) + 1]
+    # only the functions `span - degree` to `span` are not zero there; those of a degree are made of those below
+    away = knot[span + np.arange(1 - degree, order)[:, None]] - u
+    own = [np.ones(len(u))]
+    for k in range(1, order):
+        rest = np.zeros(len(u))
+        for r in range(k):
+            above, below = away[degree + r], away[degree - k + r]
+            share = own[r] / (above - below)
+            own[r] = rest + above * share
+            rest = -below * share
+        own.append(rest)
+    rows = np.arange(len(u))
+    for r, column in enumerate(own):
+        values[rows, span - degree + r] = column
     return values
 
 

@@ -27,7 +27,7 @@ from cornersmooth.verify.wide_search import look_farther, nearest_alone
 _SHORT_STEP = 0.02
 
 #: samples and rounds of the search on single elements
-_SAMPLES, _ROUNDS, _ZOOM = 17, 4, 9
+_SAMPLES, _ROUNDS, _ZOOM = 17, 2, 33
 
 
 @dataclass(frozen=True)
