@@ -85,8 +85,8 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> Non
     free = [axis for axis, clamped in state.memory.get(CLAMPED, {}).items() if not clamped]
     if free:
         state.wrong("CS538", line, f"a hole cycle while {' and '.join(free)} is not clamped")
-    state.move(line, {"G": 0.0, "X": x, "Y": y})
-    state.move(line, {"G": 0.0, "Z": cycle.clearance})
+    state.move(line, {"G": 0.0, "X": x, "Y": y}, later=True)
+    state.move(line, {"G": 0.0, "Z": cycle.clearance}, later=True)
     if cycle.pitch is not None:
         state.event(line, "G", 84.0)
         state.change(line, per_revolution=True)
@@ -94,15 +94,15 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> Non
     done = cycle.clearance if cycle.from_clearance else cycle.top
     while cycle.step and done - cycle.step > cycle.bottom + _ROUNDING:
         done -= cycle.step
-        state.move(line, {"G": 1.0, "Z": done, **feed})
+        state.move(line, {"G": 1.0, "Z": done, **feed}, later=True)
         above = done + _ABOVE * cycle.step
         for height in (above,) if cycle.chip else (cycle.clearance, above):
-            state.move(line, {"G": 0.0, "Z": min(height, cycle.clearance)})
-    state.move(line, {"G": 1.0, "Z": cycle.bottom, **feed})
+            state.move(line, {"G": 0.0, "Z": min(height, cycle.clearance)}, later=True)
+    state.move(line, {"G": 1.0, "Z": cycle.bottom, **feed}, later=True)
     if cycle.dwell:
         state.event(line, "G", 4.0, f"{cycle.dwell:.10g}")
     if cycle.feed_out or cycle.pitch is not None:
-        state.move(line, {"G": 1.0, "Z": cycle.clearance})
+        state.move(line, {"G": 1.0, "Z": cycle.clearance}, later=True)
     state.move(line, {"G": 0.0, "Z": cycle.travel})
 
 

@@ -363,6 +363,7 @@ class Reader:
 
     def event(self, line: Line, letter: str, value: float, text: str = "", *, late: bool = False) -> None:
         """Say a word that stands beside the motion; a late one acts after the motion of its block."""
+        self.flush()
         if letter == "T":
             self.memory[TOOL] = value
             self.left_cuts.forget()
@@ -390,6 +391,7 @@ class Reader:
 
     def change(self, line: Line, **modes: Any) -> None:
         """Change what holds from block to block."""
+        self.flush()
         if self.elements and modes.get("inch", self.modal.inch) != self.modal.inch:
             self.wrong("CS504", line, "units are changed in the middle of the path")
         if modes.get("inverse_time") and self.rotary is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import Final
 
 from cornersmooth.nc_reader.block_texts import any_of, shown, text_of
@@ -13,6 +14,9 @@ from cornersmooth.nc_reader.words import Line
 
 #: code of words that are not on the list or not in their place
 NOT_LISTED: Final = "CS571"
+
+#: blocks, and words, whose rules are remembered
+_REMEMBERED: Final = 4096
 
 #: words of which a block may have one
 _MOTION: Final = frozenset(("G0", "G1", "G2", "G3", "G6.2", "L", "LN", "SPL", "BSPLINE", "POLY"))
@@ -35,16 +39,15 @@ class WordRules:
         self.words = listed.words
         self.blocks = (*listed.blocks, *positions)
         self._lexer, self._tolerance = lexer, tolerance
-        self._found: dict[str, list[WordRule | None]] = {}
+        # most blocks beside the motion are alike; those of cycles are not, but most of their words are
+        self._find = lru_cache(_REMEMBERED)(self._look_up)
+        self._fitting = lru_cache(_REMEMBERED)(self._rules_for)
 
     def of(self, words: list[str], text: str) -> list[WordRule | None]:
         """Rule of every word, or of the whole block; None for a word that is not on the list, or not beside these."""
-        known = self._found.get(text)
-        if known is None:
-            known = self._found[text] = self._find(words, text)
-        return known
+        return self._find(tuple(words), text)
 
-    def _find(self, words: list[str], text: str) -> list[WordRule | None]:
+    def _look_up(self, words: tuple[str, ...], text: str) -> list[WordRule | None]:
         whole = next((rule for rule in self.blocks if rule.pattern.fullmatch(text)), None)
         if whole is not None:
             return [whole]
@@ -53,13 +56,13 @@ class WordRules:
             fitting = self._fitting(word)
             if fitting and fitting[0].never:
                 fitting = []
-            others = _others(words, k)
+            others = [*words[:k], *words[k + 1 :]]
             beside = [rule for rule in fitting if rule.needs is not None and any_of(rule.needs, others)]
             plain = [rule for rule in fitting if rule.needs is None]
             rules.append(next(iter(beside + plain), None))
         return rules
 
-    def _fitting(self, word: str) -> list[WordRule]:
+    def _rules_for(self, word: str) -> list[WordRule]:
         return [rule for rule in self.words if rule.pattern.fullmatch(word)]
 
     def stands(self, words: list[str]) -> bool:
