@@ -120,24 +120,26 @@ class _Tray:
     def __init__(self) -> None:
         self._memory = mmap.mmap(-1, _TRAY)
 
-    def put(self, item: Any) -> tuple[bytes, list[int]]:
-        """What to send instead of an item: the item without its arrays, and where each of these begins and ends."""
+    def put(self, item: Any) -> tuple[bytes, list[tuple[int, int]]]:
+        """What to send instead of an item: the item without its arrays, and where each of these begins and ends.
+
+        Where there is no room for them, the whole item.
+        """
         arrays: list[pickle.PickleBuffer] = []
         bare = pickle.dumps(item, protocol=5, buffer_callback=arrays.append)
         raw = [array.raw() for array in arrays]
-        edges = [0, *accumulate(-(-array.nbytes // _ALIGNED) * _ALIGNED for array in raw)]
-        if edges[-1] > _TRAY:
+        *begins, size = accumulate((-(-array.nbytes // _ALIGNED) * _ALIGNED for array in raw), initial=0)
+        if size > _TRAY:
             return pickle.dumps(item, protocol=5), []
-        for array, begin in zip(raw, edges[:-1], strict=True):
-            self._memory[begin : begin + array.nbytes] = array
-        return bare, [
-            edge for array, begin in zip(raw, edges[:-1], strict=True) for edge in (begin, begin + array.nbytes)
-        ]
+        places = [(begin, begin + array.nbytes) for begin, array in zip(begins, raw, strict=True)]
+        for (begin, end), array in zip(places, raw, strict=True):
+            self._memory[begin:end] = array
+        return bare, places
 
-    def take(self, bare: bytes, edges: list[int]) -> Any:
+    def take(self, bare: bytes, places: list[tuple[int, int]]) -> Any:
         """The item that was put there; its arrays are gone with the next."""
         memory = memoryview(self._memory)
-        return pickle.loads(bare, buffers=[memory[slice(*ends)] for ends in zip(edges[::2], edges[1::2], strict=True)])
+        return pickle.loads(bare, buffers=[memory[begin:end] for begin, end in places])
 
 
 class _Member:

@@ -100,3 +100,16 @@ def test_a_program_without_corners_has_an_empty_report():
     contents = json.loads(report_json(report(smoothed)))
     assert contents["summary"]["max_tip_error_mm"] == 0.0
     assert contents["worst"] == []
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 60])
+def test_the_largest_come_first_however_few_are_sorted(monkeypatch, count):
+    from cornersmooth.report import corners
+
+    monkeypatch.setattr(corners, "_TOGETHER", 3)
+    monkeypatch.setattr(corners, "_SORTED", 8)
+    bound = np.random.default_rng(count).integers(0, 20, count).astype(np.float64)
+    parts = list(corners._largest_first(bound))
+    assert all(0 < len(part) <= 3 for part in parts)
+    found = [row for part in parts for row in part.tolist()]
+    assert found == np.argsort(-bound, kind="stable").tolist()

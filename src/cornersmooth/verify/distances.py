@@ -278,7 +278,7 @@ def search_elements(
     share, off = _on_chords(points, target)
     chord = np.argmin(off, axis=1)
     each = np.arange(len(element))
-    # elements that others of their row are nearer than, by more than both may be off their chords, are out
+    # only elements go on that are not farther than another of their row by more than both may be off their chords
     least, bend = off[each, chord], np.diff(points, 2, axis=1)
     sag = np.sqrt(np.einsum("kmi,kmi->km", bend, bend).max(axis=1))
     most = (least + sag).reshape(elements.shape).min(axis=1)
