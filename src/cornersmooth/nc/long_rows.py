@@ -19,8 +19,8 @@ from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 from cornersmooth.vectors import unit
 
-#: rows handed on at a time
-_CHUNK = 1 << 17
+#: rows handed on at a time: many long lines are tested at once
+LONG_CHUNK = 1 << 17
 
 #: chord tolerance that leaves transitions with as few lines as their change of axis allows, mm
 _COARSE = 1.0
@@ -89,8 +89,8 @@ def long_rows(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form) -> Iter
         arc = np.concatenate(none)
     chunks.clear()
     limits = line_limits(smoothed.settings, form)
-    for begin in range(0, max(len(move) - 1, 1), _CHUNK):
-        here = slice(begin, begin + _CHUNK + 1)  # the last row of a chunk is the start of the next
+    for begin in range(0, max(len(move) - 1, 1), LONG_CHUNK):
+        here = slice(begin, begin + LONG_CHUNK + 1)  # the last row of a chunk is the start of the next
         start, at_pose = segments_of_rows(move, here.start, here.stop)
         part = vertices(smoothed, tip[here], axis[here], axis[here], move[here], start, at_pose)
         kept = begin + fewest_lines(part, limits)[1 if begin else 0 :]

@@ -21,7 +21,7 @@ from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
-from cornersmooth.nc.long_rows import corner_blends, line_limits
+from cornersmooth.nc.long_rows import LONG_CHUNK, corner_blends, line_limits
 from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
 from cornersmooth.rotary import (
@@ -40,8 +40,8 @@ from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.vectors import norm
 
-#: rows handed on at a time; of those that long lines are looked for in, where many are tested at once
-CHUNK, _LONG_CHUNK = 1 << 15, 1 << 17
+#: dense rows handed on at a time
+CHUNK = 1 << 15
 
 #: deg/min that no rotary axis exceeds where we time its blocks ourselves
 _FASTEST_TURN = 36_000.0
@@ -140,7 +140,7 @@ def rotary_rows(
     limits = line_limits(settings, form, largest_turn)
     timed = _timed_cuts(angles, move, program) if form.orientation == "machine" else None
     inserted, times = InsertedPoints(), _BlockTimes(smoothed, form, machine, limits)
-    size = _LONG_CHUNK if long else CHUNK
+    size = LONG_CHUNK if long else CHUNK
     for begin in range(0, max(len(move) - 1, 1), size):
         here = slice(begin, begin + size + 1)  # the last row of a chunk is the start of the next
         line = program.line[move[here]]

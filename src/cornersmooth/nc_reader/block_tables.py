@@ -10,7 +10,7 @@ import io
 import re
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Final, Protocol
 
 import numpy as np
@@ -118,10 +118,13 @@ def _in_order(
     Asides within a run follow it.
     """
     bulk = lines.bulk()
-    ends = np.flatnonzero(np.frombuffer(chunk, np.uint8) == _LINE_END)
+
+    @cache
+    def ends() -> Ints:  # most chunks of some texts have no line that is read on its own
+        return np.flatnonzero(np.frombuffer(chunk, np.uint8) == _LINE_END)
 
     def text(row: int) -> bytes:
-        return chunk[int(ends[row - 1]) + 1 if row else 0 : int(ends[row])]
+        return chunk[int(ends()[row - 1]) + 1 if row else 0 : int(ends()[row])]
 
     within = bulk.copy()
     if lexer.aside is not None:

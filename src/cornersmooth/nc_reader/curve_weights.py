@@ -29,7 +29,7 @@ def odd_weights(table: Table, weights: Floats) -> Iterator[tuple[int, float]]:
         column = table.columns[name]
         off = ~np.isnan(column)
         for weight in weights.tolist():
-            off &= ~(np.abs(column - weight) <= _ROOM)
+            off &= np.abs(column - weight) > _ROOM
         rows = np.flatnonzero(off)
         rows = rows[~np.isin(codes[rows], (2.0, 3.0))]
         yield from ((int(table.line[row]), float(column[row])) for row in rows[:_MOST].tolist())

@@ -85,6 +85,7 @@ def drill(cycle: HoleCycle, x: float, y: float, line: Line, state: State) -> Non
     free = [axis for axis, clamped in state.memory.get(CLAMPED, {}).items() if not clamped]
     if free:
         state.wrong("CS538", line, f"a hole cycle while {' and '.join(free)} is not clamped")
+    # all moves up to the next event are carried out together
     state.move(line, {"G": 0.0, "X": x, "Y": y}, later=True)
     state.move(line, {"G": 0.0, "Z": cycle.clearance}, later=True)
     if cycle.pitch is not None:

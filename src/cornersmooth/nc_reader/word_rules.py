@@ -56,7 +56,7 @@ class WordRules:
             fitting = self._fitting(word)
             if fitting and fitting[0].never:
                 fitting = []
-            others = [*words[:k], *words[k + 1 :]]
+            others = _others(words, k)
             beside = [rule for rule in fitting if rule.needs is not None and any_of(rule.needs, others)]
             plain = [rule for rule in fitting if rule.needs is None]
             rules.append(next(iter(beside + plain), None))
@@ -125,5 +125,5 @@ class WordRules:
                 yield Problem(NOT_LISTED, 0, number, f"{word} is more than {rule.share:g} of the tolerance")
 
 
-def _others(words: list[str], k: int) -> list[str]:
+def _others(words: Sequence[str], k: int) -> list[str]:
     return [*words[:k], *words[k + 1 :]]

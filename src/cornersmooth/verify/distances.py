@@ -18,7 +18,7 @@ from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import directions, written_at
 from cornersmooth.verify.in_order import Windows
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import Gap, Metric, climb, distance_between, nearest_places
+from cornersmooth.verify.nearest import COLUMNS, Gap, Metric, climb, distance_between, nearest_places
 from cornersmooth.verify.polyline import points_on
 from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.wide_search import look_farther, nearest_alone
@@ -311,17 +311,18 @@ def _on_chords(points: Floats, target: Floats) -> tuple[Floats, Floats]:
     return share, np.sqrt(np.einsum("kmi,kmi->km", off, off))
 
 
+def _each_alone(reached: Reached, rows: Ints) -> tuple[tuple[Metric, Floats], ...]:
+    """Tip and axis point, and how far each is at a common pose, which is never nearer than on its own."""
+    return ("tip", reached.gap.tip[rows]), ("axis point", reached.gap.axis_point[rows])
+
+
 def own_gaps_of_written(match: Match, reached: Reached, rows: Ints) -> tuple[Floats, Floats]:
     """Distance of chosen written vertices from the original tip path, and from its axis-point path, each on its own."""
     vertex = reached.vertex[rows]
     six, segment, low, high = match.six[vertex], match.segment[vertex], match.low[vertex], match.high[vertex]
     trail, original = match.written.trail, match.original
     result = []
-    ways: tuple[tuple[Metric, Floats], ...] = (
-        ("tip", reached.gap.tip[rows]),
-        ("axis point", reached.gap.axis_point[rows]),
-    )
-    for metric, known in ways:
+    for metric, known in _each_alone(reached, rows):
         near, at, _ = nearest_places(six, match.path.six, segment, REACH, low, high, metric)
         tip, axis = original.at(*owner_fraction(original.trail.owner, original.trail.fraction, near, at))
         gap = match.task.gap(trail.tip[vertex], trail.axis[vertex], tip, axis)
@@ -366,11 +367,8 @@ def own_gaps_of_original(match: Match, reached: Reached, rows: Ints) -> tuple[Fl
     high = np.maximum(ends[stretch] - 1, segment)
     point = match.path.six[reached.vertex[rows]]
     result = []
-    ways: tuple[tuple[Metric, slice, Floats], ...] = (
-        ("tip", slice(0, 3), reached.gap.tip[rows]),
-        ("axis point", slice(3, 6), reached.gap.axis_point[rows]),
-    )
-    for metric, column, known in ways:
+    for metric, known in _each_alone(reached, rows):
+        column = COLUMNS[metric]
         near, at, _ = nearest_places(point, match.six, segment, REACH * match.parts, low, high, metric)
         climb(point, match.six, segment, low, high, near, at, metric)
         elements = elements_around(match, near)

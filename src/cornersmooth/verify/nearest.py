@@ -119,10 +119,7 @@ def _on_segments(own: Floats, vertices: Floats, segment: Ints, columns: slice) -
         start, difference = start[..., columns], difference[..., columns]
     difference -= start
     away = own - start
-    size = np.einsum("...i,...i->...", difference, difference)
-    t = np.einsum("...i,...i->...", away, difference)
-    np.divide(t, size, out=t, where=size > 0)
-    np.clip(t, 0.0, 1.0, out=t)
+    t = foot_share(away, difference)
     difference *= t[..., None]
     away -= difference
     return t, np.einsum("...i,...i->...", away, away)

@@ -170,7 +170,7 @@ class Rapids:
             for count, i in enumerate(theirs[i0 + both : i1].tolist()):
                 self.missing(nc, i, first if count < _LOCATED else last, last)
             for j in range(j0 + both, j1):
-                if not _negligible(nc.tip, np.arange(max(ours[j] - 1, 0), ours[j] + 1), nc):
+                if not _negligible(nc.tip, ours[j], nc):
                     move = self.stops[min(int(theirs[0]) + i1, len(self.stops)) - 1] if len(theirs) else self.stops[-1]
                     text = "a rapid that the CL file does not have, or a feed move written as one"
                     self.problems.append(_problem("CS533", self.original, int(move), nc, ours[j], text))
@@ -191,7 +191,8 @@ class Rapids:
     def missing(self, nc: Elements, i: int, first: int, last: int) -> None:
         """Say that a stop is missing in the text between two elements, if it moves the tool."""
         original, move = self.original, int(self.stops[i])
-        if not _negligible(original.program.tip, original.pose[max(move - 1, 0) : move + 1], nc):
+        around = original.program.tip[original.pose[max(move - 1, 0) : move + 1]]
+        if not _negligible(around, len(around) - 1, nc):
             element = first + int(np.argmin(np.linalg.norm(nc.tip[first : last + 1] - self._tip[i], axis=1)))
             text = "a rapid of the CL file is missing, or is written as a feed move"
             self.problems.append(_problem("CS532", original, move, nc, element, text))
@@ -224,9 +225,9 @@ def _opcodes(theirs: Floats, nc: Elements, element: Ints) -> list[tuple[str, int
     return list(difflib.SequenceMatcher(None, left, right, autojunk=False).get_opcodes())
 
 
-def _negligible(tip: Floats, rows: Ints, nc: Elements) -> bool:
-    """Whether a tip moves by no more than printed digits show from one of two rows to the other; not if it is one."""
-    return len(rows) > 1 and not beyond_digits(nc, (tip[rows[-1]] - tip[rows[0]])[None])[0]
+def _negligible(tip: Floats, index: int, nc: Elements) -> bool:
+    """Whether a stop moves the tip by no more than printed digits show."""
+    return bool(index > 0 and not beyond_digits(nc, (tip[index] - tip[index - 1])[None])[0])
 
 
 def _problem(

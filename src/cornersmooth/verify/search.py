@@ -13,7 +13,14 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.assignment import ROUNDS, assign, doubtful_windows
 from cornersmooth.verify.guide import LONG, STRIDE, guide
-from cornersmooth.verify.nearest import Metric, distance_between, larger_square, nearest_from, nearest_places
+from cornersmooth.verify.nearest import (
+    Metric,
+    distance_between,
+    foot_share,
+    larger_square,
+    nearest_from,
+    nearest_places,
+)
 from cornersmooth.verify.polyline import Polyline
 from cornersmooth.verify.task import Task
 
@@ -363,12 +370,10 @@ class Search:
             return  # worse, not by the last bit only
         self.segment[at], self.fraction[at], self.distance[at] = segment[new], fraction[new], off[new]
         self.nearest[at] = False
-        start_point = self.path.six[segment]
-        way = self.path.six[segment + 1] - start_point
-        size = np.einsum("ij,ij->i", way, way)
-        free = np.einsum("ij,ij->i", self.six[part] - start_point, way)
-        free = np.clip(np.divide(free, size, out=np.zeros_like(size), where=size > 0), 0.0, 1.0)
-        self.backward[at] = (back & ((fraction - free) * np.sqrt(size) > self.margin))[new]
+        start_point, end_point = self.path.six[segment], self.path.six[segment + 1]
+        free = foot_share(self.six[part] - start_point, end_point - start_point)
+        beyond = (fraction - free) * distance_between(end_point, start_point)
+        self.backward[at] = (back & (beyond > self.margin))[new]
 
     def _moved(self, part: slice, segment: Ints, fraction: Floats, doubtful: Bools) -> tuple[int, int]:
         """First vertex of a window, and last plus one, that get another place with the doubtful ones; all in order."""
