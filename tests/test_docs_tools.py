@@ -43,8 +43,6 @@ RUN_BY = {
     "pip install .": ".ci/packages",
     "pip install 'cornersmooth[plot]'": "test_extras_that_are_named_exist",
     "python docs/make_numbers.py": "tests/test_docs.py",
-    "python docs/make_two_tools.py": "tests/nc/test_nc_docs.py",
-    "python docs/make_findings.py": "tests/nc/test_nc_docs.py",
     "python docs/make_codes.py": "tests/test_codes.py",
     "python docs/run_examples.py docs/gallery.md docs": "tests/test_docs.py",
     "python docs/make_savings.py FOLDER": "test_savings_are_printed_as_a_table",
