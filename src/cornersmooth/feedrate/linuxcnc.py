@@ -1,0 +1,214 @@
+"""When LinuxCNC runs each line of a program: the law of its trajectory planner, in closed form.
+
+The law is that of LinuxCNC 2.9 (``tp.c``, ``tc.c``, ``blendmath.c``, ``emccanon.cc``):
+
+1. Speed and acceleration of a line are limited by the axes in program space: its length over the largest share of an
+   axis. The length is that of X Y Z; only where these do not move, that of the rotary words.
+2. Where a rotary axis moves, there is no look-ahead: every line is planned from rest to rest, with half of its
+   acceleration: ``v = min(F, axes, sqrt(a L / 2))``.
+3. A line starts when the line before it brakes below a blend speed. G64 P bounds that speed:
+   ``2 sqrt(a/2 · P / cos θ)``, where 2θ is the angle between the lines. At most two lines run at once.
+4. Where no rotary axis moves on both lines, a corner is passed at a speed: of a small velocity jump, or of the arc that
+   fits within P. The planner looks ahead over such corners.
+5. Between rapid and feed, and in exact stop mode, the motion stops.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.model import Bools, Floats
+
+#: ``CART_FUZZ`` of posemath, mm or degrees: an axis that moves by less does not move
+_FUZZ = 1e-8
+#: ``tpSetupTangent``: part of the acceleration that the velocity jump at a tangent corner may take
+_KINK = 0.1
+#: ``tpSetupTangent``: lines that turn by more than 180° less this angle are reversals
+_REVERSAL = np.radians(2.0)
+#: ``BLEND_ACC_RATIO_NORMAL`` of blendmath.c, sqrt(3)/2: what an arc may take of the acceleration across the path
+_ARC_SHARE = np.sqrt(3.0) / 2.0
+
+
+@dataclass(frozen=True)
+class AxisLimits:
+    """Limits of a LinuxCNC configuration.
+
+    Parameters
+    ----------
+    velocity, acceleration : (6,) float64, mm or degrees per s, s²
+        ``[AXIS_*] MAX_VELOCITY`` and ``MAX_ACCELERATION`` of X Y Z A B C; inf for none.
+    linear_velocity : float, mm/s
+        ``[TRAJ] MAX_LINEAR_VELOCITY``.
+    servo_period : float, s
+        ``[EMCMOT] SERVO_PERIOD``.
+    """
+
+    velocity: Floats
+    acceleration: Floats
+    linear_velocity: float = np.inf
+    servo_period: float = 0.001
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Lines of a program, n of them, one after another.
+
+    Parameters
+    ----------
+    start, end : (n, 6) float64, mm and degrees
+        Words X Y Z A B C.
+    feed : (n,) float64, mm/s
+        inf for a rapid.
+    blend : (n,) float64, mm
+        P of G64; 0 for G64 without P; NaN in exact stop mode.
+    """
+
+    start: Floats
+    end: Floats
+    feed: Floats
+    blend: Floats
+
+    def __len__(self) -> int:
+        return len(self.feed)
+
+
+def line_times(lines: Lines, limits: AxisLimits) -> tuple[Floats, Floats]:
+    """(n,) start and end of every line, s.
+
+    Parameters
+    ----------
+    lines : Lines
+        Each must move.
+    limits : AxisLimits
+    """
+    if not len(lines):
+        return np.zeros(0), np.zeros(0)
+    length, speed, acceleration, direction, turning = _straight_lines(lines, limits)
+    tangent, corner_speed, braked, stop = _corners(lines, limits, length, speed, acceleration, direction, turning)
+    acceleration = acceleration * braked
+    out = _final_speeds(length, speed, acceleration, np.where(tangent, corner_speed, 0.0))
+    into = np.concatenate(([0.0], out[:-1]))
+    peak = np.minimum(speed, np.sqrt(acceleration * length + (into**2 + out**2) / 2.0))
+    peak = np.maximum(peak, np.maximum(into, out))
+    ramps = (2.0 * peak**2 - into**2 - out**2) / (2.0 * acceleration)
+    taken = (2.0 * peak - into - out) / acceleration + np.maximum(length - ramps, 0.0) / peak
+    overlap = np.where(tangent | stop, 0.0, _blend_speeds(lines, length, speed, acceleration, direction) / acceleration)
+    return _in_turn(taken, overlap)
+
+
+def _straight_lines(lines: Lines, limits: AxisLimits) -> tuple[Floats, Floats, Floats, Floats, Bools]:
+    """Length, greatest speed, acceleration, direction of X Y Z, and whether a rotary axis moves (``emccanon.cc``)."""
+    step = lines.end - lines.start
+    share = np.abs(step)
+    share[share < _FUZZ] = 0.0
+    linear, rotary = np.linalg.norm(share[:, :3], axis=1), np.linalg.norm(share[:, 3:], axis=1)
+    moves = linear > 0.0
+    length = np.where(moves, linear, rotary)
+    axes = length / (share / limits.velocity).max(axis=1)
+    speed = np.minimum(np.minimum(axes, lines.feed), length / limits.servo_period)
+    speed = np.where(moves, np.minimum(speed, limits.linear_velocity), speed)
+    acceleration = length / (share / limits.acceleration).max(axis=1)
+    direction = np.where(moves[:, None], step[:, :3] / np.where(moves, linear, 1.0)[:, None], (1.0, 0.0, 0.0))
+    return length, speed, acceleration, direction, rotary > 0.0
+
+
+def _corners(
+    lines: Lines,
+    limits: AxisLimits,
+    length: Floats,
+    speed: Floats,
+    acceleration: Floats,
+    direction: Floats,
+    turning: Bools,
+) -> tuple[Bools, Floats, Floats, Bools]:
+    """What happens at the end of each line (``tpSetupTangent``, ``tpChooseBestBlend``, ``handleModeChange``).
+
+    Returns
+    -------
+    tangent : (n,) bool
+        Passed at a speed; else a parabolic blend or a stop.
+    corner_speed : (n,) float64
+        That speed.
+    braked : (n,) float64
+        Part of its acceleration that each line has: half where it blends.
+    stop : (n,) bool
+    """
+    rapid = np.isinf(lines.feed)
+    stop = np.isnan(lines.blend)
+    stop[:-1] |= rapid[:-1] != rapid[1:]
+    ahead, behind = slice(1, None), slice(None, -1)
+    plain = ~(stop[behind] | turning[behind] | turning[ahead])
+    cosine = np.clip(np.einsum("ij,ij->i", direction[behind], direction[ahead]), -1.0, 1.0)
+    reversal = plain & (cosine < _REVERSAL**2 / 2.0 - 1.0)
+    stop[behind] |= reversal
+    plain &= ~reversal
+    both = np.minimum(speed[behind], speed[ahead])
+    jump = np.abs(direction[ahead] - direction[behind]) * (both / limits.servo_period + acceleration[ahead])[:, None]
+    kink = (jump / limits.acceleration[:3]).max(axis=1)
+    kink_speed = np.where(kink < _KINK, both, both * _KINK / np.maximum(kink, _KINK))
+    arc_speed = np.minimum(_arc_speeds(lines, limits, length, cosine), both)
+    shorter = np.minimum(length[behind], length[ahead])
+    small = kink < _KINK
+    arc = ~small & (arc_speed >= kink_speed)
+    slow = ~small & ~arc & (kink_speed > 0.5 * np.sqrt(acceleration[behind] * shorter / 2.0))
+    tangent = np.append(plain & (small | arc | slow), False)
+    corner_speed = np.append(np.where(arc, arc_speed, kink_speed), 0.0)
+    used = np.append(np.where(plain & (small | slow), np.minimum(kink, _KINK), 0.0), 0.0)
+    parabolic = np.append(plain, False) & ~tangent
+    halved = ~tangent & ~stop
+    halved[ahead] |= parabolic[behind]
+    braked = (1.0 - np.maximum(used, np.concatenate(([0.0], used[:-1])))) * np.where(halved, 0.5, 1.0)
+    return tangent, corner_speed, braked, stop
+
+
+def _arc_speeds(lines: Lines, limits: AxisLimits, length: Floats, cosine: Floats) -> Floats:
+    """(n − 1,) speeds on the arcs that round corners within P (``blendComputeParameters``); inf where all is straight.
+
+    Both lines give up at most half of their length.
+    """
+    half = np.arccos(-cosine) / 2.0
+    widest = np.fmin(
+        *(np.where(lines.blend[part] > 0.0, lines.blend[part], np.inf) for part in (slice(1, None), slice(-1)))
+    )
+    height = widest / np.maximum(1.0 - np.sin(half), np.finfo(np.float64).tiny)
+    reach = np.minimum(np.minimum(length[:-1], length[1:]) / 2.0, np.cos(half) * height)
+    found: Floats = np.sqrt(_ARC_SHARE * limits.acceleration[:3].min() * np.tan(half) * reach)
+    return found
+
+
+def _final_speeds(length: Floats, speed: Floats, acceleration: Floats, corner: Floats) -> Floats:
+    """(n,) speed at the end of each line, from which the following lines can stop (``tpRunOptimization``)."""
+    cap = np.minimum(corner, np.minimum(speed, np.append(speed[1:], 0.0))) ** 2
+    braking = np.concatenate(([0.0], np.cumsum(2.0 * acceleration[1:] * length[1:])))
+    least = np.minimum.accumulate((cap + braking)[::-1])[::-1]
+    found: Floats = np.sqrt(np.maximum(np.minimum(least - braking, cap), 0.0))
+    return found
+
+
+def _blend_speeds(lines: Lines, length: Floats, speed: Floats, acceleration: Floats, direction: Floats) -> Floats:
+    """(n,) speed below which the next line starts (``tpComputeBlendVelocity``)."""
+    reach = np.minimum(np.sqrt(acceleration * length), speed)
+    through, ramp = length / reach, reach / acceleration
+    time = np.minimum(np.minimum(through, np.roll(through, -1)), np.maximum(ramp, np.roll(ramp, -1)))
+    found = np.minimum(reach, time * acceleration)
+    cosine = np.einsum("ij,ij->i", direction, np.roll(direction, -1, axis=0))
+    across = np.sqrt(np.maximum((1.0 - cosine) / 2.0, 0.0))  # cos θ
+    bounded = (lines.blend > 0.0) & (across > np.sin(1e-3))  # the planner's own limit for straight on
+    allowed = 2.0 * np.sqrt(acceleration * np.where(bounded, lines.blend, 0.0) / np.where(bounded, across, 1.0))
+    return np.where(bounded, np.minimum(found, allowed), found)
+
+
+def _in_turn(taken: Floats, overlap: Floats) -> tuple[Floats, Floats]:
+    """Start and end of lines that take so long, each of which starts before the end of the one before it.
+
+    A line starts only when the line before the one before it has ended (``tpRunCycle`` runs two lines).
+    """
+    begin, end, now, last = [], [], 0.0, 0.0
+    for needs, shared in zip(taken.tolist(), overlap.tolist(), strict=True):
+        done = now + needs
+        begin.append(now)
+        end.append(done)
+        now, last = max(done - shared, last), done
+    return np.array(begin), np.array(end)
