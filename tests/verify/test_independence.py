@@ -23,6 +23,7 @@ ALLOWED = (
     "cornersmooth.settings",
     "cornersmooth.signatures",  # what `help` shows
     "cornersmooth.text",
+    "cornersmooth.verdict",  # a word, not a measure
     "cornersmooth.kinematics.machine",  # what a machine is; its kinematics are the verification's own
 )
 

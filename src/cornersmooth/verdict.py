@@ -1,0 +1,52 @@
+"""The one word that says how a program turned out; the same everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import StrEnum
+
+
+class Verdict(StrEnum):
+    """How an NC program turned out, from the best to the worst.
+
+    Attributes
+    ----------
+    PASSED
+        All that the CL file asks for is in the program, within ε, and was measured.
+    INCOMPLETE
+        An option left something out, such as holes. The rest is in the program and was measured.
+    NOT_VERIFIED
+        Something that may bear on the motion was not looked at.
+    FAILED
+        The program is wrong: verification found a problem.
+    """
+
+    PASSED = "PASSED"
+    INCOMPLETE = "INCOMPLETE"
+    NOT_VERIFIED = "NOT VERIFIED"
+    FAILED = "FAILED"
+
+    @classmethod
+    def of(cls, *, problems: int = 0, unverified: bool = False, left_out: int = 0) -> Verdict:
+        """Give the worst verdict that applies.
+
+        Parameters
+        ----------
+        problems : int
+            Problems that verification found.
+        unverified : bool
+            Whether something was not looked at.
+        left_out : int
+            What options left out, such as holes.
+        """
+        if problems:
+            return cls.FAILED
+        if unverified:
+            return cls.NOT_VERIFIED
+        return cls.INCOMPLETE if left_out else cls.PASSED
+
+    @classmethod
+    def worst(cls, verdicts: Iterable[Verdict]) -> Verdict:
+        """Give the worst of several; PASSED of none."""
+        order = list(cls)
+        return max(verdicts, key=order.index, default=cls.PASSED)

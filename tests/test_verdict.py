@@ -1,0 +1,26 @@
+"""The four verdicts and their order."""
+
+from __future__ import annotations
+
+import pytest
+
+from cornersmooth.verdict import Verdict
+
+
+@pytest.mark.parametrize(
+    ("how", "word"),
+    [
+        ({}, "PASSED"),
+        ({"left_out": 3}, "INCOMPLETE"),
+        ({"left_out": 3, "unverified": True}, "NOT VERIFIED"),
+        ({"left_out": 3, "unverified": True, "problems": 1}, "FAILED"),
+    ],
+)
+def test_the_worst_that_applies_is_the_verdict(how: dict[str, int], word: str) -> None:
+    assert Verdict.of(**how) == word
+
+
+def test_worst_of_several() -> None:
+    assert Verdict.worst([]) is Verdict.PASSED
+    assert Verdict.worst([Verdict.INCOMPLETE, Verdict.PASSED]) is Verdict.INCOMPLETE
+    assert Verdict.worst([Verdict.NOT_VERIFIED, Verdict.FAILED, Verdict.INCOMPLETE]) is Verdict.FAILED
