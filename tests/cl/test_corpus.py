@@ -58,8 +58,8 @@ OWN = {
     "nx_pocket.cls": ("nx", "mm", 19, (1, 4, 8, 6, 0), 2),
     "nx_spline.cls": ("nx", "mm", 222, (0, 2, 220, 0, 0), 1),
     "plain_fan.apt": ("plain", "mm", 18, (0, 0, 18, 0, 0), 0),
-    "points_fan.txt": ("csv", "mm", 25, (0, 0, 25, 0, 0), 0),
-    "points_zigzag.csv": ("csv", "mm", 30, (0, 0, 30, 0, 0), 0),
+    "points_fan.txt": ("csv", "mm", 25, (0, 1, 24, 0, 0), 0),
+    "points_zigzag.csv": ("csv", "mm", 30, (0, 1, 29, 0, 0), 0),
     "solidworks_bracket.apt": ("solidworks", "mm", 22, (0, 8, 10, 2, 2), 4),
 }
 

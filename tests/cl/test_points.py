@@ -37,8 +37,8 @@ def message(text: str | bytes, **options: object) -> str:
 
 
 def codes(program: Program) -> list[str]:
-    """Codes of the findings but for the assumed unit."""
-    return [finding.code for finding in program.findings if finding.code != "CS176"]
+    """Codes of the findings but for the assumed unit and the first rapid."""
+    return [finding.code for finding in program.findings if finding.code not in ("CS176", "CS177")]
 
 
 def check(program: Program) -> None:
@@ -52,13 +52,14 @@ def check(program: Program) -> None:
 def test_plain_file_is_linear_moves_with_line_numbers():
     program = read(rows(TIPS, AXES))
     check(program)
-    assert (program.kind == Move.LINEAR).all()
+    assert program.kind.tolist() == [Move.RAPID] + 3 * [Move.LINEAR]
     assert np.isnan(program.feed).all()
     assert program.line.tolist() == [1, 2, 3, 4]
     assert (program.source.name, program.source.format, program.source.dialect) == ("path.csv", "points", "csv")
     assert program.units == "mm"
-    assert [finding.text for finding in program.findings] == ["the file states no units: mm assumed"]
-    assert read(rows(TIPS, AXES), units="mm").findings == ()
+    first = "no column says which moves are rapid: the first pose is reached in rapid, all others at feed"
+    assert [finding.text for finding in program.findings] == ["the file states no units: mm assumed", first]
+    assert [finding.text for finding in read(rows(TIPS, AXES), units="mm").findings] == [first]
     assert program.chains.tolist() == [[0, 3]]
     assert read(rows(TIPS), name="folder/path.csv").source.name == "path.csv"
     assert message("1,2\n", name="folder/path.csv").startswith("folder/path.csv:1: error: 2 columns")
@@ -111,7 +112,7 @@ def test_columns_go_by_their_names():
     program = read(text)
     check(program)
     assert program.feed.tolist() == [500] * 4
-    assert program.findings == ()
+    assert codes(program) == []
 
 
 @pytest.mark.parametrize(
@@ -170,9 +171,9 @@ def test_inches_become_millimetres():
 
 
 def test_unused_columns_are_named():
-    program = read("x,y,z,i,j,k,move,load\n0,0,0,0,0,1,linear,3\n1,0,0,0,0,1,linear,4\n")
+    program = read("x,y,z,i,j,k,name,load\n0,0,0,0,0,1,linear,3\n1,0,0,0,0,1,linear,4\n")
     assert codes(program) == ["CS173"]
-    assert "move, load" in program.findings[1].text
+    assert "name, load" in program.findings[1].text
 
 
 # text around the rows
@@ -265,7 +266,7 @@ def test_lenient_reading_normalises_axes_and_skips_feeds():
     program = read(text, lenient=True)
     np.testing.assert_allclose(program.axis, [[0, 0, 1], [0, 0.6, 0.8], [0, 0, 1]], atol=1e-15)
     assert program.feed.tolist() == [100] * 3
-    assert [(f.code, f.line, f.count) for f in program.findings[1:]] == [("CS174", 3, 2), ("CS175", 3, 2)]
+    assert [(f.code, f.line, f.count) for f in program.findings[1:3]] == [("CS174", 3, 2), ("CS175", 3, 2)]
     assert message("x,y,z,i,j,k\n0,0,0,0,0,0\n", lenient=True).startswith("path.csv:2: error: tool axis of length zero")
 
 
@@ -379,3 +380,87 @@ def test_no_other_real_file_looks_like_points(corpus: Path):
     point_files = {"hecc_point_zigzag.csv", "shenmuxin_5x_path.csv", "hust_5x_toolpath_fan.txt"}
     found = {path.name for path in corpus.iterdir() if path.is_file() and looks_like_points(path.read_bytes())}
     assert found == point_files
+
+
+# rapids
+
+
+@pytest.mark.parametrize(
+    ("name", "cells"),
+    [
+        ("is_rapid", "1 0 0 1"),
+        ("rapid", "True false FALSE true"),
+        ("Rapid", "1.0 0.0 0 1"),
+        ("isRapid", "yes no no yes"),
+        ("type", "rapid feed cut rapid"),
+        ("Type", "G0 G1 G01 G00"),
+        ("move_type", "RAPID LINEAR Plunge Rapid"),
+        ("move type", "rapid lead_in lead-out rapid"),
+        ("g", "0 1 1 0"),
+        ("gcode", "g00 g1 g01 g0"),
+    ],
+)
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_rapids_have_a_column(name: str, cells: str, separator: str):
+    marked = zip(cells.split(), rows(TIPS, AXES, separator=separator).splitlines(), strict=True)
+    text = separator.join((name, *"xyzijk")) + "\n" + "".join(f"{cell}{separator}{row}\n" for cell, row in marked)
+    program = read(text)
+    check(program)
+    assert program.kind.tolist() == [Move.RAPID, Move.LINEAR, Move.LINEAR, Move.RAPID]
+    assert [finding.code for finding in program.findings] == ["CS176"]
+
+
+def test_rapids_with_decimal_commas_and_their_feeds():
+    program = read(
+        "x;y;z;f;type\n0,5;0;0;0;rapid\n1,5;0;0;500,5;feed\n2,5;0;0;;feed\n3,5;0;0;9000;rapid\n4;0;0;;feed\n"
+    )
+    assert program.tip[:, 0].tolist() == [0.5, 1.5, 2.5, 3.5, 4]
+    assert program.kind.tolist() == [1, 2, 2, 1, 2]
+    assert program.feed[[1, 2, 4]].tolist() == [500.5] * 3
+
+
+@pytest.mark.parametrize(
+    ("name", "cell", "want"),
+    [
+        ("type", "0", "give rapid or feed in words"),
+        ("type", "1", "give rapid or feed in words"),
+        ("type", "arc", "give rapid or feed in words"),
+        ("type", "", "give rapid or feed in words"),
+        ("rapid", "2", "give 1 or 0"),
+        ("is_rapid", "maybe", "give 1 or 0"),
+        ("g", "2", "give G0 or G1"),
+    ],
+)
+def test_rapids_that_nobody_can_tell(name: str, cell: str, want: str):
+    said = message(f"x,y,z,{name}\n1,2,3,{cell}\n")
+    assert said == f"path.csv:2: error: {cell!r} in the column {name!r} is neither rapid nor feed; {want}"
+
+
+# quaternions
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        *("x,y,z,qx,qy,qz,qw", "x,y,z,qw,qx,qy,qz", "X Y Z Q_X Q_Y Q_Z Q_W", "x;y;z;w;qx;qy;qz", "x,y,z,qx,qy,qz,q4"),
+        *("x,y,z,q0,q1,q2,q3", "x,y,z,q1,q2,q3,q4", "px,py,pz,w,x,y,z", "px,py,pz,x,y,z,w", "x,y,z,ow,ox,oy,oz"),
+        *(
+            "x,y,z,quat_x,quat_y,quat_z,quat_w",
+            "x,y,z,rx,ry,rz,rw",
+            "x,y,z,w,i,j,k",
+            "x,y,z,i,j,k,w",
+            "x,y,z,qw,qi,qj,qk",
+        ),
+        *("x,y,z,e0,e1,e2,e3", "x,y,z,qr,qi,qj,qk", "qw,qx,qy,qz,x,y,z", "t,x,y,z,qz,qy,qx,qw,f", "x,y,z,qx,qy,qz,s"),
+        "position.x,position.y,position.z,orientation.x,orientation.y,orientation.z,orientation.w",
+    ],
+)
+def test_a_quaternion_is_no_axis(names: str):
+    count = len(names.replace(";", ",").replace(" ", ",").split(","))
+    assert "are a quaternion, not a tool axis" in message(names + "\n" + ",".join(["1"] * count) + "\n")
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2, 3], [3, 0, 1, 2]])
+def test_a_quaternion_without_a_header(order: list[int]):
+    flips = np.array([[1.0, 0, 0, 0.0099], [0.9995, 0.03, 0, 0.0099], [0.6, 0.8, 0, 0.0099], [0.8, 0.6, 0, 0.0099]])
+    assert "the columns 4 to 7 are a quaternion" in message(rows(TIPS, flips[:, order]))

@@ -5,12 +5,14 @@ from __future__ import annotations
 import gzip
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cornersmooth.cl import read
+from cornersmooth.cl import words as vocabulary
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.model import FeedMode, Keep, Move, Program
 
@@ -72,6 +74,40 @@ def test_coordinate_lines_are_further_points() -> None:
     assert result.line.tolist() == [1, 2, 3, 5, 6]
     assert result.kind.tolist() == [Move.LINEAR] * 3 + [Move.RAPID, Move.LINEAR]
     assert result.axis[3:].tolist() == [[0, 1, 0], [0, 0.6, 0.8]]
+    assert codes(result) == {"CS195": 2}  # never in silence
+
+
+@pytest.mark.parametrize("word", ["CONT", "MOVE", "cont", "Move "])
+def test_cont_and_move_are_positions(word: str) -> None:
+    result = program(f"GOTO/0,0,0\n{word}/1,2,3,0,.6,.8\nRAPID\n{word} / 4, 5, $\n6\nGOTO/7,8,9\n")
+    assert result.tip[1:].tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+    assert result.axis[1:].tolist() == [[0, 0.6, 0.8]] * 3
+    assert result.kind.tolist() == [Move.LINEAR, Move.LINEAR, Move.RAPID, Move.LINEAR]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "GOTO/X1,Y2,Z3,I0,J.6,K.8",
+        "goto/x1.,y2.0,z+3,i0,j0.6,k0.8",
+        "GOTO / X 1, Y=2, Z3 ,I0,J6E-1,K.8",
+        "GOTO/X1 Y2 Z3 I0 J.6 K.8",
+        "GOTO/X1,Y2,Z3,$\nI0,J.6,K.8",
+        "FROM/X1,Y2,Z3,I0,J.6,K.8",
+    ],
+)
+def test_letters_before_the_numbers(text: str) -> None:
+    result = program(f"{text}\nGOTO/X4,Y5,Z6\n")
+    assert result.tip.tolist() == [[1, 2, 3], [4, 5, 6]]
+    assert np.allclose(result.axis, [[0, 0.6, 0.8]] * 2, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text", ["GOTO/X1,Y2", "GOTO/Y1,X2,Z3", "GOTO/X1,Y2,Z3,A30", "GOTO/X1,Y2,Z3,K1", "GOTO/X1,2,Z3"]
+)
+def test_letters_that_leave_something_open(text: str) -> None:
+    with pytest.raises(InputError, match="GOTO cannot be read"):
+        program(f"{text}\n")
 
 
 def test_axis_is_normalised() -> None:
@@ -110,9 +146,53 @@ def test_tool_path_starts_upright() -> None:
 
 def test_multax_off_locks_the_axis() -> None:
     text = "MULTAX\nGOTO/0,0,0,0,1,0\nMULTAX/OFF\nGOTO/1,0,0,1,0,0\nGOTO/2,0,0\nMULTAX/ON\nGOTO/3,0,0,1,0,0\n"
-    result = program(text)
+    result = program(text, dialect="catia")
     assert result.axis.tolist() == [[0, 1, 0]] * 3 + [[1, 0, 0]]
     assert codes(result) == {"CS137": 1}
+
+
+OFF = "MULTAX/ON\nGOTO/0,0,0,.6,0,.8\nmultax / off\nLOADTL/4\n{}"
+
+
+@pytest.mark.parametrize(
+    "after", ["GOTO/1,0,0\n", "GODLTA/1,0\n", "CONT/1,0,0\n", "GOTO/1,0,$\n0\n", "GOTO/1,0,0,0,0,1\n"]
+)
+@pytest.mark.parametrize("head", ["", "TOOL PATH/A,TOOL,B\n", "UNIT/MM\n", "CSI_SET_FLUTE_LENGTH/20.\n"])
+def test_axis_after_multax_off_is_asked_for(head: str, after: str) -> None:
+    text = head + OFF.format(after)
+    with pytest.raises(InputError, match=r":[567]: error: .*after MULTAX/OFF.*--dialect catia"):
+        program(text)
+    assert program(text, dialect="hsm").axis[1].tolist() == UP
+    assert program(text, dialect="catia").axis[1] == pytest.approx([0.6, 0, 0.8])
+
+
+@pytest.mark.parametrize(
+    ("after", "axis"),
+    [
+        ("TLAXIS/0,0,1\nGOTO/1,0,0\n", UP),
+        ("TLAXIS/0,.6,.8\nGOTO/1,0,0\n", [0, 0.6, 0.8]),
+        ("GOTO/1,0,0,.6,0,.8\n", [0.6, 0, 0.8]),
+        ("MULTAX/ON\nGOTO/1,0,0\n", [0.6, 0, 0.8]),
+        ("TOOL PATH/A,TOOL,B\nGOTO/1,0,0\n", UP),
+    ],
+)
+def test_axis_after_multax_off_that_is_stated(after: str, axis: list[float]) -> None:
+    assert program(OFF.format(after)).axis[1] == pytest.approx(axis)
+
+
+@pytest.mark.parametrize(
+    ("head", "axis"),
+    [
+        ("MODE/MILL\nCSI_SET_FLUTE_LENGTH/20.\n", UP),
+        ("CSI_TOOL_PATH/Face\nCSI_SET_PATH_PARAM/TOOL_BREAK=ON\n", UP),
+        ("MCSYS/ NUM, 1, POINT, 0, 0, 0, VECTOR, 1, 0, 0, VECTOR, 0, 1, 0\nTCP/ OFF\n", UP),
+        ("$$     CATIA APT VERSION 1.0\n", [0.6, 0, 0.8]),
+        ("$$*         Pro/CLfile  Version 9.0\n", UP),
+        ("REMARK a.as  NCLCAM\n", [0.6, 0, 0.8]),
+    ],
+)
+def test_axis_after_multax_off_of_known_systems(head: str, axis: list[float]) -> None:
+    assert program(head + OFF.format("GOTO/1,0,0\n")).axis[1] == pytest.approx(axis)
 
 
 def test_incremental_positions() -> None:
@@ -321,7 +401,11 @@ def test_cutcom_spans_are_kept() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["TRANS/0,0,0", "TRACUT/NOMORE", "ROTABL/    0.000000,,TABLE,CLW", "TRNTYP/WORLD,0,0,0"]
+    "text",
+    [
+        *("TRANS/0,0,0", "TRACUT/NOMORE", "ROTABL/    0.000000,,TABLE,CLW", "TRNTYP/WORLD,0,0,0", "WPLANE/OFF"),
+        *("LCS/OFF", "LCS/ON,1,0,0,0,0,1,0,0,0,0,1,0", "FIXTURE/2", "ORIGIN/0,0,0"),
+    ],
 )
 def test_coordinate_changes_that_change_nothing(text: str) -> None:
     result = program(f"{text}\nGOTO/1,0,0\n")
@@ -333,7 +417,20 @@ TURNED = ["MCS/1,0,0,0,0,1,0,-1,0,0,0,0", "MCSYS/NUM,1,POINT,0,0,0,VECTOR,1,0,0,
 
 
 @pytest.mark.parametrize(
-    "text", ["TRANS/1,0,0", "TRACUT/M1", "ROTABL/90,CLW", "COPY/1,TRANSL,1,0,0,5", "TRNTYP/LOCAL,0", *TURNED]
+    "text",
+    [
+        *(
+            "TRANS/1,0,0",
+            "TRACUT/M1",
+            "ROTABL/90,CLW",
+            "TRNTYP/LOCAL,0",
+            *TURNED,
+            "wplane / on",
+            "WPLANE/1",
+            "ROTHED/30",
+        ),
+        *("LCS/ON,0.8,0,0.6,10,0,1,0,0,-0.6,0,0.8,5", "HEAD/2", "MATRIX/1,2,3", "TLCOMP/ON,LEFT", "ORIGIN", "ZERO/1"),
+    ],
 )
 def test_coordinate_changes_are_refused(text: str) -> None:
     with pytest.raises(InputError, match="changes the coordinates"):
@@ -345,9 +442,138 @@ def test_several_systems_are_pointed_out() -> None:
     text = (
         "MSYS/0,0,0,1,0,0,0,1,0\nGOTO/0,0,0\nMSYS/0,0,0,1,0,0,0,1,0\nGOTO/1,0,0\nMSYS/0,0,5,1,0,0,0,1,0\nGOTO/2,0,0\n"
     )
-    assert codes(program(text)) == {"CS146": 1}
-    text = "MCS/1,0,0,0,1,0,0,0,1,0,0,0\nGOTO/0,0,0\nMCS/1,0,0,0,1,0,0,0,1,0,0,5\nGOTO/1,0,0\n"
-    assert codes(program(text)) == {"CS146": 1}
+    result = program(text)
+    assert codes(result) == {"CS146": 1}
+    assert result.tip.tolist() == [[0, 0, 0], [1, 0, 0], [2, 0, 5]]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "MCS/1,0,0,0,1,0,0,0,1,0,0,0\nGOTO/0,0,0\nMCS/1,0,0,0,1,0,0,0,1,0,0,5\n",
+        "MCSYS/NUM,1,POINT,0,0,0,VECTOR,1,0,0,VECTOR,0,1,0\nGOTO/0,0,0\n"
+        "MCSYS/NUM,2,POINT,0,0,0,VECTOR,1,0,0,VECTOR,0,1,0\n",
+        "FIXTURE/1\nGOTO/0,0,0\nFIXTURE/2\n",
+        "GOTO/0,0,0\nWCS/2\n",
+        "$$-> CSYS / 1,0,0,0, $\n0,1,0,0, $\n0,0,1,0\nGOTO/0,0,0\n$$-> CSYS / 1,0,0,0, $\n0,0,-1,0, $\n0,1,0,0\n",
+        "$$*CATIA0\n$$ A\n$$ 1. 0. 0. 0.\n$$ 0. 1. 0. 0.\n$$ 0. 0. 1. 0.\nGOTO/0,0,0\n"
+        "$$*CATIA0\n$$ B\n$$ 1. 0. 0. 0.\n$$ 0. 0. -1. 0.\n$$ 0. 1. 0. 0.\n",
+    ],
+)
+def test_systems_that_change_are_refused(text: str) -> None:
+    with pytest.raises(InputError, match="changes the coordinates"):
+        program(f"{text}GOTO/1,0,0\n")
+
+
+#: a second operation on the side of the part, as NX writes it
+SIDE = """TOOL PATH/TOP,TOOL,D10
+MSYS/0.0,0.0,0.0,1.0,0.0,0.0,0.0,1.0,0.0
+GOTO/0,0,0,0,0,1
+GOTO/30,0,0
+TOOL PATH/SIDE,TOOL,D10
+MSYS/0.0,-40.0,-20.0,1.0,0.0,0.0,0.0,0.0,1.0
+{}
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "tip", "axis"),
+    [
+        ("GOTO/30,0,0,0,0,1", [30, -40, -20], [0, -1, 0]),
+        ("GOTO/30,0,0", [30, -40, -20], [0, -1, 0]),
+        ("GOTO/1,2,3,0,1,0 $$", [1, -43, -18], [0, 0, 1]),
+        ("GODLTA/5,0,0", [35, 0, 0], [0, -1, 0]),  # from where the tool is
+        ("CLEARP/XYPLAN,9\nGOTO/30,0,0\nRETRCT", [30, -49, -20], [0, -1, 0]),
+        ("GOTO/1,2,3\nTOOL PATH/C\nMSYS/0.0,0.0,0.0,1.0,0.0,0.0,0.0,1.0,0.0\nGOTO/4,5,6", [4, 5, 6], UP),
+        ("GOTO/1,0,0\nCIRCLE/0,0,0,0,0,-1,1,.06,.5,10,0\nGOTO/0,1,0", [0, -40, -19], [0, -1, 0]),
+    ],
+)
+def test_a_turned_system_of_nx_is_carried_out(text: str, tip: list[float], axis: list[float]) -> None:
+    result = program(SIDE.format(text))
+    assert result.tip[-1] == pytest.approx(tip)
+    assert result.axis[-1] == pytest.approx(axis)
+    assert result.tip[:2].tolist() == [[0, 0, 0], [30, 0, 0]]
+    if "CIRCLE" in text:  # a quarter, left-handed about -Z of the system, which is Y of the part
+        assert result.arcs.centre.tolist() == [[0, -40, -20]]
+        assert result.arcs.normal[0] == pytest.approx([0, -1, 0])
+        assert result.arcs.sweep == pytest.approx([np.pi / 2])
+
+
+@pytest.mark.parametrize(
+    ("plane", "z"),
+    [
+        ("CLEARP/XYPLAN,60", 60),
+        ("CLEARP/60", 60),
+        ("CLEARP/0,0,1,60", 60),
+        ("CLEARP/0,0,-2,-120", 60),
+        ("CLRSRF/9,9,60", 60),
+    ],
+)
+def test_retract_goes_to_the_clearance_plane(plane: str, z: float) -> None:
+    result = program(f"{plane}\nGOTO/0,0,50,0,0,1\nGOTO/20,0,0\nRETRCT\nGOTO/80,40,0\nRAPID\nretrct\nGOTO/1,2,3\n")
+    assert result.tip[2:].tolist() == [[20, 0, z], [80, 40, 0], [80, 40, z], [1, 2, 3]]
+    assert result.kind[2:].tolist() == [Move.LINEAR, Move.LINEAR, Move.RAPID, Move.LINEAR]
+
+
+def test_retract_goes_along_the_tool() -> None:
+    result = program("CLEARP/XYPLAN,8\nGOTO/1,2,0,.6,0,.8\nRETRCT\nRETRCT\nCLEARP/YZPLAN,10\nRETRCT\nGOTO/0,0,9\n")
+    assert result.tip == pytest.approx(np.array([[1, 2, 0], [7, 2, 8], [7, 2, 8], [10, 2, 12], [0, 0, 9]]))
+    assert result.axis == pytest.approx(np.array([[0.6, 0, 0.8]] * 5))
+    above = program("CLEARP/XYPLAN,8\nGOTO/0,0,9\nRETRCT\nGOTO/1,0,9\n")
+    assert above.tip.tolist() == [[0, 0, 9], [1, 0, 9]]
+    assert codes(above) == {"CS194": 1}
+
+
+@pytest.mark.parametrize(
+    "plane", ["", "CLEARP/XYPLAN,60\nCLEARP/OFF", "CLEARP/60\nCLRSRF/1,2,3,0,0,1,5", "CLEARP/S,1,2"]
+)
+def test_retract_without_a_plane_is_refused(plane: str) -> None:
+    with pytest.raises(InputError, match="no clearance plane is known"):
+        program(f"{plane}\nGOTO/0,0,0\nRETRCT\nGOTO/1,0,0\n")
+
+
+MOTION = """GOCLER PLUNGE/5 POSITN/ZAXIS,100 INDPOS/BAXIS,45 SAFPOS HOME GOINCR/1,2 THREAD/TURN PROBE/1 PREFUN/68
+MOVETO/1 BREAK ARCSLP/-2 GO/TO GOLFT/C1 POCKET/1 TLLFT,GOFWD/C1 INSERT/G28Z0 INSERT/x10.y5 APPROACH RETRACT
+"""
+REPETITION = """COPY/1,SAME,5 INDEX/1 CALL/M1 CALSUB/7 CALSUB DEFSUB/7 ENDSUB M1=MACRO/A TERMAC LOOPST LOOPND JUMPTO/A
+INCLUD/ROUGH.CLS READ/2 DO/10 REPEAT/3"""
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        *((text, "moves the tool") for text in MOTION.split()),
+        *((text, "repeats, calls or includes") for text in REPETITION.split()),
+    ],
+)
+@pytest.mark.parametrize("spell", [str, str.lower, lambda text: text.replace("/", " / ", 1)])
+def test_what_is_not_carried_out_is_refused(text: str, reason: str, spell: Callable[[str], str]) -> None:
+    for tail in ("", " $$ behind") if "INSERT" not in text else ("",):
+        with pytest.raises(InputError, match=rf"x\.cls:2: error: .* {reason}"):
+            program(f"GOTO/0,0,0\n{spell(text)}{tail}\nGOTO/1,0,0\n")
+
+
+def test_each_refused_word_has_one_source_and_no_handler() -> None:
+    words = [word for _, source, words in vocabulary._REFUSED for word in words.split() if source]
+    assert len(words) == len(set(words)) == len(vocabulary.REFUSED_WORDS)
+    carried_out = vocabulary.MOTION_WORDS | vocabulary.STATE_WORDS | vocabulary.PLAIN_WORDS | vocabulary.TEXT_WORDS
+    assert not carried_out & set(words)
+
+
+@pytest.mark.parametrize(
+    "text", ["SLIDE/1,2,3", "SLIDE/FAST,1,2,3,4", "SLIDE 1 2 3", "SLIDE 1.,2.,3.", "P1=POINT/1,2,3", "* 1 2 3"]
+)
+def test_unknown_words_with_a_row_of_numbers_are_refused(text: str) -> None:
+    with pytest.raises(InputError, match=r"x\.cls:2: error: unknown statement .* may move the tool"):
+        program(f"GOTO/0,0,0\n{text}\n")
+    assert len(program(f"GOTO/0,0,0\n{text}\n", lenient=True)) == 1
+
+
+@pytest.mark.parametrize(
+    "text", ["SLIDE/1,2", "SLIDE/A,1,B,2,C,3", "STOCK/BLOCK,0,0,0,1,1,1", "CSI_X/1,2,3", "INSERT/M8", "HOMEY"]
+)
+def test_words_that_do_not_look_like_motion_are_kept(text: str) -> None:
+    assert len(program(f"GOTO/0,0,0\n{text}\n").statements) == 1
 
 
 @pytest.mark.parametrize(
@@ -369,6 +595,44 @@ def test_fini_ends_the_file() -> None:
     with pytest.raises(InputError, match=r"x\.cls:3: error: GOTO after FINI"):
         program("GOTO/1,0,0\nFINI\nGOTO/2,0,0\n")
     assert len(program("GOTO/1,0,0\nFINI\nGOTO/2,0,0\nGOTO/3,0,0,0,1,0\n", lenient=True)) == 1
+
+
+# --- columns and line numbers -------------------------------------------------------------------------------------
+
+
+LISTING = ["UNITS/MM", "FEDRAT/500,MMPM", "$$ a comment", "GOTO/1,2,3,$", "0,.6,.8", "RAPID", "GOTO/4,5,6", "FINI"]
+
+
+@pytest.mark.parametrize(
+    ("form", "code"),
+    [
+        (lambda text, n: f"{text:<72}{n:08d}", "CS191"),
+        (lambda text, n: f"{text:<72}PT {n:5d}" if "GOTO" in text else text, "CS191"),
+        (lambda text, n: f"{text:<72}{n:<8d}", "CS191"),
+        (lambda text, n: f"{text:<80}" if n % 2 else f"{text:<72}A{n:07d}", "CS191"),
+        (lambda text, n: f"{n:05d} {text}", "CS192"),
+        (lambda text, n: f"{n:5d}:  {text}", "CS192"),
+        (lambda text, n: f"{n}\t{text}", "CS192"),
+        (lambda text, n: f"N{n} {text}" if text[0].isalpha() else text, None),
+        (lambda text, n: f"{text:<90}", None),
+    ],
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_numbers_beside_the_statements(form: Callable[[str, int], str], code: str | None, end: str) -> None:
+    text = "".join(form(line, 10 * n) + end for n, line in enumerate(LISTING, 1))
+    result = program(text)
+    assert result.tip.tolist() == [[1, 2, 3], [4, 5, 6]]
+    assert np.allclose(result.axis, [[0, 0.6, 0.8]] * 2, rtol=0, atol=1e-15)
+    assert result.feed.tolist() == [500, 500]
+    assert result.line.tolist() == [4, 7]
+    assert codes(result) == ({code: 1} if code else {})
+
+
+def test_long_lines_are_not_cut() -> None:
+    """Of the systems that know no columns: long arguments, and integers that end there."""
+    ends = ["1.00000000", "         1", "0.", "-1", "1"]
+    lines = [f"{'GOTO/0.,0.,':<{width}}{end}" for width in (64, 70, 72, 75, 100) for end in ends]
+    assert program("\n".join(lines)).tip[:, 2].tolist() == [1, 1, 0, -1, 1] * 5
 
 
 # --- the file ----------------------------------------------------------------------------------------------------
@@ -423,6 +687,9 @@ def test_unknown_options(options: dict[str, str]) -> None:
         ("$$     CATIA APT VERSION 1.0", "catia"),
         ("$$*         Pro/CLfile  Version 11.0", "creo"),
         ("PARTNO/1\nUNIT/MM\nCSI_SET_FLUTE_LENGTH/3.2", "solidworks"),
+        ("CSI_SET_FLUTE_LENGTH/20.\nCSI_TOOL_PATH/Face2", "hsm"),
+        ("MCSYS/ NUM, 1, POINT, 0, 0, 0, VECTOR, 1, 0, 0, VECTOR, 0, 1, 0", "hsm"),
+        ("CSI_SET_FLUTE_LENGTH/20.", "plain"),
         ("MODE/MILL\nPARTNO/'x'", "hsm"),
         ("REMARK a.as  27-APR-2021  NCLCAM     2020.00", "ncl"),
         ("PPRINT/APTCL-SPEC,MAKINO-FF,1", "makino"),

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from cornersmooth.cl import arcs as arc_geometry
 from cornersmooth.cl.arcs import ArcRule
-from cornersmooth.cl.builder import Builder
+from cornersmooth.cl.builder import AXIS_NOISE, Builder
 from cornersmooth.cl.bulk import chunks
+from cornersmooth.cl.cards import without_card_columns
 from cornersmooth.cl.dialects import by_name, recognise
 from cornersmooth.cl.grammar import Decode, Record, read_records
 from cornersmooth.cl.interpret import end, obey, plain
@@ -23,9 +24,6 @@ from cornersmooth.model import MM_PER_UNIT, Arcs, Floats, Ints, Keep, Move, Prog
 #: taken apart once, and no more than so many different ones remembered
 LONGEST_GAP: Final = 3
 REMEMBERED: Final = 4096
-
-#: an axis that differs by less is the same one, printed again
-AXIS_NOISE: Final = 1e-6
 
 
 def read_apt(
@@ -64,17 +62,22 @@ def read_apt(
     Raises
     ------
     InputError
-        CS100-CS128, with the line.
+        CS101-CS128 and CS181-CS193, with the line.
 
     Notes
     -----
     Memory while reading: 5 bytes for a byte of a tool path of plain GOTO lines, at most 130 for any statements; the
     lines of a NURBS record may be `nurbs.MOST_LINES` poses for each control point.
     """
+    data, cut = without_card_columns(data, name)
     known = by_name(dialect) if dialect else recognise(data)
     decode = _decoder(data)
-    builder = Builder(name, short_axis_up=known.short_axis == "up", lenient=lenient)
+    builder = Builder(
+        name, short_axis_up=known.short_axis == "up", off_known=known.multax_off is not None, lenient=lenient
+    )
     state = ReaderState(name, known, builder, arc_rule, lenient)
+    if cut:
+        state.note(cut, 0)
     _run(data, state, decode, fast)
     end(state)
     if not builder.n:

@@ -6,7 +6,7 @@ kind of move, axis, cutter compensation) is a short list of changes, spread over
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
@@ -15,17 +15,23 @@ from numpy.typing import NDArray
 
 from cornersmooth.cl.bulk import FARTHEST, Chunk
 from cornersmooth.cl.messages import error, finding
+from cornersmooth.cl.systems import IDENTITY, System, Vector
 from cornersmooth.errors import Finding
 from cornersmooth.model import Bools, Floats, Ints, Keep, Move
 from cornersmooth.vectors import norm
 
-Vector = tuple[float, float, float]
 T = TypeVar("T", np.float64, np.int64, np.bool_)
 
 #: largest ||v|−1| of an axis vector: three printed decimals leave 1e-3
 UNIT_TOLERANCE: Final = 1e-2
 
 UP: Final[Vector] = (0.0, 0.0, 1.0)
+
+#: an axis that differs by less is the same one, printed again
+AXIS_NOISE: Final = 1e-6
+
+#: whether the axis is locked: no; by MULTAX/OFF alone; and stated after it
+_FREE, _LOCKED, _STATED = 0.0, 1.0, 2.0
 
 
 @dataclass
@@ -66,12 +72,15 @@ class Builder:
         For messages.
     short_axis_up : bool
         Whether a pose without an axis has +Z instead of the last one.
+    off_known : bool
+        Whether MULTAX/OFF surely locks the axis where it is.
     lenient : bool
         Normalise axis vectors of any length, with a finding.
     """
 
     file: str
     short_axis_up: bool = False
+    off_known: bool = True
     lenient: bool = False
     n: int = 0
     feed: Changes = field(default_factory=lambda: Changes([0], [float("nan")]))
@@ -81,6 +90,7 @@ class Builder:
     axis_locked: Changes = field(default_factory=lambda: Changes([0], [0.0]))
     special: dict[int, Move] = field(default_factory=dict)
     axis_set: list[tuple[int, Vector]] = field(default_factory=lambda: [(0, UP)])
+    systems: list[tuple[int, System]] = field(default_factory=list)  #: first pose, system seen from the first one
     _chunks: list[Chunk] = field(default_factory=list)
     _single_at: list[int] = field(default_factory=list)
     _single_tip: list[Vector] = field(default_factory=list)
@@ -121,8 +131,28 @@ class Builder:
         if not self.axis_locked.now and (axis is not None or self.short_axis_up):
             self._remember(axis or self.axis_set[-1][1])
 
+    @property
+    def system(self) -> System:
+        """The coordinate system of what follows, seen from the first one."""
+        return self.systems[-1][1] if self.systems else IDENTITY
+
+    def enter_system(self, system: System) -> None:
+        """Let positions and axes be in another coordinate system from here on; an axis that holds stays where it is."""
+        if self.axis_set[-1][0] != self.n:
+            axis = self.system.seen_from(system).vector(self.last_axis())
+            self.axis_set.append((self.n, axis))
+            self._remember(axis)
+        self.systems.append((self.n, system))
+
     def last_tip(self) -> Vector:
-        """Tip of the last pose."""
+        """Tip of the last pose, in the coordinate system of what follows."""
+        tip = self._last_tip()
+        if not self.systems or self.systems[-1][0] < self.n:
+            return tip
+        before = next((system for pose, system in reversed(self.systems) if pose < self.n), IDENTITY)
+        return before.seen_from(self.system).point(tip)
+
+    def _last_tip(self) -> Vector:
         if self._last_single:
             return self._single_tip[-1]
         row, chunk = self._row(), len(self._chunks) - 1
@@ -153,11 +183,13 @@ class Builder:
         """Let poses without an axis of their own have this one from here on."""
         self.axis_set.append((self.n, axis))
         self._remember(axis)
+        if self.axis_locked.now:
+            self.axis_locked.set(self.n, _STATED)
 
     def lock_axis(self, locked: bool) -> None:
         """Ignore (or heed again) the axes that poses have of their own."""
         self._remember(self.last_axis())
-        self.axis_locked.set(self.n, float(locked))
+        self.axis_locked.set(self.n, _LOCKED if locked else _FREE)
 
     def _remember(self, axis: Vector) -> None:
         self._axis_now = axis
@@ -168,20 +200,21 @@ class Builder:
         return self.n - 1 - len(self._single_at) - self._rows_before
 
     def tips(self) -> Floats:
-        """(n, 3) float64: all tips, as written."""
-        return self._merge([chunk.tip for chunk in self._chunks], np.array(self._single_tip).reshape(-1, 3))
+        """(n, 3) float64: all tips, in the first coordinate system."""
+        tips = self._merge([chunk.tip for chunk in self._chunks], np.array(self._single_tip).reshape(-1, 3))
+        return self._placed(tips, System.points)
 
     def lines(self) -> Ints:
         """(n,) int64: line of every pose."""
         return self._merge([chunk.line for chunk in self._chunks], np.array(self._single_line, np.int64))
 
     def axes(self) -> tuple[Floats, list[Finding]]:
-        """(n, 3) float64: the unit axis of every pose, and what is to be said about them.
+        """(n, 3) float64: the unit axis of every pose in the first system, and what is to be said about them.
 
         Raises
         ------
         InputError
-            CS111 for a zero vector, CS112 for one that is no unit vector.
+            CS111 for a zero vector, CS112 for one that is no unit vector, CS188 for one that nobody can know.
         """
         single = [axis is not None for axis in self._single_axis]
         own = self._merge([chunk.own_axis for chunk in self._chunks], np.array(single, np.bool_))
@@ -193,21 +226,60 @@ class Builder:
         findings: list[Finding] = []
         unit = self._normalise(vector, given, findings)
 
-        locked = self.axis_locked.spread(self.n) > 0
-        dropped = locked[given]
+        state = self.axis_locked.spread(self.n)
+        dropped = state[given] != _FREE
+        off_axes = given[dropped], unit[dropped]
         if dropped.any():
             findings.append(finding("CS137", int(self.lines()[given[dropped][0]]), int(dropped.sum())))
             unit, given = unit[~dropped], given[~dropped]
+        axis = self._held(unit, given)
+        if not self.off_known:
+            self._check_off(axis, state, *off_axes)
+        return self._placed(axis, System.vectors), findings
+
+    def _held(self, unit: Floats, given: Ints) -> Floats:
+        """Axes of all poses, of which some are given."""
         if len(given) == self.n:
-            return unit, findings
+            return unit
         at = np.array([pose for pose, _ in self.axis_set])
         known = np.array([axis for _, axis in self.axis_set])
         if not self.short_axis_up:
             order = np.argsort(np.concatenate((at, given)), kind="stable")  # what was set before a pose comes first
             at, known = np.concatenate((at, given))[order], np.concatenate((known, unit))[order]
-        axis = known[np.searchsorted(at, np.arange(self.n), side="right") - 1]
+        axis: Floats = known[np.searchsorted(at, np.arange(self.n), side="right") - 1]
         axis[given] = unit
-        return axis, findings
+        return axis
+
+    def _check_off(self, axis: Floats, state: Floats, own: Ints, unit: Floats) -> None:
+        """Refuse axes after MULTAX/OFF that the standard and CATIA read differently, and those that neither reads."""
+        off = state == _LOCKED
+        doubtful = off & (np.abs(axis[:, :2]).max(axis=1, initial=0) > AXIS_NOISE)
+        another = np.abs(axis[own] - unit).max(axis=1, initial=0) > AXIS_NOISE
+        doubtful[own] = another & off[own]
+        if not doubtful.any():
+            return
+        pose = int(doubtful.argmax())
+        line = int(self.lines()[pose])
+        if (at := np.flatnonzero(own == pose)).size:
+            words = ",".join(f"{part:g}" for part in unit[at[0]])
+            what = f"tool axis {words} after MULTAX/OFF, where ISO 4343 and CATIA read no axis"
+            want = "put MULTAX/ON before it, or say --dialect catia to lock the axis as it was"
+        else:
+            words = ",".join(f"{part:g}" for part in axis[pose])
+            what = f"position without a tool axis after MULTAX/OFF: +Z (ISO 4343), or locked at {words} (CATIA)"
+            want = "say --dialect hsm for +Z, or --dialect catia for the locked axis"
+        raise error("CS188", self.file, line, what=what, want=want)
+
+    def _placed(self, rows: Floats, place: Callable[[System, Floats], Floats]) -> Floats:
+        """Rows of all poses, from their coordinate systems into the first one."""
+        if not self.systems:
+            return rows
+        rows = rows.copy()
+        ends = [*(pose for pose, _ in self.systems[1:]), self.n]
+        for (begin, system), end in zip(self.systems, ends, strict=True):
+            if system is not IDENTITY:
+                rows[begin:end] = place(system, rows[begin:end])
+        return rows
 
     def _normalise(self, vector: Floats, pose: Ints, findings: list[Finding]) -> Floats:
         with np.errstate(over="ignore", invalid="ignore"):

@@ -32,6 +32,9 @@ class Dialect:
         Turning sense of CIRCLE with 11 or more numbers about its normal.
     short_axis : {"hold", "up"}
         What a GOTO of three numbers means for the axis: the last one, or +Z.
+    multax_off : {"lock", "up"} or None
+        What it means after MULTAX/OFF: the axis is locked where it is (CATIA V5, Syntax of Generated APT Instructions;
+        PostWorks 7.2), or +Z (ISO 4343:2000, 5.32); None where nothing says.
     units : {"mm", "inch"}
         Where the file does not say.
     decimals : int
@@ -44,20 +47,40 @@ class Dialect:
     fingerprint: bytes
     long_arcs: Hand = "left"
     short_axis: Literal["hold", "up"] = "hold"
+    multax_off: Literal["lock", "up"] | None = None
     units: Units = "mm"
     decimals: int = 4
     strips_zeros: bool = False
 
 
-#: in the order in which they are tried: the more telling fingerprint first
+#: in the order in which they are tried: the more telling fingerprint first. Each is written by one system alone:
+#: CSI_SET_ is not, SolidWorks CAM and Autodesk's CAMplete APT have it; Autodesk's posts are all of `hsm`
 DIALECTS: Final[tuple[Dialect, ...]] = (
     Dialect("makino", rb"^PPRINT/APTCL-SPEC, *MAKINO", decimals=7),
-    Dialect("creo", rb"^\$\$\* +Pro/CLfile|^\$\$-> *(FEATNO|MFGNO|CSYS|CUTTER|END) */", short_axis="up", decimals=10),
-    Dialect("catia", rb"^\$\$ +CATIA APT VERSION|^\$\$\*CATIA0", decimals=5),
-    Dialect("solidworks", rb"^(CSI_SET_\w+|TRNTYP)/", decimals=6, strips_zeros=True),
-    Dialect("hsm", rb"^(MODE/(MILL|TURN)|MOVARC/|CSI_TOOL_PATH/)", short_axis="up", decimals=6, strips_zeros=True),
-    Dialect("ncl", rb"^REMARK .*NCLCAM", units="inch"),
-    Dialect("nx", rb"^(TOOL PATH/|TLDATA/|MSYS/|END-OF-PATH|PAINT/)"),
+    Dialect(
+        "creo",
+        rb"^\$\$\* +Pro/CLfile|^\$\$-> *(FEATNO|MFGNO|CSYS|CUTTER|END) */",
+        short_axis="up",
+        multax_off="up",
+        decimals=10,
+    ),
+    Dialect("catia", rb"^\$\$ +CATIA APT VERSION|^\$\$\*CATIA0", multax_off="lock", decimals=5),
+    Dialect("nx", rb"^[ \t]*(TOOL PATH/|TLDATA/|MSYS/|END-OF-PATH|PAINT/)"),
+    Dialect(
+        "hsm",
+        rb"^[ \t]*(MODE[ \t]*/[ \t]*(MILL|TURN)\b|MOVARC[ \t]*/|CSI_TOOL_PATH[ \t]*/|MCSYS[ \t]*/[ \t]*NUM\b)",
+        short_axis="up",
+        multax_off="up",
+        decimals=6,
+        strips_zeros=True,
+    ),
+    Dialect(
+        "solidworks",
+        rb"^[ \t]*(TRNTYP[ \t]*/|UNIT[ \t]*/|CSYS[ \t]*/[ \t]*[-+.0-9]|RAPID/[ \t]*$|CYCLE/INIT)",
+        decimals=6,
+        strips_zeros=True,
+    ),
+    Dialect("ncl", rb"^REMARK .*NCLCAM", multax_off="lock", units="inch"),
     Dialect("plain", rb"(?!)"),
 )
 

@@ -27,6 +27,9 @@ _NUMERIC_LINE: Final = re.compile(r"(?:[+-][ \t]*)?\.?[0-9][0-9.EeDd+\-, \t]*(\$
 #: sequence numbers and labels: ``N27   ,``, ``C12 ,``, ``N10 ``, ``ID)``
 _LABEL: Final = re.compile(r"(?:[NC][0-9]+[ \t]*,|N[0-9]+(?=[ \t])|[A-Z0-9]+\))[ \t]*(?=[A-Z$])", re.IGNORECASE)
 
+#: the number of a line before its statement
+_NUMBERED: Final = re.compile(r"[0-9]+[ \t]*[:.]?[ \t]*[A-Z]{2}", re.IGNORECASE)
+
 #: a text word at the start of a statement; six letters are a field of their own in APT, blanks may not follow
 _TEXT: Final = re.compile(r"(PARTNO|PPRINT|INSERT|REMARK|LETTER|TPRINT|DISPLY|TOOL[ \t]+PATH)[ \t]*(/?)", re.IGNORECASE)
 
@@ -127,7 +130,7 @@ def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, 
     Raises
     ------
     InputError
-        CS104, CS105
+        CS104, CS105, CS190
     """
     source = _Lines(lines, first, decode, file, follows)
     while source.at < len(lines):
@@ -143,6 +146,8 @@ def read_records(lines: Sequence[bytes], first: int, decode: Decode, file: str, 
         found = _TEXT.match(text)
         if found is not None:
             yield _text_statement(source, line, text, found)
+        elif _NUMBERED.match(text):
+            raise error("CS190", file, line, text=text)
         elif _NUMERIC_LINE.match(text) or (text[0] in "+-.0123456789" and "," in text):
             raise error("CS105", file, line, text=text)
         else:

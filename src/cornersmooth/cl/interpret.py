@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import re
 from typing import Final
 
 from cornersmooth.cl import motion_statements, state_statements
-from cornersmooth.cl.grammar import Record
+from cornersmooth.cl.grammar import Record, number
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.cl.words import (
+    GOTO_WORDS,
     KNOWN_WORDS,
     MOTION_WORDS,
+    MOVES,
     PLAIN_PREFIXES,
-    STRANGE_MOTION_WORDS,
+    REFUSED_WORDS,
     near_motion_word,
 )
 from cornersmooth.model import INFORMING_WORDS
@@ -19,10 +23,17 @@ from cornersmooth.model import INFORMING_WORDS
 HANDLERS: Final = motion_statements.HANDLERS | state_statements.HANDLERS
 
 #: words that may stand between an arc and the GOTO that ends it
-_WITHIN_ARC: Final = INFORMING_WORDS | {"FEDRAT", "GOTO"}
+_WITHIN_ARC: Final = INFORMING_WORDS | GOTO_WORDS | {"FEDRAT"}
 
 #: words of a NURBS record
 _WITHIN_CURVE: Final = frozenset({"KNOT", "CNTRL"})
+
+#: so many numbers in a row may be a position
+_POSITION: Final = 3
+
+#: INSERT of blocks for the control that turn coordinates or move axes: a G code, or a word of an axis
+_INSERTED_MOTION: Final = re.compile(r"\s*(?:[A-Z][-+]?(?:\d+\.?\d*|\.\d+)\s*)+[$%;]?\s*", re.IGNORECASE)
+_AXIS_OR_G: Final = re.compile(r"[GXYZABCUVWIJK]", re.IGNORECASE)
 
 #: drive surfaces other than those that CAM systems write
 _STRANGE_PREFIXES: Final = ("TLON,", "TLLFT,", "TLRGT,", "TLOFF,")
@@ -66,16 +77,19 @@ def obey(state: ReaderState, record: Record) -> None:
         return
     if state.arc is not None and word not in _WITHIN_ARC:
         raise state.fail("CS121", state.arc.line, word=state.arc.word)
-    if record.points and word != "GOTO":
+    if record.points and word not in GOTO_WORDS:
         raise state.fail("CS105", record.points[0][0], text=state_statements.joined(record.points[0][1]))
-    if word in STRANGE_MOTION_WORDS or (word.startswith(_STRANGE_PREFIXES) and word not in HANDLERS):
-        raise state.fail("CS108", record.line, word=word)
     handler = HANDLERS.get(word)
+    refused = None if handler is not None else _refused(record, word)
+    if refused is not None:
+        raise state.fail(refused, record.line, word=record.text if word == "INSERT" else word)
     if handler is not None:
         if record.rest:
             raise state.fail("CS107", record.line, word=word, text=record.rest)
         handler(state, record)
         return
+    if any(isinstance(value, float) and not math.isfinite(value) for value in record.args):
+        raise state.fail("CS196", record.line, word=word)
     if word not in KNOWN_WORDS and word != "$$" and not word.startswith(PLAIN_PREFIXES):
         _unknown(state, record, word)
     state.keep(record)
@@ -90,16 +104,40 @@ def end(state: ReaderState) -> None:
 
 
 def _after_end(state: ReaderState, record: Record, word: str) -> None:
-    if word in MOTION_WORDS | STRANGE_MOTION_WORDS and not state.lenient:
+    if (word in MOTION_WORDS or _refused(record, word)) and not state.lenient:
         raise state.fail("CS118", record.line, word=word)
     if word != "$$":
         state.note("CS144", record.line, what="statements after FINI")
+
+
+def _refused(record: Record, word: str) -> str | None:
+    """Code of the error for a statement that is not carried out although it may move the tool."""
+    name = word.rpartition("=")[2]  # M1=MACRO
+    if name in REFUSED_WORDS:
+        return REFUSED_WORDS[name]
+    if word.startswith(_STRANGE_PREFIXES):
+        return MOVES
+    if word == "INSERT" and isinstance(text := record.args[0], str) and _INSERTED_MOTION.fullmatch(text):
+        return MOVES if _AXIS_OR_G.search(text) else None
+    return None
+
+
+def _numbers_in_a_row(record: Record) -> int:
+    """Length of the longest row of numbers in a statement that nobody knows."""
+    row = most = 0
+    for value in record.args:
+        for part in [value] if isinstance(value, float) else value.replace(",", " ").split() or [""]:
+            row = row + 1 if isinstance(part, float) or number(part) is not None else 0
+            most = max(most, row)
+    return most
 
 
 def _unknown(state: ReaderState, record: Record, word: str) -> None:
     near = near_motion_word(word)
     if near is not None and not state.lenient:
         raise state.fail("CS109", record.line, word=word, near=near)
+    if _numbers_in_a_row(record) >= _POSITION and not state.lenient:
+        raise state.fail("CS187", record.line, word=word or record.text)
     if word:
         state.note("CS130", record.line, word=word)
     else:

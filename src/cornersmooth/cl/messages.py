@@ -21,7 +21,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS105": ("a line of numbers that continues no GOTO: {text!r}", "write the statement in front of its numbers"),
     "CS106": ("{word} cannot be read: {token!r} is not a number", "give decimal numbers separated by commas"),
     "CS107": ("{word} is followed by {text!r} instead of '/'", "write {word}/ and its numbers"),
-    "CS108": ("unknown motion statement {word}", "export the path with GOTO and CIRCLE statements"),
+    "CS108": ("{word} moves the tool and is not carried out", "export the path with GOTO and CIRCLE statements"),
     "CS109": ("unknown statement {word}: is it {near}?", "correct the word; a motion must not be lost"),
     # poses
     "CS110": ("{word} with {count} number{s}", "give {want}"),
@@ -48,6 +48,20 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS126": ("{word} cannot be resolved: {why}", "export arcs as CIRCLE statements or as points"),
     "CS127": ("{word} with {value:g} turns", "give 1 to {limit:g}"),
     "CS128": ("NURBS cannot be read: {why}", "export the path with GOTO statements"),
+    # what may move the tool
+    "CS186": (
+        "{word} repeats, calls or includes statements and is not carried out",
+        "export all motion as GOTO and CIRCLE statements in one file",
+    ),
+    "CS187": (
+        "unknown statement {word} with a row of numbers: it may move the tool",
+        "export motion as GOTO; where it moves nothing, remove it or read with --lenient",
+    ),
+    "CS188": ("{what}", "{want}"),
+    "CS189": ("numbers in columns 73 to 80, but not on every long line in order", "remove columns 73 to 80"),
+    "CS190": ("a line number in front of {text!r}, and not on every line in order", "remove the line numbers"),
+    "CS196": ("{word} has a number too large for any machine", "correct the number"),
+    "CS193": ("RETRCT cannot be carried out: {why}", "{want}"),
     "CS181": ("{word} inside a CYCLE, which is drilled at every position", "put CYCLE/OFF before it"),
 }
 
@@ -75,11 +89,15 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS143": ("warning", "{word} changes the coordinates of what follows; ignored"),
     "CS144": ("warning", "{what}; ignored"),
     "CS145": ("note", "NURBS curves are read as lines within {tolerance:g} mm"),
-    "CS146": ("warning", "positions in more than one coordinate system ({word} changes); check the part zero"),
+    "CS146": ("note", "{word} changes: positions and axes are read into the first {word}"),
     "CS147": ("warning", "the tool axis turns along an arc; how it turns is not defined"),
     "CS148": ("warning", "FEDRAT without a unit is read in the unit of the file"),
     "CS149": ("note", "GOHOME without coordinates is kept as a statement"),
     "CS185": ("warning", "FROM is where the tool is not: it feeds on from where it is; put a RAPID behind the FROM"),
+    "CS191": ("note", "columns 73 to 80 are left out: they hold numbers of lines or points"),
+    "CS192": ("note", "the line numbers in front of all lines are left out"),
+    "CS195": ("note", "lines of numbers alone are further points of the GOTO before them"),
+    "CS194": ("warning", "RETRCT beyond the clearance plane; ignored"),
     "CS180": ("warning", "the feeds are in {feeds} per minute, the positions are read in {units} as asked for"),
 }
 

@@ -3,29 +3,52 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
-from cornersmooth.cl.arcs import LEAST_DECIMALS, read_arc
-from cornersmooth.cl.builder import Vector, check_range
-from cornersmooth.cl.grammar import Argument, Record
+from cornersmooth.cl.arcs import LEAST_DECIMALS, Arc, read_arc
+from cornersmooth.cl.builder import check_range
+from cornersmooth.cl.grammar import NUMBER, Argument, Record, number
 from cornersmooth.cl.nurbs import CURVE_DIGITS, Curve, lines_of
 from cornersmooth.cl.reader_state import ReaderState
+from cornersmooth.cl.state_statements import joined
 from cornersmooth.cl.surfaces import read_drive_arc, read_helix
+from cornersmooth.cl.systems import Vector
+from cornersmooth.cl.words import GOTO_WORDS
+from cornersmooth.errors import InputError
 from cornersmooth.model import Move
+
+#: X1,Y2,Z3 or X1,Y2,Z3,I0,J0,K1, separated by commas or blanks
+_AFTER: Final = r"\s*{}\s*=?\s*(" + NUMBER.pattern.replace("(", "(?:").replace("(?:?:", "(?:") + ")"
+_LETTERED: Final = re.compile(
+    "".join(map(_AFTER.format, "XYZ")) + "(?:" + "".join(map(_AFTER.format, "IJK")) + r")?\s*", re.IGNORECASE
+)
+
+#: sine of the angle at which a tool axis meets a plane at least
+_PARALLEL: Final = 1e-6
 
 
 def _pose(state: ReaderState, record: Record, args: tuple[Argument, ...], line: int) -> tuple[Vector, Vector | None]:
-    values = state.numbers(record, args, line)
+    values = state.numbers(record, _without_letters(args), line)
     if len(values) not in (3, 6, 9):  # 7 to 9 are the surface normal of an expanded record
         raise state.count(record, len(values), "x,y,z or x,y,z,i,j,k", line)
     return (values[0], values[1], values[2]), (values[3], values[4], values[5]) if len(values) > 3 else None
 
 
+def _without_letters(args: tuple[Argument, ...]) -> tuple[Argument, ...]:
+    """Numbers of X1,Y2,Z3[,I0,J0,K1] in this order; all other arguments as they are."""
+    found = _LETTERED.fullmatch(" ".join(value if isinstance(value, str) else "?" for value in args))
+    return args if found is None else tuple(number(token) or 0.0 for token in found.groups() if token is not None)
+
+
 def _goto(state: ReaderState, record: Record) -> None:
+    if record.points and state.arc is None:
+        state.note("CS195", record.points[0][0])
     poses = [(line, *_pose(state, record, args, line)) for line, args in ((record.line, record.args), *record.points)]
     if state.arc is not None:  # more points of one GOTO lie on the arc; the last one ends it
-        state.arcs.pass_through([tip for _, tip, _ in poses[:-1]])
+        state.arcs.pass_through([state.builder.system.point(tip) for _, tip, _ in poses[:-1]])
         poses = poses[-1:]
     for line, tip, axis in poses:
         if record.cut_short:
@@ -49,6 +72,36 @@ def _gohome(state: ReaderState, record: Record) -> None:
     state.rapid = False
     state.builder.special[state.builder.n] = Move.RAPID
     state.builder.add(tip, axis, record.line)
+
+
+def _retract(state: ReaderState, record: Record) -> None:
+    """RETRCT: along the tool axis until the tip rests on the clearance surface (ICAM, The RETRCT Command)."""
+    if record.args:
+        raise _no_retract(state, record, f"its option {joined(record.args)} is not understood", "write RETRCT alone")
+    if state.hole:
+        raise state.fail("CS181", record.line, word=record.word)
+    if not state.builder.n:
+        raise _no_retract(state, record, "it is before the first position", "put a GOTO before it")
+    if state.clearance is None:
+        want = "put CLEARP/XYPLAN,z before it"
+        raise _no_retract(state, record, "no clearance plane is known", want)
+    tip, axis = state.builder.last_tip(), state.builder.last_axis()
+    normal, point = state.clearance
+    normal = normal or axis
+    slope = sum(a * b for a, b in zip(normal, axis, strict=True))
+    if not abs(slope) > _PARALLEL:
+        raise _no_retract(state, record, "the tool axis never meets the clearance plane", "write it as GOTO")
+    way = sum(n * (p - t) for n, p, t in zip(normal, point, tip, strict=True)) / slope
+    if way < 0:
+        state.note("CS194", record.line)
+        state.rapid = False
+        return
+    x, y, z = (t + way * a for t, a in zip(tip, axis, strict=True))
+    state.add((x, y, z), state.builder.held_axis(), record.line)
+
+
+def _no_retract(state: ReaderState, record: Record, why: str, want: str) -> InputError:
+    return state.fail("CS193", record.line, why=why, want=want)
 
 
 def _godlta(state: ReaderState, record: Record) -> None:
@@ -80,8 +133,14 @@ def _circle(state: ReaderState, record: Record) -> None:
     _check_curve(state, record)
     values = [value for value in record.args if isinstance(value, float)]
     decimals = state.dialect.decimals if state.dialect.strips_zeros else 0
-    state.arc = read_arc(record, values, state.file, state.arc_rule, decimals)
+    state.arc = _placed(state, read_arc(record, values, state.file, state.arc_rule, decimals))
     _at_feed(state, record)
+
+
+def _placed(state: ReaderState, arc: Arc) -> Arc:
+    """Return the same arc in the first coordinate system."""
+    system = state.builder.system
+    return replace(arc, centre=system.point(arc.centre), normal=system.vector(arc.normal))
 
 
 def _direction(state: ReaderState, record: Record) -> None:
@@ -93,8 +152,8 @@ def _direction(state: ReaderState, record: Record) -> None:
 def _drive(state: ReaderState, record: Record) -> None:
     _check_curve(state, record)
     read = read_helix if record.word == "HELICAL" else read_drive_arc
-    state.arc, end = read(record, state.builder.last_tip(), state.direction, state.file)
-    state.direction = None
+    arc, end = read(record, state.builder.last_tip(), state.direction, state.file)
+    state.arc, state.direction = _placed(state, arc), None
     _at_feed(state, record)
     state.add(end, state.builder.held_axis(), record.line)
 
@@ -162,7 +221,8 @@ def _at_feed(state: ReaderState, record: Record) -> None:
 
 
 HANDLERS: Final[dict[str, Callable[[ReaderState, Record], None]]] = {
-    "GOTO": _goto,
+    **dict.fromkeys(GOTO_WORDS, _goto),
+    "RETRCT": _retract,
     "FROM": _from,
     "GOHOME": _gohome,
     "GODLTA": _godlta,

@@ -8,13 +8,14 @@ from pathlib import PurePath
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.cl import points_header
 from cornersmooth.cl import points_table as table
 from cornersmooth.cl.points_header import Columns
 from cornersmooth.cl.points_messages import error, finding
 from cornersmooth.errors import Finding
-from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Program, Source, Units
+from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Move, Program, Source, Units
 
 #: largest ||v|−1| of an axis vector; three printed decimals leave 1e-3 (reference/cl-formats.md, fact 13)
 UNIT_TOLERANCE: Final = 1e-2
@@ -64,10 +65,11 @@ def looks_like_points(data: bytes) -> bool:
 
 
 def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: bool = False) -> Program:
-    """Read a CSV or column file: every row is a linear feed move to its pose.
+    """Read a CSV or column file: every row is a linear move to its pose, at feed or rapid.
 
-    Columns are named by a header line (also one in a comment) or known from their number: 3 are tips with axis +Z, 6
-    are tip and axis vector or tip and second point of the axis, whichever the numbers say, a seventh is the feed.
+    A column says which moves are rapid; where there is none, the first is, and all others are at feed. Columns are
+    named by a header line (also one in a comment) or known from their number: 3 are tips with axis +Z, 6 are tip and
+    axis vector or tip and second point of the axis, whichever the numbers say, a seventh is the feed.
 
     Parameters
     ----------
@@ -88,7 +90,7 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
     Raises
     ------
     InputError
-        CS150-CS164, with the line.
+        CS150-CS166, with the line.
     """
     text = table.clean(data, name)
     columns = _find_columns(text, name)
@@ -103,13 +105,15 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
     units = units or columns.units or "mm"
     scale = MM_PER_UNIT[units]
     axis, axis_findings = _axis(rows, scale, lenient)
-    feed, feed_findings = _feed(rows, lenient)
-    findings += [*axis_findings, *feed_findings]
+    kind, rapid_findings = _kind(rows)
+    feed, feed_findings = _feed(rows, kind, lenient)
+    findings += [*axis_findings, *feed_findings, *rapid_findings]
     if columns.unused:
         findings.append(finding("CS173", text.header_line, len(columns.unused), names=", ".join(columns.unused)))
     return Program.from_poses(
         rows.take(columns.tip) * scale,
         axis,
+        kind=kind,
         feed=feed * scale,
         line=line,
         units=units,
@@ -161,6 +165,10 @@ def _second_points(rows: _Rows, tip: Floats, second: Floats) -> bool:
     second points keeps its distance from the tips. What is neither must be named by a header.
     """
     length = np.linalg.norm(second, axis=1)
+    if rows.columns.feed is not None:
+        four = np.hypot(length, rows.values[:, rows.columns.feed])
+        if (np.abs(four - 1) <= UNIT_TOLERANCE).all():
+            raise error("CS165", rows.file, int(rows.line[0]), names="4 to 7")
     if 2 * np.count_nonzero(np.abs(length - 1) <= UNIT_TOLERANCE) >= len(length):
         return False
     distance = np.linalg.norm(second - tip, axis=1)
@@ -168,6 +176,16 @@ def _second_points(rows: _Rows, tip: Floats, second: Floats) -> bool:
     if steady and (distance.mean() > LEAST_DISTANCE or np.median(length) > LEAST_DISTANCE):
         return True
     raise error("CS157", rows.file, int(rows.line[0]))
+
+
+def _kind(rows: _Rows) -> tuple[NDArray[np.uint8], list[Finding]]:
+    """`Move` of every row."""
+    kind = np.full(len(rows.values), Move.LINEAR, np.uint8)
+    if rows.columns.rapid is None:
+        kind[0] = Move.RAPID
+        return kind, [finding("CS177", 0)]
+    kind[rows.values[:, rows.columns.rapid] == table.RAPID] = Move.RAPID
+    return kind, []
 
 
 def _distances(rows: _Rows, distance: Floats) -> list[Finding]:
@@ -179,11 +197,13 @@ def _distances(rows: _Rows, distance: Floats) -> list[Finding]:
     return said
 
 
-def _feed(rows: _Rows, lenient: bool) -> tuple[Floats, list[Finding]]:
-    """Feed of every move in units of the file; an empty cell keeps the feed before it, as CL files do."""
+def _feed(rows: _Rows, kind: NDArray[np.uint8], lenient: bool) -> tuple[Floats, list[Finding]]:
+    """Feed of every move in units of the file; an empty cell and a rapid keep the feed before it, as in CL files."""
     if rows.columns.feed is None:
         return np.full(len(rows.values), np.nan), []
     feed = rows.values[:, rows.columns.feed].copy()
+    if rows.columns.rapid is not None:
+        feed[kind == Move.RAPID] = np.nan
     wrong = feed <= 0
     said = []
     if wrong.any():

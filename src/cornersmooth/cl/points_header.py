@@ -24,7 +24,17 @@ _VECTORS = (
     *("toolaxisx toolaxisy toolaxisz", "normalx normaly normalz", "toolx tooly toolz"),
 )
 _BY_VALUES = ("u v w",)
-_FEEDS = ("f", "feed", "feedrate", "fedrat", "vf")
+_FEEDS = ("f", "feed", "feedrate", "fedrat", "vf", "feedmmmin", "feedratemmmin", "feedmmpm")
+
+#: columns that say which moves are rapid: a flag (1, true), a G code (0 is rapid), or a word
+Rapid = Literal["flag", "code", "word"]
+_RAPIDS: dict[str, Rapid] = {
+    **dict.fromkeys(("rapid", "israpid", "rapidmove", "rapidflag", "g0", "isg0"), "flag"),
+    **dict.fromkeys(("g", "gcode", "code", "cmd", "command"), "code"),
+    **dict.fromkeys(
+        ("type", "movetype", "motiontype", "movement", "motion", "move", "mode", "kind", "feedtype"), "word"
+    ),
+}
 _COUNTERS = ("n", "no", "nr", "num", "number", "id", "idx", "index", "line", "row", "point", "pose", "t", "time")
 
 #: units a header may state behind a name, as in ``x [mm]``
@@ -46,6 +56,11 @@ class Columns:
         Axis vector or second point, see `meaning`.
     meaning : {"none", "vectors", "points", "values"}
     feed : int or None
+    rapid : int or None
+        Says which moves are rapid, as `rapid_as` has it.
+    rapid_as : {"flag", "code", "word"}
+    rapid_name : str
+        Of that column, for messages.
     unused : tuple of str
         Names of columns that hold something nobody reads; counters and times are not counted among them.
     units : {"mm", "inch"} or None
@@ -57,12 +72,15 @@ class Columns:
     second: Triple | None = None
     meaning: Meaning = "none"
     feed: int | None = None
+    rapid: int | None = None
+    rapid_as: Rapid = "word"
+    rapid_name: str = ""
     unused: tuple[str, ...] = ()
     units: Units | None = None
 
     @property
     def wanted(self) -> tuple[int, ...]:
-        """Columns that must hold a number in every row."""
+        """Columns of tip and axis, which must hold a number in every row."""
         return (*self.tip, *(self.second or ()))
 
 
@@ -87,7 +105,7 @@ def from_header(text: str, file: str, line: int) -> Columns:
     Raises
     ------
     InputError
-        CS156 where the names leave tip or axis open, CS162 for units nobody reads.
+        CS156 where the names leave tip or axis open, CS162 for units nobody reads, CS165 for a quaternion.
     """
     names = _split(text, r"[,;\t]") if re.search(r"[,;\t]", text) else _split(text, r"\s+")
     if len(names) < 3 or not _find(_TIPS, _plain(names)):
@@ -96,18 +114,23 @@ def from_header(text: str, file: str, line: int) -> Columns:
     twice = sorted({name for name in plain if name and plain.count(name) > 1})
     if twice:
         raise error("CS156", file, line, why=f"{twice[0]!r} stands there twice")
+    if quaternion := _quaternion(plain):
+        raise error("CS165", file, line, names=", ".join(quaternion))
     tip = _find(_TIPS, plain)
     if tip is None:
         raise error("CS156", file, line, why=f"no x, y and z in {text.strip()[:60]!r}")
     left = [name if column not in tip else "" for column, name in enumerate(plain)]
     second, meaning = _second(left)
     feed = next((left.index(name) for name in _FEEDS if name in left), None)
-    used = {*tip, *(second or ()), *(() if feed is None else (feed,))}
+    rapid = next((left.index(name) for name in _RAPIDS if name in left), None)
+    used = {*tip, *(second or ()), feed, rapid}
     unused = tuple(names[c].strip() for c, name in enumerate(left) if name and c not in used and name not in _COUNTERS)
     if unused and second is None:  # an axis in a spelling we do not know must not become +Z in silence
         raise error("CS156", file, line, why=f"no tool axis in {', '.join(unused)}")
     units = _units(names, (*tip, *(second if second and meaning == "points" else ())), feed, file, line)
-    return Columns(len(names), tip, second, meaning, feed, unused, units)
+    says: Rapid = "word" if rapid is None else _RAPIDS[left[rapid]]
+    name = "" if rapid is None else names[rapid].strip()
+    return Columns(len(names), tip, second, meaning, feed, rapid, says, name, unused, units)
 
 
 def is_header(text: str) -> bool:
@@ -123,6 +146,29 @@ def _split(text: str, pattern: str) -> list[str]:
 def _plain(names: list[str]) -> list[str]:
     """Bare names: lower case, no quotes, units, underscores or blanks."""
     return [re.sub(r"[^a-z0-9]", "", _UNIT.sub("", name.lower().strip(" \"'"))) for name in names]
+
+
+def _quaternion(names: list[str]) -> list[str]:
+    """Names of the four parts of a quaternion, in any spelling; empty where there is none.
+
+    The scalar is w beside x, y, z (qw, ow, quat_w) or i, j, k, or a fourth name that begins with q; or the parts are
+    counted from 0 or from 1.
+    """
+    for name in names:
+        for vector in ("xyz", "ijk", "123"):
+            parts = [name, *(name.replace("w", part) for part in vector)]
+            if "w" in name and all(part in names for part in parts) and not {"u", "v", "w"} <= set(names):
+                return parts
+    for stem in {name[:-1] for name in names if name[-1:] in ("0", "4")}:
+        for first in (0, 1):
+            parts = [f"{stem}{count}" for count in range(first, first + 4)]
+            counted = [name for name in names if name[:-1] == stem and name[-1:].isdigit()]
+            if stem[:1] in ("q", "e", "o", "r") and sorted(counted) == parts:
+                return parts
+    parts = [name for name in names if name.startswith("q")]
+    if "qx" in names:
+        parts += [name for name in names if name in ("w", "s", "scalar", "real")]
+    return parts if len(parts) > 3 else []
 
 
 def _find(spellings: tuple[str, ...], names: list[str]) -> Triple | None:

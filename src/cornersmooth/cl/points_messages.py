@@ -30,6 +30,11 @@ ERRORS: dict[str, tuple[str, str]] = {
     "CS162": ("column {column!r} is in {unit!r}", "give lengths in mm or inch and feeds per minute"),
     "CS163": ("coordinate beyond {limit:g}", "check the columns and the units"),
     "CS164": ("an empty cell where a number is expected", "fill it or leave the line out"),
+    "CS165": (
+        "the columns {names} are a quaternion, not a tool axis",
+        "give the tool axis as a unit vector: x,y,z,i,j,k",
+    ),
+    "CS166": ("{cell!r} in the column {column!r} is neither rapid nor feed", "{want}"),
 }
 
 #: code: (severity, sentence)
@@ -43,6 +48,7 @@ FINDINGS: dict[str, tuple[Severity, str]] = {
     "CS173": ("warning", "columns not used: {names}"),
     "CS174": ("warning", "tool axis is {length:.6g} long, not 1; normalised"),
     "CS175": ("warning", "feed {feed:g} is not positive; the feed before it is kept"),
+    "CS177": ("note", "no column says which moves are rapid: the first pose is reached in rapid, all others at feed"),
     "CS176": ("note", "the file states no units: mm assumed"),
 }
 
@@ -50,7 +56,7 @@ FINDINGS: dict[str, tuple[Severity, str]] = {
 def error(code: str, file: str, line: int | None, **values: object) -> InputError:
     """Return the error of this code at FILE:LINE, ready to be raised."""
     what, hint = ERRORS[code]
-    return InputError(code, what.format(**values), hint, file=file, line=line)
+    return InputError(code, what.format(**values), hint.format(**values), file=file, line=line)
 
 
 def finding(code: str, line: int, count: int = 1, **values: object) -> Finding:

@@ -123,14 +123,14 @@ def numbers(text: PointText, columns: Columns, file: str) -> tuple[Floats, Ints]
     Raises
     ------
     InputError
-        CS151, CS152, CS153, CS164 with the line of the first row that does not fit.
+        CS151, CS152, CS153, CS164, CS166 with the line of the first row that does not fit.
     """
     tables, lines = [], []
     first, start = text.first_line, 0
     while start < len(text.body):
         end = text.body.find(b"\n", start + _CHUNK) + 1 or len(text.body)
         chunk = text.body[start:end]
-        table, row = _fast(chunk, columns.width) or careful(chunk, columns, first, file)
+        table, row = _flags(_fast(chunk, columns.width), columns) or careful(chunk, columns, first, file)
         tables.append(table)
         lines.append(row + first)
         first, start = first + chunk.count(b"\n"), end
@@ -153,6 +153,8 @@ def careful(chunk: bytes, columns: Columns, first_line: int, file: str) -> tuple
         if len(cells) != columns.width:
             raise error("CS151", file, first_line + offset, got=len(cells), want=columns.width)
         row = [_number(cell) for cell in cells]
+        if columns.rapid is not None:
+            row[columns.rapid] = _rapid(cells[columns.rapid], columns, file, first_line + offset)
         for column in used:
             if not math.isfinite(row[column]) and (cells[column] or column in columns.wanted):
                 cell = cells[column]
@@ -161,6 +163,49 @@ def careful(chunk: bytes, columns: Columns, first_line: int, file: str) -> tuple
         table.append(row)
         offsets.append(offset)
     return np.array(table, np.float64).reshape(-1, columns.width), np.array(offsets, np.int64)
+
+
+#: values of the column of rapids, whatever it says
+RAPID, FED = 0.0, 1.0
+
+_RAPID_WORDS = frozenset({"rapid", "g0", "g00", "rapids", "traverse", "fast", "true", "yes", "y", "r", "positioning"})
+_FEED_WORDS = frozenset(
+    """
+    feed g1 g01 linear line cut cutting work false no n f l normal plunge ramp lead leadin leadout entry exit engage
+    """.split()
+)
+
+
+def _flags(read: tuple[Floats, Ints] | None, columns: Columns) -> tuple[Floats, Ints] | None:
+    """Rows with `RAPID` or `FED` in the column of rapids; None where its numbers do not say."""
+    if read is None or columns.rapid is None:
+        return read
+    said = read[0][:, columns.rapid]
+    if columns.rapid_as == "word" or not np.isin(said, (0.0, 1.0)).all():
+        return None
+    if columns.rapid_as == "flag":
+        said[:] = 1.0 - said
+    return read
+
+
+def _rapid(cell: str, columns: Columns, file: str, line: int) -> float:
+    """Whether a row is reached in rapid; an empty cell of flags is feed.
+
+    Raises
+    ------
+    InputError
+        CS166 for a word nobody knows, and for numbers in a column whose name does not tell what they mean.
+    """
+    word = re.sub(r"[^a-z0-9.]", "", cell.lower())
+    number = _number(word)
+    if math.isfinite(number) and columns.rapid_as != "word" and number in (0, 1):
+        return number if columns.rapid_as == "code" else 1.0 - number
+    if word in _RAPID_WORDS:
+        return RAPID
+    if word in _FEED_WORDS or (not word and columns.rapid_as == "flag"):
+        return FED
+    wanted = {"flag": "give 1 or 0", "code": "give G0 or G1", "word": "give rapid or feed in words"}
+    raise error("CS166", file, line, cell=cell, column=columns.rapid_name, want=wanted[columns.rapid_as])
 
 
 def is_row(line: str) -> bool:
@@ -213,6 +258,7 @@ def _plain_commas(body: bytes, file: str, first_line: int) -> bytes:
         end = body.find(b"\n", at)
         row = _decode(body[body.rfind(b"\n", 0, at) + 1 : end if end >= 0 else len(body)]).strip()
         cells = [cell.strip() for cell in row.split(separator)]
+        cells = [cell for cell in cells if not cell[:1].isalpha()]
         if len(cells) >= 3 and all(_DECIMAL_COMMA.fullmatch(cell) for cell in cells if cell):
             if separator is None:
                 raise error("CS160", file, first_line + body.count(b"\n", 0, at))

@@ -9,11 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from cornersmooth.cl.arcs import Arc, ArcRule, ArcTable
-from cornersmooth.cl.builder import Builder, Vector
+from cornersmooth.cl.builder import Builder
 from cornersmooth.cl.dialects import Dialect
 from cornersmooth.cl.grammar import Argument, Record, number
 from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.nurbs import Curve
+from cornersmooth.cl.systems import System, Vector
 from cornersmooth.errors import Finding, InputError
 from cornersmooth.model import Move, Statement, Units
 
@@ -51,7 +52,10 @@ class ReaderState:
     arc: Arc | None = None  #: waits for its end
     curve: Curve | None = None  #: waits for more control points
     direction: tuple[str, Vector] | None = None  #: INDIRV or INDIRP, for the arc after it
-    system: tuple[Argument, ...] | None = None  #: MSYS
+    first_system: tuple[tuple[Argument, ...], System | None] | None = None  #: MSYS, MCS or MCSYS as written, and read
+    offsets: dict[str, tuple[Argument, ...]] = field(default_factory=dict)  #: FIXTURE, WCS; $$-> CSYS, $$*CATIA0
+    rows: list[str] | None = None  #: numbers after $$*CATIA0
+    clearance: tuple[Vector | None, Vector] | None = None  #: normal of the plane of RETRCT (None: the tool axis), point
     renamed: dict[str, str] = field(default_factory=dict)  #: SYN
     finished: bool = False  #: FINI was met
     _findings: dict[str, Finding] = field(default_factory=dict)

@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from cornersmooth.cl.builder import UNIT_TOLERANCE, UP, Vector
-from cornersmooth.cl.grammar import Argument, Record
+from cornersmooth.cl.builder import UNIT_TOLERANCE, UP
+from cornersmooth.cl.bulk import FARTHEST
+from cornersmooth.cl.grammar import Argument, Record, number
 from cornersmooth.cl.reader_state import ReaderState
-from cornersmooth.cl.words import FRAME_WORDS, MOTION_WORDS
+from cornersmooth.cl.systems import IDENTITY, System, Vector, from_numbers
+from cornersmooth.cl.words import MOTION_WORDS, REFUSED_WORDS, TURNS
 from cornersmooth.model import FeedMode, Keep, Units
 
 #: unit words of FEDRAT: millimetres per unit of the value (None: the unit of the file) and what it is per
@@ -34,6 +36,13 @@ _TURNED: Final = 1e-6
 
 #: first words of CYCLE and CUTCOM that end them
 _ENDS: Final = frozenset({"OFF", "NOMORE"})
+
+
+#: normals of the planes of CLEARP
+_PLANES: Final[dict[str, Vector]] = {"XYPLAN": UP, "YZPLAN": (1.0, 0.0, 0.0), "ZXPLAN": (0.0, 1.0, 0.0)}
+
+#: the matrix [R|t] that changes nothing
+_NO_TURN: Final = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 
 
 def _rapid(state: ReaderState, record: Record) -> None:
@@ -121,24 +130,101 @@ def _csys(state: ReaderState, record: Record) -> None:
 
 
 def _msys(state: ReaderState, record: Record) -> None:
-    if state.system not in (None, record.args):
-        state.note("CS146", record.line, word="MSYS")
-    state.system = record.args
+    """MSYS/origin,x,y of NX, also misspelt SYS: positions are in this system; those of all go into the first one."""
+    args, system = record.args, _system(record)
+    if state.first_system is None:
+        state.first_system = args, system
+    elif args == state.first_system[0]:
+        _enter(state, IDENTITY)
+    elif system is None or state.first_system[1] is None:
+        _frame(state, record)
+        return
+    else:
+        _enter(state, system.seen_from(state.first_system[1]))
+        state.note("CS146", record.line, word=record.word)
     state.keep(record)
+
+
+def _system(record: Record) -> System | None:
+    values = [value for value in record.args if isinstance(value, float)]
+    return from_numbers(values) if len(values) == len(record.args) == 9 and max(map(abs, values)) <= FARTHEST else None
+
+
+def _enter(state: ReaderState, system: System) -> None:
+    builder = state.builder
+    if system is builder.system:
+        return
+    if state.clearance is not None:  # the plane stays where it is
+        change = builder.system.seen_from(system)
+        normal, point = state.clearance
+        state.clearance = normal and change.vector(normal), change.point(point)
+    builder.enter_system(system)
+
+
+def _clearance(state: ReaderState, record: Record) -> None:
+    """CLEARP/d, /a,b,c,d or /XYPLAN,d, CLRSRF/x,y,z or /a,b,c,d: where RETRCT ends (ICAM, CLEARP and CLRSRF)."""
+    values = [value for value in record.args if isinstance(value, float)]
+    words = [value for value in record.args if isinstance(value, str)]
+    normal: Vector | None = None
+    if len(values) == 1 and len(words) < 2:
+        normal = _PLANES.get(words[0]) if words else UP
+    elif len(values) == 4 and not words:
+        normal = values[0], values[1], values[2]
+    if normal is not None and (length := math.hypot(*normal)) > 0:
+        distance = values[-1] / length
+        x, y, z = (part / length for part in normal)
+        state.clearance = (x, y, z), (x * distance, y * distance, z * distance)
+    elif record.word == "CLRSRF" and len(values) == 3 and not words:
+        state.clearance = None, (values[0], values[1], values[2])  # the plane through this point, square to the tool
+    else:
+        state.clearance = None
+    state.keep(record)
+
+
+def _offset(state: ReaderState, record: Record) -> None:
+    """FIXTURE/n, WCS/n: another work offset of the machine, which the text does not select."""
+    if state.builder.n and record.args != state.offsets.get(record.word):
+        _frame(state, record)
+    else:
+        state.keep(record)
+    state.offsets[record.word] = record.args
 
 
 def _mcs(state: ReaderState, record: Record) -> None:
     """MCS/ of CAMplete, MCSYS/NUM,n,POINT,...,VECTOR,...,VECTOR,... of MfgSuite: positions are in this system."""
     values = [value for value in record.args if isinstance(value, float)]
     axes = values[:6] if record.word == "MCS" else values[4:10]
-    if len(axes) == 6 and max(abs(a - b) for a, b in zip(axes, (1, 0, 0, 0, 1, 0), strict=True)) > _TURNED:
+    turned = len(axes) == 6 and max(abs(a - b) for a, b in zip(axes, (1, 0, 0, 0, 1, 0), strict=True)) > _TURNED
+    if turned or (state.first_system is not None and state.first_system[0] != record.args):
         _frame(state, record)
-    elif state.system not in (None, record.args):
-        state.note("CS146", record.line, word=record.word)
-        state.keep(record)
     else:
+        state.first_system = record.args, None
         state.keep(record)
-    state.system = record.args
+
+
+def _comment(state: ReaderState, record: Record) -> None:
+    """Comments that say which system positions are in: Creo's $$-> CSYS, and the 3 rows after CATIA's $$*CATIA0."""
+    text = str(record.args[0])
+    state.keep(record)
+    if text.startswith("*CATIA0"):
+        state.rows = []
+    elif text.startswith("->") and text[2:].lstrip().upper().startswith("CSYS"):
+        _same_system(state, record, "$$-> CSYS", text.partition("/")[2].replace(",", " ").split())
+    elif state.rows is not None and len(row := text.split()) == 4:
+        state.rows += row
+        if len(state.rows) == 12:
+            _same_system(state, record, "$$*CATIA0", state.rows)
+            state.rows = None
+
+
+def _same_system(state: ReaderState, record: Record, word: str, given: list[str]) -> None:
+    matrix = tuple(value for value in map(number, given) if value is not None)
+    before = state.offsets.get(word, matrix)
+    state.offsets[word] = matrix
+    if state.builder.n and matrix != before:
+        if not state.lenient:
+            raise state.fail("CS117", record.line, word=word)
+        state.note("CS143", record.line, word=word)
 
 
 def _cutcom(state: ReaderState, record: Record) -> None:
@@ -167,10 +253,10 @@ def _frame(state: ReaderState, record: Record) -> None:
 
 
 def _changes_nothing(record: Record) -> bool:
-    """Whether a coordinate-changing statement is switched off, or by nothing: all its numbers are zero."""
+    """Whether a coordinate change is switched off, or by nothing: its numbers are zero, or the matrix of no turn."""
     first = record.args[0] if record.args else ""
     values = [value for value in record.args if isinstance(value, float)]
-    return first in _ENDS or (bool(values) and not any(values))
+    return first in _ENDS or (bool(values) and not any(values)) or values == _NO_TURN
 
 
 def _set(state: ReaderState, record: Record) -> None:
@@ -225,5 +311,10 @@ HANDLERS: Final[dict[str, Callable[[ReaderState, Record], None]]] = {
     "TRNTYP": _trntyp,
     "SYN": _syn,
     "FINI": _fini,
-    **dict.fromkeys(FRAME_WORDS, _frame),
+    "SYS": _msys,
+    "$$": _comment,
+    "CLEARP": _clearance,
+    "CLRSRF": _clearance,
+    **dict.fromkeys(("FIXTURE", "WCS"), _offset),
+    **{word: _frame for word, code in REFUSED_WORDS.items() if code == TURNS},
 }

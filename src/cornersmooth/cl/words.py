@@ -1,7 +1,8 @@
-"""The vocabulary of CL files: which words move, which carry text, which are known to do neither.
+"""The vocabulary of CL files: which words are carried out, which are refused, which carry text, which do nothing.
 
-Sources: NCCS PostWorks 15.1 manual, ICAM "Other CL File Commands", Siemens NX and CATIA output (see the format notes
-of the project); words outside these sets are kept as statements and reported once.
+What may move the tool, turn the coordinates, repeat or include is in one table (`_REFUSED`) with the source of each
+word; the readers raise an error there, since a path without it would be another path. Words outside all sets are kept
+as statements and reported once; with a row of numbers they are refused, too.
 """
 
 from __future__ import annotations
@@ -11,53 +12,68 @@ from typing import Final
 #: statements whose rest is text and never taken apart
 TEXT_WORDS: Final = frozenset({"PARTNO", "PPRINT", "INSERT", "REMARK", "LETTER", "TPRINT", "DISPLY", "TOOL PATH"})
 
-#: words that move the tool or place it; the readers know them
-MOTION_WORDS: Final = frozenset(
-    {"GOTO", "FROM", "GODLTA", "GOHOME", "CIRCLE", "MOVARC", "HELICAL", "NURBS", "KNOT", "CNTRL"}
-    | {"INDIRV", "INDIRP", "AUTOPS", "PSIS", "TLON,GOFWD"}
+#: positions: ICAM reads CONT and MOVE as the same record as GOTO (CLDATA 5000:5)
+GOTO_WORDS: Final = frozenset({"GOTO", "CONT", "MOVE"})
+
+#: words that move the tool or place it; the readers carry them out
+MOTION_WORDS: Final = GOTO_WORDS | {
+    *("FROM", "GODLTA", "GOHOME", "RETRCT", "CIRCLE", "MOVARC", "HELICAL", "NURBS", "KNOT", "CNTRL"),
+    *("INDIRV", "INDIRP", "AUTOPS", "PSIS", "TLON,GOFWD"),
+}
+
+#: what is said of words that are not carried out
+MOVES, TURNS, REPEATS = "CS108", "CS117", "CS186"
+
+#: words that are not carried out: what they do, where they are described, the words
+_REFUSED: Final = (
+    # motion of part programs, which a processor turns into GOTO
+    (MOVES, "APT 360, ISO 4343: language", "GO GOFWD GOBACK GOLFT GORGT GOUP GODOWN GODLTI TLLFT TLRGT POCKET"),
+    (MOVES, "APT 360, ISO 4343: surfaces", "GCONIC LCONIC SPLINE BSPLIN SCURV SSURF LOFT TABCYL"),
+    (MOVES, "NCL 2020", "GOPARM CONTUR SCRUB PMILL RMILL SMILL FMILL AMILL REGMIL PROFIL"),
+    # arcs and indexed motion: Varimetrix, Solution 3000, Gerber; the depth of a helix
+    (MOVES, "PostWorks 15.1, G.1 and G.2", "ARCMOV ARCDAT ARCSLP CW CCW GOCLW GOCCLW"),
+    # words of post-processors; THREAD, COUPLE and PITCH make threads of the positions after them
+    (MOVES, "APT 360: postprocessor words", "GOCLER PLUNGE DRESS PICKUP PROBX PROBY FACEML PENUP PENDWN DRAWLI MOVETO"),
+    (MOVES, "APT 360: postprocessor words", "ASLOPE SAFETY REGBRK THREAD COUPLE PITCH"),
+    (MOVES, "ICAM: vocabulary", "POSITN INDPOS SAFPOS"),
+    (MOVES, "IMSpost", "GOINCR HOME"),
+    (MOVES, "PostWorks 15.1: a tape break retracts the tool", "BREAK RETURN"),
+    (MOVES, "CATIA V5", "PROBE"),
+    (MOVES, "ISO 4343: a G code, which may be any of these", "PREFUN"),
+    (MOVES, "plain English", "APPROACH DEPART ENGAGE INDEXED LEADIN LEADOUT MOVEARC RETRACT WITHDRAW"),
+    # coordinates
+    (TURNS, "APT 360, ISO 4343", "TRANS TRACUT ORIGIN ROTATE ROTABL ROTHED REFSYS MATRIX REVERS ZSURF"),
+    (TURNS, "APT 360: postprocessor words", "VTLAXS ZERO HEAD"),
+    (TURNS, "ICAM: vocabulary", "LCS ROTREF TRFORM TLCOMP"),
+    (TURNS, "IMSpost", "WPLANE"),
+    (TURNS, "plain English", "MIRROR SCALE WORKPLANE WORKPL WRKPLN"),
+    # statements that are elsewhere, or mean several
+    (REPEATS, "APT 360, ISO 4343", "COPY INDEX MACRO TERMAC CALL LOOPST LOOPND JUMPTO IF READ INCLUD PATERN"),
+    (REPEATS, "APT 360: postprocessor words", "MDWRIT MDEND"),
+    (REPEATS, "NCL 2020", "DO DOEND"),
+    (REPEATS, "PTC Creo, ICAM", "DEFSUB ENDSUB CALSUB"),
+    (REPEATS, "plain English", "INCLUDE REPEAT WHILE UNTIL"),
 )
 
-#: words that move the tool in ways no reader here knows: a path without them would be another path
-STRANGE_MOTION_WORDS: Final = frozenset(
-    {"ARCMOV", "ARCDAT", "ARCSLP", "CW", "CCW", "GOCLW", "GOCCLW", "GO", "GOFWD", "GOBACK", "GOLFT", "GORGT", "GOUP"}
-    | {"GODOWN", "GOPARM", "GODLTI", "GCONIC", "LCONIC", "SPLINE", "BSPLIN", "SCURV", "POCKET", "CONTUR", "SCRUB"}
-    | {"PMILL", "RMILL", "SMILL", "FMILL", "AMILL", "REGMIL", "TLLFT", "TLRGT", "INDEXED", "MOVETO", "MOVEARC"}
-)
-
-#: words that change the meaning of coordinates
-FRAME_WORDS: Final = frozenset({"TRANS", "ORIGIN", "TRACUT", "ROTATE", "COPY", "INDEX", "ROTABL", "ROTHED", "REFSYS"})
+#: word: code of the error
+REFUSED_WORDS: Final = {word: code for code, _, words in _REFUSED for word in words.split()}
 
 #: words of state that the reader acts on
 STATE_WORDS: Final = frozenset(
-    {
-        "RAPID",
-        "FEDRAT",
-        "UNITS",
-        "UNIT",
-        "MULTAX",
-        "TLAXIS",
-        "CUTCOM",
-        "CYCLE",
-        "CSYS",
-        "MSYS",
-        "MCS",
-        "MCSYS",
-        "MODE",
-        "SET",
-        "SYN",
-    }
-    | {"TRNTYP", "FINI", "END"}
+    """
+    CLEARP CLRSRF CSYS CUTCOM CYCLE END FEDRAT FINI FIXTURE MCS MCSYS MODE MSYS MULTAX RAPID SET SYN SYS TLAXIS TRNTYP
+    UNIT UNITS WCS
+    """.split()
 )
 
 #: words that neither move nor change coordinates
 PLAIN_WORDS: Final = frozenset(
     """
-    AIR AUXFUN BREAK CALSUB CHUCK CLAMP CLEARP CLRSRF COOLNT COUPLE CUTTER CUTTING DEBUG DELAY DELETE DRAFT
-    END-OF-PATH ENDATA FIXTURE GLOBAL HEAD HEADER INCLUD INTOL INTPOL ISN LEADER LINTOL LOAD LOADTL LPRINT MACHIN
-    MAXDP MAXVEL MCHFIN MCHTOL NOPOST NOPS OFFSET OFSTNO OPSKIP OPSTOP OUTTOL OVPLOT PAINT PALETTE PBS PIVOTZ
-    PITCH PLABEL PLOT POSITN POSTN POST PPFUN PPLOT PPOPT PPTOL PPWORD PREFUN PROBE REGBRK REMOVE RESET RETRCT RETURN
-    REWIND SAFETY SAFPOS SAVE SELCTL SELECT SEQNO SEQUENCE SLOWDN SMOOTH SPINDL START STARTUP STOP SWITCH TAPE TCP
-    TCPCTL THREAD TLDATA TLNOSE TLSPEC TMARK TOLER TOOL TOOLNO TOOLST TURRET UNLOAD VTLAXS WCORN WCS ZERO ZSURF
+    AIR APPLY AUXFUN BEGIN CHUCK CLAMP COOLNT CUTTER CUTTING DEBUG DELAY DELETE DRAFT END-OF-PATH ENDATA GLOBAL GOUGCK
+    HEADER INTOL INTPOL ISN LEADER LINTOL LOAD LOADTL LPRINT MACHIN MATERL MAXDP MAXDPM MAXVEL MCHFIN MCHTOL NOPOST
+    NOPS OFFSET OFSTNO OPNAME OPSKIP OPSTOP OUTTOL OVPLOT PAINT PALETTE PBS PIVOTZ PLABEL PLOT POST POSTN PPFUN PPLOT
+    PPOPT PPTOL PPWORD REMOVE RESET REWIND SAVE SELCTL SELECT SEQNO SEQUENCE SLOWDN SMOOTH SPINDL START STARTUP STOCK
+    STOP SWITCH TAPE TCP TCPCTL TLDATA TLNOSE TLSPEC TMARK TOLER TOOL TOOLNO TOOLST TURRET UNLOAD WCORN
     """.split()
 )
 
@@ -67,10 +83,10 @@ PLAIN_PREFIXES: Final = ("CSI_",)
 #: all words that a misspelt one is compared with, because missing them would change the path
 GUARDED_WORDS: Final = frozenset(
     {"GOTO", "FROM", "GODLTA", "GOHOME", "CIRCLE", "MOVARC", "HELICAL", "NURBS", "CNTRL", "INDIRV", "INDIRP", "RAPID"}
-    | {"FEDRAT", "UNITS", "MULTAX", "TLAXIS", "CYCLE", "CUTCOM", "TLON,GOFWD"}
+    | {"FEDRAT", "UNITS", "MULTAX", "TLAXIS", "CYCLE", "CUTCOM", "TLON,GOFWD", "RETRCT"}
 )
 
-KNOWN_WORDS: Final = TEXT_WORDS | MOTION_WORDS | STRANGE_MOTION_WORDS | FRAME_WORDS | STATE_WORDS | PLAIN_WORDS
+KNOWN_WORDS: Final = TEXT_WORDS | MOTION_WORDS | set(REFUSED_WORDS) | STATE_WORDS | PLAIN_WORDS
 
 
 def near_motion_word(word: str) -> str | None:
