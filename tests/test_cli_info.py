@@ -45,7 +45,7 @@ def test_standard_input_and_reading_options():
     text = run("-", "--units", "inch", data=b"0 0 0\n1 0 0\n1 1 0\n")
     assert "<stdin>: csv, inch" in text
     assert "50.8 mm of lines at feed" in text
-    assert "3 moves without" in text
+    assert "2 moves without" in text
     assert "<stdin>: note: no columns for the tool axis: +Z is used" in text
 
 

@@ -94,4 +94,4 @@ def test_paper_table_is_read_as_second_points_ten_millimetres_up():
         [179.5084, -11.8775, -68.4966],
     ]
     np.testing.assert_allclose(program.tip[1] + 10 * program.axis[1], [176.2593, -7.9576, -58.1921], atol=1e-4)
-    assert [finding.code for finding in program.findings] == ["CS176", "CS171"]
+    assert [finding.code for finding in program.findings] == ["CS176", "CS171", "CS177"]

@@ -113,7 +113,6 @@ def test_what_is_understood(cl: str, blocks: list[str]) -> None:
         "CUTCOM/LEFT,SOMETHING",
         "CLEARP/XYPLAN,50",
         "AUXFUN/30",  # it would end the program
-        "PREFUN/51",
         "SWITCH/9",
     ],
 )

@@ -214,7 +214,8 @@ class Builder:
         Raises
         ------
         InputError
-            CS111 for a zero vector, CS112 for one that is no unit vector, CS188 for one that nobody can know.
+            CS111 for a zero vector, CS112 for one that is no unit vector, CS188 and CS197 for those that nobody can
+            know.
         """
         single = [axis is not None for axis in self._single_axis]
         own = self._merge([chunk.own_axis for chunk in self._chunks], np.array(single, np.bool_))
@@ -260,15 +261,9 @@ class Builder:
             return
         pose = int(doubtful.argmax())
         line = int(self.lines()[pose])
-        if (at := np.flatnonzero(own == pose)).size:
-            words = ",".join(f"{part:g}" for part in unit[at[0]])
-            what = f"tool axis {words} after MULTAX/OFF, where ISO 4343 and CATIA read no axis"
-            want = "put MULTAX/ON before it, or say --dialect catia to lock the axis as it was"
-        else:
-            words = ",".join(f"{part:g}" for part in axis[pose])
-            what = f"position without a tool axis after MULTAX/OFF: +Z (ISO 4343), or locked at {words} (CATIA)"
-            want = "say --dialect hsm for +Z, or --dialect catia for the locked axis"
-        raise error("CS188", self.file, line, what=what, want=want)
+        at = np.flatnonzero(own == pose)
+        words = ",".join(f"{part:g}" for part in (unit[at[0]] if len(at) else axis[pose]))
+        raise error("CS197" if len(at) else "CS188", self.file, line, axis=words)
 
     def _placed(self, rows: Floats, place: Callable[[System, Floats], Floats]) -> Floats:
         """Rows of all poses, from their coordinate systems into the first one."""

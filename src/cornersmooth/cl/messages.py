@@ -57,7 +57,14 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
         "unknown statement {word} with a row of numbers: it may move the tool",
         "export motion as GOTO; where it moves nothing, remove it or read with --lenient",
     ),
-    "CS188": ("{what}", "{want}"),
+    "CS188": (
+        "position without a tool axis after MULTAX/OFF: +Z (ISO 4343), or locked at {axis} (CATIA)",
+        "say --dialect hsm for +Z, or --dialect catia for the locked axis",
+    ),
+    "CS197": (
+        "tool axis {axis} after MULTAX/OFF, where ISO 4343 and CATIA read no axis",
+        "put MULTAX/ON before it, or say --dialect catia to lock the axis as it was",
+    ),
     "CS189": ("numbers in columns 73 to 80, but not on every long line in order", "remove columns 73 to 80"),
     "CS190": ("a line number in front of {text!r}, and not on every line in order", "remove the line numbers"),
     "CS196": ("{word} has a number too large for any machine", "correct the number"),
