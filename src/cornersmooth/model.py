@@ -1,8 +1,8 @@
 """The data that travels through the program: a tool path as arrays, and its statements as a side table.
 
 Words (design section 1): a *pose* is one tool tip with its axis; a *move* takes the tool from one pose to the next;
-a *chain* is a run of linear feed moves that nothing interrupts; a *corner* is an inner pose of a chain; a *statement*
-is what the CL file says between moves. Lengths are millimetres throughout; `Program.units` says what the file spoke
+a *chain* is a run of linear feed moves; a *corner* is an inner pose of a chain; a *statement* is what the CL file says
+between moves. Lengths are millimetres throughout; `Program.units` says what the file spoke
 and what the NC text will speak.
 """
 
@@ -56,10 +56,14 @@ class Keep(IntEnum):
     CONTRADICTION = 3  #: the reader found contradicting information here
 
 
-#: statement words that only inform: they neither stop the motion nor change the state of the machine, so the path may
-#: be rounded where they stand. Everything else interrupts the chain.
-INFORMING_WORDS = frozenset(
-    {"$$", "PAINT", "PPRINT", "REMARK", "DISPLY", "PARTNO", "TPRINT", "LETTER", "INTOL", "OUTTOL", "CUTTER", "TLDATA"}
+#: words that act where the tool stands: what the NC program has words for, and orders to the machine that a person puts
+#: in where the comment is. The tool passes these poses exactly. All other words move nothing, so corners are rounded
+#: there.
+ACTING_WORDS = frozenset(
+    """
+    AUXFUN BREAK CHUCK CLAMP COOLNT COUPLE CUTCOM CYCLE DELAY END GOHOME HEAD INSERT LOAD LOADTL OPSTOP PREFUN PROBE
+    SELECT SPINDL STOP THREAD TOOLNO TURRET UNLOAD
+    """.split()
 )
 
 
@@ -89,9 +93,9 @@ class Statement:
     text: str = ""
 
     @property
-    def interrupts(self) -> bool:
-        """Whether a chain ends here: true for all but purely informing words."""
-        return self.word not in INFORMING_WORDS
+    def acts(self) -> bool:
+        """Whether the tool must pass the place of the statement exactly (`ACTING_WORDS`)."""
+        return self.word in ACTING_WORDS
 
 
 @dataclass(frozen=True)
@@ -256,11 +260,11 @@ class Program:
         return MM_PER_UNIT[self.units]
 
     @cached_property
-    def interrupted(self) -> Bools:
-        """(n+1,) bool: whether a statement that interrupts stands before pose i."""
+    def acted(self) -> Bools:
+        """(n+1,) bool: whether a statement that acts is between pose i-1 and pose i."""
         flags = np.zeros(len(self) + 1, np.bool_)
         for statement in self.statements:
-            if statement.interrupts:
+            if statement.acts:
                 flags[statement.pose] = True
         return flags
 
@@ -269,7 +273,7 @@ class Program:
         """(k, 2) int64: first and last pose of every chain, both included; the first is where the run starts from.
 
         A move belongs to a chain when it is a linear feed move with a pose to come from. A chain starts anew where the
-        move before is of another kind or an interrupting statement stands at the pose.
+        move before is of another kind.
         """
         n = len(self)
         linear = self.kind == Move.LINEAR
@@ -278,7 +282,7 @@ class Program:
             linear[1:] &= self.kind[:-1] != Move.FROM  # a FROM is stated, not passed
         inner = np.zeros(n, np.bool_)  # pose i joins two moves of one chain
         if n > 2:
-            inner[1:-1] = linear[1:-1] & linear[2:] & ~self.interrupted[2:n]
+            inner[1:-1] = linear[1:-1] & linear[2:]
         first = np.flatnonzero(linear & ~np.concatenate(([False], inner[:-1]))) - 1
         last = np.flatnonzero(linear & ~inner)
         return np.stack((first, last), axis=1).astype(np.int64)
@@ -304,8 +308,9 @@ class Status(IntEnum):
     DUPLICATE = 6  #: repeats the pose before it
     TOO_SHORT = 7  #: no room for a transition, or less than the output can show
     FEED_PER_REVOLUTION = 8  #: the output form has no curves at a feed per revolution
-    STRAYS = 10  #: the method's own construction would leave the path by more than it promises
     IN_RUN = 9  #: rounded together with its neighbours, by the curves of `SmoothProgram.runs`
+    STRAYS = 10  #: the method's own construction would leave the path by more than it promises
+    STATEMENT = 11  #: a statement acts here (`ACTING_WORDS`)
 
 
 class LimitedBy(IntEnum):

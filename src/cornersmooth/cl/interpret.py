@@ -18,12 +18,13 @@ from cornersmooth.cl.words import (
     REFUSED_WORDS,
     near_motion_word,
 )
-from cornersmooth.model import INFORMING_WORDS
 
 HANDLERS: Final = motion_statements.HANDLERS | state_statements.HANDLERS
 
 #: words that may stand between an arc and the GOTO that ends it
-_WITHIN_ARC: Final = INFORMING_WORDS | GOTO_WORDS | {"FEDRAT"}
+_WITHIN_ARC: Final = GOTO_WORDS | frozenset(
+    "$$ PAINT PPRINT REMARK DISPLY PARTNO TPRINT LETTER INTOL OUTTOL CUTTER TLDATA FEDRAT".split()
+)
 
 #: words of a NURBS record
 _WITHIN_CURVE: Final = frozenset({"KNOT", "CNTRL"})

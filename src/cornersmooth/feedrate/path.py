@@ -356,8 +356,8 @@ def _junction_speeds(
     if stop_everywhere or len(moves) < 2:
         return speeds
     feeding = (program.kind[moves] == Move.LINEAR) | (program.kind[moves] == Move.ARC)
-    # an interrupting statement may stand anywhere between the end of the last move and the end of this one
-    told = np.concatenate(([0], np.cumsum(program.interrupted)))
+    # a statement that acts may be anywhere between the end of the last move and the end of this one
+    told = np.concatenate(([0], np.cumsum(program.acted)))
     quiet = told[moves[1:] + 1] == told[moves[:-1] + 1]
     joined = feeding[1:] & feeding[:-1] & quiet
     if corners is not None:

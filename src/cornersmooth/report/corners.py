@@ -26,6 +26,7 @@ STATUS_NAMES = {
     Status.FEED_PER_REVOLUTION: "feed_per_revolution",
     Status.IN_RUN: "in_run",
     Status.STRAYS: "strays",
+    Status.STATEMENT: "statement",
 }
 LIMIT_NAMES = {
     LimitedBy.NOTHING: "",

@@ -28,6 +28,7 @@ ENDS_RUN = (
     Status.FEED_CHANGE,
     Status.KEPT,
     Status.FEED_PER_REVOLUTION,
+    Status.STATEMENT,
 )
 
 #: degrees: where the axis turns by more in a segment, output in curves (which cannot change F inside one) has no run.

@@ -101,6 +101,8 @@ def _what_forbids(
     status[~same_mode | (~same & (not settings.round_feed_changes))] = Status.FEED_CHANGE
     if not settings.round_feed_changes:
         status[program.feed_mode[pose] == FeedMode.PER_REVOLUTION] = Status.FEED_PER_REVOLUTION
+    acts = np.cumsum(program.acted)
+    status[acts[after] > acts[pose]] = Status.STATEMENT
     status[program.keep[pose] != 0] = Status.KEPT
     status[program.kind[pose - 1] == Move.HOLE] = Status.KEPT  # the tool comes from above the hole, not out of its pose
     status[after == 0] = Status.TOO_SHORT

@@ -26,7 +26,8 @@ class Task:
     path : Polyline
         Its trail as points.
     exact : (m,) bool
-        Whether the end of every move must be passed exactly: all but the inner poses of chains.
+        Whether the end of every move must be passed exactly: all but the inner poses of chains at which
+        nothing acts.
     tolerance, axis_length : float, mm
         ε and H; H is the distance at which the axis tolerance shows as ε, where there is one.
     axis_tolerance : float or None, degrees
@@ -99,6 +100,6 @@ def _exact_poses(original: Original) -> Bools:
         np.add.at(steps, chains[:, 0] + 1, 1)
         np.add.at(steps, chains[:, 1], -1)
         exact = np.cumsum(steps[:-1]) == 0
-    exact |= program.keep != Keep.NO
+    exact |= (program.keep != Keep.NO) | program.acted[1:]
     chosen: Bools = exact[original.pose]
     return chosen
