@@ -43,7 +43,7 @@ def plan(
     """Plan the motion along the smoothed path.
 
     Path speed, tangential acceleration, centripetal acceleration and tangential jerk of the tip stay within the
-    limits at every moment; the motion stops where a run of feed moves is interrupted, at reversals, and where the tip
+    limits at every moment; the motion stops where a statement acts between feed moves, at reversals, and where the tip
     stands still while the axis turns. Other sharp corners are passed with a jump of velocity of at most
     ``accel · period``.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints, Program, SmoothProgram, Status
 from cornersmooth.report.corners import LIMIT_NAMES, STATUS_NAMES, corner_table
+from cornersmooth.smoothing.sharp import arc_corners, sharp_rows
 from cornersmooth.vectors import angle_between
 from cornersmooth.verify import Verification
 
@@ -77,34 +78,41 @@ def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, den
         measured = np.fmax(found.pose_tip, found.pose_axis_point)[corners.pose]
         off = np.where(np.isfinite(measured), measured, off)
     out = off > tolerance
-    idle = np.isin(status, (Status.STRAIGHT, Status.DUPLICATE)) & ~out
-    sharp = ~corners.rounded & ~idle & ~out
+    sharp = np.zeros(len(corners), np.bool_)
+    sharp[sharp_rows(smoothed)] = True
+    sharp &= ~out
+    idle = ~corners.rounded & ~sharp & ~out
+    arcs = arc_corners(smoothed.program, smoothed.settings.axis_length)
     kind = np.where(out, 0, np.where(sharp, 1, 1 + corners.limited_by.astype(np.int64)))
     kind[~out & (status == Status.IN_RUN)] = len(KINDS) - 1
     counts = {name: int(np.count_nonzero((kind == index) & ~idle)) for index, name in enumerate(KINDS)}
     counts["straight"] = int(np.count_nonzero(idle))
+    counts[KINDS[1]] += len(arcs.pose)
     rounded = np.flatnonzero(corners.rounded & ~out)
     rounded = rounded[np.argsort(-off[rounded], kind="stable")][:_MOST_ROUNDED]
     rows = np.concatenate((np.flatnonzero(out), np.flatnonzero(sharp), rounded))
     table = corner_table(smoothed, rows, dense=dense)
     tip, axis = np.asarray(table["tip_error_mm"], np.float64), np.asarray(table["axis_error_mm"], np.float64)
-    pose = corners.pose[rows]
+    nothing = np.zeros(len(arcs.pose))
+    tip, axis = np.append(tip, nothing), np.append(axis, nothing)
+    pose = np.append(corners.pose[rows], arcs.pose)
     if found is not None:
         tip = np.where(np.isfinite(found.pose_tip[pose]), found.pose_tip[pose], tip)
         axis = np.where(np.isfinite(found.pose_axis_point[pose]), found.pose_axis_point[pose], axis)
     names = (
         *(STATUS_NAMES[item].replace("_", " ") for item in Status),
         *(name for name in LIMIT_NAMES.values() if name),
+        "arc",
     )
     reason = np.where(corners.smoothed[rows], len(Status) - 1 + corners.limited_by[rows], status[rows]).astype(np.int64)
     return _ranked(
         pose,
-        kind[rows],
-        reason,
+        np.append(kind[rows], np.ones(len(arcs.pose), np.int64)),
+        np.append(reason, np.full(len(arcs.pose), len(names) - 1)),
         names,
-        np.asarray(table["tip_angle_deg"], np.float64),
-        np.asarray(table["axis_angle_deg"], np.float64),
-        np.asarray(table["tip_length_in_mm"], np.float64) + np.asarray(table["tip_length_out_mm"], np.float64),
+        np.append(table["tip_angle_deg"], arcs.tip_turn),
+        np.append(table["axis_angle_deg"], arcs.axis_turn),
+        np.append(np.asarray(table["tip_length_in_mm"]) + np.asarray(table["tip_length_out_mm"]), nothing),
         tip,
         axis,
         smoothed.program.line[pose],

@@ -11,7 +11,7 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status
 from cornersmooth.report.corners import STATUS_NAMES, corner_table, worst_corners
-from cornersmooth.report.verdict import sharp_corners, sharp_count
+from cornersmooth.report.verdict import sharp_corners
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import dot, norm
 
@@ -55,6 +55,7 @@ def report(
     done, runs = corners.rounded, smoothed.runs
     chains = program.chains
     worst = worst_corners(smoothed, dense=dense)
+    sharp, listed = sharp_corners(smoothed)
     own = smoothed.settings.axis_tolerance is not None  # bounds of runs hold at another distance from the tip then
     summary: dict[str, Any] = {
         "corners": len(corners),
@@ -67,7 +68,7 @@ def report(
             for status in Status
             if status not in (Status.SMOOTHED, Status.IN_RUN) and (count := int((corners.status == status).sum()))
         },
-        "sharp": sharp_count(corners),
+        "sharp": sharp,
         "max_tip_error_mm": max(worst.tip_error, _largest(runs.tip_bound) if runs is not None else 0.0),
         "max_axis_error_mm": max(worst.axis_error, _largest(runs.axis_bound) if runs is not None and not own else 0.0),
         "max_orientation_error_deg": float(np.degrees(_largest(corners.orientation_error))),
@@ -108,7 +109,7 @@ def report(
             for finding in (*smoothed.findings, *findings)
         ],
         "worst": _records(smoothed, worst.rows, dense=dense),
-        "sharp": sharp_corners(smoothed),
+        "sharp": listed,
     }
     if verification is not None:
         contents["verification"] = dict(verification)

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.model import Floats, Program, SmoothProgram, Status
+from cornersmooth.model import Floats, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.report.paths import original_path, written_path
 from cornersmooth.report.picture import new_figure, saved
 from cornersmooth.report.thinning import thinned
+from cornersmooth.smoothing.sharp import arc_corners, sharp_rows
 
 #: points drawn of each path
 _POINTS = 20_000
@@ -55,9 +56,10 @@ def draw_path(
     points = view.scatter(
         *written.tip[cutting].T, c=off[cutting], s=1.5, cmap="viridis", vmin=0.0, vmax=tolerance, label="written"
     )
-    corners = smoothed.corners
-    sharp = ~corners.rounded & ~np.isin(corners.status, (Status.STRAIGHT, Status.DUPLICATE))
-    view.scatter(*program.tip[corners.pose[sharp]].T, color="#d55e00", marker="D", s=18, label="sharp corners")
+    sharp = np.append(
+        smoothed.corners.pose[sharp_rows(smoothed)], arc_corners(program, smoothed.settings.axis_length).pose
+    )
+    view.scatter(*program.tip[sharp].T, color="#d55e00", marker="D", s=18, label="sharp corners")
     view.set_aspect("equal")
     _box(view, written.tip[cutting])
     view.legend(loc="upper right", fontsize=8)

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.model import Corners, SmoothProgram, Status
+from cornersmooth.model import SmoothProgram
 from cornersmooth.report.corners import corner_table
+from cornersmooth.smoothing.sharp import STRAIGHT_ON, arc_corners, sharp_rows
 
 #: sharp corners that a report lists
 _LISTED = 100
@@ -17,35 +18,27 @@ _LISTED = 100
 #: part of the time below which an estimated saving is none
 _ALIKE = 0.005
 
-#: degrees below which the tip goes straight on
-_STRAIGHT_ON = 1.0
-
 #: limits that the sentence about times names
 _LIMITS_TOLD = 2
 _LEAST_TOLD = 0.005
 
-#: what is no corner of the path: it turns by less than shows, or repeats a pose
-_IDLE = (Status.STRAIGHT, Status.DUPLICATE)
 
+def sharp_corners(smoothed: SmoothProgram) -> tuple[int, list[dict[str, Any]]]:
+    """Number of corners that stay sharp, and the first of them in path order: CL line, reason, turn.
 
-def sharp_count(corners: Corners) -> int:
-    """Number of corners that stay as they are although the path turns."""
-    return int(np.count_nonzero(~corners.rounded & ~np.isin(corners.status, _IDLE)))
-
-
-def sharp_corners(smoothed: SmoothProgram) -> list[dict[str, Any]]:
-    """The first of the corners that stay sharp, in path order: CL line, reason, turn.
-
-    The turn is that of the tip path, or of the axis-point path where the tip goes straight on.
+    The turn is that of the tip path, or of the axis-point path where the tip goes straight on. The reason ``arc`` is an
+    arc that meets a line or another arc at an angle.
     """
-    corners = smoothed.corners
-    rows = np.flatnonzero(~corners.rounded & ~np.isin(corners.status, _IDLE))[:_LISTED]
-    table = corner_table(smoothed, rows)
-    tip, axis = np.asarray(table["tip_angle_deg"], np.float64), np.asarray(table["axis_angle_deg"], np.float64)
-    turn = np.where(tip < _STRAIGHT_ON, axis, tip)
-    columns = table["line"].tolist(), table["status"].tolist(), turn.tolist()
-    return [
-        {"line": line, "status": status, "turn_deg": degrees} for line, status, degrees in zip(*columns, strict=True)
+    rows, arcs = sharp_rows(smoothed), arc_corners(smoothed.program, smoothed.settings.axis_length)
+    table = corner_table(smoothed, rows[:_LISTED])
+    pose = np.concatenate((np.asarray(table["corner"]), arcs.pose[:_LISTED]))
+    tip = np.concatenate((np.asarray(table["tip_angle_deg"], np.float64), arcs.tip_turn[:_LISTED]))
+    axis = np.concatenate((np.asarray(table["axis_angle_deg"], np.float64), arcs.axis_turn[:_LISTED]))
+    status = [*table["status"].tolist(), *["arc"] * len(arcs.pose[:_LISTED])]
+    turn, line = np.where(tip < STRAIGHT_ON, axis, tip), smoothed.program.line[pose]
+    return len(rows) + len(arcs.pose), [
+        {"line": int(line[k]), "status": status[k], "turn_deg": float(turn[k])}
+        for k in np.argsort(pose, kind="stable")[:_LISTED].tolist()
     ]
 
 

@@ -88,6 +88,19 @@ def arc_points(program: Program, rows: Ints, share: Floats) -> tuple[Floats, Flo
     return tip, axis
 
 
+def arc_tangents(program: Program, rows: Ints, share: float) -> Floats:
+    """Derivatives (m, 3) of the tips on arcs `rows` (m,) by their share, mm: where the tool goes there."""
+    arcs = program.arcs
+    pose, normal, sweep = arcs.pose[rows], arcs.normal[rows], arcs.sweep[rows]
+    radius = program.tip[pose - 1] - arcs.centre[rows]
+    radius -= dot(radius, normal)[:, None] * normal
+    side, angle = np.cross(normal, radius), sweep * share
+    closing = program.tip[pose] - program.tip[pose - 1]
+    closing -= (np.cos(sweep) - 1.0)[:, None] * radius + np.sin(sweep)[:, None] * side
+    swing: Floats = np.cos(angle)[:, None] * side - np.sin(angle)[:, None] * radius
+    return sweep[:, None] * swing + closing
+
+
 def divided(counts: Ints) -> tuple[Ints, Floats]:
     """Rows and shares of the ends of the parts when arc r is divided into ``counts[r]`` equal parts."""
     rows = np.repeat(np.arange(len(counts)), counts)
