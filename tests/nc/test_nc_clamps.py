@@ -54,7 +54,7 @@ def cl_of(control: str) -> str:
 
 
 def text_of(control: str) -> list[str]:
-    return lines_of(choose_form(control, machine=MACHINE), cl_of(control), frame=Frame(skip_taps=False))
+    return lines_of(choose_form(control, machine=MACHINE), cl_of(control), frame=Frame(skip_cycles=False))
 
 
 def problems(control: str, lines: list[str]) -> list[str]:
@@ -103,7 +103,7 @@ def test_what_is_no_pair_of_m_words_is_refused() -> None:
 
 def test_auxfun_of_a_clamp_is_left_to_the_file_of_the_machine() -> None:
     cl = CL.replace("FEDRAT/MMPM,300", "AUXFUN/11\nAUXFUN/71\nFEDRAT/MMPM,300").replace("FINI", "AUXFUN/10\nFINI")
-    form, frame = choose_form("haas", machine=MACHINE), Frame(skip_taps=False)
+    form, frame = choose_form("haas", machine=MACHINE), Frame(skip_cycles=False)
     lines, plain = lines_of(form, cl, frame=frame), lines_of(form, CL, frame=frame)
     assert {"(AUXFUN/11)", "M71", "(AUXFUN/10)"} <= set(lines)
     assert [lines.count(word) for word in ("M10", "M11")] == [plain.count(word) for word in ("M10", "M11")]

@@ -133,7 +133,7 @@ _CYCLE = re.compile(r"(?:\d+ )?(.*(?:G98 |CYCLE8\d\(|CYCL DEF 20\d ).*)")
 @cache
 def text_of(case: Case, cl: str = PLAIN, cycles: str = "native") -> list[str]:
     """Lines of a text with cycles of the control."""
-    return lines_of(case.choose(), cl, frame=Frame(cycles=cycles, skip_taps=False))
+    return lines_of(case.choose(), cl, frame=Frame(cycles=cycles, skip_cycles=False))
 
 
 def problems(case: Case, lines: list[str], cl: str = PLAIN) -> list[str]:
@@ -177,7 +177,7 @@ def test_without_a_machine_nothing_brings_the_axes_back_behind_a_tilted_tool() -
     case = Case("fanuc", "g1")
     with pytest.raises(InputError, match="nothing says that the rotary axes do"):
         text_of(case, TILTED)
-    lines = lines_of(case.choose(), TILTED, frame=Frame(cycles="native", skip_taps=True))
+    lines = lines_of(case.choose(), TILTED, frame=Frame(cycles="native", skip_cycles=True))
     assert not any("G98" in line for line in lines)
 
 
@@ -220,12 +220,13 @@ def test_a_tap_that_no_cycle_can_do_is_an_error(old: str, new: str, why: str) ->
 
 def test_a_tap_left_out_on_purpose_is_no_problem_and_any_other_is() -> None:
     case = CASES[0]
-    frame = Frame(skip_taps=True, comments=False)
-    lines = lines_of(case.choose(), PLAIN, frame=frame)
+    frame = Frame(skip_cycles=True, comments=False)
+    cl = PLAIN.replace(",CLW", ",CCLW")
+    lines = lines_of(case.choose(), cl, frame=frame)
     assert sum("NOT DRILLED" in line for line in lines) == 2
-    assert problems(case, lines) == []
+    assert problems(case, lines, cl) == []
     without = [line for line in lines if "NOT DRILLED" not in line]
-    assert problems(case, without) == ["CS561 a hole of the CL file is not tapped"] * 2
+    assert problems(case, without, cl) == ["CS561 a hole of the CL file is not tapped"] * 2
 
 
 def test_a_thread_cut_by_plain_feeds_is_found() -> None:
@@ -342,7 +343,7 @@ def test_taps_have_a_feed_per_minute_in_plans(case: Case) -> None:
 @pytest.mark.parametrize("case", [CASES[0], CASES[2], CASES[3]], ids=str)
 def test_planned_feeds_leave_cycles_alone(case: Case) -> None:
     program, stream = read(PLAIN.encode(), name="part.cls"), io.BytesIO()
-    frame, settings = Frame(cycles="native", skip_taps=False), Settings(tolerance=EPS)
+    frame, settings = Frame(cycles="native", skip_cycles=False), Settings(tolerance=EPS)
     result = postprocess(program, stream, settings, form=case.choose(), frame=frame, plan_feeds=Limits())
     assert result.verification is not None
     assert result.verification.problems == ()
@@ -361,7 +362,8 @@ def test_a_tap_behind_a_place_that_the_tool_was_at_before_is_found(case: Case) -
     assert problems(case, lines, cl) == []
     tap = next(k for k, line in enumerate(lines) if re.search(r"G84|CYCLE84|M99", line))
     assert "CS561 a hole of the CL file is not tapped" in problems(case, [*lines[:tap], *lines[tap + 1 :]], cl)
-    left_out = lines_of(case.choose(), cl, frame=Frame(skip_taps=True, comments=False))
+    cl = cl.replace(",CLW", ",CCLW")
+    left_out = lines_of(case.choose(), cl, frame=Frame(skip_cycles=True, comments=False))
     assert sum("NOT DRILLED" in line for line in left_out) == 1
     assert problems(case, left_out, cl) == []
 

@@ -191,8 +191,8 @@ def drilling(control: str) -> str:
 
 
 def taps(control: str) -> str:
-    text = lines(control, TAPPED, frame=Frame(skip_taps=False))
-    tilted = lines(control, TILTED_TAP, frame=Frame(skip_taps=False), planes=_has_planes(control))
+    text = lines(control, TAPPED, frame=Frame(skip_cycles=False))
+    tilted = lines(control, TILTED_TAP, frame=Frame(skip_cycles=False), planes=_has_planes(control))
     if text == ("CS342",):
         return "error"
     for word, pattern in (("G84", "G98 G84"), ("CYCLE84", "CYCLE84"), ("207", "CYCL DEF 207")):
@@ -203,7 +203,7 @@ def taps(control: str) -> str:
 
 
 def other_taps(control: str) -> str:
-    return yes(lines(control, TILTED_TAP, frame=Frame(skip_taps=False)) == ("CS342",), "error")
+    return yes(lines(control, TILTED_TAP, frame=Frame(skip_cycles=False)) == ("CS342",), "error")
 
 
 def _has_planes(control: str) -> bool:

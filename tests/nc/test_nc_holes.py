@@ -15,6 +15,7 @@ from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Frame, choose_form
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
+from cornersmooth.verify import verify
 from nc.writing import codes, lines_of, text_of_cl
 
 NX = "TOOL PATH/A,TOOL,B\nTLDATA/DRILL,MILL,8.0,0.0,80.0,118.0,35.0\nMSYS/0,0,0,1,0,0,0,1,0\n"
@@ -87,8 +88,12 @@ def test_explicit_moves(cycle: str, expected: list[str]) -> None:
         "CYCLE/INIT",
     ],
 )
-def test_what_is_not_understood_never_plunges(cycle: str) -> None:
-    lines, written = text_of_cl(f"{PLAIN}RAPID\nGOTO/0,0,30\n{cycle}\nGOTO/10,5,0\nGOTO/20,5,0\nCYCLE/OFF\nFINI\n")
+def test_what_is_not_understood_is_an_error_or_left_out_and_never_plunges(cycle: str) -> None:
+    cl = f"{PLAIN}RAPID\nGOTO/0,0,30\n{cycle}\nGOTO/10,5,0\nGOTO/20,5,0\nCYCLE/OFF\nFINI\n"
+    with pytest.raises(InputError, match="the hole cycle is not written") as refused:
+        text_of_cl(cl)
+    assert (refused.value.code, refused.value.line) == ("CS342", 1 + cl[: cl.index("CYCLE/")].count("\n"))
+    lines, written = text_of_cl(cl, frame=Frame(skip_cycles=True))
     assert codes(written) == {"CS315": 2}
     assert "(NOT DRILLED: HOLE AT X10.0000 Y5.0000 Z0.0000)" in lines
     places = [line for line in lines if line.startswith("G0 ")]
@@ -107,9 +112,8 @@ def test_nx_counts_depths_upwards() -> None:
     found, findings = heights(text.format("-33.0043"))
     assert found == ["G0 50", "G0 13", "G1 -23.0043", "G0 50"]
     assert findings == {"CS316": 1}
-    found, findings = heights(text.format("33.0043"))
-    assert found == ["G0 50"]
-    assert findings == {"CS315": 1}
+    with pytest.raises(InputError, match="its words are not understood"):
+        heights(text.format("33.0043"))
 
 
 def test_a_tilted_hole_is_drilled_along_the_tool() -> None:
@@ -172,7 +176,6 @@ def test_several_holes_share_the_height_of_travel() -> None:
     ("approach", "cycle", "radii", "warned"),
     [
         (100.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200", [100, 53, 40, 100, 100, 53, 40, 100], 0),
-        (100.0, "CYCLE/BORE,ORIENT,RAPTO,3,FEDTO,-10,MMPM,200", [100, 100], 0),
         (51.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200", [51, 53, 40, 53, 53, 40, 53], 1),
         (51.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200,RTRCTO,30", [51, 80, 53, 40, 80, 80, 53, 40, 80], 0),
         (-100.0, "CYCLE/DRILL,RAPTO,3,FEDTO,-10,MMPM,200", [100, 53, 40, 53, 53, 40, 53], 2),
@@ -217,13 +220,85 @@ def test_the_corner_after_a_hole_is_passed_exactly() -> None:
     assert not [line for line in lines if " X9.0000 Y9.0000" in line]
 
 
-def test_a_tap_is_an_error_unless_it_may_be_left_out() -> None:
-    cl = f"{PLAIN}RAPID\nGOTO/10,5,30\nCYCLE/TAP,FEDTO,10,MMPM,250,RAPTO,3\nGOTO/10,5,0\nCYCLE/OFF\nFINI\n"
-    form = choose_form("fanuc", "g1")
-    assert any("NOT DRILLED" in line for line in lines_of(form, cl, frame=Frame(skip_taps=True)))
-    with pytest.raises(InputError, match="a tap, which is not written") as refused:
-        lines_of(form, cl, frame=Frame(skip_taps=False))
-    assert refused.value.line == 1 + cl[: cl.index("CYCLE/TAP")].count("\n")
+@pytest.mark.parametrize(("cycle", "why"), [("BORE,ORIENT", "its words"), ("TAP", "a tap takes a spindle")])
+def test_holes_left_out_are_gone_over_as_high_as_the_tool_came(cycle: str, why: str) -> None:
+    cl = (
+        f"{PLAIN}RAPID\nGOTO/100,0,0,1,0,0\nCYCLE/{cycle},RAPTO,3,FEDTO,10,MMPM,200\nGOTO/50,0,0,1,0,0\n"
+        "GOTO/0,50,0,0,1,0\nCYCLE/OFF\nFINI\n"
+    )
+    form, frame = choose_form("fanuc", "g1"), Frame(skip_cycles=True, comments=False)
+    lines = lines_of(form, cl, frame=frame)
+    assert sum("NOT DRILLED" in line for line in lines) == 2
+    places = [re.match(r"G0 X([-\d.]+) Y([-\d.]+) Z", line) for line in lines]
+    assert {float(np.hypot(float(one[1]), float(one[2]))) for one in places if one} == {100.0}
+    with pytest.raises(InputError, match=why) as refused:
+        lines_of(form, cl)
+    assert refused.value.code == "CS342"
+
+
+#: CL text of cycles, and the heights that the tool goes to
+UNDERSTOOD = {
+    "ISO 4343 begins a cycle with ON": (
+        "CYCLE/DRILL,ON,DEPTH,12,PERMIN,85,CLEAR,1,RAPTO,2,RETURN,20\nGOTO/10,0,0\n",
+        ["G0 2", "G1 -12", "G0 30"],
+    ),
+    "a fixed order: depth, unit, feed, clearance": (
+        "CYCLE/DRILL, 12, MMPM, 85, 1\nGOTO/10,0,0\n",
+        ["G0 1", "G1 -12", "G0 30"],
+    ),
+    "a fixed order with words after it": (
+        "CYCLE/DRILL, 12, MMPM, 85, 1, RAPTO, 3\nGOTO/10,0,0\n",
+        ["G0 3", "G1 -12", "G0 30"],
+    ),
+    "a fixed order with pecks": (
+        "CYCLE/DEEP, 12, INCR, 8, MMPM, 85, 1, RAPTO, 3\nGOTO/10,0,0\n",
+        ["G0 3", "G1 -8", "G0 3", "G0 -7.5", "G1 -12", "G0 30"],
+    ),
+    "ON goes on with another depth": (
+        "CYCLE/DRILL,FEDTO,5,MMPM,250,RAPTO,2\nGOTO/10,0,0\nCYCLE/ON,FEDTO,7\nGOTO/20,0,0\nCYCLE/OFF\nRAPID\n"
+        "GOTO/20,0,30\nCYCLE/ON\nGOTO/30,0,0\n",
+        ["G0 2", "G1 -5", "G0 30", "G0 30", "G0 2", "G1 -7", "G0 30", "G0 30", "G0 2", "G1 -7", "G0 30"],
+    ),
+    "another word for the same takes its place": (
+        "CYCLE/DRILL,DEEP,STEP,4,DEPTH,8,MMPM,250,CLEAR,2\nGOTO/10,0,0\nCYCLE/ON,FEDTO,9,INCR,9,RAPTO,3\nGOTO/10,0,0\n",
+        ["G0 2", "G1 -4", "G0 2", "G0 -3.5", "G1 -8", "G0 30", "G0 3", "G1 -9", "G0 30"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", UNDERSTOOD)
+def test_other_spellings_are_understood(name: str) -> None:
+    said, expected = UNDERSTOOD[name]
+    cl = f"{PLAIN}SPINDL/1000,RPM,CLW\nRAPID\nGOTO/10,0,30\n{said}CYCLE/OFF\nFINI\n"
+    found, findings = heights(cl)
+    assert found == ["G0 30", *expected]
+    assert findings.get("CS385", 0) == ("fixed order" in name)
+    out = io.BytesIO()
+    result = postprocess(cl.encode(), out)
+    assert result.verification is not None
+    assert result.verification.problems == ()
+    deeper = re.sub(rb"Z(-\d+\.\d)", rb"Z\g<1>9", out.getvalue())
+    assert not verify(result.program, deeper, tolerance=0.01, axis_length=10.0).passed
+
+
+def test_the_feed_of_on_takes_the_place_of_the_first() -> None:
+    lines, _ = moves(
+        f"{PLAIN}GOTO/0,0,30\nCYCLE/DRILL,FEDTO,5,MMPM,250,RAPTO,2\nGOTO/0,0,0\nCYCLE/ON,PERMIN,90\nGOTO/9,0,0\nCYCLE/OFF\nFINI\n"
+    )
+    assert [line.partition("F")[2] for line in lines if line.startswith("G1") and "F" in line][-2:] == ["250.", "90."]
+
+
+@pytest.mark.parametrize(
+    "cycle", ["CYCLE/ON,FEDTO,7", "CYCLE/DRILL, 12, MMPM, 85", "CYCLE/DRILL,-12,MMPM,85,1", "CYCLE/DRILL,12,85,1"]
+)
+def test_numbers_whose_meaning_is_open_are_refused(cycle: str) -> None:
+    with pytest.raises(InputError, match="its words are not understood"):
+        heights(f"{PLAIN}RAPID\nGOTO/0,0,30\n{cycle}\nGOTO/10,0,0\nCYCLE/OFF\nFINI\n")
+
+
+def test_the_fixed_order_is_that_of_dialects_that_have_it() -> None:
+    with pytest.raises(InputError, match="its words are not understood"):
+        heights(f"{NX}RAPID\nGOTO/0,0,30,0,0,1\nCYCLE/DRILL,12,MMPM,85,1\nGOTO/10,0,0\nCYCLE/OFF\n")
 
 
 @pytest.mark.parametrize("cycles", ["moves", "native"])

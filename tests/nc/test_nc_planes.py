@@ -130,7 +130,7 @@ def text_of(case: Case, cl: str = CL, cycles: str = "native", digits: str = "") 
     form, program, stream = form_of(case, digits=digits), read(cl.encode(), name="part.cls"), io.BytesIO()
     settings = fit_settings(Settings(tolerance=EPS, axis_length=H), form, program.units)
     written = write(
-        smooth(program, settings), stream, form=form, frame=Frame(cycles=cycles, skip_taps=False, comments=False)
+        smooth(program, settings), stream, form=form, frame=Frame(cycles=cycles, skip_cycles=False, comments=False)
     )
     lines = stream.getvalue().decode("ascii").splitlines()
     assert written.blocks == sum(not line.endswith(" ~") for line in lines)
@@ -272,7 +272,10 @@ def test_what_is_no_run_between_rapids_is_written_as_ever(cut: str) -> None:
         program = read(cl.encode(), name="part.cls")
         settings = fit_settings(Settings(tolerance=EPS, axis_length=H), form_of(case), "mm")
         write(
-            smooth(program, settings), stream, form=plain, frame=Frame(cycles="native", skip_taps=False, comments=False)
+            smooth(program, settings),
+            stream,
+            form=plain,
+            frame=Frame(cycles="native", skip_cycles=False, comments=False),
         )
         lines = [line for line in lines if line not in form_of(case).table.forms["g1"].plane.reset]
         assert lines == stream.getvalue().decode("ascii").splitlines()
@@ -473,7 +476,7 @@ def test_taps_are_cut_in_planes() -> None:
     form, program = choose_form("fanuc", "g1"), read(TAP.encode(), name="part.cls")
     smoothed = smooth(program, fit_settings(Settings(), form, "mm"))
     with pytest.raises(InputError, match="along Z"):
-        write(smoothed, io.BytesIO(), form=form, frame=Frame(skip_taps=False))
+        write(smoothed, io.BytesIO(), form=form, frame=Frame(skip_cycles=False))
 
 
 def test_clamped_axes_turn_to_a_plane_and_stand_in_it() -> None:

@@ -67,6 +67,8 @@ def said(cl: str, *, start: str = "UNITS/MM\n") -> tuple[list[str], dict[str, in
         # waits
         ("DELAY/2.5", ["G4 P2500"]),
         ("DELAY/0.0001", ["G4 P1"]),
+        ("DELAY/DWELL,1.5", ["G4 P1500"]),
+        ("DELAY/DWELL,0", []),
         ("DELAY/0", []),
         ("SPINDL/1200,RPM,CLW\nDELAY/10,REV", ["S1200 M3", "G4 P500"]),
         ("STOP\nOPSTOP", ["M0", "M1"]),
@@ -110,6 +112,8 @@ def test_what_is_understood(cl: str, blocks: list[str]) -> None:
         "DELAY/10,REV",  # the spindle stands
         "DELAY/-1",
         "DELAY/1,2",
+        "DELAY/DWELL",
+        "DELAY/DWELL,1,REV",
         "CUTCOM/LEFT,SOMETHING",
         "CLEARP/XYPLAN,50",
         "AUXFUN/30",  # it would end the program

@@ -18,12 +18,14 @@ from cornersmooth.smoothing import smooth
 ABOVE = re.compile(r"G0 X\S+ Y\S+( [^Z].*)?")
 
 
-def text_of(program: Program, form: str = "g1", **settings: Any) -> tuple[list[str], Written]:
+def text_of(
+    program: Program, form: str = "g1", *, frame: Frame | None = None, **settings: Any
+) -> tuple[list[str], Written]:
     """Lines of the NC text without the rapids over its first positions, and what was said of it."""
     chosen = choose_form("fanuc", form)
     smoothed = smooth(program, fit_settings(Settings(**settings), chosen, program.units))
     stream = io.BytesIO()
-    written = write(smoothed, stream, form=form)
+    written = write(smoothed, stream, form=form, frame=frame)
     lines = stream.getvalue().decode("ascii").splitlines()
     return [line for line in lines if not ABOVE.fullmatch(line)], written
 

@@ -180,7 +180,7 @@ def trial(seed: int) -> PlaneTrial:
     approach = float(rng.choice([0.0, 0.0, 15.0]))
     retract = float(rng.choice([0.0, 0.0, 20.0]))
     modal = bool(rng.random() < 0.3)
-    frame_ = Frame(cycles=cycles, skip_taps=True, approach=approach, retract=retract, modal=modal)
+    frame_ = Frame(cycles=cycles, skip_cycles=True, approach=approach, retract=retract, modal=modal)
     return PlaneTrial(seed, form, settings, frame_, "\n".join(text.lines) + "\n")
 
 

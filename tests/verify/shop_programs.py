@@ -186,7 +186,7 @@ def with_options(one: ShopTrial) -> ShopTrial:
         comments=bool(rng.random() < 0.8),
         header=("(MINE {units})",) if rng.random() < 0.2 and table.layout.comment[0] == "(" else (),
         work_offset=offsets[int(rng.integers(len(offsets)))],
-        skip_taps=True,
+        skip_cycles=True,
     )
     digits = str(rng.choice(["", *map(str, range(3, table.digits.most + 1)), *table.systems]))
     two = len(one.machine.names) == 2

@@ -109,7 +109,7 @@ def _options(draws: random.Random) -> list[str]:
         options += draws.choice([[], [], [], ["--no-tcp"]]) + draws.choice([[], ["--rewind", "20"]])
     if form == "g1" and control not in ("generic", "linuxcnc"):
         options += draws.choice([[], [], ["--planes", "tilted"]])
-    options += draws.choice([[], ["--skip-taps"]]) + draws.choice([[], [], ["--cycles", "native"]])
+    options += draws.choice([[], ["--skip-cycles"]]) + draws.choice([[], [], ["--cycles", "native"]])
     return options + draws.choice([[], ["--feed", "500"]])
 
 

@@ -235,7 +235,7 @@ def _frame(given: dict[str, Any]) -> Frame:
         header=read_lines(given["header"]) if given["header"] else (),
         footer=read_lines(given["footer"]) if given["footer"] else (),
         comments=not given["no_comments"],
-        skip_taps=given["skip_taps"],
+        skip_cycles=given["skip_cycles"],
         cycles=given["cycles"],
         modal=given["modal"],
         approach=given["approach"] or 0.0,

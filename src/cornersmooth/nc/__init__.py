@@ -188,12 +188,11 @@ def write(
     values = frame.values(chosen, program, smoothed.settings)
     operation = Operation(chosen, values, frame.texts(chosen, values), findings, units=program.units)
     statements = StatementWriter(
-        chosen, program, findings, operation, comments=frame.comments, skip_taps=frame.skip_taps
+        chosen, program, findings, operation, comments=frame.comments, skip_cycles=frame.skip_cycles
     )
     native = frame.cycles == "native"
-    taps = not frame.skip_taps
-    upright = upright_poses(program, chosen, drills=native, taps=taps)
-    planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native, taps=taps)
+    upright = upright_poses(program, chosen, drills=native)
+    planes = plan_planes(program, smoothed.settings, chosen, upright, findings, drills=native)
     check_travel_in_planes(planes, program, chosen, findings)
     circles = plan_circles(program, smoothed.settings, chosen, planes, upright)
     add_warnings(chosen, smoothed, circles, findings)

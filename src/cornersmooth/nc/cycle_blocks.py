@@ -18,7 +18,7 @@ from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
 from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.holes import Cycle, read_cycle
+from cornersmooth.nc.holes import Cycle, in_force, read_cycle
 from cornersmooth.nc.statement_args import number_after, whole_number, words_of
 from cornersmooth.text import format_number
 
@@ -58,21 +58,21 @@ def loaded_tool(statement: Statement) -> tuple[int, int] | None:
     return number, number if offset is None else offset
 
 
-def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> Bools:
+def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
     """(n,) whether a pose belongs to a tool that runs without tool tip control, for cycles or cutter compensation.
 
     Parameters
     ----------
     program : Program
     form : Form
-    drills, taps : bool
-        What is to be written as a cycle.
+    drills : bool
+        Whether holes are to be written as cycles; taps are in any case.
     """
     chosen = np.zeros(len(program), np.bool_)
     holes = program.kind == Move.HOLE
     sides = [one for one in program.statements if one.word == "CUTCOM" and words_of(one)[:1] in _SIDES]
     compensated = [one.pose for one in sides if drills]
-    if (not compensated and (not (drills or taps) or not holes.any())) or not _can_stand_upright(form):
+    if (not compensated and not holes.any()) or not _can_stand_upright(form):
         return chosen
     tilted = np.abs(program.axis - (0.0, 0.0, 1.0)).max(axis=1) > _ALONG_Z
     tilted &= program.kind != Move.FROM
@@ -83,11 +83,11 @@ def upright_poses(program: Program, form: Form, *, drills: bool, taps: bool) -> 
         here = slice(first, stop)
         if not tilted[here].any():
             offset = any(first <= pose < stop for pose in compensated)
-            chosen[here] = offset or has_cycles(program, form, here, drills=drills, taps=taps)
+            chosen[here] = offset or has_cycles(program, form, here, drills=drills)
     return chosen
 
 
-def has_cycles(program: Program, form: Form, part: slice, *, drills: bool, taps: bool) -> bool:
+def has_cycles(program: Program, form: Form, part: slice, *, drills: bool) -> bool:
     """Whether any hole of a part of the poses can be a cycle of the control.
 
     Parameters
@@ -95,30 +95,33 @@ def has_cycles(program: Program, form: Form, part: slice, *, drills: bool, taps:
     program : Program
     form : Form
     part : slice
-    drills, taps : bool
-        What is to be written as a cycle.
+    drills : bool
+        As in `upright_poses`.
     """
-    if not (drills or taps) or not (program.kind[part] == Move.HOLE).any():
+    if not (program.kind[part] == Move.HOLE).any():
         return False
     said = _said_cycles(program)
-    for k, (statement, clockwise) in enumerate(said):
-        until = said[k + 1][0].pose if k + 1 < len(said) else len(program)
-        poses = np.arange(max(statement.pose, part.start), min(until, part.stop))
+    for k, (first, args, clockwise) in enumerate(said):
+        until = said[k + 1][0] if k + 1 < len(said) else len(program)
+        poses = np.arange(max(first, part.start), min(until, part.stop))
         poses = poses[program.kind[poses] == Move.HOLE]
-        cycle = read_cycle(statement.args, program, None) if len(poses) else None
+        cycle = read_cycle(args, program, None) if len(poses) else None
         if cycle is not None and (clockwise if cycle.tap else drills) and kind_of(cycle, form, program, poses[:1]):
             return True
     return False
 
 
-def _said_cycles(program: Program) -> list[tuple[Statement, bool]]:
-    """CYCLE statements, and whether the last SPINDL before them starts the spindle clockwise, as a tap needs it."""
-    said, clockwise = [], False
+def _said_cycles(program: Program) -> list[tuple[int, tuple[float | str, ...], bool]]:
+    """Pose and arguments in force of CYCLE statements, and whether the spindle turns clockwise, as a tap needs it."""
+    said: list[tuple[int, tuple[float | str, ...], bool]] = []
+    args: tuple[float | str, ...] = ()
+    clockwise = False
     for statement in program.statements:
         if statement.word == "SPINDL":
             clockwise = not {"OFF", "NOMORE", "CCLW", "LOCK", "ORIENT"} & set(words_of(statement))
-        elif statement.word == "CYCLE" and len(statement.args) > 1:
-            said.append((statement, clockwise))
+        elif statement.word == "CYCLE" and words_of(statement)[:1] not in (["OFF"], ["NOMORE"]):
+            args = in_force(args, statement.args, program)
+            said.append((statement.pose, args, clockwise))
     return said
 
 

@@ -40,19 +40,15 @@ class HoleWriter:
         return approaches(self.runs.program)
 
     def write(self, rows: Rows, part: slice) -> Iterator[bytes]:
-        """Holes of one cycle, of the control or as plain moves; those not understood are only approached."""
+        """Holes of one cycle, of the control or as plain moves; those left out are only approached."""
         runs = self.runs
         cycle, program, poses = runs.statements.cycles.now, runs.program, rows.move[part]
         approach = self._approach[poses]
         line = int(program.line[poses[0]])
         kind = self._cycle_of_control(cycle, poses)
-        if cycle is not None and cycle.tap and not kind:
-            if not runs.statements.cycles.skip_taps:
-                runs.statements.cycles.refuse_tap(self._why_no_tap(cycle, poses))
-            cycle = None
-        if cycle is None:
-            text = "hole of a cycle that is not understood; it is not drilled, the tool only goes over it"
-            runs.findings.add("CS315", "warning", line, text, len(poses))
+        if cycle is None or (cycle.tap and not kind):
+            why = "its words are not understood" if cycle is None else self._why_no_tap(cycle, poses)
+            runs.statements.cycles.leave_out(why, line, len(poses))
             yield from self._over_holes(rows, part, travel_height(program, poses, approach))
             return
         if kind:
@@ -78,12 +74,12 @@ class HoleWriter:
         return kind_of(cycle, self.runs.writer.form, self.runs.program, poses)
 
     def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
-        """Why the control's cycle cannot do a tap, in words."""
+        """Why the control's cycle cannot do a tap, in words; plain moves cannot turn the spindle with the feed."""
         if not kind_of(cycle, self.runs.writer.form, self.runs.program, poses):
-            return "the control has no such cycle for it"
+            return "a tap, and the control has no such cycle for it"
         if not self._can_thread():
-            return "it takes a spindle that turns clockwise at a known speed"
-        return "the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
+            return "a tap takes a spindle that turns clockwise at a known speed"
+        return "a tap, and the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
 
     def _can_thread(self) -> bool:
         """Whether the spindle turns as a thread needs it."""

@@ -12,15 +12,20 @@ approached. ``DEEP`` retracts to the clearance after every ``STEP``, ``INCR`` or
 `PECK_GAP` only. ``REAM`` and ``BORE`` come out at feed. HSM's ``CLEAR`` is an absolute height and is passed over for
 its ``RAPTO`` and ``RETURN``.
 
+``CYCLE/ON`` goes on with the last cycle; words after it (``CYCLE/ON,FEDTO,-74.5``) take the place of its own.
+``CYCLE/DRILL,ON,...`` is how ISO 4343 (10.8.7) begins one. Autodesk's ISO 4343 post has a fixed order, in which some
+numbers have no word: ``CYCLE/DRILL, 12, MMPM, 85, 1`` says depth, unit, feed and clearance.
+
 Not understood, and so never drilled by guess: threads, bores that orient or stop the spindle, countersinks by
-diameter, numbers without a word that says what they are (CATIA's ``CYCLE/DRILL, 3.0, 5.0`` depends on the PP table).
-Such holes are approached at the height from which the cycle was entered, and no further. A plain ``TAP`` is understood,
-but it is no moves: only a cycle of the control can do it (`cycle_blocks`).
+diameter, other numbers without a word that says what they are (CATIA's ``CYCLE/DRILL, 3.0, 5.0`` depends on the PP
+table). Where such holes may be left out, they are approached at the height from which the cycle was entered, and no
+further. A plain ``TAP`` is understood, but it is no moves: only a cycle of the control can do it (`cycle_blocks`).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,6 +62,12 @@ _FEEDS = {
     "IPR": (25.4, FeedMode.PER_REVOLUTION),
     "PERREV": (None, FeedMode.PER_REVOLUTION),
 }
+
+#: words of which a later one takes the place of all the others
+_FAMILIES = ({*_DEPTHS}, {*_RETURNS}, {*_STEPS}, {"RAPTO", "CLEAR"}, {*_FEEDS}, {"DWELL"})
+
+#: dialects in which the fixed order is that of ISO 4343; elsewhere a table of the post-processor says what numbers mean
+_FIXED_ORDER = ("plain", "hsm")
 
 
 @dataclass(frozen=True)
@@ -100,8 +111,61 @@ class Cycle:
     tap: bool = False
 
 
+def in_force(
+    before: tuple[float | str, ...], said: tuple[float | str, ...], program: Program
+) -> tuple[float | str, ...]:
+    """Arguments of the cycle that holds after a CYCLE statement, every number after the word that says what it is.
+
+    Parameters
+    ----------
+    before : tuple
+        Those that held before it.
+    said : tuple
+        Its own.
+    program : Program
+    """
+    own = _without_on(said)
+    if own == ["INIT"]:  # SolidWorks announces a cycle by it
+        return before
+    if own[:1] != ["ON"]:
+        clearance = _unit_place(own) + 2
+        named = (
+            [own[0], "DEPTH", *own[1:clearance], "CLEAR", *own[clearance:]] if has_fixed_order(said, program) else own
+        )
+        return tuple(named)
+    gone = set().union(*(family for family in _FAMILIES if family.intersection(own)))
+    kept, word = [], ""
+    for value in before:
+        if isinstance(value, str) and value not in ("AUTO", "REV"):
+            word = value
+        if word not in gone:
+            kept.append(value)
+    return (*kept, *own[1:])
+
+
+def has_fixed_order(args: tuple[float | str, ...], program: Program) -> bool:
+    """Whether numbers have no words, but the order of Autodesk's ISO 4343 post: kind, depth, unit, feed, clearance."""
+    own = _without_on(args)
+    unit = _unit_place(own)
+    numbers = [value for value in (*own[1:2], *own[unit + 1 : unit + 3]) if isinstance(value, float)]
+    if program.source.dialect not in _FIXED_ORDER or len(numbers) < 3:
+        return False
+    return own[0] in _KINDS and own[unit] in _FEEDS and numbers[0] > 0.0
+
+
+def _without_on(args: tuple[float | str, ...]) -> list[float | str]:
+    """Arguments that say something, without the ON of ISO 4343 after the kind of cycle."""
+    own = [value for value in args if value != ""]
+    return own[:1] + own[2:] if own[1:2] == ["ON"] and own[0] in _KINDS else own
+
+
+def _unit_place(args: Sequence[float | str]) -> int:
+    """Where the unit is in the fixed order: pecks come before it."""
+    return 4 if args[2:3] and args[2] in _STEPS else 2
+
+
 def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | None) -> Cycle | None:
-    """Read the arguments of a CYCLE statement; None where any of them is not understood.
+    """Read the arguments of a cycle, as `in_force` gives them; None where any of them is not understood.
 
     Parameters
     ----------

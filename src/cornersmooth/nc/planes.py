@@ -74,7 +74,7 @@ class Planes:
 
 
 def plan_planes(
-    program: Program, settings: Settings, form: Form, upright: Bools, findings: Findings, *, drills: bool, taps: bool
+    program: Program, settings: Settings, form: Form, upright: Bools, findings: Findings, *, drills: bool
 ) -> Planes:
     """Choose the runs of poses that are written in tilted planes.
 
@@ -93,8 +93,8 @@ def plan_planes(
         Poses of tools that stay along Z, which need no plane.
     findings : Findings
         Takes which runs are in planes, and which are not although they could.
-    drills, taps : bool
-        What is to be written as a cycle.
+    drills : bool
+        Whether holes are to be written as cycles; taps are in any case.
     """
     of = np.full(len(program), -1, np.int64)
     if form.plane is None:
@@ -103,7 +103,7 @@ def plan_planes(
     found: list[Plane] = []
     for first, stop in _runs(program):
         along_z = bool(norm(program.axis[first] - _UNIT["z"]) <= _SAME)
-        if upright[first] or (along_z and not has_cycles(program, form, slice(first, stop), drills=drills, taps=taps)):
+        if upright[first] or (along_z and not has_cycles(program, form, slice(first, stop), drills=drills)):
             continue
         line = int(program.line[first])
         plane, why = _plane(program.axis[first], settings, form)

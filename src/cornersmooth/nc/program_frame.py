@@ -62,8 +62,9 @@ class Frame:
     approach, retract : float, mm
         How far the tool comes down along its axis to the first position behind a retract, and goes back along it before
         a retract; 0 for neither. A form with a point on the axis comes down by `POINT_APPROACH` at least.
-    skip_taps : bool
-        Whether holes that are to be tapped are only gone over, with a warning; an error otherwise.
+    skip_cycles : bool
+        Whether holes whose cycle cannot be written are only gone over, with a warning and a comment NOT DRILLED; an
+        error otherwise.
     cycles : {"moves", "native"}
         How holes are written: as plain moves, or as the control's own cycles where it has such and the tool stays along
         Z. Taps are its own cycles anyway.
@@ -81,7 +82,7 @@ class Frame:
     work_offset: str | None = None
     provenance: tuple[str, ...] = ()
     stem: str = ""
-    skip_taps: bool = True
+    skip_cycles: bool = False
     cycles: str = "moves"
     approach: float = 0.0
     retract: float = 0.0

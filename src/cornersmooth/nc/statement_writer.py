@@ -63,7 +63,7 @@ class StatementWriter:
     findings: Findings
     operation: Operation
     comments: bool = True
-    skip_taps: bool = True  #: whether taps are left out with a warning
+    skip_cycles: bool = False  #: whether hole cycles that cannot be written are left out with a warning
     plane: int = 17  #: the plane selected, kept by who writes the motion
     changed: bool = False  #: a tool change, or the way home, left the machine elsewhere
     speed: float | None = None  #: of the spindle, revolutions per minute
@@ -79,7 +79,7 @@ class StatementWriter:
 
     def __post_init__(self) -> None:
         self.words = self.form.table.words
-        self.cycles = HoleCycles(self.program, self.findings, skip_taps=self.skip_taps)
+        self.cycles = HoleCycles(self.program, self.findings, skip=self.skip_cycles)
         said = {statement.word for statement in self.program.statements}
         self.toolno_loads = not TOOL_WORDS & said
         self._ahead_of_tools = ahead_of_tools(self.program)
@@ -271,9 +271,9 @@ class StatementWriter:
         return list(blocks)
 
     def delay(self, statement: Statement) -> list[str] | None:
-        """DELAY/seconds and DELAY/n,REV."""
+        """DELAY/seconds, DELAY/DWELL,seconds (ISO 4343 5.13) and DELAY/n,REV."""
         numbers, words = numbers_of(statement), words_of(statement)
-        if len(numbers) != 1 or words not in ([], ["REV"]):
+        if len(numbers) != 1 or words not in ([], ["DWELL"], ["REV"]):
             return None
         time = milliseconds(numbers[0], "REV" in words, self.speed)
         if time is None:

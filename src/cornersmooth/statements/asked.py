@@ -141,11 +141,12 @@ class Asking:
 
     def delay(self, words: list[str], numbers: list[float], statement: Statement) -> None:
         """Wait for seconds or revolutions."""
-        if len(numbers) != 1 or numbers[0] <= 0 or words not in ([], ["REV"]):
+        if len(numbers) != 1 or numbers[0] <= 0 or words not in ([], ["DWELL"], ["REV"]):
             return
-        if words and not self.speed:
+        turns = words == ["REV"]
+        if turns and not self.speed:
             return
-        seconds = numbers[0] * (60.0 / self.speed if words else 1.0)
+        seconds = numbers[0] * (60.0 / self.speed if turns else 1.0)
         self.say("dwell", max(1, round(1000.0 * seconds)))
 
     def cutter(self, words: list[str], numbers: list[float], statement: Statement) -> None:

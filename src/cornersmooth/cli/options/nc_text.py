@@ -79,7 +79,11 @@ rewind = click.option(
     help="Where a rotary axis would pass its limit in a cut, leave the cut by this length along the tool, turn the "
     "axis back above the retract and go on. [default: an error]",
 )
-skip_taps = click.option("--skip-taps", is_flag=True, help="Only go over holes that are to be tapped, with a warning.")
+skip_cycles = click.option(
+    "--skip-cycles",
+    is_flag=True,
+    help="Leave out holes whose cycle cannot be written; the program says NOT DRILLED there. [default: an error]",
+)
 cycles = click.option(
     "--cycles",
     type=click.Choice(["moves", "native"]),
@@ -148,7 +152,7 @@ def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
             approach,
             retract,
             rewind,
-            skip_taps,
+            skip_cycles,
             cycles,
             planes,
             header,
