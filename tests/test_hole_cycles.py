@@ -1,4 +1,4 @@
-"""Hole cycles through the whole command: what is understood is drilled in every form, all else is refused or counted."""
+"""Hole cycles through the whole command: drilled in every form, or refused, or left out and counted."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def test_corners_at_which_a_statement_acts_stay_sharp_and_are_counted(tmp_path: 
     assert contents["verification"]["passed"]
 
 
-@pytest.mark.parametrize("word", ["STOP", "PREFUN/61", "INSERT M55", "LOADTL/2", "CUTCOM/OFF", "AUXFUN/55"])
+@pytest.mark.parametrize("word", ["STOP", "CLAMP/1", "INSERT M55", "LOADTL/2", "CUTCOM/OFF", "AUXFUN/55"])
 def test_the_pose_of_a_statement_that_acts_is_passed_exactly(tmp_path: Path, word: str) -> None:
     data = f"{HEAD}GOTO/10,0,0\nGOTO/20,5,0\nGOTO/20,5,0\n{word}\nGOTO/30,0,0\nGOTO/40,8,0\nFINI\n".encode()
     contents, program, _ = smoothed(tmp_path, data)
