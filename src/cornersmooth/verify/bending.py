@@ -1,0 +1,101 @@
+"""How far motions leave their chords at most, proved.
+
+The *bend* of a part of a motion is an eighth of the largest second derivative by the fraction of the part: a motion
+leaves its chord by no more than that, and a part of ``1 / n`` of it has ``1 / n²`` of its bend. Here it is in mm, of
+tip and axis point alike: the axis point is the tip and H times the tool axis, so its bend is at most the sum of both.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.model import Floats
+from cornersmooth.nc_reader.curves import CurveGroup
+from cornersmooth.nc_reader.elements import Second
+
+#: A direction u = v / |v| has |u"| <= |v"| / |v| + (b² + 2 a b) / |v|², where a and b are the parts of v' along v and
+#: across it: from v" = |v|" u + 2 |v|' u' + |v| u", where |v|' = a, |v|" = u' v' + u v" and |u'| = b / |v|. And
+#: b² + 2 a b is at most this number times |v'|²: the larger eigenvalue of the form.
+_GOLDEN: Final = (1.0 + math.sqrt(5.0)) / 2.0
+
+
+def turn_bend(start: Floats, end: Floats) -> Floats:
+    """(k,) bend, without unit, of the directions of vectors that run straight from `start` to `end`, (k, 3).
+
+    Directions that run evenly along the great circle bend less. It is inf where the way leads through zero.
+    """
+    way = end - start
+    size = np.einsum("ij,ij->i", way, way)
+    foot = np.clip(-np.einsum("ij,ij->i", start, way) / np.where(size > 0.0, size, 1.0), 0.0, 1.0)
+    nearest = start + foot[:, None] * way
+    least = np.einsum("ij,ij->i", nearest, nearest)
+    bend: Floats = np.divide(_GOLDEN / 8.0 * size, least, out=np.where(size > 0.0, np.inf, 0.0), where=least > 0.0)
+    return bend
+
+
+def wound_bend(start: Floats, slope: Floats, bend: Floats) -> Floats:
+    """(k,) bend of the directions of vectors (k, 3) that change by at most `slope`, and bend by `bend`."""
+    least = np.linalg.norm(start, axis=1) - slope
+    safe = np.where(least > 0.0, least, 1.0)
+    return np.where(least > 0.0, bend / safe + _GOLDEN / 8.0 * (slope / safe) ** 2, np.inf)
+
+
+def arc_bend(radius: Floats, sweep: Floats) -> Floats:
+    """(k,) bend of arcs, and of helices, in the unit of the radius; the sweep in rad."""
+    bend: Floats = radius * sweep * sweep / 8.0
+    return bend
+
+
+def curve_bend(group: CurveGroup, second: Second, axis_length: float) -> Floats:
+    """(k, s) bend, mm, of rational curves between their knots, each of s intervals.
+
+    In each interval a curve is N / w with Bernstein coefficients, which bound N, w and their derivatives. Seen from a
+    point c in the middle it is c + N / w with |N / w| <= R, so with the least weight w0
+
+        |P'| <= (|N'| + |w'| R) / w0,    |P"| <= (|N"| + |w"| R + 2 |w'| |P'|) / w0.
+
+    The direction of the tool does not depend on the weights.
+    """
+    bends = []
+    for k in range(len(group.spans) - 1):
+        points, weight = group.bezier(k)
+        tip, other = points[..., :3], points[..., 3:]
+        vector = (other - tip if second == "point" else other) * weight[..., None]
+        bends.append(_point_bend(tip, weight) + axis_length * _direction_bend(vector))
+    return np.stack(bends, axis=1) if bends else np.zeros((len(group.index), 0))
+
+
+def _point_bend(points: Floats, weight: Floats) -> Floats:
+    """(k,) bend of rational Bézier curves with control points (k, d + 1, 3)."""
+    away = points - points.mean(axis=1, keepdims=True)
+    reach = np.sqrt((away**2).sum(axis=2)).max(axis=1)
+    first, second = _derivatives(away * weight[..., None])
+    if not np.ptp(weight):
+        one: Floats = second / weight[:, 0] / 8.0
+        return one
+    least = weight.min(axis=1)
+    fall, curl = _derivatives(weight[..., None])
+    slope = (first + fall * reach) / least
+    bend: Floats = (second + curl * reach + 2.0 * fall * slope) / least / 8.0
+    return np.where(least > 0.0, bend, np.inf)
+
+
+def _direction_bend(vector: Floats) -> Floats:
+    """(k,) bend of the directions of Bézier curves with control points (k, d + 1, 3)."""
+    middle = vector.mean(axis=1)
+    middle /= np.maximum(np.sqrt((middle**2).sum(axis=1)), np.finfo(np.float64).tiny)[:, None]
+    least = np.einsum("ijk,ik->ij", vector, middle).min(axis=1)  # the curve is in the hull of its control points
+    first, second = _derivatives(vector)
+    safe = np.where(least > 0.0, least, 1.0)
+    return np.where(least > 0.0, (second / safe + _GOLDEN * (first / safe) ** 2) / 8.0, np.inf)
+
+
+def _derivatives(points: Floats) -> tuple[Floats, Floats]:
+    """(k,) bounds of the first and of the second derivative of Bézier curves with control points (k, d + 1, 3)."""
+    degree = points.shape[1] - 1
+    first, second = np.diff(points, axis=1), np.diff(points, 2, axis=1)
+    bounds = [np.sqrt((values**2).sum(axis=2)).max(axis=1, initial=0.0) for values in (first, second)]
+    return degree * bounds[0], degree * max(degree - 1, 0) * bounds[1]

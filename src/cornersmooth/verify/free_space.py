@@ -1,0 +1,235 @@
+"""The free space of two polylines: which pairs of places are near each other, and which of them can be reached.
+
+A *row* is a vertex of the own polyline against all places of the path; a *cell* is a segment of one against a segment
+of the other. What is free of a cell is convex, so what can be reached of it is known from its edges (Alt and Godau,
+Computing the Fréchet distance between two polygonal curves, 1995).
+
+Points are columns of arrays (3h, ...): h triples, each of which has to keep the radius on its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from cornersmooth.model import Floats
+
+#: what is reached of a row: by segment of the path the lowest and the highest fraction
+Reached: TypeAlias = dict[int, tuple[float, float]]
+
+#: rows whose edges are worked out together (speed only), and segments of them up to which that is worth while
+_ROWS, _NARROW = 8, 64
+
+#: fraction of a segment by which two ways of working out the same place may differ
+_HAIR = 1e-9
+
+#: share by which the radius is wider where it is looked which of the reached places lead on
+_WIDER = 1.0 + 1e-6
+
+#: edges of a row of cells: from fraction, to fraction, by column; nothing is free where the first is the larger
+_Edges: TypeAlias = tuple[list[float], list[float], list[float], list[float]]
+
+
+def largest_square(away: Floats) -> Floats:
+    """Square (...) of the longest of the triples of vectors (3h, ...)."""
+    squares = [np.einsum("i...,i...->...", away[c : c + 3], away[c : c + 3]) for c in range(0, len(away), 3)]
+    return np.maximum(*squares) if len(squares) == 2 else np.asarray(squares[0])
+
+
+def free_interval(point: Floats, start: Floats, way: Floats, radius: Floats) -> tuple[Floats, Floats]:
+    """Fractions of segments at which every triple is within a radius of a point; the first is larger where none is.
+
+    Parameters
+    ----------
+    point, start, way : (3h, ...) float64, mm
+        Segments lead from `start` to ``start + way``.
+    radius : (...) float64, mm
+        Nothing is within a negative one.
+    """
+    square = np.where(radius < 0.0, -1.0, radius * radius)
+    low, high = np.asarray(0.0), np.asarray(1.0)
+    for c in range(0, len(way), 3):
+        own, away = way[c : c + 3], point[c : c + 3] - start[c : c + 3]
+        size = np.einsum("i...,i...->...", own, own)
+        safe = np.where(size > 0.0, size, 1.0)
+        foot = np.einsum("i...,i...->...", own, away) / safe
+        rest = away - foot * own  # from the foot point: no difference of large squares
+        left = square - np.einsum("i...,i...->...", rest, rest)
+        half = np.where(size > 0.0, np.sqrt(np.maximum(left, 0.0) / safe), np.inf)
+        low = np.where(left < 0.0, np.inf, np.maximum(low, foot - half))
+        high = np.where(left < 0.0, -np.inf, np.minimum(high, foot + half))
+    return low, high
+
+
+@dataclass(frozen=True)
+class FreeSpace:
+    """Own polyline against path.
+
+    Parameters
+    ----------
+    own : (3h, n) float64, mm
+    path : (3h, m + 1) float64, mm
+    radius : float, mm
+    own_bend, path_bend : (n - 1,), (m,) float64, mm
+        How far the motions may leave these segments: it is taken off the radius.
+    gate : (m + 1,) float64, mm
+        Radius at vertices of the path, no larger than the other.
+    """
+
+    own: Floats
+    path: Floats
+    radius: float
+    own_bend: Floats
+    path_bend: Floats
+    gate: Floats
+
+    def reversed(self) -> FreeSpace:
+        """The same, run backwards."""
+        own, path = self.own[:, ::-1], self.path[:, ::-1]
+        return FreeSpace(own, path, self.radius, self.own_bend[::-1], self.path_bend[::-1], self.gate[::-1])
+
+    def part(self, rows: slice, segments: slice) -> FreeSpace:
+        """Some of its rows, and some of its segments."""
+        return FreeSpace(
+            self.own[:, rows],
+            self.path[:, segments.start : segments.stop + 1],
+            self.radius,
+            self.own_bend[rows.start : rows.stop - 1],
+            self.path_bend[segments],
+            self.gate[segments.start : segments.stop + 1],
+        )
+
+    def row_radius(self, row: slice, segments: slice) -> Floats:
+        """(rows, segments) radius at which rows are free."""
+        rows = np.arange(row.start, row.stop)
+        last = self.own.shape[1] - 2
+        bend = np.maximum(self.own_bend[np.clip(rows - 1, 0, last)], self.own_bend[np.clip(rows, 0, last)])
+        radius: Floats = self.radius - bend[:, None] - self.path_bend[segments]
+        return radius
+
+    def along(self, row: int, place: float) -> Reached:
+        """What is reached of a row from one free place of it on: that, and what is free beyond without a break."""
+        count = self.path.shape[1] - 1
+        first = k = min(int(place), count - 1)
+        found: Reached = {k - 1: (1.0, 1.0)} if place == k > 0 else {}
+        step = 4
+        while k < count:
+            part = slice(k, min(k + step, count))
+            start = self.path[:, part]
+            way = self.path[:, part.start + 1 : part.stop + 1] - start
+            low, high = free_interval(self.own[:, row, None], start, way, self.row_radius(slice(row, row + 1), part)[0])
+            away = largest_square(self.own[:, row, None] - start) <= self.gate[part] ** 2
+            for one, other, passes in zip(low.tolist(), high.tolist(), away.tolist(), strict=True):
+                if k == first:
+                    found[k] = place - k, max(other, place - k)
+                elif found[k - 1][1] >= 1.0 and passes and one <= 0.0 <= other:
+                    found[k] = 0.0, other
+                else:
+                    return found
+                k += 1
+            step *= 4
+        return found
+
+    def sweep(self, row: int, reached: Reached) -> Iterator[tuple[int, Reached]]:
+        """Go on from what is reached of a row; the last that is given out is the last row, or one with nothing."""
+        count, last = self.path.shape[1] - 1, self.own.shape[1] - 1
+        begin, first, stop = row, 0, 0
+        edges: list[_Edges] = []
+        while row < last and reached:
+            low, top = min(reached), max(reached)
+            if row - begin >= len(edges) or low < first or (top + 1 >= stop and stop < count):
+                begin, first, stop = row, low, min(max(2 * top - low, top) + 4, count)
+                edges = self._edges(row, first, stop)
+            new: Reached = {}
+            below: float | None = None
+            k = low
+            up_low, up_high, right_low, right_high = edges[row - begin]
+            while k < count and (k <= top or below is not None):
+                if k >= stop:
+                    begin, stop = row, min(first + 2 * (stop - first), count)
+                    edges = self._edges(row, first, stop)
+                    up_low, up_high, right_low, right_high = edges[0]
+                c, here = k - first, reached.get(k)
+                if up_low[c] <= up_high[c]:
+                    if below is not None:
+                        new[k] = up_low[c], up_high[c]
+                    elif here is not None and here[0] <= up_high[c]:
+                        new[k] = max(up_low[c], here[0]), up_high[c]
+                if right_low[c] > right_high[c]:
+                    below = None
+                elif here is not None:
+                    below = right_low[c]
+                elif below is not None:
+                    below = max(below, right_low[c])
+                    below = below if below <= right_high[c] else None
+                k += 1
+            row, reached = row + 1, new
+            yield row, reached
+
+    def _edges(self, row: int, first: int, stop: int) -> list[_Edges]:
+        """What is free of the upper and of the right edge of cells in rows from one on, segments `first` to `stop`."""
+        rows = _ROWS if stop - first <= _NARROW else 1
+        rows = min(rows, self.own.shape[1] - 1 - row)
+        segments, ahead = slice(first, stop), slice(row + 1, row + 1 + rows)
+        start = self.path[:, None, segments]
+        end = self.path[:, None, first + 1 : stop + 1]
+        own = self.own[:, row : row + rows, None]
+        upper = self.own[:, ahead, None]
+        up = free_interval(upper, start, end - start, self.row_radius(ahead, segments))
+        beside = np.append(self.path_bend[first + 1 : stop + 1], 0.0)[: stop - first]
+        bend = np.maximum(self.path_bend[segments], beside)
+        radius = np.minimum(self.radius - bend - self.own_bend[row : row + rows, None], self.gate[first + 1 : stop + 1])
+        right = free_interval(end, own, upper - own, radius)
+        return list(zip(*(values.tolist() for values in (*up, *right)), strict=True))
+
+    def between(self, rows: list[Reached], place: float) -> list[Reached]:
+        """What of rows can be reached, and the place in the last of them from there.
+
+        Parameters
+        ----------
+        rows : list of Reached
+            Forward from some place, row by row of this free space; the last holds `place`.
+        """
+        first, stop = min(map(min, rows)), max(map(max, rows)) + 1
+        part = self.part(slice(0, len(rows)), slice(first, stop)).reversed()
+        # nothing is proved here, and what is free at one point only should not be lost by rounding
+        part = replace(part, radius=part.radius * _WIDER, gate=part.gate * _WIDER)
+        count = stop - first
+        back = [part.along(0, count - (place - first))]
+        back += [reached for _, reached in part.sweep(0, back[0])]
+        found = []
+        for forward, reached in zip(rows, reversed(back), strict=True):
+            here: Reached = {}
+            for k, (low, high) in forward.items():
+                other = reached.get(count - 1 - (k - first))
+                if other is not None and max(low, 1.0 - other[1]) <= min(high, 1.0 - other[0]) + _HAIR:
+                    here[k] = max(low, 1.0 - other[1]), min(high, 1.0 - other[0])
+            found.append(here)
+        return found
+
+
+def holds(reached: Reached, place: float, last: int) -> bool:
+    """Whether a place is reached; a vertex of the path is where the segment behind it begins: it has been passed."""
+    k = min(int(place), last)
+    return k in reached and reached[k][0] <= place - k <= reached[k][1]
+
+
+def lowest(reached: Reached) -> float:
+    """First place that is reached; before the vertex at the end of a segment that is not passed."""
+    k = min(reached)
+    return min(k + reached[k][0], float(np.nextafter(k + 1.0, 0.0)))
+
+
+def is_all(space: FreeSpace, row: int, reached: Reached, segments: slice) -> bool:
+    """Whether all that is free of a row on some segments is reached; a hair less will do: who asks wants to give up."""
+    start = space.path[:, segments]
+    way = space.path[:, segments.start + 1 : segments.stop + 1] - start
+    radius = space.row_radius(slice(row, row + 1), segments)[0]
+    low, high = free_interval(space.own[:, row, None], start, way, radius)
+    free = np.flatnonzero(low <= high)
+    found = [reached.get(segments.start + k, (np.inf, -np.inf)) for k in free.tolist()]
+    inside = [one <= low[k] + _HAIR and other >= high[k] - _HAIR for k, (one, other) in zip(free, found, strict=True)]
+    return all(inside) and len(free) >= len(reached)

@@ -1,0 +1,124 @@
+"""Both motions as polylines with a bound of how far each leaves them: what the theorem is about.
+
+Nothing is put into straight moves that hardly turn the axis, which are nearly all. Arcs, curves and turns get inner
+vertices, as many as keep the bend (see `bending`) within a share of the tolerance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.nc_reader.curves import groups
+from cornersmooth.nc_reader.elements import Element, Elements
+from cornersmooth.nc_reader.tool import directions, written_at
+from cornersmooth.verify.bending import arc_bend, curve_bend, turn_bend, wound_bend
+from cornersmooth.verify.task import side_by_side
+
+#: bend of a step of the written motion, in tolerances (speed only: steps that are not proved are divided)
+WRITTEN_SHARE: Final = 1.0 / 32.0
+
+#: parts of an element at most; what bends more is not proved
+_MOST_PARTS: Final = 1 << 16
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion as a polyline, v vertices.
+
+    Parameters
+    ----------
+    six : (v, 6) float64, mm
+        Tips and axis points.
+    owner : (v,) int64
+        The element that leads to each vertex, counted in the elements at hand.
+    fraction : (v,) float64
+        Where on it, 1 at its end.
+    last : (m,) int64
+        Vertex at the end of each element.
+    bend : (v - 1,) float64, mm
+        Of the step to the next vertex.
+    """
+
+    six: Floats
+    owner: Ints
+    fraction: Floats
+    last: Ints
+    bend: Floats
+
+
+def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_axis: bool) -> Motion:
+    """Make the polyline of elements; the first of them only says where the motion begins.
+
+    Parameters
+    ----------
+    nc : Elements
+    tolerance, axis_length : float, mm
+    own_axis : bool
+        Whether the axis point is measured from the tip (see `Task`).
+    """
+    second = nc.second - nc.tip if nc.second_is == "point" else nc.second
+    bend = np.zeros(len(nc))
+    bend[1:] = axis_length * turn_bend(second[:-1], second[1:])
+    bend[nc.kind == Element.RAPID] = 0.0  # the way of a rapid is the machine's
+    if len(nc.arcs):
+        at = nc.arcs.element
+        radius = np.linalg.norm(np.cross(nc.tip[at - 1] - nc.arcs.centre, nc.arcs.normal), axis=1)
+        arc = arc_bend(radius, nc.arcs.sweep)
+        bend[at] += arc
+        if nc.second_is == "point":  # the tip turns the direction, too
+            slope = np.linalg.norm(nc.second[at] - nc.second[at - 1], axis=1) + radius * nc.arcs.sweep
+            bend[at] = arc + axis_length * wound_bend(second[at - 1], slope, arc)
+    bend[:1] = 0.0
+    share = WRITTEN_SHARE * tolerance
+    parts = parts_of(bend, share)
+    step_bend = bend / parts**2
+    curved = []
+    for group in groups(nc.curves, np.arange(len(nc.curves))):
+        at = nc.curves.element[group.index]
+        spans = curve_bend(group, nc.second_is, axis_length)
+        inner = parts_of(spans.max(axis=1, initial=0.0), share)
+        parts[at] = inner * max(spans.shape[1], 1)
+        curved.append((group, at, inner, spans))
+    last = np.cumsum(parts) - 1
+    owner = np.repeat(np.arange(len(nc)), parts)
+    fraction = (np.arange(len(owner)) - np.repeat(last + 1 - parts, parts) + 1) / np.repeat(parts, parts)
+    bends = step_bend[owner]
+    tip, other = nc.tip[owner], nc.second[owner]
+    for group, at, inner, spans in curved:
+        if not spans.shape[1]:
+            continue
+        edges = (group.spans - group.spans[0]) / (group.spans[-1] - group.spans[0])
+        for number in np.unique(inner).tolist():
+            some = np.flatnonzero(inner == number)
+            share_of = np.arange(1, number + 1) / number
+            u = (edges[:-1, None] + share_of * np.diff(edges)[:, None]).ravel()
+            vertex = (last[at[some]] - len(u) + 1)[:, None] + np.arange(len(u))
+            fraction[vertex] = u
+            bends[vertex] = np.repeat(spans[some], number, axis=1) / number**2
+            if len(u) > 1:
+                points = group.only(some).at(group.spans[0] + u[:-1] * (group.spans[-1] - group.spans[0]))
+                tip[vertex[:, :-1]], other[vertex[:, :-1]] = points[..., :3], points[..., 3:]
+    within = np.flatnonzero((fraction < 1.0) & (nc.kind[owner] != Element.CURVE))
+    axis = directions(nc, tip, other)
+    if len(within):
+        tip[within], axis[within] = written_at(nc, owner[within], fraction[within])
+    return Motion(side_by_side(tip, axis, axis_length, own_axis), owner, fraction, last, bends[1:])
+
+
+def inner_points(nc: Elements, motion: Motion, number: Floats, axis_length: float, *, own_axis: bool) -> Floats:
+    """(k, 6) points of a written motion at vertex numbers with fractions of the steps behind them."""
+    before = number.astype(np.int64)
+    after = np.minimum(before + 1, len(motion.owner) - 1)
+    owner = motion.owner[after]
+    start = np.where(motion.owner[before] == owner, motion.fraction[before], 0.0)
+    tip, axis = written_at(nc, owner, start + (number - before) * (motion.fraction[after] - start))
+    return side_by_side(tip, axis, axis_length, own_axis)
+
+
+def parts_of(bend: Floats, share: float) -> Ints:
+    """(k,) number of equal parts whose bends are at most `share`."""
+    return np.clip(np.ceil(np.sqrt(np.minimum(bend / share, float(_MOST_PARTS) ** 2))), 1, _MOST_PARTS).astype(np.int64)

@@ -1,0 +1,185 @@
+"""The decision of the theorem, judged by the whole free-space diagram."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cornersmooth.verify import passage as module
+from cornersmooth.verify.passage import CHUNK, Walk, passage
+from oracle.free_space import passes
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def walk(rng: np.random.Generator, kind: str, n: int) -> np.ndarray:
+    """A motion of tip and axis point in steps of about 1."""
+    if kind == "wander":
+        return np.cumsum(rng.normal(size=(n, 6)), axis=0)
+    if kind == "fold":
+        x, y = (np.cumsum(rng.choice([-1.0, 0.0, 1.0, 1.0], n)) for _ in range(2))
+        return np.stack((x, 0 * x, 0 * x, y, 0 * x, 0 * x), axis=1)
+    if kind == "spiral":
+        t = np.cumsum(rng.uniform(0.0, 0.6, n))
+        tip = np.stack((np.cos(t), np.sin(t), 0.02 * t), axis=1) * (1 + 0.05 * t[:, None])
+        return np.hstack((tip, tip + [0, 0, 1]))
+    if kind == "tip stands":
+        other = np.cumsum(rng.normal(size=(n, 3)), axis=0)
+        return np.hstack((np.zeros((n, 3)), other))
+    if kind == "repeated":
+        return np.cumsum(np.repeat(rng.normal(size=((n + 2) // 3, 6)), 3, axis=0)[:n], axis=0)
+    places = np.cumsum(rng.normal(size=(n, 6)), axis=0)
+    return places[rng.integers(0, n, n)]  # to and fro between the same poses
+
+
+KINDS = ("wander", "fold", "spiral", "tip stands", "repeated", "to and fro")
+
+
+def written(rng: np.random.Generator, path: np.ndarray) -> np.ndarray:
+    """The motion with more vertices, some left out; two exchanged, or a piece run twice; and noise of digits."""
+    if len(path) == 1:
+        return np.repeat(path, rng.integers(1, 4), axis=0)
+    points = [path[0]]
+    for start, end in pairwise(path):
+        points += [start + f * (end - start) for f in np.sort(rng.uniform(0, 1, rng.integers(0, 4)))]
+        points += [end] if rng.random() < 0.7 else []
+    own = np.array([*points, path[-1]])
+    fault = rng.integers(4)
+    if fault == 1 and len(own) > 6:
+        i = rng.integers(1, len(own) - 3)
+        own[[i, i + 1]] = own[[i + 1, i]]
+    if fault == 2 and len(own) > 9:
+        i = rng.integers(1, len(own) - 5)
+        own = np.insert(own, i + 3, own[i : i + 3], axis=0)
+    return own + rng.normal(size=own.shape) * rng.choice([0.0, 1e-9, 0.01, 0.1, 0.4])
+
+
+@settings(deadline=None)
+@given(
+    seed=SEEDS,
+    kind=st.sampled_from(KINDS),
+    radius=st.sampled_from([1e-6, 0.02, 0.1, 0.3, 0.6, 1.0, 2.0]),
+    columns=st.sampled_from([slice(0, 6), slice(0, 3), slice(3, 6)]),
+    gated=st.booleans(),
+)
+def test_verdict_is_that_of_the_whole_diagram(seed, kind, radius, columns, gated):
+    rng = np.random.default_rng(seed)
+    path = walk(rng, kind, rng.integers(1, 14))
+    own, path = written(rng, path)[:, columns], path[:, columns]
+    gate = np.where(rng.random(len(path)) < 0.5, radius, radius * rng.uniform(0.2, 1.0)) if gated else None
+    limits = np.full(len(path), radius) if gate is None else gate
+
+    def judge(share):
+        return passes(own.tolist(), path.tolist(), share * radius, (share * limits).tolist())
+
+    if judge(1 - 1e-9) != judge(1 + 1e-9):
+        return  # nobody can tell
+    for chunk in (5, CHUNK):
+        found = passage(own, path, radius, gate=gate, chunk=chunk)
+        assert found.passed == judge(1.0)
+        assert found.passed or found.breaks
+    if found.passed:
+        assert (np.diff(found.place) >= -1e-9).all()
+        k = np.minimum(found.place.astype(int), max(len(path) - 2, 0))
+        end = path[np.minimum(k + 1, len(path) - 1)]
+        away = (own - path[k] - (found.place - k)[:, None] * (end - path[k])).reshape(len(own), -1, 3)
+        assert np.linalg.norm(away, axis=2).max() <= radius * (1 + 1e-6)
+
+
+def arcs(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A motion of parabolas: vertices, second derivatives, and dense points."""
+    own = np.cumsum(rng.normal(size=(n, 6)), axis=0)
+    second = rng.normal(size=(n - 1, 6)) * rng.choice([0.0, 0.1, 1.0], (n - 1, 1))
+    t = np.linspace(0, 1, 21)[:-1, None, None]
+    dense = own[:-1] + t * (own[1:] - own[:-1]) - second * t * (1 - t) / 2
+    return own, second, np.concatenate((dense.transpose(1, 0, 2).reshape(-1, 6), own[-1:]))
+
+
+@settings(deadline=None)
+@given(seed=SEEDS, radius=st.sampled_from([0.02, 0.05, 0.1, 0.3]), divided=st.booleans())
+def test_bent_motions_pass_only_where_they_keep_the_radius(seed, radius, divided):
+    rng = np.random.default_rng(seed)
+    own, second, dense = arcs(rng, 5)
+    path = dense[:: rng.choice([1, 4, 10])] + rng.normal(size=6) * rng.choice([0.0, 0.02])
+    bend = np.linalg.norm(second.reshape(-1, 2, 3), axis=2).max(axis=1) / 8
+
+    def inner(number):
+        k = number.astype(int)
+        t = (number - k)[:, None]
+        return own[k] + t * (own[k + 1] - own[k]) - second[k] * t * (1 - t) / 2
+
+    found = Walk.along(path, radius).take(own, bend, final=True, inner=inner if divided else None)
+    assert len(found.place) == len(own)
+    if found.passed:  # chords of a twentieth are off by a four-hundredth of the bend
+        assert passes(dense.tolist(), path.tolist(), radius + bend.max() / 400, [radius + bend.max() / 400] * len(path))
+    elif divided:
+        close = 0.99 * radius - bend.max() / 400
+        assert not passes(dense.tolist(), path.tolist(), close, [close] * len(path))
+
+
+def straight(n: int) -> np.ndarray:
+    x = np.arange(n, dtype=float)
+    tip = np.stack((x, np.sin(x), 0 * x), axis=1)
+    return np.hstack((tip, tip + [0, 0, 10]))
+
+
+@pytest.mark.parametrize("chunk", [7, CHUNK])
+def test_every_fault_is_named_where_it_is(chunk):
+    path = straight(200)
+    own = path.copy()
+    for row in (20, 90, 150):
+        own[row, 2] += 0.5
+    found = passage(own, path, 0.1, chunk=chunk)
+    assert [one.row for one in found.breaks] == [20, 90, 150]
+    assert all(one.proved and row - 1 <= one.place <= row for one, row in zip(found.breaks, (20, 90, 150), strict=True))
+    assert np.isnan(found.place[[20, 90, 150]]).all()
+    assert np.isfinite(found.place[[19, 25, 89, 149, 160]]).all()
+
+
+def test_goes_on_behind_what_is_left_out_and_what_is_run_twice():
+    path = straight(300)
+    own = np.concatenate((path[:50], path[80:200], path[170:]))
+    rows = [one.row for one in passage(own, path, 0.1).breaks]
+    assert rows[0] == 50
+    assert any(165 <= row <= 175 for row in rows)
+
+
+def test_stops_after_the_last_break_it_names(monkeypatch):
+    monkeypatch.setattr(module, "MOST_BREAKS", 3)
+    path = straight(200)
+    own = path.copy()
+    own[10::10, 2] += 0.5
+    found = passage(own, path, 0.1)
+    assert len(found.breaks) == 3
+    assert not found.whole
+    assert not found.passed
+
+
+def test_what_lies_too_far_back_is_not_proved(monkeypatch):
+    """The motion stands where both ways of a path to and fro are near, and must have gone the later one."""
+    path = np.zeros((4, 3))
+    path[:, 0] = 0, 5, 0, 5
+    path[2:, 1] = 0.5
+    stand = np.repeat([[2.5, -0.1, 0.0]], 40, axis=0)
+    own = np.concatenate(([path[0]], stand, [[2.5, 5.0, 0.0]], path[-1:]))
+    monkeypatch.setattr(module, "LOOK_BACK", (3, 8))
+    monkeypatch.setattr(module, "AROUND", 100.0)
+    found = passage(own, path, 1.0)
+    assert not found.passed
+    assert found.breaks[0].row == 41
+    assert not found.breaks[0].proved
+    monkeypatch.setattr(module, "LOOK_BACK", (3, 2048))
+    assert passage(own, path, 1.0).breaks[0].proved
+
+
+def test_the_verdict_does_not_need_one_speed():
+    """One motion stands while the other goes on."""
+    path = np.zeros((3, 6))
+    path[1:, 0], path[:, 5] = (0.05, 10.0), 10.0
+    path[1:, 3] = 0.05, 10.0
+    assert passage(np.repeat(path, [40, 3, 1], axis=0), path, 0.01).passed
+    assert passage(path, np.repeat(path, [1, 30, 2], axis=0), 0.01).passed
