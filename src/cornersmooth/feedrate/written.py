@@ -129,7 +129,7 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
         keep=np.zeros(len(owner), np.uint8),
         arcs=Arcs(last[arcs.element[proper]], arcs.centre[proper], arcs.normal[proper], arcs.sweep[proper]),
         statements=tuple(
-            Statement(int(first[event.element]), event.line, event.letter, (event.value,), event.text)
+            Statement(int(first[event.element]), event.line, "STOP", (event.value,), event.text)
             for event in nc.events
             if _stops(event)
         ),
