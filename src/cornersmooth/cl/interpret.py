@@ -32,9 +32,12 @@ _WITHIN_CURVE: Final = frozenset({"KNOT", "CNTRL"})
 #: so many numbers in a row may be a position
 _POSITION: Final = 3
 
-#: INSERT of blocks for the control that turn coordinates or move axes: a G code, or a word of an axis
-_INSERTED_MOTION: Final = re.compile(r"\s*(?:[A-Z][-+]?(?:\d+\.?\d*|\.\d+)\s*)+[$%;]?\s*", re.IGNORECASE)
+#: blocks for the control that turn coordinates or move axes: a G code, or a word of an axis
+_NC_BLOCK: Final = re.compile(r"\s*(?:[A-Z][-+]?(?:\d+\.?\d*|\.\d+)\s*)+[$%;]?\s*", re.IGNORECASE)
 _AXIS_OR_G: Final = re.compile(r"[GXYZABCUVWIJK]", re.IGNORECASE)
+
+#: words whose first argument says what they do
+_CHOOSING: Final = frozenset({"LOAD", "SELECT", "MODE", "SET"})
 
 #: drive surfaces other than those that CAM systems write
 _STRANGE_PREFIXES: Final = ("TLON,", "TLLFT,", "TLRGT,", "TLOFF,")
@@ -81,9 +84,10 @@ def obey(state: ReaderState, record: Record) -> None:
     if record.points and word not in GOTO_WORDS:
         raise state.fail("CS105", record.points[0][0], text=state_statements.joined(record.points[0][1]))
     handler = HANDLERS.get(word)
-    refused = None if handler is not None else _refused(record, word)
+    refused = _refused(record, word) if handler is None or word in _CHOOSING else None
     if refused is not None:
-        raise state.fail(refused, record.line, word=record.text if word == "INSERT" else word)
+        whole = word in _CHOOSING or word == "INSERT" or refused == "CS198"
+        raise state.fail(refused, record.line, word=record.text if whole else word)
     if handler is not None:
         if record.rest:
             raise state.fail("CS107", record.line, word=word, text=record.rest)
@@ -113,14 +117,21 @@ def _after_end(state: ReaderState, record: Record, word: str) -> None:
 
 def _refused(record: Record, word: str) -> str | None:
     """Code of the error for a statement that is not carried out although it may move the tool."""
+    first = record.args[0] if record.args else ""
     name = word.rpartition("=")[2]  # M1=MACRO
+    if word in _CHOOSING and isinstance(first, str):
+        name = first  # LOAD/HEAD,2
     if name in REFUSED_WORDS:
-        return REFUSED_WORDS[name]
+        return None if first in ("OFF", "NOMORE") else REFUSED_WORDS[name]
     if word.startswith(_STRANGE_PREFIXES):
         return MOVES
-    if word == "INSERT" and isinstance(text := record.args[0], str) and _INSERTED_MOTION.fullmatch(text):
-        return MOVES if _AXIS_OR_G.search(text) else None
-    return None
+    if word == "INSERT":
+        return MOVES if _is_nc_motion(str(first)) else None
+    return "CS198" if word not in KNOWN_WORDS and _is_nc_motion(record.text) else None
+
+
+def _is_nc_motion(text: str) -> bool:
+    return _NC_BLOCK.fullmatch(text) is not None and _AXIS_OR_G.search(text) is not None
 
 
 def _numbers_in_a_row(record: Record) -> int:

@@ -47,6 +47,9 @@ _NO_TURN: Final = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 
 def _rapid(state: ReaderState, record: Record) -> None:
     option = record.args[0] if record.args else ""
+    if isinstance(option, float):
+        text = joined(record.args)
+        raise state.fail("CS115", record.line, word="RAPID", text=text, want="write RAPID, and GOTO with the position")
     if option in ("ON", "OFF"):
         state.rapid_on = option == "ON"
         state.rapid = False
@@ -97,7 +100,10 @@ def _units(state: ReaderState, record: Record) -> None:
 
 
 def _multax(state: ReaderState, record: Record) -> None:
-    state.builder.lock_axis(record.args[:1] == ("OFF",))
+    if record.args not in ((), ("ON",), ("OFF",), ("NOMORE",)):
+        text = joined(record.args)
+        raise state.fail("CS115", record.line, word="MULTAX", text=text, want="use MULTAX/ON or MULTAX/OFF")
+    state.builder.lock_axis(record.args[:1] in (("OFF",), ("NOMORE",)))
     state.keep(record)
 
 
@@ -132,6 +138,8 @@ def _csys(state: ReaderState, record: Record) -> None:
 def _msys(state: ReaderState, record: Record) -> None:
     """MSYS/origin,x,y of NX, also misspelt SYS: positions are in this system; those of all go into the first one."""
     args, system = record.args, _system(record)
+    if state.builder.n and state.first_system is None:  # positions before it are in no system that is known
+        state.first_system = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0), None
     if state.first_system is None:
         state.first_system = args, system
     elif args == state.first_system[0]:
@@ -182,7 +190,7 @@ def _clearance(state: ReaderState, record: Record) -> None:
 
 
 def _offset(state: ReaderState, record: Record) -> None:
-    """FIXTURE/n, WCS/n: another work offset of the machine, which the text does not select."""
+    """FIXTURE/n, FIXTUR/n, WCS/n: another work offset of the machine, which the text does not select."""
     if state.builder.n and record.args != state.offsets.get(record.word):
         _frame(state, record)
     else:
@@ -195,7 +203,8 @@ def _mcs(state: ReaderState, record: Record) -> None:
     values = [value for value in record.args if isinstance(value, float)]
     axes = values[:6] if record.word == "MCS" else values[4:10]
     turned = len(axes) == 6 and max(abs(a - b) for a, b in zip(axes, (1, 0, 0, 0, 1, 0), strict=True)) > _TURNED
-    if turned or (state.first_system is not None and state.first_system[0] != record.args):
+    moved = state.builder.n and (state.first_system is None or state.first_system[0] != record.args)
+    if turned or moved:
         _frame(state, record)
     else:
         state.first_system = record.args, None
@@ -315,6 +324,6 @@ HANDLERS: Final[dict[str, Callable[[ReaderState, Record], None]]] = {
     "$$": _comment,
     "CLEARP": _clearance,
     "CLRSRF": _clearance,
-    **dict.fromkeys(("FIXTURE", "WCS"), _offset),
+    **dict.fromkeys(("FIXTUR", "FIXTURE", "WCS"), _offset),
     **{word: _frame for word, code in REFUSED_WORDS.items() if code == TURNS},
 }
