@@ -9,6 +9,7 @@ from typing import Final
 
 from cornersmooth.cl.arcs import RULES, ArcRule
 from cornersmooth.cl.dialects import NAMES as DIALECTS
+from cornersmooth.cl.given_tool import with_tool
 from cornersmooth.cl.messages import unknown
 from cornersmooth.cl.source import clean, load
 from cornersmooth.model import MM_PER_UNIT, Program, Units
@@ -37,6 +38,8 @@ def read(
     units: Units | None = None,
     arc_rule: ArcRule | None = None,
     lenient: bool = False,
+    tool_number: int | None = None,
+    spindle: tuple[float, str] | None = None,
 ) -> Program:
     """Read a tool path.
 
@@ -56,6 +59,10 @@ def read(
         Sense of rotation of CIRCLE about its normal; None for what the dialect means.
     lenient : bool
         Go on where that is safe, and say so in the findings.
+    tool_number : int or None
+        Of the tool, for inputs that load none.
+    spindle : (float, str) or None
+        Revolutions per minute, and ``CLW`` or ``CCLW``, for inputs that start no spindle.
 
     Returns
     -------
@@ -67,7 +74,7 @@ def read(
     InputError
         ``FILE:LINE: error: what; what to do``.
     SettingsError
-        CS230 for a format, dialect, unit or rule that does not exist.
+        CS230 for a format, dialect, unit or rule that does not exist; CS248 for a tool or a speed that the input has.
     """
     for what, value, choices in (
         ("format", format, FORMATS),
@@ -89,7 +96,8 @@ def read(
 
         text = clean(data, name)
         program = read_apt(text, name=name, dialect=dialect, units=units, arc_rule=arc_rule, lenient=lenient)
-    return replace(program, source=replace(program.source, name=os.path.basename(name)))
+    program = replace(program, source=replace(program.source, name=os.path.basename(name)))
+    return with_tool(program, tool_number, spindle)
 
 
 def _recognise(data: bytes) -> str:

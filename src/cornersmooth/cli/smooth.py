@@ -24,6 +24,9 @@ from cornersmooth.output import make_folder
 if TYPE_CHECKING:
     from cornersmooth.nc import Form, Frame
 
+#: files named in a warning
+_NAMED = 3
+
 
 @click.command(
     "smooth",
@@ -54,6 +57,7 @@ if TYPE_CHECKING:
 @reading.feed
 @motion.planned_feed_options
 @reading.reading_options
+@reading.tool_options
 @nc_text.no_verify
 @nc_text.require_verify
 @outputs.force
@@ -158,6 +162,8 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
         )
     _check_targets(jobs)
     _check_against_inputs(jobs)
+    if not given["quiet"]:
+        _tell_same_programs(jobs)
     if folder:
         make_folder(folder)
     return jobs
@@ -238,6 +244,7 @@ def _frame(given: dict[str, Any]) -> Frame:
         skip_cycles=given["skip_cycles"],
         cycles=given["cycles"],
         modal=given["modal"],
+        line_ends=given["line_ends"],
         approach=given["approach"] or 0.0,
         retract=given["retract"] or 0.0,
         work_offset="" if given["work_offset"] == "none" else given["work_offset"],
@@ -254,6 +261,21 @@ def _check_targets(jobs: list[Job]) -> None:
             if path in by_target:
                 _refuse_clash(by_target[path], job, path)
             by_target[path] = job
+
+
+def _tell_same_programs(jobs: list[Job]) -> None:
+    """Say which programs a control would take for the same one."""
+    sources: dict[str, list[str]] = {}
+    for job in jobs:
+        if (name := job.frame.kept_as(job.form)) is not None:
+            sources.setdefault(name, []).append(job.source)
+    for name, same in sources.items():
+        if len(same) > 1:
+            others = f" and {more(len(same) - _NAMED, 'file')}" if len(same) > _NAMED else ""
+            print_line(
+                f"warning: {', '.join(same[:_NAMED])}{others}: all become program {name}, and a control keeps one of "
+                "them; let the names of the files end in different numbers, or give each its --program-name"
+            )
 
 
 def _refuse_clash(one: Job, other: Job, path: str) -> NoReturn:

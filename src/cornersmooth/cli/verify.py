@@ -50,6 +50,7 @@ _REWINDS_SHOWN = 5
 @nc_text.no_tcp
 @nc_text.trusted
 @reading.reading_options
+@reading.tool_options
 @outputs.found_reports
 @surface.tool
 @outputs.plot_deviation

@@ -186,6 +186,7 @@ def write(
     check_program(chosen, program, smoothed.settings)
     frame = frame or Frame()
     values = frame.values(chosen, program, smoothed.settings)
+    frame.refuse_tool(chosen, program)
     operation = Operation(chosen, values, frame.texts(chosen, values), findings, units=program.units)
     statements = StatementWriter(
         chosen, program, findings, operation, comments=frame.comments, skip_cycles=frame.skip_cycles

@@ -183,7 +183,7 @@ class BlockWriter:
         self._feed, self._mode = other._feed, other._mode
 
     def forget_feed(self) -> None:
-        """Say the feed again with the next block: others have changed it."""
+        """Say the feed again with the next block: others may have changed it, or the program is started there."""
         self._feed = -1
 
     def feed_mode(self, mode: int) -> list[str]:

@@ -16,6 +16,9 @@ Blocks = tuple[str, ...]
 #: rotary axes with the tip (tool tip control) or with the linear axes of the machine, or nothing
 Orientation = Literal["vector", "point", "angles", "machine", "fixed"]
 
+#: what lines may end with
+LINE_ENDS: Mapping[str, bytes] = {"lf": b"\n", "crlf": b"\r\n"}
+
 #: how curves are written; empty for lines
 CurveStyle = Literal["", "g6.2", "bspline", "poly", "spl"]
 
@@ -114,6 +117,8 @@ class Motion:
         ``axis`` (the tool vector as a whole, each rotary word).
     fastest : float, 1/min
         Largest F of inverse time (G93) that the control takes; 0 for none. Such an F has three decimals.
+    largest_feed : float, mm/min
+        Largest F per minute that the control takes; 0 where its manual names none.
     with_z : str
         Block, the last of those that switch the length of the tool on, whose words stand in the first block that moves
         Z instead, behind the approach: alone it may move the axis. Empty where it never does.
@@ -139,6 +144,7 @@ class Motion:
     inch_feed: int = 1
     modal: tuple[str, ...] = ()
     fastest: float = 9999.999
+    largest_feed: float = 0.0
     with_z: str = ""
 
 
@@ -236,6 +242,8 @@ class TextStyle:
         Characters that a line may have; 0 for any number.
     continuation : str
         What a line ends with whose block goes on in the next; empty where blocks cannot.
+    line_ends : {"lf", "crlf"}
+        What the lines of its files end with, where the user says nothing.
     suffix : str
         What the names of its files end in.
     """
@@ -250,6 +258,7 @@ class TextStyle:
     number_last: int = 0
     longest_block: int = 0
     continuation: str = ""
+    line_ends: str = "lf"
     suffix: str = ".nc"
 
 

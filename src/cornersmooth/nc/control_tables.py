@@ -16,6 +16,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.model import FeedMode
 from cornersmooth.nc.control import (
     INVERSE_TIME,
+    LINE_ENDS,
     Control,
     CurveStyle,
     Cycles,
@@ -268,6 +269,8 @@ def _layout(table: Table) -> TextStyle:
     layout = _record(TextStyle, plain, "layout")
     if len(layout.comment) != 2:
         raise _SHELF.wrong(f"layout.comment is {plain['comment']!r}", "give what stands before and behind")
+    if layout.line_ends not in LINE_ENDS:
+        raise _SHELF.wrong(f"layout.line_ends is {layout.line_ends!r}", f"use {' or '.join(LINE_ENDS)}")
     return TextStyle(**{**vars(layout), "units": units})
 
 

@@ -92,6 +92,9 @@ class MotionWriter:
         if self.runs.statements.changed:  # a tool change leaves the machine elsewhere
             self.runs.position, self._return_to, self.runs.statements.changed = None, statement.pose, False
             self.runs.warnings.another_tool()
+            self.runs.writer.forget_feed()
+        if self.runs.operation.halted:
+            self.runs.writer.forget_feed()
         yield from self.runs.text(text)
 
     def _between(self, rows: Rows, start: int, stop: int) -> Iterator[bytes]:

@@ -58,7 +58,8 @@ class PlannedFeeds:
         planned = np.where(planned >= _ALL_BUT * asked, asked, np.maximum(np.floor(planned / step) * step, 1.0))
         ticks = np.where(np.isnan(self.feed), asked, planned)
         rate = np.floor(10.0**INVERSE_TIME_DECIMALS / self.minutes)
-        lines = text.split(b"\n")
+        end = b"\r\n" if b"\r\n" in text else b"\n"
+        lines = text.split(end)
         word = (" " if motion.spaces else "") + motion.feed
 
         def said(value: float, decimals: int) -> bytes:
@@ -92,4 +93,4 @@ class PlannedFeeds:
             new = said(float(ticks[k]), digits.feed)
             lines[last] = bare if new == current else bare + new
             current = new
-        return b"\n".join(lines)
+        return end.join(lines)

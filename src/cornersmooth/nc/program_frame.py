@@ -11,10 +11,11 @@ from typing import Protocol
 import numpy as np
 
 from cornersmooth.errors import OutputError, SettingsError
-from cornersmooth.model import Program
+from cornersmooth.model import Move, Program
 from cornersmooth.nc.comments import comment_lines
-from cornersmooth.nc.control import Blocks, Control, TextStyle
+from cornersmooth.nc.control import LINE_ENDS, Blocks, Control, TextStyle
 from cornersmooth.nc.control_tables import control_names, load_control
+from cornersmooth.nc.cycle_blocks import tool_loads
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.program_table import ProgramTable
 from cornersmooth.settings import Settings
@@ -32,6 +33,11 @@ _LONGEST_NAME = 24
 
 #: numbers of programs from names of files: FANUC's parameters NE8 and NE9 lock those from 8000 to 9999
 _HIGHEST_NUMBER = 7999
+
+
+#: a word that loads a tool, and what of a line is a comment
+_TOOL_WORD = re.compile(r"(?<![A-Z])T[ ]?[\d#\[]", re.IGNORECASE)
+_COMMENT = re.compile(r"\([^)]*\)|;.*")
 
 
 class Stream(Protocol):
@@ -70,6 +76,8 @@ class Frame:
         Z. Taps are its own cycles anyway.
     modal : bool
         Whether words that repeat are left out where the control keeps them.
+    line_ends : {"lf", "crlf"} or None
+        What lines end with; None for that of the control's table.
     stem : str
         Name of the CL file without its ending, for the program where `program` is None; empty for none.
     """
@@ -87,6 +95,7 @@ class Frame:
     approach: float = 0.0
     retract: float = 0.0
     modal: bool = False
+    line_ends: str | None = None
 
     def values(self, form: Form, program: Program, settings: Settings) -> dict[str, str]:
         """What stands for braces in the blocks around the motion and in those of extras.
@@ -103,11 +112,22 @@ class Frame:
             )
         turn = math.degrees(settings.blend_share * settings.tolerance / settings.axis_scale)
         return {
-            "program": self.program or name_of_file(self.stem, table) or table.name,
+            "program": self.program_of(form),
             "units": form.table.layout.units[program.units],
             "blend": blend_word(settings.blend_share * settings.tolerance / program.mm_per_unit),
             "turn": format_number(max(turn, 10.0**-_BLEND_DECIMALS), _BLEND_DECIMALS),
         }
+
+    def program_of(self, form: Form) -> str:
+        """Name or number of the program, given or from the name of the CL file."""
+        table = form.table.program
+        return self.program or name_of_file(self.stem, table) or table.name
+
+    def kept_as(self, form: Form) -> str | None:
+        """Name or number by which the control keeps the program; None where only a comment says it."""
+        blocks = [block for block in form.table.program.start if "{program}" in block]
+        comment = form.table.layout.comment[0].strip()
+        return self.program_of(form) if any(not block.startswith(comment) for block in blocks) else None
 
     def texts(self, form: Form, values: dict[str, str]) -> dict[str, Blocks]:
         """Blocks of the steps that a user gives: work offset, header and footer.
@@ -140,6 +160,24 @@ class Frame:
             "footer": tuple(_filled(self.footer, values)),
         }
 
+    def refuse_tool(self, form: Form, program: Program) -> None:
+        """Refuse a header that loads a tool where the program then takes the length of another.
+
+        Raises
+        ------
+        SettingsError
+            CS249.
+        """
+        moving = program.kind != Move.FROM
+        loaded = any(not moving[:pose].any() for pose, _ in tool_loads(program))
+        if loaded or not any("{offset}" in block for block in form.mode.on):
+            return
+        for line in self.header:
+            found = _TOOL_WORD.search(_COMMENT.sub("", line))
+            if found is not None:
+                what = f"the header loads a tool, {line!r}, and the program takes the length of tool 1"
+                raise SettingsError("CS249", what, "leave it out of the header, and give --tool-number")
+
     def named_offset(self, table: Control) -> str:
         """Work offset for the head of a text; empty for that of the table that the control's is like."""
         offset = table.program.work_offset if self.work_offset is None else self.work_offset
@@ -155,7 +193,8 @@ class Frame:
         """One text, nothing written yet."""
         layout = form.table.layout
         number = layout.block_number or ("N{number} " if self.block_numbers else "")
-        return FramedText(stream, number=number, layout=layout, next_number=layout.number_start)
+        end = LINE_ENDS[self.line_ends or layout.line_ends]
+        return FramedText(stream, number=number, layout=layout, end=end, next_number=layout.number_start)
 
 
 def name_of_file(stem: str, table: ProgramTable) -> str:
@@ -183,11 +222,14 @@ class FramedText:
     stream : binary stream
     number : str
         With ``{number}``; empty for none.
+    end : bytes
+        What lines end with.
     """
 
     stream: Stream
     number: str
     layout: TextStyle
+    end: bytes
     next_number: int
     blocks: int = 0  #: in head and tail
 
@@ -198,7 +240,7 @@ class FramedText:
         longest = self.layout.longest_block
         if longest and _longest_line(text) > longest:
             text = b"".join(self._folded(line) for line in text.splitlines(keepends=True))
-        self.stream.write(text)
+        self.stream.write(text if self.end == b"\n" else text.replace(b"\n", self.end))
 
     def write_blocks(self, lines: Sequence[str]) -> None:
         """Write blocks of head or tail."""

@@ -317,7 +317,7 @@ class StatementWriter:
             return []
         text = "END stands before the last motion; written as a program stop"
         self.findings.add("CS318", "warning", statement.line, text)
-        return [*self.comment(statement.text), *self.words.stop]
+        return [*self.comment(statement.text), *self.halt(self.words.stop)]
 
     def insert(self, statement: Statement) -> list[str]:
         """INSERT: text for the NC file; as a comment, since nobody has looked at what it does."""

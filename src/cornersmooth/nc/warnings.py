@@ -22,6 +22,7 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
     _arcs(circles, smoothed.program, findings)
     if not form.rotary:  # rotary words say which way to turn
         _flips(smoothed.program, findings)
+    _large_feeds(form, smoothed.program, findings)
     if form.orientation == "machine":
         _feeds(smoothed.program, findings)
     if form.curves:
@@ -69,6 +70,16 @@ def _flips(program: Program, findings: Findings) -> None:
             "defined: keep clear of the part there, or insert a pose in between"
         )
         findings.add("CS326", "warning", int(program.line[poses[0]]), text, len(poses))
+
+
+def _large_feeds(form: Form, program: Program, findings: Findings) -> None:
+    """Feeds per minute beyond what the control takes."""
+    largest = form.mode.motion.largest_feed
+    cuts = ~rapid_moves(program.kind) & (program.feed_mode == FeedMode.PER_MINUTE)
+    rows = np.flatnonzero(cuts & (program.feed > largest))
+    if largest and len(rows):
+        text = f"feed beyond the F{largest:.10g} mm/min that the control takes: give a lower one"
+        findings.add("CS385", "warning", int(program.line[rows[0]]), text, len(rows))
 
 
 def _feeds(program: Program, findings: Findings) -> None:

@@ -57,6 +57,11 @@ program_name = click.option(
     metavar="TEXT",
     help="Name or number of the NC program. [default: from the name of the CL file]",
 )
+line_ends = click.option(
+    "--line-ends",
+    type=click.Choice(["lf", "crlf"]),
+    help="What each line of the program ends with. [default: that of the control's table, lf]",
+)
 work_offset = click.option(
     "--work-offset",
     type=str,
@@ -158,6 +163,7 @@ def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
             header,
             footer,
             block_numbers,
+            line_ends,
             modal,
             no_comments,
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -28,6 +29,40 @@ units = click.option(
 arc_rule = click.option(
     "--arc-rule", type=click.Choice(["left", "right", "tangent"]), help="Sense of CIRCLE about its axis."
 )
+
+
+class SpindleType(click.ParamType[tuple[float, str]]):
+    """A speed of the spindle, with the direction where it is not clockwise."""
+
+    name = "RPM[,CCLW]"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, str]:
+        """Return the speed and CLW or CCLW."""
+        if isinstance(value, tuple):
+            return value
+        number, _, direction = str(value).partition(",")
+        direction = direction.strip().upper() or "CLW"
+        try:
+            speed = float(number)
+        except ValueError:
+            speed = math.nan
+        if not 0.0 < speed < math.inf or direction not in ("CLW", "CCLW"):
+            self.fail(f"{value!r} is no speed; give it as 8000 or 8000,CCLW", param, ctx)
+        return speed, direction
+
+
+tool_number = click.option(
+    "--tool-number",
+    type=click.IntRange(1, 99999999),
+    metavar="N",
+    help="Tool that is loaded first, with its length, for inputs that load none.",
+)
+spindle = click.option(
+    "--spindle",
+    type=SpindleType(),
+    metavar="RPM[,CCLW]",
+    help="Speed of the spindle, clockwise or with CCLW counterclockwise, for inputs that start none.",
+)
 lenient = click.option("--lenient", is_flag=True, help="Go on after errors in the input where it is safe.")
 
 _READING = {
@@ -37,6 +72,7 @@ _READING = {
     "arc_rule": arc_rule,
     "lenient": lenient,
 }
+_TOOL = {"tool_number": tool_number, "spindle": spindle}
 
 
 def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -44,6 +80,11 @@ def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return all_of(function, _READING.values())
 
 
+def tool_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of the commands that know of a tool which the input does not name."""
+    return all_of(function, _TOOL.values())
+
+
 def reading_of(given: dict[str, Any]) -> dict[str, Any]:
     """Keyword arguments of `cornersmooth.read` that were given."""
-    return {name: given[name] for name in _READING}
+    return {name: given[name] for name in (*_READING, *_TOOL) if name in given}
