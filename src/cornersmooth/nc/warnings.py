@@ -79,7 +79,7 @@ def _large_feeds(form: Form, program: Program, findings: Findings) -> None:
     rows = np.flatnonzero(cuts & (program.feed > largest))
     if largest and len(rows):
         text = f"feed beyond the F{largest:.10g} mm/min that the control takes: give a lower one"
-        findings.add("CS385", "warning", int(program.line[rows[0]]), text, len(rows))
+        findings.add("CS388", "warning", int(program.line[rows[0]]), text, len(rows))
 
 
 def _feeds(program: Program, findings: Findings) -> None:
