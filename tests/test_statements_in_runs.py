@@ -11,7 +11,7 @@ import pytest
 
 from cornersmooth.cl import read
 from cornersmooth.smoothing import smooth
-from cornersmooth.smoothing.sharp import arc_corners
+from cornersmooth.smoothing.sharp import other_corners
 from oracle.command import DONE, run
 
 HEAD = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/500,MMPM\nRAPID\nGOTO/0,0,0,0,0,1\nMULTAX/ON\n"
@@ -105,6 +105,13 @@ def test_a_statement_on_a_straight_line_leaves_no_corner(tmp_path: Path) -> None
     assert "no corner stays sharp" in told
 
 
+def test_a_rapid_that_leads_nowhere_leaves_a_sharp_corner(tmp_path: Path) -> None:
+    cl = "GOTO/10,0,0\nRAPID\nGOTO/10,0,0\nGOTO/10,20,0\nRAPID\nGOTO/10,20,9\nGOTO/10,20,0\nGOTO/0,0,0\nFINI\n"
+    contents, _, _ = smoothed(tmp_path, f"{HEAD}{cl}".encode())
+    assert contents["summary"]["sharp"] == 1  # the second rapid ends the cut
+    assert [(one["line"], one["status"], round(one["turn_deg"])) for one in contents["sharp"]] == [(8, "rapid", 90)]
+
+
 def test_arcs_that_meet_lines_and_arcs_at_an_angle_are_sharp_corners(tmp_path: Path) -> None:
     # a half circle leaves the line at a right angle, the next arc leaves it at one again, and ends along its line
     cl = (
@@ -119,5 +126,5 @@ def test_arcs_that_meet_lines_and_arcs_at_an_angle_are_sharp_corners(tmp_path: P
     ]
     assert "2 corners stay sharp, first :8 arc 90" in told
     program = read(cl)
-    assert arc_corners(program, 10.0).pose.tolist() == [1, 2]
+    assert other_corners(program, 10.0).pose.tolist() == [1, 2]
     assert len(smooth(program).corners) == 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints, Program, SmoothProgram, Status
 from cornersmooth.report.corners import LIMIT_NAMES, STATUS_NAMES, corner_table
-from cornersmooth.smoothing.sharp import arc_corners, sharp_rows
+from cornersmooth.smoothing.sharp import other_corners, sharp_rows
 from cornersmooth.vectors import angle_between
 from cornersmooth.verify import Verification
 
@@ -82,20 +82,20 @@ def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, den
     sharp[sharp_rows(smoothed)] = True
     sharp &= ~out
     idle = ~corners.rounded & ~sharp & ~out
-    arcs = arc_corners(smoothed.program, smoothed.settings.axis_length)
+    others = other_corners(smoothed.program, smoothed.settings.axis_length)
     kind = np.where(out, 0, np.where(sharp, 1, 1 + corners.limited_by.astype(np.int64)))
     kind[~out & (status == Status.IN_RUN)] = len(KINDS) - 1
     counts = {name: int(np.count_nonzero((kind == index) & ~idle)) for index, name in enumerate(KINDS)}
     counts["straight"] = int(np.count_nonzero(idle))
-    counts[KINDS[1]] += len(arcs.pose)
+    counts[KINDS[1]] += len(others.pose)
     rounded = np.flatnonzero(corners.rounded & ~out)
     rounded = rounded[np.argsort(-off[rounded], kind="stable")][:_MOST_ROUNDED]
     rows = np.concatenate((np.flatnonzero(out), np.flatnonzero(sharp), rounded))
     table = corner_table(smoothed, rows, dense=dense)
     tip, axis = np.asarray(table["tip_error_mm"], np.float64), np.asarray(table["axis_error_mm"], np.float64)
-    nothing = np.zeros(len(arcs.pose))
+    nothing = np.zeros(len(others.pose))
     tip, axis = np.append(tip, nothing), np.append(axis, nothing)
-    pose = np.append(corners.pose[rows], arcs.pose)
+    pose = np.append(corners.pose[rows], others.pose)
     if found is not None:
         tip = np.where(np.isfinite(found.pose_tip[pose]), found.pose_tip[pose], tip)
         axis = np.where(np.isfinite(found.pose_axis_point[pose]), found.pose_axis_point[pose], axis)
@@ -103,15 +103,16 @@ def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, den
         *(STATUS_NAMES[item].replace("_", " ") for item in Status),
         *(name for name in LIMIT_NAMES.values() if name),
         "arc",
+        "rapid",
     )
     reason = np.where(corners.smoothed[rows], len(Status) - 1 + corners.limited_by[rows], status[rows]).astype(np.int64)
     return _ranked(
         pose,
-        np.append(kind[rows], np.ones(len(arcs.pose), np.int64)),
-        np.append(reason, np.full(len(arcs.pose), len(names) - 1)),
+        np.append(kind[rows], np.ones(len(others.pose), np.int64)),
+        np.append(reason, np.where(others.reason == "arc", len(names) - 2, len(names) - 1)),
         names,
-        np.append(table["tip_angle_deg"], arcs.tip_turn),
-        np.append(table["axis_angle_deg"], arcs.axis_turn),
+        np.append(table["tip_angle_deg"], others.tip_turn),
+        np.append(table["axis_angle_deg"], others.axis_turn),
         np.append(np.asarray(table["tip_length_in_mm"]) + np.asarray(table["tip_length_out_mm"]), nothing),
         tip,
         axis,

@@ -14,7 +14,7 @@ from cornersmooth.nc_reader import NcProgram
 from cornersmooth.report.paths import original_path, written_path
 from cornersmooth.report.picture import new_figure, saved
 from cornersmooth.report.thinning import thinned
-from cornersmooth.smoothing.sharp import arc_corners, sharp_rows
+from cornersmooth.smoothing.sharp import other_corners, sharp_rows
 
 #: points drawn of each path
 _POINTS = 20_000
@@ -57,7 +57,7 @@ def draw_path(
         *written.tip[cutting].T, c=off[cutting], s=1.5, cmap="viridis", vmin=0.0, vmax=tolerance, label="written"
     )
     sharp = np.append(
-        smoothed.corners.pose[sharp_rows(smoothed)], arc_corners(program, smoothed.settings.axis_length).pose
+        smoothed.corners.pose[sharp_rows(smoothed)], other_corners(program, smoothed.settings.axis_length).pose
     )
     view.scatter(*program.tip[sharp].T, color="#d55e00", marker="D", s=18, label="sharp corners")
     view.set_aspect("equal")

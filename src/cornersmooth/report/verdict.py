@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.model import SmoothProgram
 from cornersmooth.report.corners import corner_table
-from cornersmooth.smoothing.sharp import STRAIGHT_ON, arc_corners, sharp_rows
+from cornersmooth.smoothing.sharp import STRAIGHT_ON, other_corners, sharp_rows
 
 #: sharp corners that a report lists
 _LISTED = 100
@@ -26,17 +26,17 @@ _LEAST_TOLD = 0.005
 def sharp_corners(smoothed: SmoothProgram) -> tuple[int, list[dict[str, Any]]]:
     """Number of corners that stay sharp, and the first of them in path order: CL line, reason, turn.
 
-    The turn is that of the tip path, or of the axis-point path where the tip goes straight on. The reason ``arc`` is an
-    arc that meets a line or another arc at an angle.
+    The turn is that of the tip path, or of the axis-point path where the tip goes straight on. The reason is a status,
+    or one of `OtherCorners`.
     """
-    rows, arcs = sharp_rows(smoothed), arc_corners(smoothed.program, smoothed.settings.axis_length)
+    rows, others = sharp_rows(smoothed), other_corners(smoothed.program, smoothed.settings.axis_length)
     table = corner_table(smoothed, rows[:_LISTED])
-    pose = np.concatenate((np.asarray(table["corner"]), arcs.pose[:_LISTED]))
-    tip = np.concatenate((np.asarray(table["tip_angle_deg"], np.float64), arcs.tip_turn[:_LISTED]))
-    axis = np.concatenate((np.asarray(table["axis_angle_deg"], np.float64), arcs.axis_turn[:_LISTED]))
-    status = [*table["status"].tolist(), *["arc"] * len(arcs.pose[:_LISTED])]
+    pose = np.concatenate((np.asarray(table["corner"]), others.pose[:_LISTED]))
+    tip = np.concatenate((np.asarray(table["tip_angle_deg"], np.float64), others.tip_turn[:_LISTED]))
+    axis = np.concatenate((np.asarray(table["axis_angle_deg"], np.float64), others.axis_turn[:_LISTED]))
+    status = [*table["status"].tolist(), *others.reason[:_LISTED].tolist()]
     turn, line = np.where(tip < STRAIGHT_ON, axis, tip), smoothed.program.line[pose]
-    return len(rows) + len(arcs.pose), [
+    return len(rows) + len(others.pose), [
         {"line": int(line[k]), "status": status[k], "turn_deg": float(turn[k])}
         for k in np.argsort(pose, kind="stable")[:_LISTED].tolist()
     ]

@@ -1,6 +1,6 @@
 """Corners that stay sharp: the tool cuts on in another direction, and nothing rounds the path there.
 
-Most are rows of `Corners`. The others are ends of arcs, which no method rounds.
+Most are rows of `Corners`. The others are between moves of different kinds, which no method rounds.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status
 from cornersmooth.smoothing.arcs import arc_tangents
@@ -41,42 +42,43 @@ def sharp_rows(smoothed: SmoothProgram) -> Ints:
     return rows[turns]
 
 
-class ArcCorners(NamedTuple):
-    """Ends of arcs at which the path turns, g of them in path order.
+class OtherCorners(NamedTuple):
+    """Corners between moves of different kinds, g of them in path order.
 
     Parameters
     ----------
     pose : (g,) int64
+    reason : (g,) str
+        ``arc``: an arc meets a line or another arc. ``rapid``: a rapid that leads nowhere is between two cuts.
     tip_turn, axis_turn : (g,) float64, degrees
         Change of direction of the tip path and of the axis-point path.
     """
 
     pose: Ints
+    reason: NDArray[np.str_]
     tip_turn: Floats
     axis_turn: Floats
 
 
-def arc_corners(program: Program, axis_length: float) -> ArcCorners:
-    """Find the poses where an arc meets a line or another arc, and the path turns by more than `STRAIGHT_ON`."""
-    if not len(program.arcs):
-        return ArcCorners(np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
-    arc = program.kind == Move.ARC
-    step = np.diff(program.tip, axis=0, prepend=program.tip[:1])
+def other_corners(program: Program, axis_length: float) -> OtherCorners:
+    """Find the corners of a path that are no poses inside a chain, where it turns by more than `STRAIGHT_ON`."""
+    arc, step = program.kind == Move.ARC, np.diff(program.tip, axis=0, prepend=program.tip[:1])
     turn = axis_length * np.diff(program.axis, axis=0, prepend=program.axis[:1])
     cuts = arc | (program.kind == Move.LINEAR)
     cuts[:1] = False  # nothing to come from
     cuts[1:] &= ~np.isin(program.kind[:-1], (Move.FROM, Move.HOLE))
-    moving = np.flatnonzero(arc | ~cuts | step.any(axis=1) | turn.any(axis=1))
+    still = (cuts & ~arc) | (program.kind == Move.RAPID)
+    still[still] = ~(step[still].any(axis=1) | turn[still].any(axis=1))
+    moving = np.flatnonzero(~still)
     one, other = moving[:-1], moving[1:]
-    meet = cuts[one] & cuts[other] & (arc[one] | arc[other])
+    rapids = np.cumsum(still & (program.kind == Move.RAPID))
+    meet = cuts[one] & cuts[other] & (arc[one] | arc[other] | (rapids[other] > rapids[one]))
     one, other = one[meet], other[meet]
-    starts, ends = step.copy(), step
+    begins, ends = step.copy(), step
     rows = np.arange(len(program.arcs))
-    starts[program.arcs.pose], ends[program.arcs.pose] = (
-        arc_tangents(program, rows, 0.0),
-        arc_tangents(program, rows, 1.0),
-    )
-    tip = np.degrees(angle_between(ends[one], starts[other]))
-    axis = np.degrees(angle_between(ends[one] + turn[one], starts[other] + turn[other]))
+    begins[program.arcs.pose], ends[program.arcs.pose] = (arc_tangents(program, rows, share) for share in (0.0, 1.0))
+    tip = np.degrees(angle_between(ends[one], begins[other]))
+    axis = np.degrees(angle_between(ends[one] + turn[one], begins[other] + turn[other]))
     bent = np.maximum(tip, axis) > STRAIGHT_ON
-    return ArcCorners(one[bent], tip[bent], axis[bent])
+    reason = np.where(arc[one] | arc[other], "arc", "rapid")
+    return OtherCorners(one[bent], reason[bent], tip[bent], axis[bent])
