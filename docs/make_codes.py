@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from cornersmooth.errors import Finding
+
 HERE = Path(__file__).resolve().parent
 SOURCE = HERE.parent / "src" / "cornersmooth"
 CODE = re.compile(r"CS\d{3}")
@@ -32,11 +34,12 @@ Errors, warnings and notes carry a code that does not change; reports name it. T
 
 An *error* ends the command (exit code 2 for settings, 3 for input, 4 for output); a *problem* is something that
 verification finds in a text (exit code 1); *warnings* and *notes* are findings, and the work goes on.
+A warning *to check* bears on the metal, and the verdict counts it: `PASSED, 3 to check`.
 CS551 to CS559 and CS566 say of a word that it is missing, that nothing asks for it, that it is another or elsewhere.
 """
 #: arguments by which a code is given to a method that is called with its texts
 CALLS = {"wrong_value": "wrong"}
-ERRORS = ("InputError", "SettingsError", "OutputError", "PromiseError", "CornersmoothError")
+ERRORS = ("InputError", "SettingsError", "OutputError", "VerdictError", "CornersmoothError")
 
 
 @dataclass(frozen=True, order=True)
@@ -52,6 +55,11 @@ class Entry:
 def called(call: ast.Call) -> str:
     """Name of what is called."""
     return call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+
+
+def checked(code: str, kind: str) -> str:
+    """Whether a warning is counted with the verdict."""
+    return ", to check" if kind == "warning" and Finding(code, "warning", 0, "").to_check else ""
 
 
 class Module:
@@ -211,7 +219,7 @@ def page() -> str:
     for digit, title in PARTS.items():
         lines += [f"## CS{digit}xx: {title}", "", "| code | kind | says | from |", "|---|---|---|---|"]
         lines += [
-            f"| {code} | {kind} | {text.replace('|', chr(92) + '|')} | {', '.join(packages)} |"
+            f"| {code} | {kind}{checked(code, kind)} | {text.replace('|', chr(92) + '|')} | {', '.join(packages)} |"
             for (code, kind, text), packages in rows.items()
             if code[2] == digit
         ]

@@ -40,14 +40,14 @@ def lines(*args: object, code: int = DONE) -> list[str]:
 
 
 def statuses(said: list[str]) -> list[str]:
-    return [line.split()[0] for line in said if line.startswith(("done ", "skipped "))]
+    return [line.split()[0].strip(",") for line in said if line.startswith(("PASSED", "skipped "))]
 
 
 def test_folders_are_mirrored(tree: Path, tmp_path: Path) -> None:
     said = lines(tree, "-d", tmp_path / "nc", "--report", tmp_path / "rep" / "{stem}.json")
     assert list(files_in(tmp_path / "nc")) == ["a/deep/three.nc", "a/two.nc", "one.nc"]
     assert list(files_in(tmp_path / "rep")) == ["a/deep/three.json", "a/two.json", "one.json"]
-    assert said[-1] == "3 files: 3 done"
+    assert said[-1] == "3 files: 3 PASSED (3 to check)"
     assert run("smooth", tree / "one.cls").stdout == files_in(tmp_path / "nc")["one.nc"]
     beside = lines(tree, "-d", tmp_path / "again", "-j", "2")
     assert [line.split(" s")[0].rsplit(",", 1)[0] for line in beside] == [
@@ -73,12 +73,12 @@ def test_names_end_as_the_control_wants(tree: Path, tmp_path: Path) -> None:
 
 def test_a_run_again_continues(tree: Path, tmp_path: Path) -> None:
     out = tmp_path / "nc"
-    assert statuses(lines(tree, "-d", out)) == ["done"] * 3
+    assert statuses(lines(tree, "-d", out)) == ["PASSED"] * 3
     before = files_in(out)
     (out / "one.nc").unlink()
-    assert sorted(statuses(lines(tree, "-d", out))) == ["done", "skipped", "skipped"]
+    assert sorted(statuses(lines(tree, "-d", out))) == ["PASSED", "skipped", "skipped"]
     assert files_in(out) == before
-    assert statuses(lines(tree, "-d", out, "--force")) == ["done"] * 3
+    assert statuses(lines(tree, "-d", out, "--force")) == ["PASSED"] * 3
 
 
 def test_what_has_changed_is_not_skipped(tree: Path, tmp_path: Path) -> None:
@@ -91,17 +91,17 @@ def test_what_has_changed_is_not_skipped(tree: Path, tmp_path: Path) -> None:
     assert [line for line in said if "exists already" in line] == [
         f"{out / name}: error: exists already; use --force to replace it" for name in ("one.nc", "a/two.nc")
     ]
-    assert said[-1] == "3 files: 1 skipped, 2 failed"
+    assert said[-1] == "3 files: 1 skipped, 2 errors"
     assert files_in(out) == before | {"a/two.nc": b"edited by hand"}
     for options in (["-e", "0.02"], ["--no-verify"], ["-f", "g6.2"], ["--block-numbers"], ["--feed", "900"]):
-        assert lines(tree, "-d", out, *options, code=BAD_OUTPUT)[-1] == "3 files: 3 failed"
+        assert lines(tree, "-d", out, *options, code=BAD_OUTPUT)[-1] == "3 files: 3 errors"
 
 
 def test_a_report_that_is_missing_is_made(tree: Path, tmp_path: Path) -> None:
     out, reports = tmp_path / "nc", tmp_path / "{stem}.csv"
     lines(tree, "-d", out)
     before = files_in(out)
-    assert statuses(lines(tree, "-d", out, "--report", reports)) == ["done"] * 3
+    assert statuses(lines(tree, "-d", out, "--report", reports)) == ["PASSED"] * 3
     assert (tmp_path / "a" / "two.csv").exists()
     assert statuses(lines(tree, "-d", out, "--report", reports)) == ["skipped"] * 3
     assert files_in(out) == before
@@ -118,7 +118,7 @@ def test_without_marks_what_is_made_is_compared(tree: Path, tmp_path: Path, monk
     (out / "one.nc").write_bytes(b"edited by hand")
     before = files_in(out)
     said = lines(tree, "-d", out, code=BAD_OUTPUT)
-    assert said[-1] == "3 files: 2 done, 1 failed"
+    assert said[-1] == "3 files: 2 PASSED (2 to check), 1 error"
     assert files_in(out) == before
 
 
@@ -126,7 +126,7 @@ def test_existing_outputs_may_be_skipped(tree: Path, tmp_path: Path) -> None:
     out = tmp_path / "nc"
     out.mkdir()
     (out / "one.nc").write_bytes(b"mine")
-    assert lines(tree, "-d", out, "--skip-existing")[-1] == "3 files: 2 done, 1 skipped"
+    assert lines(tree, "-d", out, "--skip-existing")[-1] == "3 files: 2 PASSED (2 to check), 1 skipped"
     assert (out / "one.nc").read_bytes() == b"mine"
 
 
@@ -135,15 +135,15 @@ def test_summaries_have_a_row_for_each_file(tree: Path, tmp_path: Path) -> None:
     out, text, table = tmp_path / "nc", tmp_path / "s.json", tmp_path / "s.csv"
     lines(tree, "-d", out, "--summary", text, code=BAD_INPUT)
     found = json.loads(text.read_text())
-    assert found["counts"] == {"done": 3, "skipped": 0, "rejected": 0, "failed": 1}
+    assert found["counts"] == {"PASSED": 3, "INCOMPLETE": 0, "NOT VERIFIED": 0, "FAILED": 0, "skipped": 0, "error": 1}
     failed, first = found["files"][:2]
-    assert (failed["status"], failed["exit_code"], failed["corners"]) == ("failed", BAD_INPUT, None)
+    assert (failed["status"], failed["exit_code"], failed["corners"]) == ("error", BAD_INPUT, None)
     assert "bad.cls:9: error" in failed["reason"]
     assert first["output"] == str(out / "one.nc")
     assert first["blocks"] > first["corners"] >= first["smoothed"] > 0
     lines(tree, "-d", out, "--summary", table, code=BAD_INPUT)
     rows = list(csv.DictReader(table.read_text().splitlines()))
-    assert [row["status"] for row in rows] == ["failed", "skipped", "skipped", "skipped"]
+    assert [row["status"] for row in rows] == ["error", "skipped", "skipped", "skipped"]
     assert rows[1]["reason"] == "nothing has changed"
     for wrong in (["--summary", tmp_path / "s.txt", "-d", out], ["--summary", text]):
         assert run("smooth", tree / "one.cls", *wrong).returncode == USAGE

@@ -85,10 +85,10 @@ def test_a_lost_worker_loses_no_file(scheduler: Path, folder: Path, tmp_path: Pa
     # each line but for its seconds
     lines, others = (text.decode().splitlines() for text in (said, plain.stderr))
     assert [line.rpartition(",")[0] for line in lines[:-1]] == [line.rpartition(",")[0] for line in others[:-1]]
-    assert lines[-1] == others[-1] == f"{FILES + 1} files: {FILES} done, 1 failed"
+    assert lines[-1] == others[-1] == f"{FILES + 1} files: {FILES} PASSED ({FILES} to check), 1 error"
     address = json.loads(scheduler.read_text())["address"]
     again = run("smooth", "cl", "-d", "there", "--scheduler", address, cwd=tmp_path)
-    assert again.stderr.decode().splitlines()[-1] == f"{FILES + 1} files: {FILES} skipped, 1 failed"
+    assert again.stderr.decode().splitlines()[-1] == f"{FILES + 1} files: {FILES} skipped, 1 error"
 
 
 def test_the_commands_of_the_page_work(scheduler: Path, folder: Path, tmp_path: Path) -> None:
@@ -136,5 +136,5 @@ def test_workers_that_do_not_fit_say_so(tmp_path: Path) -> None:
     job = Job("a.cls", "out/a.nc", (), {}, Settings(), choose_form(), Frame(), None, force=False, batch=True)
     assert "does not see out; let it stand in a folder that all share" in do(job, "/", "out/none", __version__).message
     found = do(job, "/", "", "0.0")
-    assert (found.status, found.message.startswith("a.cls: error: ")) == ("failed", True)
+    assert (found.status, found.message.startswith("a.cls: error: ")) == ("error", True)
     assert f"has cornersmooth {__version__}, not 0.0; install the same" in found.message

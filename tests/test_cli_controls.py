@@ -200,12 +200,10 @@ def test_text_that_cannot_be_read_back_says_so(tmp_path: Path) -> None:
     assert re.fullmatch(r"G10 L2 P1, NC line \d+", found("--footer", tmp_path / "foot.txt"))
     own = tmp_path / "mine.toml"
     own.write_text('like = "fanuc"\n[words]\ncoolant = { ON = ["M50"], OFF = ["M51"] }\n')
-    # its M words may mean anything; all other words are fanuc's
-    assert found("--control", own) == "what your own table says of coolant"
+    # its M words may mean anything; the CL file has no coolant
+    assert found("--control", own) == ""
     own.write_text('like = "fanuc"\n[program]\nend = ["G10 L2 P1", "M30"]\n')
-    named = (
-        r"G10 L2 P1, NC line \d+; the program must end with M30, %, once, NC line \d+; what your own table says of end"
-    )
+    named = r"G10 L2 P1, NC line \d+; the program must end with M30, %, once, NC line \d+"
     assert re.fullmatch(named, found("--control", own))
     assert found("--control", "fanuc") == ""
-    assert found("--no-verify") == "it was not asked for"
+    assert found("--no-verify") == "nothing was measured, as asked for"

@@ -412,7 +412,9 @@ def test_what_may_not_be_read_is_bad_input(
     assert result.returncode == BAD_INPUT
     assert f"{closed}: error: cannot read it: permission denied; check the path\n" in result.stderr.decode()
     assert len(_contents(tmp_path / "out")) == len(several) - 1
-    assert result.stderr.decode().splitlines()[-1] == f"{len(several) + 1} files: {len(several) - 1} done, 2 failed"
+    assert result.stderr.decode().splitlines()[-1] == (
+        f"{len(several) + 1} files: {len(several) - 1} PASSED ({len(several) - 1} to check), 2 errors"
+    )
 
 
 def test_existing_outputs_in_the_folder_are_kept(several: list[Path], tmp_path: Path) -> None:

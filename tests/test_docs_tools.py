@@ -200,7 +200,7 @@ def test_batch_runs_times_a_batch(tmp_path: Path, capsys: pytest.CaptureFixture[
     (tmp_path / "cl" / "one.cls").write_text(cl_text(20, 1))
     found = runs.run_whole(runs.Way("-j 1", ("-j", "1")), tmp_path, tmp_path / "out")
     assert list(found) == ["one.nc"]
-    assert "1 file: 1 done" in capsys.readouterr().out
+    assert "1 file: 1 PASSED (1 to check)" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import cornersmooth
-from cornersmooth import CornersmoothError, PromiseError, Settings, pipeline
+from cornersmooth import CornersmoothError, Settings, VerdictError, pipeline
 from cornersmooth.cli import run
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "impeller.cls"
@@ -153,25 +153,25 @@ def test_one_call_does_what_the_command_does(tmp_path, capsys):
         cornersmooth.postprocess(ours, ours, force=True)
 
 
-def test_a_broken_promise_is_an_error_and_the_old_file_stays(tmp_path, monkeypatch):
+def test_a_failed_program_is_an_error_and_the_old_file_stays(tmp_path, monkeypatch):
     nothing = lambda smoothed: np.zeros(0, np.int64)  # noqa: E731
     monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_transitions", nothing)
     monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_remainders", nothing)
     out = tmp_path / "o.nc"
     out.write_text("old")
     settings = Settings(tolerance=0.01, method="zhang2016")
-    with pytest.raises(PromiseError, match=r"breaks its promise; the text is in .*o\.nc\.rejected") as caught:
+    with pytest.raises(VerdictError, match=r"the verdict is FAILED; the program is in .*o\.nc\.failed") as caught:
         cornersmooth.postprocess(BREAKING, out, settings, force=True)
     assert out.read_text() == "old"
     result = caught.value.result
     assert result.verification.problems
     assert Path(result.path).read_text().endswith("M30\n%\n")
     stream = io.BytesIO()
-    with pytest.raises(PromiseError, match="nothing was written"):
+    with pytest.raises(VerdictError, match="nothing was written"):
         cornersmooth.postprocess(BREAKING, stream, settings)
     assert stream.getvalue() == b""
     result = cornersmooth.postprocess(BREAKING, stream, settings, verify=False)
-    assert (result.verification, result.unverified) == (None, "it was not asked for")
+    assert (result.verification, result.unverified) == (None, "nothing was measured, as asked for")
     assert stream.getvalue()
 
 

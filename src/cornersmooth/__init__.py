@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from cornersmooth.cl import read
-    from cornersmooth.errors import CornersmoothError, Finding, PromiseError
+    from cornersmooth.errors import CornersmoothError, Finding, VerdictError
     from cornersmooth.feedrate import Limits, TimeLaw, compare, direct, plan
     from cornersmooth.kinematics import load_machine
     from cornersmooth.model import Corners, Program, SmoothProgram, Statement
@@ -56,7 +56,8 @@ _HOME = {
     "Limits": "feedrate",
     "PathPoints": "path_points",
     "Program": "model",
-    "PromiseError": "errors",
+    "Verdict": "verdict",
+    "VerdictError": "errors",
     "Result": "pipeline",
     "Settings": "settings",
     "SmoothProgram": "model",
@@ -89,12 +90,13 @@ __all__ = [
     "Limits",
     "PathPoints",
     "Program",
-    "PromiseError",
     "Result",
     "Settings",
     "SmoothProgram",
     "Statement",
     "TimeLaw",
+    "Verdict",
+    "VerdictError",
     "Verification",
     "choose_form",
     "compare",

@@ -11,6 +11,13 @@ from typing import Any, Literal
 
 Severity = Literal["note", "warning", "error"]
 
+#: numbers of warnings that say nothing of the metal: how the input is spelt, what was asked for, what costs time, what
+#: the verdict says already
+_BESIDE_THE_METAL = frozenset((133, 134, 139, 174, 184, 325, 371, 509))
+
+#: numbers of warnings of what an option leaves out of the program
+_LEFT_OUT = frozenset((315,))
+
 
 class CornersmoothError(Exception):
     """Work stopped; the text says what happened and what to do.
@@ -96,8 +103,8 @@ class OutputError(CornersmoothError):
     exit_code = 4
 
 
-class PromiseError(CornersmoothError):
-    """The text was written, and verification found that it does not keep what was asked for.
+class VerdictError(CornersmoothError):
+    """The program was written, and its verdict is not good enough to put it in place.
 
     Parameters
     ----------
@@ -131,3 +138,13 @@ class Finding:
     line: int
     text: str
     count: int = 1
+
+    @property
+    def leaves_out(self) -> bool:
+        """Whether it says that an option left something out of the program."""
+        return int(self.code[2:]) in _LEFT_OUT
+
+    @property
+    def to_check(self) -> bool:
+        """Whether it bears on the metal: somebody has to look before the program runs. So do codes that are new."""
+        return self.severity == "warning" and int(self.code[2:]) not in _BESIDE_THE_METAL | _LEFT_OUT

@@ -27,8 +27,8 @@ from cornersmooth.errors import OutputError, SettingsError
 #: a path, or a binary stream that is open already
 Target = str | os.PathLike[str] | BinaryIO
 
-#: ending of the file beside the output that holds a text which breaks its promise
-REJECTED = ".rejected"
+#: ending of the file beside the output that holds a program which must not take its place
+FAILED = ".failed"
 
 #: hash of what is written: many processors have instructions of their own for it
 _HASH: Final = "sha256"
@@ -146,7 +146,7 @@ class Output:
     stream : HashedStream
     path : str
         Where the text is until then; empty where it goes straight to a stream or device.
-    rejected : bool
+    failed : bool
         Set by the writer: the text must not take the place of the output.
     mark : mapping of str to str
         Set by the writer: kept with the file where the file system can, for `read_mark`.
@@ -154,7 +154,7 @@ class Output:
 
     stream: HashedStream
     path: str = ""
-    rejected: bool = False
+    failed: bool = False
     mark: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -162,7 +162,7 @@ class Output:
 def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> Iterator[Output]:
     """Open an output; a regular file appears under its name only when the block ends without an error.
 
-    A rejected file is moved to ``PATH.rejected`` instead, and nothing of it reaches a stream or device.
+    A file that failed is moved to ``PATH.failed`` instead, and nothing of it reaches a stream or device.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def open_output(target: Target, *, hold: bool = False, replace: bool = True) -> 
                     yield output
                     output.stream.flush()
                     output.stream.check(temporary)
-                    if not output.rejected:
+                    if not output.failed:
                         with open(temporary, "rb") as text:
                             shutil.copyfileobj(text, device, 1 << 20)
             else:
@@ -280,8 +280,8 @@ def _moving(target: str, told: str, *, replace: bool) -> Iterator[Output]:
         if output.mark and hasattr(os, "setxattr"):
             with contextlib.suppress(OSError):
                 os.setxattr(temporary, _MARK, json.dumps({"text": output.stream.digest, **output.mark}).encode())
-        if output.rejected:
-            os.replace(temporary, target + REJECTED)
+        if output.failed:
+            os.replace(temporary, target + FAILED)
         elif replace:
             os.replace(temporary, target)
         else:

@@ -19,24 +19,23 @@ import numpy as np
 
 from cornersmooth import __version__, nc, smoothing
 from cornersmooth.cl import read
-from cornersmooth.errors import Finding, InputError, PromiseError
+from cornersmooth.errors import Finding, InputError, VerdictError
 from cornersmooth.memory import return_free_memory
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
 from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
-from cornersmooth.output import REJECTED, Target, check_output, open_output, path_of
+from cornersmooth.output import FAILED, Target, check_output, open_output, path_of
 from cornersmooth.provenance import Provenance
 from cornersmooth.report import report
+from cornersmooth.report.verdict import Judgement, judge, trusted_blocks
 from cornersmooth.settings import Settings
+from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, Verifier, useful_processes
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
-
-#: blocks taken on trust that are told one by one
-_TRUSTED_TOLD = 3
 
 #: called with the stage, what is done of it, and all of it
 Progress = Callable[[str, int, int], None]
@@ -77,6 +76,16 @@ class Result:
     seconds: Mapping[str, float] = field(default_factory=dict)
     path: str | None = None
 
+    @property
+    def verdict(self) -> Verdict:
+        """How the program turned out."""
+        return self.judgement.verdict
+
+    @property
+    def judgement(self) -> Judgement:
+        """The verdict and what it rests on."""
+        return judge(self.verification, self.findings, self.unverified)
+
     def report(self) -> dict[str, Any]:
         """Everything that the JSON report says; see `cornersmooth.report`."""
         own = len(self.smoothed.findings)
@@ -86,7 +95,7 @@ class Result:
             blocks_out=self.written.blocks,
             seconds=self.seconds,
             findings=self.findings[own:],
-            verification=None if self.verification is None else self.verification.to_dict(),
+            verification=self.verification,
             unverified=self.unverified,
         )
 
@@ -153,7 +162,7 @@ def postprocess(
     feed: float | None = None,
     plan_feeds: Limits | None = None,
     verify: bool = True,
-    require_verified: bool = False,
+    strict: bool = False,
     force: bool | None = False,
     mark: Mapping[str, str] | None = None,
     processes: int | None = None,
@@ -182,12 +191,12 @@ def postprocess(
         that it reaches there. The whole text is held in memory then.
     verify : bool
         Whether the text is read back and measured before it takes its place.
-    require_verified : bool
-        Whether a text that is not wholly verified is an error, too.
+    strict : bool
+        Whether any verdict but PASSED is an error.
     force : bool or None
         Whether an existing file may be replaced; None for not, but it may stay if it is the same.
     mark : mapping of str to str, optional
-        Kept with the file where the file system can (`cornersmooth.output.read_mark`).
+        Kept with the file where the file system can (`cornersmooth.output.read_mark`), with the verdict.
     processes : int, optional
         Processes to smooth and to verify with; by default as many as are useful. The result does not depend on it.
     progress : callable, optional
@@ -195,9 +204,9 @@ def postprocess(
 
     Raises
     ------
-    PromiseError
-        The text breaks its promise, or could not be verified as required. A file is kept as ``TARGET.rejected``,
-        nothing reaches a stream; `result` of the error says what was found.
+    VerdictError
+        The verdict is FAILED, or with `strict` another than PASSED. The program goes to ``TARGET.failed``, nothing
+        reaches a stream; `result` of the error says what was found.
     InputError, SettingsError, OutputError
         As `read`, `choose_form`, `write` and `open_output` say it.
     """
@@ -205,9 +214,9 @@ def postprocess(
     processes = useful_processes() if processes is None else processes
     may_replace = check_output(target, [] if isinstance(source, (Program, bytes)) else [source], force=force)
     back = reading_back(form)
-    unverified = "" if verify else "it was not asked for"
+    unverified = "" if verify else "nothing was measured, as asked for"
     if verify and not back["control"]:
-        unverified = "the control's table is like no control whose text is known"
+        unverified = "nothing was measured: the control is like none whose programs can be read"
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
         program = source if isinstance(source, Program) else read(source, **(reading or {}))
@@ -225,7 +234,7 @@ def postprocess(
     )
     frame = replace(frame, provenance=provenance.lines())
     with (
-        open_output(target, hold=not unverified or require_verified, replace=may_replace) as output,
+        open_output(target, hold=not unverified or strict, replace=may_replace) as output,
         ExitStack() as stack,
     ):
         verifier = None
@@ -255,24 +264,19 @@ def postprocess(
         if verifier is not None:
             with _timed(seconds, "verify"):
                 verification, unverified = _verified(verifier, form, frame)
-        broken = verification is not None and not verification.passed
-        output.rejected = broken or bool(require_verified and unverified)
+        findings = (*smoothed.findings, *_remarks(program, smoothed.settings), *written.findings)
+        if unverified:
+            findings += (Finding("CS509", "warning", 0, f"NOT VERIFIED: {unverified}"),)
+        if verification is not None:
+            findings += tuple(trusted_blocks(verification))
+        path = path_of(target)
+        result = Result(program, smoothed, form, frame, written, verification, unverified, findings, seconds, path)
+        judgement = result.judgement
+        output.failed = judgement.verdict is Verdict.FAILED or (strict and judgement.verdict is not Verdict.PASSED)
         if mark:
-            output.mark = {**mark, "not_verified": unverified}
-    findings = (*smoothed.findings, *_remarks(program, smoothed.settings), *written.findings)
-    if unverified:
-        findings += (Finding("CS509", "warning", 0, f"NOT VERIFIED: {unverified}"),)
-    if verification is not None:
-        findings += tuple(
-            Finding("CS573", "note", 0, f"taken on trust: {block}, NC line {line}")
-            for line, block in verification.trusted
-        )
-    path = path_of(target)
-    if output.rejected and path is not None:
-        path += REJECTED
-    result = Result(program, smoothed, form, frame, written, verification, unverified, findings, seconds, path)
-    if output.rejected:
-        raise _rejection(result, "breaks its promise" if broken else "is not verified")
+            output.mark = {**mark, "verdict": judgement.text}
+    if output.failed:
+        raise _failure(replace(result, path=None if path is None else path + FAILED))
     return result
 
 
@@ -353,19 +357,14 @@ def _verified(verifier: Verifier, form: Form, frame: Frame) -> tuple[Verificatio
         if not (own or frame.header or frame.footer):
             raise
         return None, f"{failure.what}, NC line {failure.line}"
-    unsure = [f"{block}, NC line {line}" for line, block in found.trusted[:_TRUSTED_TOLD]]
-    if len(found.trusted) > _TRUSTED_TOLD:
-        unsure.append(f"{len(found.trusted) - _TRUSTED_TOLD} more blocks of your own")
-    if found.unverified:
-        unsure.append(found.unverified)
-    return found, "; ".join(unsure)
+    return found, found.unverified
 
 
-def _rejection(result: Result, why: str) -> PromiseError:
-    kept = "nothing was written" if result.path is None else f"the text is in {result.path}"
-    rejection = PromiseError("CS508", f"the written text {why}; {kept}", file=result.program.source.name)
-    rejection.result = result
-    return rejection
+def _failure(result: Result) -> VerdictError:
+    where = "nothing was written" if result.path is None else f"the program is in {result.path}"
+    failure = VerdictError("CS508", f"the verdict is {result.verdict}; {where}", file=result.program.source.name)
+    failure.result = result
+    return failure
 
 
 def _stage(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:

@@ -48,9 +48,11 @@ def test_a_page_is_one_file_that_fetches_nothing(page, result):
 
 def test_the_verdict_names_the_sharp_corner(page, result):
     meta, arrays = values_of(page)
-    assert meta["verdict"].startswith("OK: within 0.02 mm everywhere; 1 corner stays sharp, first :12 reversal 17")
+    assert meta["verdict"].startswith(
+        "PASSED, 2 to check: within 0.02 mm everywhere; 1 corner stays sharp, first :12 reversal 17"
+    )
     assert re.search(r"(saves|takes) \d+\.\d s", meta["verdict"])
-    assert meta["kept"] is True
+    assert meta["badge"] == "PASSED"
     facts = dict(meta["facts"])
     assert facts["SHA-256 of the CL file"] == hashlib.sha256(b"part").hexdigest()
     assert cornersmooth.__version__ in facts["made by"]
@@ -160,7 +162,7 @@ def test_a_file_without_feeds_says_that_no_speed_is_planned():
 def test_a_page_of_curves_for_whole_runs():
     made = smoothed(method="global")
     meta, arrays = values_of(page_of(made))
-    assert meta["verdict"].startswith("OK: within 0.02 mm everywhere; ")
+    assert meta["verdict"].startswith("PASSED, 2 to check: within 0.02 mm everywhere; ")
     assert dict(meta["facts"])["method"].startswith("global, ")
     assert set(meta["charts"]["speeds"]) == {"direct", "local", "written"}
     assert meta["totals"]["local"] < meta["totals"]["direct"]
@@ -249,7 +251,7 @@ def test_commands_write_pages(tmp_path):
     done = run("smooth", source, "-e", "0.02", "-o", nc, "--report", page)
     assert done.returncode == 0, done.stderr
     said = done.stderr.decode()
-    assert said.startswith("OK: within 0.02 mm everywhere; 1 corner stays sharp, first :12 reversal 17")
+    assert said.startswith("PASSED, 2 to check: within 0.02 mm everywhere; 1 corner stays sharp, first :12 reversal 17")
     assert "part.cls:12 reversal 17" in said
     # the page says the same words
     assert values_of(page.read_text())[0]["verdict"] == said.splitlines()[0]
@@ -261,9 +263,9 @@ def test_commands_write_pages(tmp_path):
     found = tmp_path / "found.html"
     done = run("verify", source, nc, "-e", "0.02", "--report", found)
     assert done.returncode == 0
-    assert done.stdout.decode().startswith("OK: within 0.02 mm everywhere\n")
+    assert done.stdout.decode().startswith("PASSED: within 0.02 mm everywhere\n")
     meta, _ = values_of(found.read_text())
-    assert meta["verdict"].startswith("OK: within 0.02 mm everywhere")
+    assert meta["verdict"].startswith("PASSED: within 0.02 mm everywhere")
     times = tmp_path / "times.html"
     assert run("time", source, "-e", "0.02", "--report", times, "-q").returncode == 0
     meta, _ = values_of(times.read_text())
@@ -280,7 +282,7 @@ def test_the_time_of_long_paths_is_estimated(tmp_path):
         done = run("smooth", source, "-e", "0.02", "-o", nc, "--force", *more)
         assert done.returncode == 0, done.stderr
         verdicts.append(done.stderr.decode().split("\n")[0])
-    opening = "OK: within 0.02 mm everywhere; no corner stays sharp; "
+    opening = r"PASSED, \d to check: within 0.02 mm everywhere; no corner stays sharp; "
     about = re.fullmatch(opening + r"saves about (\d+) s of (\d+) s \(estimated from 66.4 % of the path\)", verdicts[0])
     planned = re.fullmatch(opening + r"saves (\d+\.\d) s of (\d+\.\d) s", verdicts[1])
     for found, right in zip(about.groups(), planned.groups(), strict=True):
@@ -303,10 +305,10 @@ def test_a_text_off_the_path_is_broken_in_words(tmp_path):
     nc.write_text(text.replace(line, line.replace("Y15.", "Y15.3"), 1))
     done = run("verify", source, nc, "-e", "0.02", "--report", page)
     assert done.returncode == 1
-    assert done.stdout.decode().startswith("BROKEN: ")
+    assert done.stdout.decode().startswith("FAILED: ")
     meta, arrays = values_of(page.read_text())
-    assert meta["kept"] is False
-    assert meta["verdict"].startswith("BROKEN: ")
+    assert meta["badge"] == "FAILED"
+    assert meta["verdict"].startswith("FAILED: ")
     assert (arrays["w_off"] > 0.02).any()
 
 
@@ -355,6 +357,6 @@ def test_surface_command(tmp_path):
 def test_a_path_without_any_feed_move_has_a_page():
     path = "TOOL PATH/{name},TOOL,T\n$$ {comment}\nRAPID\nGOTO/0,0,20,0,0,1\nRAPID\nGOTO/9,0,20\nEND-OF-PATH\n"
     meta, arrays = values_of(page_of(smoothed(path)))
-    assert meta["kept"] is True
+    assert meta["badge"] == "PASSED"
     assert not np.isfinite(arrays["w_off"]).any()
     assert len(arrays["c_line"]) == 0

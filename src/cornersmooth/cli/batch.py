@@ -10,9 +10,10 @@ from queue import SimpleQueue
 
 from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.job import Job, Outcome, run_job
+from cornersmooth.verdict import Verdict
 
-#: what becomes of a file
-STATUSES = ("done", "skipped", "rejected", "failed")
+#: what becomes of a file: a verdict, nothing as before, or none of both
+STATUSES = (*map(str, Verdict), "skipped", "error")
 
 
 class Batch:
@@ -52,7 +53,7 @@ class Batch:
             yield from self._beside(ending)
 
     def _interrupted(self) -> str:
-        ready = self.counts["done"] + self.counts["skipped"]
+        ready = self.counts.total() - self.counts["error"] - self.counts[Verdict.FAILED]
         return f"interrupted: {ready} of {len(self.jobs)} done; run again to continue"
 
     def _counted(self, outcome: Outcome) -> Outcome:

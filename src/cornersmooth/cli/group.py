@@ -68,7 +68,7 @@ class LazyGroup(click.Group):
 @click.group(
     cls=LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 1 done, but a promise is broken; 2 wrong usage or configuration; "
+    epilog="Exit codes: 0 done; 1 the program FAILED, or is not PASSED under --strict; 2 wrong usage or configuration; "
     "3 input cannot be read or is not valid; 4 output cannot be written.",
 )
 @click.version_option(__version__, prog_name="cornersmooth")
@@ -112,7 +112,7 @@ def run(args: list[str] | None, ending: Ending) -> int:
         return 4
     except (click.exceptions.Abort, KeyboardInterrupt):
         return EXIT_INTERRUPTED
-    except Exception as failure:  # a fault of ours: said in a line, and never with the code of a broken promise
+    except Exception as failure:  # a fault of ours: said in a line, and never with the code of a verdict
         if isinstance(failure, OSError) and failure.errno in _NO_ROOM:  # files are spoken for: it is standard output
             return _unwritten(failure)
         _say(internal_error(failure))

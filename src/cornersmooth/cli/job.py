@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO, cast
 from cornersmooth.cli.files import STANDARD, Beginning, check_path, read_input, target_of
 from cornersmooth.cli.fingerprint import fingerprint
 from cornersmooth.cli.show import more
-from cornersmooth.errors import CornersmoothError, PromiseError, SettingsError
+from cornersmooth.errors import CornersmoothError, SettingsError, VerdictError
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import ClosedPipe, make_folder, open_output, read_mark
+from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
@@ -33,7 +34,7 @@ _OURS = {
 #: exit code for a fault of the program itself
 EXIT_INTERNAL = 70
 
-#: problems of a rejected file that are printed
+#: problems of a program that are printed
 _PROBLEMS_SHOWN = 5
 
 
@@ -55,8 +56,8 @@ class Job:
         For moves without one.
     verify : bool
         Whether the text is read back.
-    require_verify : bool
-        Whether a text that is not wholly verified is set aside.
+    strict : bool
+        Whether a program with any verdict but PASSED is an error.
     alone : bool
         Whether no other job runs at the same time: verification may use all processors.
     batch : bool
@@ -89,7 +90,7 @@ class Job:
     feed: float | None
     force: bool
     verify: bool = True
-    require_verify: bool = False
+    strict: bool = False
     alone: bool = False
     batch: bool = False
     skip_existing: bool = False
@@ -111,19 +112,22 @@ class Outcome:
     contents: dict[str, Any] = field(default_factory=dict)
     #: why nothing had to be done
     skipped: str = ""
-    #: what of the text is not verified; empty for nothing
-    unverified: str = ""
+    #: the verdict in one line, of an earlier run where nothing had to be done; empty where there is none
+    verdict_text: str = ""
     #: planned times
     saving: Saving | None = None
     #: lines that standard output did not get
     held_back: int = 0
 
     @property
+    def verdict(self) -> str:
+        """The word of it; empty where there is none."""
+        return next((str(word) for word in Verdict if self.verdict_text.startswith(word)), "")
+
+    @property
     def status(self) -> str:
-        """What became of it, in a word."""
-        if self.skipped:
-            return "skipped"
-        return {0: "done", 1: "rejected"}.get(self.exit_code, "failed")
+        """What became of it: ``skipped``, a verdict, or ``error`` where it did not come to one."""
+        return "skipped" if self.skipped else self.verdict or "error"
 
 
 def check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | None]:
@@ -203,7 +207,7 @@ def _exists(job: Job, outcome: Outcome) -> bool:
 def _made_of(job: Job, source: bytes) -> str:
     """Name for everything that the text of a job depends on."""
     text = hashlib.sha256(source).hexdigest()
-    wanted = (job.verify, job.require_verify, job.feed, job.plan_feeds)
+    wanted = (job.verify, job.strict, job.feed, job.plan_feeds)
     return fingerprint(text, job.reading, job.settings, job.form, job.frame, *wanted)
 
 
@@ -219,12 +223,12 @@ def _may_replace(job: Job, made_of: str, outcome: Outcome) -> bool | None:
     if job.run and before.get("run") == job.run:
         return True
     if all(map(os.path.exists, job.reports)):
-        outcome.skipped, outcome.unverified = "nothing has changed", before.get("not_verified", "")
+        outcome.skipped, outcome.verdict_text = "nothing has changed", before.get("verdict", "")
     return True
 
 
 def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
-    """Make text and reports; a broken promise goes to the outcome, and why there was nothing to do."""
+    """Make text and reports; a verdict that is not good enough goes to the outcome, and why there was nothing to do."""
     from cornersmooth.pipeline import postprocess
 
     source, name = read_input(job.source)
@@ -251,24 +255,24 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
             feed=job.feed,
             plan_feeds=job.plan_feeds,
             verify=job.verify,
-            require_verified=job.require_verify,
+            strict=job.strict,
             force=may_replace[job.target],
             mark={"made_of": made_of, "run": job.run} if made_of else None,
             processes=None if job.alone else 1,
             progress=progress,
         )
-    except PromiseError as broken:
-        result = broken.result
-        outcome.exit_code = broken.exit_code
-        outcome.message = _say_rejected(name, result, broken)
+    except VerdictError as failure:
+        result = failure.result
+        outcome.exit_code = failure.exit_code
+        outcome.message = _say_failed(name, result, failure)
     if beginning is not None:
         outcome.held_back = beginning.held_back
-    outcome.unverified = result.unverified
     contents = result.report()
+    outcome.verdict_text = contents["verdict_text"]
     for path in job.reports:
         saving = _write_report(path, job, bool(may_replace[path]), source, result, contents)
         outcome.saving = saving or outcome.saving
-    if job.plan[1] and not outcome.saving and result.verification is not None and result.verification.passed:
+    if job.plan[1] and not outcome.saving and result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE):
         outcome.saving = _planned(job, result)
     if job.plot:
         picture = _picture(job, result, contents)
@@ -280,9 +284,9 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
 def _picture(job: Job, result: Result, contents: dict[str, Any]) -> bytes:
     from cornersmooth.page.pages import read_written
     from cornersmooth.report.pathplot import draw_path
-    from cornersmooth.report.verdict import verdict
+    from cornersmooth.report.verdict import first_line
 
-    title = f"{os.path.basename(result.program.source.name)}\n{verdict(contents)}"
+    title = f"{os.path.basename(result.program.source.name)}\n{first_line(contents)}"
     tolerance = result.smoothed.settings.verified_tolerance
     form = os.path.splitext(job.plot)[1].lower().lstrip(".")
     nc = read_written(result, result.frame)
@@ -325,12 +329,12 @@ def _write_report(
     return saving
 
 
-def _say_rejected(name: str, result: Result, broken: PromiseError) -> str:
+def _say_failed(name: str, result: Result, failure: VerdictError) -> str:
     """Say what verification found, and where the text is now."""
     found = result.verification
     problems = found.problems[:_PROBLEMS_SHOWN] if found is not None else ()
     lines = [f"{name}:{problem.cl_line}: error: {problem.text} (NC line {problem.nc_line})" for problem in problems]
     if found is not None and (rest := found.problem_count - len(lines)) > 0:
         lines.append(f"{name}: {more(rest, 'problem')}; a JSON report lists them")
-    lines.append(f"{name}: error: {broken.what}")
+    lines.append(f"{name}: error: {failure.what}")
     return "\n".join(lines)

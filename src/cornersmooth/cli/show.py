@@ -65,13 +65,14 @@ def progress_bar(quiet: bool, *, rate: bool = False) -> Iterator[Progress | None
         yield advance
 
 
-def show_findings(source: str, contents: dict[str, Any], verbose: int) -> None:
-    """Print the findings of one file, warnings first, each on its line."""
-    told = [finding for finding in contents["findings"] if finding["code"] != NOT_VERIFIED]  # has a line of its own
-    ranked = sorted(told, key=lambda finding: ("error", "warning", "note").index(finding["severity"]))
+def show_findings(source: str, findings: list[dict[str, Any]], verbose: int) -> None:
+    """Print the findings of one file, each on its line: first what is to be checked, all of it."""
+    told = [finding for finding in findings if finding["code"] != NOT_VERIFIED]  # the first line says it
+    ranked = sorted(told, key=_rank)
     if not verbose:
         ranked = [finding for finding in ranked if finding["severity"] != "note"]
-    shown = ranked if verbose else ranked[:_FINDINGS_SHOWN]
+    count = max(_FINDINGS_SHOWN, sum(finding["to_check"] for finding in ranked))
+    shown = ranked if verbose else ranked[:count]
     for finding in shown:
         place = f"{source}:{finding['line']}" if finding["line"] else source
         times = f" ({finding['count']} times)" if finding["count"] > 1 else ""
@@ -80,11 +81,15 @@ def show_findings(source: str, contents: dict[str, Any], verbose: int) -> None:
         print_line(f"{source}: {more(len(ranked) - len(shown), 'finding')}; -v shows them")
 
 
-def show_verdict(contents: dict[str, Any], saving: Saving | None = None) -> None:
-    """Print how it went, in one sentence."""
-    from cornersmooth.report.verdict import verdict
+def _rank(finding: dict[str, Any]) -> int:
+    return 0 if finding["to_check"] else ("error", "warning", "note").index(finding["severity"]) + 1
 
-    console().print(verdict(contents, saving), style="bold")
+
+def show_verdict(contents: dict[str, Any], saving: Saving | None = None) -> None:
+    """Print the verdict, in one line."""
+    from cornersmooth.report.verdict import first_line
+
+    console().print(first_line(contents, saving), style="bold")
 
 
 def show_summary(contents: dict[str, Any], verbose: int) -> None:
@@ -102,8 +107,8 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
         out.print(Text.assemble((f"{label:<{_LABEL}}", "bold"), text))
 
     say("input", f"{given['name']}: {given['dialect']}, {given['poses']} poses, {given['units']}")
-    kept = ", ".join(f"{count} {reason}" for reason, count in summary["not_smoothed"].items())
-    say("corners", f"{summary['smoothed']} of {summary['corners']} rounded" + (f" ({kept})" if kept else ""))
+    sharp = ", ".join(f"{count} {reason}" for reason, count in summary["not_smoothed"].items())
+    say("corners", f"{summary['smoothed']} of {summary['corners']} rounded" + (f" ({sharp})" if sharp else ""))
     say(
         "limited by",
         f"the tolerance ({summary['limited_by_tolerance']} of them), segment length ({summary['limited_by_segment']})",
@@ -127,12 +132,9 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
         if own_axis:
             second = f"tool axis {found['max_orientation_deviation_deg']:.4f}°"
         say(
-            "verified",
-            f"{'passed' if found['passed'] else 'FAILED'}: tip {found['max_tip_deviation_mm']:.4f} mm, "
-            f"{second} in the written text",
+            "measured",
+            f"tip {found['max_tip_deviation_mm']:.4f} mm, {second} in the written program",
         )
-    if "not_verified" in contents:
-        say("NOT VERIFIED", contents["not_verified"])
     say("blocks", f"{summary['blocks_in']} in, {summary['blocks_out']} out")
     if verbose:
         times = ", ".join(f"{stage} {value:.3f}" for stage, value in summary["seconds"].items())

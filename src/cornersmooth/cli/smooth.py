@@ -20,6 +20,7 @@ from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import more, print_line, progress_bar, show_findings, show_summary, show_verdict
 from cornersmooth.cli.summary import check_summary, counts_line, line_of, row_of, write_summary
 from cornersmooth.output import make_folder
+from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.nc import Form, Frame
@@ -32,7 +33,7 @@ _NAMED = 3
     "smooth",
     cls=ShopCommand,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 1 done, but a promise is broken; 2 wrong usage or configuration; "
+    epilog="Exit codes: 0 done; 1 the program FAILED, or is not PASSED under --strict; 2 wrong usage or configuration; "
     "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
 )
 @click.argument("inputs", type=PATH, nargs=-1, required=True, metavar="IN...")
@@ -59,7 +60,7 @@ _NAMED = 3
 @reading.reading_options
 @reading.tool_options
 @nc_text.no_verify
-@nc_text.require_verify
+@nc_text.strict
 @outputs.force
 @outputs.quiet
 @outputs.verbose
@@ -97,31 +98,31 @@ def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
         if outcome.contents and not quiet:
             show_summary(outcome.contents, verbose)
         return outcome.exit_code
-    rows, worst, unverified = [], 0, 0
+    rows, worst = [], 0
     with progress_bar(quiet, rate=True) as progress:
         batch = Batch(jobs, given["jobs"], progress, scheduler=given["scheduler"] or "")
         for outcome in batch.run(ending):
-            told = outcome.status in ("done", "skipped") and not quiet and (progress is None or verbose > 0)
+            told = outcome.status != "error" and not quiet and (progress is None or verbose > 0)
             if told:
                 print_line(line_of(outcome))
             _tell(outcome, quiet, verbose, told)
             rows.append(row_of(outcome))
-            worst, unverified = max(worst, outcome.exit_code), unverified + bool(outcome.unverified)
+            worst = max(worst, outcome.exit_code)
     if given["summary"]:
         write_summary(given["summary"], rows)
     if not quiet:
-        print_line(counts_line(batch.counts, unverified))
+        print_line(counts_line(rows))
     return worst
 
 
 def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> None:
-    """Print what went wrong and what was noticed, and what is not verified where no line or summary has told it."""
+    """Print what went wrong and what was noticed, and any verdict but PASSED where no line has told it."""
     if outcome.message:
         print_line(outcome.message)
-    if outcome.unverified and not told and (quiet or outcome.job.batch):
-        print_line(f"{outcome.job.source}: NOT VERIFIED: {outcome.unverified}")
+    elif not told and (quiet or outcome.job.batch) and outcome.verdict not in ("", Verdict.PASSED):
+        print_line(f"{outcome.job.source}: {outcome.verdict_text}")
     if outcome.contents and not quiet:
-        show_findings(outcome.job.source, outcome.contents, verbose)
+        show_findings(outcome.job.source, outcome.contents["findings"], verbose)
 
 
 def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
@@ -150,7 +151,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 plan_feeds=motion.planned_limits_of(given),
                 force=given["force"],
                 verify=not given["no_verify"],
-                require_verify=given["require_verify"],
+                strict=given["strict"],
                 alone=len(files) == 1,
                 batch=bool(folder),
                 skip_existing=given["skip_existing"],
@@ -183,8 +184,8 @@ def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:
     folder = given["directory"]
     if given["quiet"] and given["verbose"]:
         raise click.UsageError("-q and -v exclude each other")
-    if given["no_verify"] and given["require_verify"]:
-        raise click.UsageError("--no-verify and --require-verify exclude each other")
+    if given["no_verify"] and given["strict"]:
+        raise click.UsageError("--no-verify and --strict exclude each other")
     if folder and given["output"]:
         raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
     if given["glob"] and not folder:

@@ -6,7 +6,8 @@ import csv
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cornersmooth.cli.batch import STATUSES
@@ -14,20 +15,20 @@ from cornersmooth.cli.files import target_of
 from cornersmooth.cli.job import Outcome
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
+from cornersmooth.verdict import Verdict
 
 
 def line_of(outcome: Outcome) -> str:
-    """One line for a file that did not fail."""
+    """One line for a file that has a verdict, or was skipped."""
     name, row = outcome.job.source, row_of(outcome)
+    head, _, what = outcome.verdict_text.partition(": ")
     if outcome.status == "skipped":
-        told = f"skipped  {name}: {outcome.skipped}"
-    else:
-        told = (
-            f"{outcome.status:<8} {name}: {row['smoothed']} of {row['corners']} corners, "
-            f"tip {row['max_tip_error_mm']:.4f} mm, {_second(outcome.contents)}, "
-            f"{row['blocks']} blocks, {row['seconds']:.1f} s"
-        )
-    return told + (f", NOT VERIFIED: {outcome.unverified}" if outcome.unverified else "")
+        return f"skipped   {name}: {outcome.skipped}" + (f"; {outcome.verdict_text}" if what else "")
+    return (
+        f"{head:<8}  {name}: {what}; {row['smoothed']} of {row['corners']} corners, "
+        f"tip {row['max_tip_error_mm']:.4f} mm, {_second(outcome.contents)}, "
+        f"{row['blocks']} blocks, {row['seconds']:.1f} s"
+    )
 
 
 def _second(contents: Mapping[str, Any]) -> str:
@@ -38,12 +39,19 @@ def _second(contents: Mapping[str, Any]) -> str:
     return f"axis point {summary['max_axis_error_mm']:.4f} mm"
 
 
-def counts_line(counts: Mapping[str, int], unverified: int) -> str:
-    """How many files there were of each status."""
-    total = sum(counts.values())
-    parts = [f"{counts[status]} {status}" for status in STATUSES if counts.get(status)]
-    parts += [f"{unverified} NOT VERIFIED"] if unverified else []
-    return f"{total} file{'s' * (total != 1)}: {', '.join(parts)}"
+def counts_line(rows: Sequence[Mapping[str, Any]]) -> str:
+    """How many files there were of each status, and what is to be looked at among them."""
+    parts = []
+    for status in STATUSES:
+        same = [row for row in rows if row["status"] == status]
+        checks = sum(bool(row["to_check"]) for row in same)
+        within = [f"{checks} to check"] if checks else []
+        if status == "skipped":  # what the run before said of them
+            words = Counter(row["verdict"] for row in same)
+            within = [f"{words[word]} {word}" for word in list(Verdict)[1:] if words[word]]
+        name = "errors" if status == "error" and len(same) != 1 else status
+        parts += [f"{len(same)} {name}" + (f" ({', '.join(within)})" if within else "")] if same else []
+    return f"{len(rows)} file{'s' * (len(rows) != 1)}: {', '.join(parts)}"
 
 
 def row_of(outcome: Outcome) -> dict[str, Any]:
@@ -57,7 +65,11 @@ def row_of(outcome: Outcome) -> dict[str, Any]:
         "status": outcome.status,
         "exit_code": outcome.exit_code,
         "reason": outcome.message or outcome.skipped,
-        "not_verified": outcome.unverified,
+        "verdict": outcome.verdict,
+        "verdict_text": outcome.verdict_text,
+        "to_check": contents.get("to_check"),
+        "left_out": contents.get("left_out"),
+        "not_verified": contents.get("not_verified"),
         "poses": contents.get("input", {}).get("poses"),
         "corners": summary.get("corners"),
         "smoothed": summary.get("smoothed"),

@@ -15,10 +15,11 @@ from cornersmooth.cli.files import STANDARD, check_path, read_input, read_lines,
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import more
+from cornersmooth.cli.show import more, show_findings
 from cornersmooth.errors import SettingsError
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import open_output
+from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.model import Program
@@ -77,7 +78,9 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.cl import read
     from cornersmooth.nc import own_words
     from cornersmooth.nc_reader.source import readable_twice
+    from cornersmooth.report import findings_table
     from cornersmooth.report.along import deviation_along
+    from cornersmooth.report.verdict import judge, trusted_blocks
     from cornersmooth.verify import useful_processes, verify
 
     if source == text == STANDARD:
@@ -122,11 +125,15 @@ def command(source: str, text: str, **given: Any) -> int:
         picture = draw_deviation(deviation_along(program, nc, **how), given["tolerance"], form)
         with open_output(target_of(given["plot"])) as output:
             output.stream.write(picture)
-    if found.unverified:
-        click.echo(f"{text}: warning: NOT VERIFIED: {found.unverified}", err=True)
     for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
         click.echo(line, err=True)
-    if not given["quiet"]:
+    findings = (*program.findings, *trusted_blocks(found))
+    if given["quiet"]:
+        if found.verdict not in (Verdict.PASSED, Verdict.FAILED):
+            click.echo(f"{text}: {judge(found, findings).text}", err=True)
+    else:
+        show_findings(name, findings_table(findings), given["verbose"])
+        click.echo(judge(found, findings).text)
         for line in _summary(found):
             click.echo(line)
         if given["verbose"]:
@@ -251,12 +258,8 @@ def _problems(found: Verification, name: str, text: str, verbose: int) -> Iterat
 
 def _summary(found: Verification) -> Iterator[str]:
     """Label and text of everything measured."""
-    from cornersmooth.report.verdict import kept_text
     from cornersmooth.verify.deviation import TOGETHER
 
-    yield kept_text(found.to_dict())
-    failed = f"FAILED: {found.problem_count} problem{'s' * (found.problem_count != 1)}"
-    yield f"{'result':<18}{'passed' if found.passed else failed}"
     own_axis = found.axis_tolerance is not None
     second = f"tool axis {found.axis_tolerance:g} deg" if own_axis else f"axis point at {found.axis_length:g} mm"
     yield f"{'tolerance':<18}{found.tolerance:g} mm, {second}"
@@ -277,9 +280,8 @@ def _summary(found: Verification) -> Iterator[str]:
         yield f"{'rewind':<18}the cut is left at NC line {out}, and gone on with at NC line {back}"
     if len(found.rewinds) > _REWINDS_SHOWN:
         yield f"{'':<18}{more(len(found.rewinds) - _REWINDS_SHOWN, 'rewind')}"
-    for line, block in found.trusted:
-        yield f"{'taken on trust':<18}{block}, NC line {line}"
-    yield f"{'blocks':<18}{found.blocks}, shortest move {_place(found.shortest, 'mm')}"
+    least = f", shortest move {_place(found.shortest, 'mm')}" if found.shortest.nc_line else ""
+    yield f"{'blocks':<18}{found.blocks}{least}"
 
 
 def _along(found: Verification, along: Distribution) -> Iterator[str]:

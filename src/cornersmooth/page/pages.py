@@ -17,10 +17,11 @@ from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.page.document import document
 from cornersmooth.page.scene import Story, Subject, scene
-from cornersmooth.report.verdict import Saving, kept_text, saving_text, times_text, verdict
+from cornersmooth.report.verdict import Saving, first_line, judge, saving_text, times_text, trusted_blocks
 from cornersmooth.saving import estimate_saving
 from cornersmooth.settings import TIMED_POSES_VERBOSE, TIMED_STRETCHES_VERBOSE, Settings
 from cornersmooth.surface.tool import Tool
+from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, verify
 
 if TYPE_CHECKING:
@@ -74,16 +75,16 @@ def page_and_saving(
         *_settings_facts(settings),
         *_limit_facts(limits, form.machine),
     ]
-    kept = None if result.verification is None else result.verification.passed
+    badge = result.verdict
     notes = [f"{finding.severity}, line {finding.line}: {finding.text}" for finding in result.findings[:_MOST_NOTES]]
 
-    meta, pack = scene(subject, Story(result.program.source.name, "", kept, facts, notes))
+    meta, pack = scene(subject, Story(result.program.source.name, "", badge, facts, notes))
     saving = _saving(meta["totals"], result.program)
-    if saving is None and kept:
+    if saving is None and badge not in (Verdict.FAILED, Verdict.NOT_VERIFIED):
         saving = estimate_saving(
             result.program, settings, form, limits, poses=TIMED_POSES_VERBOSE, stretches=TIMED_STRETCHES_VERBOSE
         )
-    meta["verdict"] = verdict(contents, saving)
+    meta["verdict"] = first_line(contents, saving)
     return document(meta, pack), saving
 
 
@@ -132,7 +133,8 @@ def verified_page(
         *_measured_facts(found),
         *_limit_facts(limits, machine),
     ]
-    text = kept_text(found.to_dict())
+    judgement = judge(found, (*program.findings, *trusted_blocks(found)))
+    text = judgement.text
     if surface is not None:
         text += "; " + surface_text(surface)
         facts[-1:-1] = [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]
@@ -142,7 +144,7 @@ def verified_page(
         saving = _saving(seconds, program) if surface is None else None
         return text if saving is None else f"{text}; {saving_text(saving)}"
 
-    return _page(subject, Story(program.source.name, "", found.passed, facts, notes), sentence)
+    return _page(subject, Story(program.source.name, "", judgement.verdict, facts, notes), sentence)
 
 
 def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None = None) -> str:
@@ -155,14 +157,16 @@ def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None =
     write(smoothed, stream, form=form)
     settings = smoothed.settings
     tolerance, own = settings.verified_tolerance, settings.verified_axis_tolerance
-    nc = read_nc(stream.getvalue(), tolerance=tolerance, axis_length=settings.axis_scale)
+    written = stream.getvalue()
+    nc = read_nc(written, tolerance=tolerance, axis_length=settings.axis_scale)
+    found = verify(program, written, tolerance=tolerance, axis_length=settings.axis_length, axis_tolerance=own)
     method = settings.method
     laws = {"direct": compared.laws["direct_velocity_jump"], "local": compared.laws[method]}
     subject = Subject(
         program=program,
         nc=nc,
         settings=settings,
-        verification=verify(program, nc, tolerance=tolerance, axis_length=settings.axis_length, axis_tolerance=own),
+        verification=found,
         smoothed=smoothed,
         laws=laws,
         limits=compared.limits,
@@ -177,8 +181,7 @@ def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None =
     ]
     methods = [name for name in compared.laws if not name.startswith("direct")]
     text = times_text(compared.seconds, methods)
-    kept = None if subject.verification is None else subject.verification.passed
-    return _page(subject, Story(program.source.name, text, kept, facts), lambda seconds: text)
+    return _page(subject, Story(program.source.name, text, found.verdict, facts), lambda seconds: text)
 
 
 #: findings or problems that are told as notes

@@ -19,6 +19,7 @@ from cornersmooth.report.paths import OriginalPath, WrittenPath, original_path, 
 from cornersmooth.report.thinning import thinned
 from cornersmooth.settings import Settings
 from cornersmooth.surface.tool import Tool, tools_of
+from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification
 
 if TYPE_CHECKING:
@@ -49,8 +50,7 @@ class Story:
         Name of the part.
     verdict : str
         One sentence.
-    kept : bool or None
-        Whether the promise is kept; None where nothing was measured.
+    badge : Verdict
     facts : sequence of (str, str)
         Labels and values: settings, versions, hash.
     notes : sequence of str
@@ -59,7 +59,7 @@ class Story:
 
     title: str
     verdict: str
-    kept: bool | None
+    badge: Verdict
     facts: Sequence[tuple[str, str]] = ()
     notes: Sequence[str] = ()
 
@@ -148,7 +148,7 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         "schema": SCHEMA,
         "title": story.title,
         "verdict": story.verdict,
-        "kept": story.kept,
+        "badge": str(story.badge),
         "facts": [list(fact) for fact in story.facts],
         "notes": [*story.notes, *planned.left_out, *_thinning_note(len(written), original)],
         "tolerance": settings.verified_tolerance,

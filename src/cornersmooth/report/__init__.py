@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cornersmooth.errors import Finding
 from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status
 from cornersmooth.report.corners import STATUS_NAMES, corner_table, worst_corners
-from cornersmooth.report.verdict import sharp_corners
+from cornersmooth.report.verdict import judge, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import dot, norm
+
+if TYPE_CHECKING:
+    from cornersmooth.verify import Verification
 
 __all__ = ["SCHEMA", "corners_csv", "report", "report_json"]
 
@@ -29,7 +33,7 @@ def report(
     blocks_out: int | None = None,
     seconds: Mapping[str, float] | None = None,
     findings: tuple[Finding, ...] = (),
-    verification: Mapping[str, Any] | None = None,
+    verification: Verification | None = None,
     unverified: str = "",
 ) -> dict[str, Any]:
     """Everything the JSON report says (design section 7); keys carry their unit.
@@ -44,13 +48,15 @@ def report(
         Time of each stage.
     findings : tuple of Finding
         Those of the writer, besides those of the program.
-    verification : mapping, optional
+    verification : Verification, optional
         What `cornersmooth.verify` measured in the written text.
     unverified : str
         What of the text was not verified, and why; empty for nothing.
     """
     from cornersmooth import __version__
 
+    told = (*smoothed.findings, *findings)
+    judgement = judge(verification, told, unverified)
     program, corners = smoothed.program, smoothed.corners
     done, runs = corners.rounded, smoothed.runs
     chains = program.chains
@@ -85,6 +91,8 @@ def report(
     summary |= construction_of(smoothed.settings.method).report_summary(corners)
     contents: dict[str, Any] = {
         "schema": SCHEMA,
+        **judgement.as_dict(),
+        "not_verified": judgement.unverified,
         "tool": {"name": "cornersmooth", "version": __version__},
         "input": {
             "name": program.source.name,
@@ -98,24 +106,18 @@ def report(
         },
         "settings": smoothed.settings.as_dict(),
         "summary": summary,
-        "findings": [
-            {
-                "code": finding.code,
-                "severity": finding.severity,
-                "line": finding.line,
-                "text": finding.text,
-                "count": finding.count,
-            }
-            for finding in (*smoothed.findings, *findings)
-        ],
+        "findings": findings_table(told),
         "worst": _records(smoothed, worst.rows, dense=dense),
         "sharp": listed,
     }
     if verification is not None:
-        contents["verification"] = dict(verification)
-    if unverified:
-        contents["not_verified"] = unverified
+        contents["verification"] = verification.to_dict()
     return contents
+
+
+def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """Findings as plain values."""
+    return [{**asdict(finding), "to_check": finding.to_check} for finding in findings]
 
 
 def report_json(contents: Mapping[str, Any]) -> str:

@@ -1,16 +1,21 @@
-"""The outcome in one sentence, in the same words on the terminal and on the page."""
+"""The verdict in one line, in the same words on the terminal, in batches, on the page and in reports."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cornersmooth.errors import Finding
 from cornersmooth.model import SmoothProgram
 from cornersmooth.report.corners import corner_table
 from cornersmooth.smoothing.sharp import STRAIGHT_ON, other_corners, sharp_rows
+from cornersmooth.verdict import Verdict
+
+if TYPE_CHECKING:
+    from cornersmooth.verify import Verification
 
 #: sharp corners that a report lists
 _LISTED = 100
@@ -63,8 +68,105 @@ class Saving:
     part: float = 1.0
 
 
-def verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> str:
-    """Say how it went.
+@dataclass(frozen=True)
+class Judgement:
+    """A verdict and what it rests on.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    to_check : int
+        Warnings that bear on the metal.
+    left_out : int
+        Holes that an option left out.
+    unverified : str
+        What was not looked at; empty for nothing.
+    what : str
+        One clause: what was found.
+    """
+
+    verdict: Verdict
+    to_check: int
+    left_out: int
+    unverified: str
+    what: str
+
+    @property
+    def head(self) -> str:
+        """The verdict, and how much is to check: ``PASSED, 3 to check``."""
+        return self.verdict + (f", {self.to_check:,} to check" if self.to_check else "")
+
+    @property
+    def text(self) -> str:
+        """The first line of every output."""
+        return f"{self.head}: {self.what}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as reports begin with them."""
+        values = {"verdict": str(self.verdict), "verdict_text": self.text}
+        return values | {"to_check": self.to_check, "left_out": self.left_out}
+
+
+def judge(found: Verification | None, findings: Iterable[Finding] = (), unverified: str = "") -> Judgement:
+    """Give the verdict on a program.
+
+    Parameters
+    ----------
+    found : Verification or None
+        What verification found; None where nothing was measured.
+    findings : iterable of Finding
+        What was noticed on the way from the CL file to the program.
+    unverified : str
+        What was not looked at, where `found` does not say it.
+    """
+    findings = tuple(findings)
+    out = [finding for finding in findings if finding.leaves_out]
+    left_out = max(sum(finding.count for finding in out), 0 if found is None else found.left_out)
+    unverified = unverified or ("nothing was measured" if found is None else found.unverified)
+    problems = 0 if found is None else found.problem_count
+    parts = []
+    if found is not None and problems:
+        parts.append(_problems_text(found))
+    if unverified:
+        parts.append(f"not verified: {unverified}" if parts else unverified)
+    if left_out:
+        first = min((finding.line for finding in out if finding.line), default=0)
+        holes = f"{left_out:,} hole{'s' * (left_out != 1)} not drilled"
+        parts.append(holes + (f", first CL line {first}" if first else ""))
+    if found is not None and not problems:
+        axis = "" if found.axis_tolerance is None else f" and {found.axis_tolerance:g} deg"
+        parts.append(f"{'the rest ' if parts else ''}within {found.tolerance:g} mm{axis} everywhere")
+    return Judgement(
+        Verdict.of(problems=problems, unverified=bool(unverified), left_out=left_out),
+        sum(finding.to_check for finding in findings),
+        left_out,
+        unverified,
+        "; ".join(parts),
+    )
+
+
+def _problems_text(found: Verification) -> str:
+    count = found.problem_count
+    text = f"{count:,} {'problem' if count == 1 else 'problems'}"
+    if not found.problems:
+        return text
+    first = found.problems[0]
+    line = f" in NC line {first.nc_line}" if first.nc_line else ""
+    return f"{text}, first{line}: {first.text}"
+
+
+def trusted_blocks(found: Verification) -> Iterator[Finding]:
+    """Blocks of the user's own that nothing was compared with: one finding for each block."""
+    lines: dict[str, list[int]] = {}
+    for line, block in found.trusted:
+        lines.setdefault(block, []).append(line)
+    for block, where in lines.items():
+        text = f"not compared with the CL file: {block}" + (f", NC line {where[0]}" if where[0] else "")
+        yield Finding("CS573", "warning", 0, text, len(where))
+
+
+def first_line(contents: Mapping[str, Any], saving: Saving | None = None) -> str:
+    """Say in one line how it went: the verdict, the sharp corners, the time saved.
 
     Parameters
     ----------
@@ -72,10 +174,7 @@ def verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> str:
         The report.
     saving : Saving, optional
     """
-    found, unverified = contents.get("verification"), contents.get("not_verified", "")
-    parts = ["NOT VERIFIED" + (f": {unverified}" if unverified else "")] if found is None else [kept_text(found)]
-    if found is not None and unverified:
-        parts.append(f"not verified: {unverified}")
+    parts = [contents["verdict_text"]]
     count = contents["summary"]["sharp"]
     if count:
         stay = "corner stays" if count == 1 else "corners stay"
@@ -85,20 +184,6 @@ def verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> str:
     if saving is not None:
         parts.append(saving_text(saving))
     return "; ".join(parts)
-
-
-def kept_text(found: Mapping[str, Any]) -> str:
-    """Say whether the promise is kept, from what verification found (`Verification.to_dict`)."""
-    if found["passed"]:
-        axis = found.get("axis_tolerance_deg")
-        return f"OK: within {found['tolerance_mm']:g} mm{'' if axis is None else f' and {axis:g} deg'} everywhere"
-    count, problems = found["problem_count"], found["problems"]
-    text = f"BROKEN: {count:,} {'problem' if count == 1 else 'problems'}"
-    if problems:
-        first = problems[0]
-        line = f" in NC line {first['nc_line']}" if first["nc_line"] else ""
-        text += f", first{line}: {first['text']}"
-    return text
 
 
 def saving_text(saving: Saving) -> str:

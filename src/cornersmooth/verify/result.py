@@ -9,6 +9,7 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.verdict import Verdict
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Worst
 from cornersmooth.verify.task import Task
 
@@ -74,11 +75,14 @@ class Verification:
     pose_nc_line : (n,) int64
         NC line that passes nearest.
     trusted : tuple of (int, str)
-        NC lines, and blocks, whose meaning is taken on trust because the user put them there.
+        NC lines, and blocks of the user's own, that were not compared with the CL file and do not bear on the motion.
+        Line 0: statements of a kind, wherever they are.
     unverified : str
-        What of the text was not looked at; empty where all of it was.
+        What of the text was not looked at and may bear on the motion; empty where all of it was.
     rewinds : tuple of (int, int)
         NC lines where a cut is left along the tool, and where the tool comes back into it.
+    left_out : int
+        Holes that the text leaves out, as its comments say.
     """
 
     passed: bool
@@ -106,6 +110,12 @@ class Verification:
     trusted: tuple[tuple[int, str], ...] = ()
     unverified: str = ""
     rewinds: tuple[tuple[int, int], ...] = ()
+    left_out: int = 0
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst that applies."""
+        return Verdict.of(problems=self.problem_count, unverified=bool(self.unverified), left_out=self.left_out)
 
     @property
     def max_tip_deviation_mm(self) -> float:
@@ -136,6 +146,7 @@ class Verification:
         }
         return {
             "schema": "cornersmooth-verification/1",
+            "verdict": str(self.verdict),
             "passed": self.passed,
             "tolerance_mm": self.tolerance,
             "axis_length_mm": _finite(self.axis_length),
@@ -146,6 +157,7 @@ class Verification:
             "curves": self.curves,
             "problem_count": self.problem_count,
             "not_verified": self.unverified,
+            "left_out": self.left_out,
             "rewinds": [{"nc_line": out, "back_nc_line": back} for out, back in self.rewinds],
             "trusted": [{"nc_line": line, "text": text} for line, text in self.trusted],
             **{key: _finite(where.value) for key, where in places.items()},

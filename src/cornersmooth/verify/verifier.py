@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -37,6 +37,12 @@ from cornersmooth.verify.word_places import WordPlaces
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
+
+#: kinds of statements that bear on the motion: where the path is moved to
+_OF_MOTION: Final = frozenset(("compensation", "register", "offset"))
+
+#: blocks that were not looked at and are told one by one
+_UNSURE_TOLD: Final = 3
 
 #: poses from which on it is worth while to let other processes work
 _LONG: Final = 30_000
@@ -202,11 +208,26 @@ class Verifier:
         found = measured.verification(
             problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
-        unverified = f"what your own table says of {', '.join(sorted(own))}" if own else ""
-        if not self._words:
-            unverified = "words beside the motion, which a table of your own may define"
         rewinds = tuple((out, back) for *_, out, back in reader.left_cuts.found)
-        return replace(found, trusted=tuple(check.trusted), unverified=unverified, rewinds=rewinds)
+        trusted = [(0, _own_table(own - _OF_MOTION))] if own - _OF_MOTION else []
+        return replace(
+            found, trusted=(*trusted, *check.trusted), unverified=self._unverified(check, own), rewinds=rewinds
+        )
+
+    def _unverified(self, check: WordCheck, own: Set[str]) -> str:
+        """What of the text was not looked at and may bear on the motion."""
+        if not self._words:
+            return "words beside the motion, which a table of your own may define"
+        unsure = [f"{block}, NC line {line}" for line, block in check.unsure[:_UNSURE_TOLD]]
+        if len(check.unsure) > _UNSURE_TOLD:
+            unsure.append(f"{len(check.unsure) - _UNSURE_TOLD} more blocks of your own")
+        if own & _OF_MOTION:
+            unsure.append(_own_table(own & _OF_MOTION))
+        return "; ".join(unsure)
+
+
+def _own_table(kinds: Set[str]) -> str:
+    return f"what your own table says of {', '.join(sorted(kinds))}"
 
 
 @taking_what(Verifier)
@@ -270,7 +291,7 @@ class _Measured:
         if self.words and self.batches.elements:  # without any motion nothing has a place
             of_statements, at_home = self.places.problems(self.batches, unsaid, self.own, self.clamps)
             problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
-        return Verification.of(
+        found = Verification.of(
             self.findings,
             self.poses,
             problems,
@@ -280,6 +301,7 @@ class _Measured:
             elements=self.batches.elements,
             curves=curves,
         )
+        return replace(found, left_out=left_out)
 
 
 def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measured:

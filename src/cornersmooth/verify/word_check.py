@@ -39,6 +39,9 @@ FRAME: Final = "program frame"
 _TOOL_CALL: Final = re.compile(r"TOOL CALL \d")
 _SPINDLE: Final = re.compile(r"M[345]")
 
+#: words that bear on no motion: tool, spindle, stops, coolant (ISO 6983-1, M0 to M9 and M19)
+_BESIDE_MOTION: Final = re.compile(r"T\d+|S\d+(\.\d*)?|M(\d|19)|TOOL CALL \d+( Z)?( S\d+)?")
+
 _CONTROL_CHARACTERS: Final = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
 
 
@@ -74,8 +77,9 @@ class WordCheck:
         self._rules = WordRules(self.list, self._positions.rules, lexer, tolerance)
         self.lexer = lexer
         self.problems: list[Problem] = []
-        #: blocks taken on trust: line and text
+        #: blocks of the user's own that were not compared: line and text, with those that may bear on the motion apart
         self.trusted: list[tuple[int, str]] = []
+        self.unsure: list[tuple[int, str]] = []
         trusted = tuple(trusted)
         self._left = set(trusted)
         plain = [block for block in trusted if "{" not in block]
@@ -143,7 +147,7 @@ class WordCheck:
     def _unframed(self, code: str, line: int, text: str) -> None:
         """Complain of the blocks around the motion; where they are the user's own, it is taken on trust."""
         if FRAME in self._left:
-            self.trusted.append((line, text))
+            self.unsure.append((line, text))
         else:
             self._wrong(code, line, text)
 
@@ -234,7 +238,8 @@ class WordCheck:
         whole = len(rules) == len(words)
         if line.skipped or len(self.problems) > before or any(rule is not None and rule.compared for rule in rules):
             del self.problems[before:]
-            self.trusted.append((line.number, text))
+            harmless = not line.skipped and all(map(_BESIDE_MOTION.fullmatch, words))
+            (self.trusted if harmless else self.unsure).append((line.number, text))
             if whole:
                 kept = [rule is not None and not rule.compared for rule in rules]
                 if "tool" in self._left:  # stops for a tool are told by it

@@ -137,8 +137,8 @@ no_comments = click.option("--no-comments", is_flag=True, help="Leave out what t
 no_verify = click.option(
     "--no-verify", is_flag=True, help="Do not read the written text back and measure it before it takes its place."
 )
-require_verify = click.option(
-    "--require-verify", is_flag=True, help="Set a text aside that is not wholly verified, and end with 1."
+strict = click.option(
+    "--strict", is_flag=True, help="Take no verdict but PASSED: else the program goes to OUT.failed, and 1 is returned."
 )
 
 

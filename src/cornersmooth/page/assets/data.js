@@ -9,7 +9,7 @@
  * @typedef {object} Meta
  * @property {string} title
  * @property {string} verdict
- * @property {boolean | null} kept
+ * @property {string} badge
  * @property {string[][]} facts
  * @property {string[]} notes
  * @property {number} tolerance mm

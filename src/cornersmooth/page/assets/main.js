@@ -75,8 +75,8 @@ function showHead(meta) {
   element("title").textContent = meta.title;
   element("verdict").textContent = meta.verdict;
   const badge = element("badge");
-  badge.textContent = meta.kept === null ? "not verified" : meta.kept ? "kept" : "broken";
-  if (meta.kept !== null) badge.classList.add(meta.kept ? "kept" : "broken");
+  badge.textContent = meta.badge;
+  badge.classList.add(meta.badge.toLowerCase().replace(" ", "-"));
   for (const [label, value] of meta.facts) element("facts").append(made("dt", label), made("dd", value));
   for (const note of meta.notes) element("notes").append(made("li", note));
 }
