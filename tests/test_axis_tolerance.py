@@ -68,8 +68,8 @@ def verified(case: Case, text: bytes | None = None, axis_tolerance: float | None
     return cornersmooth.verify(
         case.program,
         case.text if text is None else text,
-        tolerance=case.settings.verified_tolerance,
-        axis_tolerance=axis_tolerance or case.settings.verified_axis_tolerance,
+        tolerance=case.settings.tolerance,
+        axis_tolerance=axis_tolerance or case.settings.axis_tolerance,
     )
 
 

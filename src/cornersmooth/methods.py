@@ -28,9 +28,6 @@ class Method:
         the paths, and can rotary words follow the curves.
     prescribed : mapping of str to object
         Settings that the method does not leave open.
-    excess : float
-        By how much of ε the written text may exceed ε, besides the rounding of its digits; 0 for a method that takes
-        the rounding off ε and keeps its promise.
     """
 
     name: str
@@ -38,7 +35,6 @@ class Method:
     module: str
     one_parameter: bool = True
     prescribed: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
-    excess: float = 0.0
 
 
 #: in the order of tables, the oldest first
@@ -52,9 +48,6 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 "cornersmooth.smoothing.zhang2016",
                 one_parameter=False,
                 prescribed=MappingProxyType({"shape": "paper", "allocation": "half"}),
-                # On the paper's own Table 1 its axis point leaves the path by 0.0783 mm where ε is 0.078 mm: the bound
-                # (10) holds for each curve, not for the synchronised motion.
-                excess=0.01,
             ),
             Method(
                 "proportional",

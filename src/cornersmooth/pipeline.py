@@ -148,7 +148,7 @@ def reading_back(form: Form) -> dict[str, Any]:
 def read_back(text: bytes | str, form: Form, settings: Settings, name: str | None = None) -> NcProgram:
     """Read a text of the form, or the file that holds it, as its control does; see `nc_reader.read_nc`."""
     how = {key: value for key, value in reading_back(form).items() if key != "trusted"}
-    return read_nc(text, **how, name=name, tolerance=settings.verified_tolerance, axis_length=settings.axis_scale)
+    return read_nc(text, **how, name=name, tolerance=settings.tolerance, axis_length=settings.axis_scale)
 
 
 def postprocess(
@@ -242,9 +242,9 @@ def postprocess(
             verifier = Verifier(
                 program,
                 output.path,
-                tolerance=smoothed.settings.verified_tolerance,
+                tolerance=smoothed.settings.tolerance,
                 axis_length=smoothed.settings.axis_length,
-                axis_tolerance=smoothed.settings.verified_axis_tolerance,
+                axis_tolerance=smoothed.settings.axis_tolerance,
                 weights=provenance.weights,
                 slower=provenance.planned_feeds,
                 processes=processes,

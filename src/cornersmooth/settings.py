@@ -169,6 +169,14 @@ class Settings:
         return self.curve_share * (self.axis_point_allowed - self._axis_point_rounding)
 
     @property
+    def common_tolerance(self) -> float:
+        """What curves may use at the tip and at `axis_scale` from it, where both are measured with one limit, mm."""
+        axis = self._axis_point_rounding
+        if self.axis_tolerance is not None:
+            axis = (self._tip_rounding + axis) / self.axis_length * self.axis_scale
+        return self.curve_share * (self.tolerance - max(self._tip_rounding, axis))
+
+    @property
     def line_tolerances(self) -> tuple[float, float]:
         """What long lines may use at the tip and at the axis point, mm."""
         return (
@@ -183,30 +191,6 @@ class Settings:
     @property
     def _axis_point_rounding(self) -> float:
         return math.sqrt(3) / 2 * (self.tip_resolution + self.axis_point_resolution)
-
-    @property
-    def verified_tolerance(self) -> float:
-        """What verification allows: ε, and more for a method that does not promise ε of the written digits."""
-        excess = METHODS[self.method].excess
-        if not excess:
-            return self.tolerance
-        if self.axis_tolerance is not None:
-            return self._excess_of_both * self.tolerance
-        return (1.0 + excess) * self.tolerance + self._axis_point_rounding
-
-    @property
-    def verified_axis_tolerance(self) -> float | None:
-        """What verification allows the tool axis, degrees; None where the axis point has to keep ε."""
-        if self.axis_tolerance is None or not METHODS[self.method].excess:
-            return self.axis_tolerance
-        chord = self._excess_of_both * chord_of(self.axis_tolerance)
-        return math.degrees(2.0 * math.asin(min(chord / 2.0, 1.0)))
-
-    @property
-    def _excess_of_both(self) -> float:
-        """How many times as much is allowed of tip and axis as they are promised: the same, so `axis_scale` holds."""
-        axis = (self._tip_rounding + self._axis_point_rounding) / self.axis_length * self.axis_scale
-        return 1.0 + METHODS[self.method].excess + max(self._tip_rounding, axis) / self.tolerance
 
     @property
     def chord(self) -> float:

@@ -41,7 +41,7 @@ def text_of(case: Case, units: str, frame: Frame):
     settings = fit_settings(Settings(tolerance=EPS), form, program.units)
     stream = io.BytesIO()
     write(smooth(program, settings), stream, form=form, frame=frame)
-    return program, stream.getvalue().decode().splitlines(), settings.verified_tolerance
+    return program, stream.getvalue().decode().splitlines(), settings.tolerance
 
 
 def unnumbered(line: str) -> str:

@@ -103,9 +103,9 @@ def judged(one: Trial, program: Program, *, oracle: bool = True) -> tuple[str, s
         found = verify(
             program,
             text,
-            tolerance=fitted.verified_tolerance,
+            tolerance=fitted.tolerance,
             axis_length=settings.axis_length,
-            axis_tolerance=fitted.verified_axis_tolerance,
+            axis_tolerance=fitted.axis_tolerance,
             control=case.control,
             machine=form.machine,
             tcp=case.tcp,
@@ -114,15 +114,12 @@ def judged(one: Trial, program: Program, *, oracle: bool = True) -> tuple[str, s
         problems = [f"{problem.nc_line}: {problem.code} {problem.text}" for problem in found.problems]
     except CornersmoothError as refusal:
         problems = [str(refusal)]
-    allowed = fitted.verified_tolerance / fitted.tolerance
     oracle = oracle and not has_holes(program) and settings.axis_tolerance is None
     oracle = oracle and not (settings.method == "global" and form.curves)  # it reads curves of one corner only
     if problems:
-        wrong = oracle and not keeps(case, program, text, settings, allowed - HAIR, digits)
-        if wrong and settings.method == "zhang2016":  # it promises ε of its own construction
-            return "rightly found", ""
+        wrong = oracle and not keeps(case, program, text, settings, 1.0 - HAIR, digits)
         return ("BROKEN PROMISE" if wrong else "FALSE ALARM"), " | ".join(problems[:3])
-    if oracle and not keeps(case, program, text, settings, allowed + HAIR, digits):
+    if oracle and not keeps(case, program, text, settings, 1.0 + HAIR, digits):
         return "MISSED", "beyond the tolerance"
     return "passed", ""
 

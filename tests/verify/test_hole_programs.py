@@ -122,9 +122,9 @@ def test_the_tool_comes_back_to_the_pose_of_the_hole(between: str, method: str, 
     code = "G0" if between == "rapid" else "G1"
     there = [k for k, line in enumerate(lines) if f"{code} X20.0000 Y5.0000 Z1.0000" in line]
     assert len(there) == 1
-    assert not verify(program, stream.getvalue(), tolerance=settings.verified_tolerance).problems
+    assert not verify(program, stream.getvalue(), tolerance=settings.tolerance).problems
     without = "\n".join([*lines[: there[0]], *lines[there[0] + 1 :], ""])
-    found = verify(program, without.encode(), tolerance=settings.verified_tolerance).problems
+    found = verify(program, without.encode(), tolerance=settings.tolerance).problems
     assert found, "the move that is not there is found"
 
 
@@ -138,7 +138,7 @@ CYCLE/OFF\nRAPID\nGOTO/0,0,40\nFINI\n"""
     stream = io.BytesIO()
     write(smooth(program, settings), stream, form=form)
     assert [line for line in stream.getvalue().decode().splitlines() if line[:3] == "G4 "] == ["G4 P150", "G4 P600"]
-    assert not verify(program, stream.getvalue(), tolerance=settings.verified_tolerance).problems
+    assert not verify(program, stream.getvalue(), tolerance=settings.tolerance).problems
 
 
 @pytest.mark.parametrize("cycles", ["moves", "native"])
@@ -151,10 +151,10 @@ CYCLE/DRILL,RAPTO,3,FEDTO,0,MMPM,250\nGOTO/66,0,240\nGOTO/-50,0,240\nCYCLE/OFF\n
     stream = io.BytesIO()
     write(smooth(program, settings), stream, form=form, frame=Frame(cycles=cycles))
     lines = stream.getvalue().decode().splitlines()
-    assert not verify(program, stream.getvalue(), tolerance=settings.verified_tolerance).problems
+    assert not verify(program, stream.getvalue(), tolerance=settings.tolerance).problems
     there = next(k for k, line in enumerate(lines) if " X66.0000" in line)
     without = "\n".join([*lines[:there], *lines[there + 1 :], ""])
-    assert verify(program, without.encode(), tolerance=settings.verified_tolerance).problems
+    assert verify(program, without.encode(), tolerance=settings.tolerance).problems
 
 
 LEFT_OUT = """UNITS/MM

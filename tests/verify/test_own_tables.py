@@ -71,8 +71,10 @@ def test_a_table_that_adds_no_words_is_verified_as_the_control_that_it_is_like()
 def test_what_a_table_adds_is_named() -> None:
     text, result = made(WORDS)
     assert result.verification is not None
-    assert {block for _, block in result.verification.trusted} == {*("M98 P1", "M98 P2", "M50", "M51")}
-    assert result.unverified.endswith("1 more blocks of your own; what your own table says of coolant, next tool, tool")
+    kinds, *blocks = result.verification.trusted
+    assert {block for _, block in blocks} == {*("M98 P1", "M98 P2", "M50", "M51")}
+    assert kinds == (0, "what your own table says of coolant, next tool, tool")
+    assert result.unverified.endswith("1 more blocks of your own")
     assert judged(WORDS, text).passed
 
 

@@ -68,7 +68,7 @@ def test_command(files, tmp_path, capsys):
     told = capsys.readouterr()
     assert told.err == ""
     # corner to chamfer: 0.05/sqrt(2)
-    assert "passed" in told.out
+    assert told.out.startswith("PASSED")
     assert "tip               0.0353553 mm (limit 0.04) at CL line 6, NC line 11" in told.out
     assert "common pose       tip 0.0353553 mm (limit 0.08) at CL line 6, NC line 11" in told.out
     assert run(["verify", source, text, "-e", "0.03", "-q"]) == 1

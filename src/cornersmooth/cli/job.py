@@ -287,7 +287,7 @@ def _picture(job: Job, result: Result, contents: dict[str, Any]) -> bytes:
     from cornersmooth.report.verdict import first_line
 
     title = f"{os.path.basename(result.program.source.name)}\n{first_line(contents)}"
-    tolerance = result.smoothed.settings.verified_tolerance
+    tolerance = result.smoothed.settings.tolerance
     form = os.path.splitext(job.plot)[1].lower().lstrip(".")
     nc = read_written(result, result.frame)
     return draw_path(result.program, nc, result.smoothed, title, form, tolerance=tolerance)

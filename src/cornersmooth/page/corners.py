@@ -71,7 +71,7 @@ class CornerList:
 
 def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, dense: bool) -> CornerList:
     """Corners of a program that was smoothed here."""
-    corners, tolerance = smoothed.corners, smoothed.settings.verified_tolerance
+    corners, tolerance = smoothed.corners, smoothed.settings.tolerance
     status = corners.status
     off = np.maximum(corners.tip_error, corners.axis_error)
     if found is not None:

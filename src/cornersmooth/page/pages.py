@@ -156,7 +156,7 @@ def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None =
     stream = io.BytesIO()
     write(smoothed, stream, form=form)
     settings = smoothed.settings
-    tolerance, own = settings.verified_tolerance, settings.verified_axis_tolerance
+    tolerance, own = settings.tolerance, settings.axis_tolerance
     written = stream.getvalue()
     nc = read_nc(written, tolerance=tolerance, axis_length=settings.axis_scale)
     found = verify(program, written, tolerance=tolerance, axis_length=settings.axis_length, axis_tolerance=own)

@@ -151,7 +151,7 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         "badge": str(story.badge),
         "facts": [list(fact) for fact in story.facts],
         "notes": [*story.notes, *planned.left_out, *_thinning_note(len(written), original)],
-        "tolerance": settings.verified_tolerance,
+        "tolerance": settings.tolerance,
         "axis_length": settings.axis_length,
         "centre": centre.tolist(),
         "seconds": float(seconds[-1]) if len(seconds) else 0.0,
@@ -214,7 +214,7 @@ def _add_written(
     must[:-1] |= written.rapid[1:]
     if must.sum() > MOST_POINTS:
         must[:] = False
-    must |= larger > settings.verified_tolerance
+    must |= larger > settings.tolerance
     kind = np.full(len(written), 255, np.uint8)
     if corners is not None:
         seen = _seen(corners, places, len(written))

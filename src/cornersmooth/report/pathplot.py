@@ -42,7 +42,7 @@ def draw_path(
         CS262: matplotlib is not installed.
     """
     figure = new_figure(8.0, 9.0)
-    height, own = smoothed.settings.axis_length, smoothed.settings.verified_axis_tolerance
+    height, own = smoothed.settings.axis_length, smoothed.settings.axis_tolerance
     original = original_path(program)
     written = written_path(program, nc, original, tolerance=tolerance, axis_length=height, axis_tolerance=own)
     off = np.fmax(written.tip_off, written.axis_off)

@@ -75,8 +75,8 @@ class Verification:
     pose_nc_line : (n,) int64
         NC line that passes nearest.
     trusted : tuple of (int, str)
-        NC lines, and blocks of the user's own, that were not compared with the CL file and do not bear on the motion.
-        Line 0: statements of a kind, wherever they are.
+        NC lines, and blocks of the user's own, that were not compared with the CL file. Line 0: all statements of a
+        kind. `unverified` names those that may bear on the motion.
     unverified : str
         What of the text was not looked at and may bear on the motion; empty where all of it was.
     rewinds : tuple of (int, int)

@@ -77,7 +77,7 @@ class WordCheck:
         self._rules = WordRules(self.list, self._positions.rules, lexer, tolerance)
         self.lexer = lexer
         self.problems: list[Problem] = []
-        #: blocks of the user's own that were not compared: line and text, with those that may bear on the motion apart
+        #: blocks taken on trust, line and text, and those of them that may bear on the motion
         self.trusted: list[tuple[int, str]] = []
         self.unsure: list[tuple[int, str]] = []
         trusted = tuple(trusted)
@@ -147,6 +147,7 @@ class WordCheck:
     def _unframed(self, code: str, line: int, text: str) -> None:
         """Complain of the blocks around the motion; where they are the user's own, it is taken on trust."""
         if FRAME in self._left:
+            self.trusted.append((line, text))
             self.unsure.append((line, text))
         else:
             self._wrong(code, line, text)
@@ -238,8 +239,9 @@ class WordCheck:
         whole = len(rules) == len(words)
         if line.skipped or len(self.problems) > before or any(rule is not None and rule.compared for rule in rules):
             del self.problems[before:]
-            harmless = not line.skipped and all(map(_BESIDE_MOTION.fullmatch, words))
-            (self.trusted if harmless else self.unsure).append((line.number, text))
+            self.trusted.append((line.number, text))
+            if line.skipped or not all(map(_BESIDE_MOTION.fullmatch, words)):
+                self.unsure.append((line.number, text))
             if whole:
                 kept = [rule is not None and not rule.compared for rule in rules]
                 if "tool" in self._left:  # stops for a tool are told by it
