@@ -39,7 +39,7 @@ TABLE_1 = (
     [(0.078, (0.0729, 0.0780), (0.0780, 0.0767)), (0.15, (0.0729, 0.1265), (0.0789, 0.1307))],
 )
 def test_table_2_of_the_paper(monkeypatch, tolerance, tips, axes):
-    """Of the construction alone: at 0.078 mm it leaves the tolerance by 0.1 %, and the corner would get a smaller one."""
+    """Of the construction alone: in lines it leaves 0.078 mm by 0.1 %, and the corner would get a smaller one."""
     monkeypatch.setattr("cornersmooth.smoothing.zhang2016._straying_transitions", lambda smoothed: [])
     tip, top = TABLE_1
     corners = smooth(Program.from_poses(tip, top - tip), Settings(tolerance=tolerance, method="zhang2016")).corners

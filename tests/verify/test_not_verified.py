@@ -42,4 +42,4 @@ def test_the_command_says_so_even_if_quiet(tmp_path: Path, capsys) -> None:
     assert run(["smooth", str(part), "-o", str(text), "--control", str(own), "-q"]) == 0
     capsys.readouterr()
     assert run(["verify", str(part), str(text), "--control", str(own), "-q"]) == 0
-    assert capsys.readouterr().err.startswith(f"{text}: NOT VERIFIED, 2 to check: M50, NC line ")
+    assert capsys.readouterr().err.startswith(f"{text}: NOT VERIFIED, 3 to check: M50, NC line ")
