@@ -183,7 +183,7 @@ def test_a_hole_that_is_left_out_makes_the_program_incomplete(tmp_path, capsys):
     source.write_text(
         f"UNITS/MM\nLOADTL/1\nSPINDL/RPM,900,CLW\nRAPID\nGOTO/5,0,10\nFEDRAT/100,MMPM\n{tap}RAPID\nGOTO/0,0,50\nFINI\n"
     )
-    options = ("-o", out, "--report", story, "--skip-taps")
+    options = ("-o", out, "--report", story, "--skip-cycles")
     code, line = first_lines(capsys, "smooth", source, *options)
     assert (code, line.partition(":")[2]) == (
         0,
@@ -198,7 +198,7 @@ def test_a_hole_that_is_left_out_makes_the_program_incomplete(tmp_path, capsys):
     assert line.startswith(f"{source}: INCOMPLETE")
     assert first_lines(capsys, "smooth", source, *options, "--force", "--strict")[0] == 1
     assert (tmp_path / "hole.nc.failed").exists()
-    assert first_lines(capsys, "smooth", source, "-d", tmp_path / "out", "--summary", table, "--skip-taps")[
+    assert first_lines(capsys, "smooth", source, "-d", tmp_path / "out", "--summary", table, "--skip-cycles")[
         1
     ].startswith("INCOMPLETE")
     assert ",INCOMPLETE," in table.read_text()

@@ -118,7 +118,7 @@ def judged(one: Trial, program: Program, *, oracle: bool = True) -> tuple[str, s
     oracle = oracle and not (settings.method == "global" and form.curves)  # it reads curves of one corner only
     if problems:
         wrong = oracle and not keeps(case, program, text, settings, 1.0 - HAIR, digits)
-        return ("BROKEN PROMISE" if wrong else "FALSE ALARM"), " | ".join(problems[:3])
+        return ("WRONG PROGRAM" if wrong else "FALSE ALARM"), " | ".join(problems[:3])
     if oracle and not keeps(case, program, text, settings, 1.0 + HAIR, digits):
         return "MISSED", "beyond the tolerance"
     return "passed", ""
@@ -210,7 +210,7 @@ def _told(count: Counter[str]) -> str:
     why = ", ".join(f"{name.removeprefix('refused ')} {number}" for name, number in refused.items())
     said = [f"passed {count['passed']}", f"refused by design {sum(refused.values())}" + (f" ({why})" if why else "")]
     said += [f"rightly found {count['rightly found']}", f"false alarms {count['FALSE ALARM']}"]
-    said += [f"broken promises {count['BROKEN PROMISE']}", f"passed beyond the tolerance {count['MISSED']}"]
+    said += [f"wrong programs {count['WRONG PROGRAM']}", f"passed beyond the tolerance {count['MISSED']}"]
     return ", ".join([*said, f"failures {count['FAILED']}"])
 
 

@@ -7,7 +7,7 @@ import pytest
 from oracle.command import DONE, run
 
 #: exit code of a broken promise
-BROKEN = 1
+FAILED = 1
 
 _CL = """LOADTL/3
 SPINDL/12000,CLW
@@ -135,7 +135,7 @@ def test_a_wrong_digit_in_it_is_found(control, verified):
     wrong = text.replace("Y1.5", "Y1.502").replace("Y+1.5", "Y+1.502")
     assert wrong != text
     result = verified(control, wrong)
-    assert result.returncode == BROKEN
+    assert result.returncode == FAILED
     assert "the tip leaves its path by 0.002000 mm" in result.stderr.decode()
 
 
@@ -151,5 +151,5 @@ def test_axes_that_go_away_before_the_tool_is_high_are_found(control, high, asid
     text = _TEXTS[control]
     assert high in text
     result = verified(control, text.replace(high, aside))
-    assert result.returncode == BROKEN
+    assert result.returncode == FAILED
     assert "without a retract before it" in result.stderr.decode()
