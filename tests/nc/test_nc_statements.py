@@ -115,7 +115,6 @@ def test_what_is_understood(cl: str, blocks: list[str]) -> None:
         "DELAY/DWELL",
         "DELAY/DWELL,1,REV",
         "CUTCOM/LEFT,SOMETHING",
-        "CLEARP/XYPLAN,50",
         "AUXFUN/30",  # it would end the program
         "SWITCH/9",
     ],

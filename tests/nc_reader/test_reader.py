@@ -163,6 +163,9 @@ def test_unreadable_text_says_where():
     for block in (b"G X1.0", b"G1 X Y2.0"):  # a letter alone is no call of a program, nor zero
         with pytest.raises(InputError, match="is no NC word"):
             read_nc(block + b"\n", control="siemens")
+    for digits in (14, 200, 400):  # larger ones overflow where they are squared
+        with pytest.raises(InputError, match=r"part.nc:3: error: 'X9999.* is no NC word"):
+            read_nc(b"%%\nG21 G90\nG1 X%b.5 F100.\n" % (b"9" * digits), name="part.nc")
     with pytest.raises(InputError, match="G68 is not understood"):
         read_nc(b"G68\n")
     with pytest.raises(SettingsError, match="unknown control"):

@@ -30,7 +30,7 @@ _TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
 #: words that describe the file or the tool: comments, nothing to warn of
 _DESCRIBING = frozenset(
     "PARTNO TLDATA MSYS CSYS CUTTER INTOL OUTTOL TOLER MULTAX UNITS UNIT MACHIN TLAXIS TRNTYP SYN PPFUN ISN TOOLNO "
-    "CSI_SET_FLUTE_LENGTH CSI_SET_EXTENSION_LENGTH".split()
+    "CSI_SET_FLUTE_LENGTH CSI_SET_EXTENSION_LENGTH CLEARP CLRSRF MCS MCSYS".split()
 ) | {"TOOL PATH"}
 
 #: words that say nothing beside what the NC text shows anyway

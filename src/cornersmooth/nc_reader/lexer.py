@@ -16,6 +16,9 @@ from cornersmooth.nc_reader.words import Columns, Line, Word
 #: a number as controls write it
 NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 
+#: no control reads so many digits before the point
+_LARGEST: Final = 1e12
+
 #: bytes at the end of a chunk in which the begin of a block is looked for first
 _TAIL: Final = 1 << 16
 
@@ -70,7 +73,7 @@ class Lexer:
         while place < len(rest):
             match = self.word.match(rest, place)
             found = self.named(match) if match else None
-            if match is None or found is None:
+            if match is None or found is None or any(abs(word.value) > _LARGEST for word in found):
                 raise InputError(
                     "CS501",
                     f"{rest[place : place + 20]!r} is no NC word",
