@@ -201,8 +201,8 @@ class Settings:
     def interpolation_tolerance(self) -> float:
         """Distance, at `axis_scale` from the tip, that turning the axis inside one written line may add, mm.
 
-        It needs no share of ε in the choice of L: on straight remainders nothing else deviates, and inside a
-        transition it vanishes at the written poses, where the deviation has its maximum.
+        It needs no share of ε in the choice of L: inside a transition it vanishes at the written poses, where the
+        deviation has its maximum.
         """
         return 0.1 * self.tolerance
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -198,3 +199,45 @@ def test_bad_speeds_are_refused(cl: Path) -> None:
         made = run("smooth", cl, "--spindle", given)
         assert made.returncode == USAGE
         assert b"give it as 8000 or 8000,CCLW" in made.stderr
+
+
+STANDING = """UNITS/MM
+LOADTL/3
+SPINDL/8000,CLW
+RAPID
+GOTO/0,0,50,{first}
+FEDRAT/1000,MMPM
+GOTO/0,0,0,{first}
+GOTO/10,0,0,{first}
+GOTO/10,0,0,{second}
+GOTO/20,0,0,{second}
+RAPID
+GOTO/20,0,50,{second}
+FINI
+"""
+
+
+@pytest.mark.parametrize(
+    "machine",
+    [
+        ("--control", "fanuc"),
+        ("--control", "siemens"),
+        ("--control", "heidenhain"),
+        ("--control", "fanuc", "--machine", "table-ac"),
+        ("--control", "haas", "--machine", "table-bc"),
+        ("--control", "siemens", "--machine", "head-table-bc"),
+        ("--control", "linuxcnc", "--machine", "xyzac-trt"),
+        ("--control", "linuxcnc", "--machine", "xyzbc-trt"),
+    ],
+)
+def test_a_turn_about_a_standing_tip_is_one_block_where_the_axes_run_evenly(
+    machine: tuple[str, ...], tmp_path: Path
+) -> None:
+    directions = [f"0,{math.sin(math.radians(angle))},{math.cos(math.radians(angle))}" for angle in (10.0, 40.0)]
+    cl = tmp_path / "part.cls"
+    cl.write_text(STANDING.format(first=directions[0], second=directions[1]))
+    made = run("smooth", cl, *machine, "-o", "-", "-e", "0.01")
+    assert made.returncode == DONE, made.stderr
+    there = re.compile(r"(?:\d+ )?(?:G1|LN?) X[+]?10\.0* Y[+]?0\.0* Z[+]?0\.0* ")
+    rows = [line for line in made.stdout.decode().splitlines() if there.match(line)]
+    assert len(rows) == 2, rows  # from the corner before to the corner after

@@ -103,6 +103,8 @@ class _State:
     position: tuple[str, ...] | None = None
     values: Six | None = None  # the same as numbers
     feed: str | None = None
+    started: bool = False  # programs are started here, after a tool change or a stop: the next cut says F
+    gone_up: bool = False  # a retract: the next cut may say F again
     per_revolution: bool = False
     plane: int = 17
     tool_length: bool = False  # G43.5 in form g1, G43 in form g6.2
@@ -206,7 +208,7 @@ class _Grammar:
         if line == "G91 G28 Z0.":
             if state.raised or state.in_curve:
                 raise BadTextError(f"{number}: {line!r} again, or in a curve")
-            state.raised = state.incremental = True
+            state.raised = state.incremental = state.gone_up = True
             state.blocks.append(Code(number, line))
         elif line == "G90":
             if not state.incremental:
@@ -270,6 +272,8 @@ class _Grammar:
             if " M6" in line and not state.raised:
                 raise BadTextError(f"{number}: tool change without a retract")
             state.changed = True
+        if line in ("M0", "M1") or " M6" in line:
+            state.started = True
         state.blocks.append(Code(number, line))
 
     def straight(self, match: re.Match[str], number: int, state: _State) -> None:
@@ -279,7 +283,7 @@ class _Grammar:
             raise BadTextError(f"{number}: F on a rapid")
         end = self.numbers(words, number)
         start = state.values
-        value = self.feed(number, feed, state)
+        value = None if rapid else self.feed(number, feed, state)
         state.position, state.values, state.in_curve = words, end, False
         state.blocks.append(Line(number, rapid, start, end, None if rapid else value, state.per_revolution))
 
@@ -341,13 +345,16 @@ class _Grammar:
     def feed(self, number: int, word: str | None, state: _State) -> float | None:
         """Feed in mm per minute or revolution that holds for this block."""
         if word is not None:
-            if word == state.feed:
+            if word == state.feed and not (state.started or state.gone_up):
                 raise BadTextError(f"{number}: F{word} is modal already")
             if word[-1] == "0" and "." in word[:-1]:
                 raise BadTextError(f"{number}: trailing zero in F{word}")
             if float(word) <= 0:
                 raise BadTextError(f"{number}: F{word} does not move")
             state.feed = word
+        elif state.started and state.feed is not None:
+            raise BadTextError(f"{number}: no F in the first cut after a tool change or a stop")
+        state.started = state.gone_up = False
         return None if state.feed is None else float(state.feed) * self.scale
 
     def numbers(self, words: tuple[str, ...], number: int) -> Six:

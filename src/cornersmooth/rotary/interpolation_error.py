@@ -228,13 +228,15 @@ class InterpolationError:
         beside = angle_between(axis, wanted) / self.tolerance
         if self.tip_tolerance is None:
             still = np.zeros(len(fraction))
-            return _Look(still, beside, fraction, still, beside)
+            along = self._swept(part, axis, fraction)
+            _, wanted = ruled(self.tip, self.axis, part.segment, part.start + along * (part.end - part.start))
+            return _Look(still, angle_between(axis, wanted) / self.tolerance, along, still, beside)
         start, end, from_, to = ends
         real = tip_position(self.machine, from_ * (1 - share) + to * share, words)
         way = end - start
         square = dot(way, way)
         along = dot(real - start, way) / np.where(square > 0, square, 1.0)
-        along = np.where(square > 0, np.clip(along, 0, 1), fraction)
+        along = np.where(square > 0, np.clip(along, 0, 1), self._swept(part, axis, fraction))
         _, wanted = ruled(self.tip, self.axis, part.segment, part.start + along * (part.end - part.start))
         return _Look(
             tip=np.linalg.norm(real - start - along[:, None] * way, axis=1) / self.tip_tolerance,
@@ -243,6 +245,23 @@ class InterpolationError:
             tip_beside=np.linalg.norm(real - start - share * way, axis=1) / self.tip_tolerance,
             axis_beside=beside,
         )
+
+    def _swept(self, part: Intervals, axis: Floats, fraction: Floats) -> Floats:
+        """Share of each interval where the ruled axis is nearest to another, where the tip stands: else `fraction`.
+
+        About a standing tip nothing says when the axis is where: all that counts is the great circle that it sweeps.
+        """
+        still = np.flatnonzero((self.tip[part.segment] == self.tip[part.segment + 1]).all(axis=1))
+        along = fraction.copy()
+        if len(still):
+            some = part.take(still)
+            start, end = self._lever(some.segment, some.start), self._lever(some.segment, some.end)
+            normal = np.cross(start, end)
+            gone, left = (dot(np.cross(*pair), normal) for pair in ((start, axis[still]), (axis[still], end)))
+            whole = gone + left
+            swept = np.divide(gone, whole, out=fraction[still].copy(), where=whole > 0.0)
+            along[still] = np.clip(swept, 0.0, 1.0)
+        return along
 
     def divide(self, intervals: Intervals, count: Ints) -> tuple[Intervals, Intervals]:
         """Divide each interval into so many equal parts: the new intervals, and those that start with a new point."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, Settings
 from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
@@ -105,7 +106,10 @@ def _measure_remainders(smoothed: SmoothProgram, segments: Segments, poses: Ints
         joins &= (rest <= 1e-9) | ((rest < settings.shortest_line) & (rest < 0.1 * leg))
     segments.has_line[poses[joins]] = False
     if dense:
-        _divide(settings, segments, poses[~joins], norm(turn)[~joins])
+        chord = norm(turn)
+        # about a standing tip all ways of turning evenly are one motion: nothing says when the axis is where
+        divided = ~joins & ((norm(step) > 0.0) | (settings.axis_step is not None))
+        _divide(settings, segments, poses[divided], chord[divided])
 
 
 def turn_limit(settings: Settings, half_turn: Floats, tolerance: float) -> Floats:
@@ -128,8 +132,14 @@ def turn_limit(settings: Settings, half_turn: Floats, tolerance: float) -> Float
 
 
 def _divide(settings: Settings, segments: Segments, poses: Ints, chord: Floats) -> None:
-    """Set `lines`: lines per straight remainder, from the change of axis along it, given as its chord."""
-    share = settings.interpolation_tolerance / settings.axis_scale
+    """Set `lines`: lines per straight remainder, from the change of axis along it, given as its chord.
+
+    Dense lines begin and end on the original motion there, where tip and axis are trimmed alike: all of ε is left to
+    how the control turns the axis between.
+    """
+    exact = settings.lines != "long" and METHODS[settings.method].one_parameter
+    allowed = min(settings.line_tolerances) if exact else settings.interpolation_tolerance
+    share = allowed / settings.axis_scale
     turning = chord**3 / 54.0 + chord**2 / 4.0 * np.tan(np.minimum(chord, 2.0) / 2.0) > share
     if settings.axis_step is not None:
         turning |= 2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)) > math.radians(settings.axis_step)
@@ -141,9 +151,7 @@ def _divide(settings: Settings, segments: Segments, poses: Ints, chord: Floats) 
     high = np.arctan((2.0 * segments.axis_exit[pose] - 1.0) * np.tan(half))
     turn = high - low
     as_one = turn**2 / 4.0 * np.abs(np.tan((low + high) / 2.0)) + turn**3 / 54.0
-    lines = np.ceil(
-        turn / turn_limit(settings, np.maximum(np.abs(low), np.abs(high)), settings.interpolation_tolerance) - 1e-9
-    )
+    lines = np.ceil(turn / turn_limit(settings, np.maximum(np.abs(low), np.abs(high)), allowed) - 1e-9)
     if settings.axis_step is None:
         lines[as_one <= share] = 1
     segments.lines[pose] = np.clip(lines, 1, _MOST_LINES).astype(np.int64)
