@@ -10,7 +10,7 @@ import numpy as np
 
 from cornersmooth.cl import read
 from cornersmooth.model import Move, Program, SmoothProgram
-from cornersmooth.nc import Form, fit_settings, write
+from cornersmooth.nc import Form, Frame, fit_settings, write
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from nc.cases import Case
@@ -26,7 +26,7 @@ def written(program: Program, form: Form, settings: Settings) -> tuple[str, Smoo
     stream = io.BytesIO()
     with np.errstate(all="raise", under="ignore"):
         smoothed = smooth(program, fit_settings(settings, form, program.units))
-        found = write(smoothed, stream, form=form)
+        found = write(smoothed, stream, form=form, frame=Frame(skip_cycles=True))
     text = stream.getvalue().decode("ascii")
     assert found.blocks == sum(not line.endswith(" ~") for line in text.splitlines())
     return text, smoothed

@@ -87,7 +87,7 @@ def written(
     chosen = Case("linuxcnc", "g1", machine, tcp).choose(endless=endless)
     smoothed = smooth(program, fit_settings(Settings(tolerance=tolerance), chosen, program.units))
     stream = io.BytesIO()
-    write(smoothed, stream, form=chosen, frame=frame)
+    write(smoothed, stream, form=chosen, frame=frame or Frame(skip_cycles=True))
     return stream.getvalue().decode("ascii")
 
 

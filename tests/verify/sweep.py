@@ -53,7 +53,7 @@ def texts(
     program: Program, form: Form, settings: Settings, *, planned: bool = False, native: bool = False
 ) -> tuple[bytes, Settings]:
     """NC text of a program, and the settings with the digits of the control in them."""
-    frame = Frame(cycles="native" if native else "moves")
+    frame = Frame(cycles="native" if native else "moves", skip_cycles=True)
     fitted = fit_settings(settings, form, program.units)
     stream = io.BytesIO()
     limits = Limits() if planned else None
