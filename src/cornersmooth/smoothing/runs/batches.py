@@ -7,6 +7,9 @@ is off across the axis O, and by what the tip is off along it; what the axis poi
 show. So the tip leaves along the axis at least what the fit needs across it, and the axis point may use across the axis
 what the tip has left.
 
+Where poses sample a surface, deviations cost something: one that makes the motion hardly smoother would only treat
+neighbouring passes differently. At sharp corners, and along the segments between them, deviations cost nothing.
+
 Where all axes of a run lie in one plane the lever does not leave it: a machine may have no rotary axis that goes there,
 and another one would tremble. Across the plane the axis point then is off by what the tip is, so there, too, the tip
 leaves the axis point its part.
@@ -21,6 +24,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import TAPS, Gather
+from cornersmooth.smoothing.runs.fitting import holding_poses
 from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, dot, smoothest
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.ranges import ranges, spread, starts
@@ -56,6 +60,10 @@ TIP_COUNTS = 0.3
 #: the same where the tip may go out of its way for the lever, and the tip is much faster than the lever
 OWN_WAY = 0.5
 
+#: what a deviation as large as the tolerance costs where poses sample a surface, over the objective at the beginning of
+#: a round; and spans on either side that tell whether they do. Measured: docs/global.md, neighbouring passes.
+PENALTY, SURROUNDINGS = 6.0, 12
+
 #: squared ratio of the lever's speed to the tip's beyond which the tip stands
 _LARGEST_RATIO = 1e100
 
@@ -89,6 +97,17 @@ class Problem:
     def first_piece(self) -> Ints:
         """(spans + 1,) where the pieces of each span begin."""
         return starts(np.bincount(self.pieces.span, minlength=len(self.splines.span_run)))
+
+    @cached_property
+    def sampled(self) -> Floats:
+        """(spans,) share of the spans around each that hold poses: near 1 where these sample a surface."""
+        splines = self.splines
+        count = starts(holding_poses(splines, self.lines).astype(np.int64))
+        first = splines.span_first[splines.span_run], splines.span_first[splines.span_run + 1]
+        span = np.arange(len(splines.span_run))
+        low, high = np.maximum(span - SURROUNDINGS, first[0]), np.minimum(span + SURROUNDINGS + 1, first[1])
+        share: Floats = (count[high] - count[low]) / (high - low)
+        return share
 
     @cached_property
     def lever(self) -> Floats:
@@ -176,6 +195,7 @@ class _Places:
     limit: Floats  # (m, 2)
     rough: Floats  # (m, 6)
     normal: Floats  # (m, 3) of the plane of the axes, or 0
+    penalty: Floats
     sample_window: Ints
     span_window: Ints
 
@@ -199,9 +219,11 @@ class _Places:
         axis, short = lever / length[:, None], length / problem.axis_length
         normal = problem.normal[splines.span_run[windows.span[span]]]
         window = span_window[span]
-        return cls(
-            problem, windows, samples.target, near, smooth, axis, short, limit, rough, normal, window, span_window
-        )
+        length_of_samples = (own.high - own.low)[samples.piece] / np.bincount(samples.piece)[samples.piece]
+        share = length_of_samples / np.bincount(span_window, splines.width[windows.span])[window]
+        penalty = PENALTY * share * problem.sampled[windows.span[span]]
+        places = samples.target, near, smooth, axis, short, limit, rough, normal, penalty
+        return cls(problem, windows, *places, window, span_window)
 
     def deviation(self, moved: Floats, part: int) -> Floats:
         """(m, 3) of tip or axis point from control points (c, 6)."""
@@ -246,6 +268,7 @@ class _Places:
             axis=axis,
             stretch=stretch,
             radius=radius,
+            penalty=self.penalty,
             free=self.windows.free,
             sample_window=self.sample_window,
             span_window=self.span_window,

@@ -14,8 +14,9 @@ from cornersmooth.smoothing.runs.samples import Pieces, Samples
 from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.smoothing.runs.windows import Windows
 
-#: share of the tolerances that the fit may use: the rest is for smoothness
-CLOSE = 0.5
+#: share of the tolerances that the fit may use: the rest is for smoothness. Less in spans that hold poses: neighbouring
+#: passes get nearly the same curve only where their knots do not show.
+CLOSE, CLOSE_TO_POSES = 0.5, 0.3
 
 #: poses between the first knots
 STRIDE = 8
@@ -75,11 +76,19 @@ def fit(lines: Polylines, tolerances: tuple[float, float]) -> Fit:
         samples = Samples.of(splines, lines, pieces)
         control = _least_squares(splines, windows, samples, control)
         off[active] = _largest(splines, samples, control, tolerances)[active]
-        bad = active & (off > CLOSE) & (splines.width > SHORTEST)
+        close = np.where(holding_poses(splines, lines), CLOSE_TO_POSES, CLOSE)
+        bad = active & (off > close) & (splines.width > SHORTEST)
         if not bad.any():
             break
         splines, control, active, off = _refine(lines, splines, control, off, np.flatnonzero(bad), corner)
     return Fit(splines, control, off)
+
+
+def holding_poses(splines: Splines, lines: Polylines) -> Bools:
+    """(spans,) bool: poses lie inside the span."""
+    low, high = splines.knot[splines.span_knot], splines.knot[splines.span_knot + 1]
+    before, after = lines.poses_around(splines.span_run, low, high)
+    return np.asarray(after - before > 1)
 
 
 def first_knots(lines: Polylines) -> Splines:
@@ -181,11 +190,8 @@ def _refine(
         splines.knot[splines.span_knot[bad]],
         splines.knot[splines.span_knot[bad] + 1],
     )
-    before = lines.segment_at(run, low)  # pose at or before the start
-    after = lines.segment_at(run, high)
-    after += high > lines.s[after]  # pose at or behind the end
-    inner = after - before - 1
-    split = inner > 0
+    before, after = lines.poses_around(run, low, high)
+    split = after - before > 1
     new_run, new_knot = [run[split]], [lines.s[(before[split] + after[split] + 1) // 2]]
     # inside one segment: beside a sharp corner, else in the middle
     run, before, after, low, high = run[~split], before[~split], after[~split], low[~split], high[~split]

@@ -1,9 +1,9 @@
 """The smoothest spline within the tolerances: a primal-dual interior-point method on many windows at once.
 
-Minimised is ∫w·|C‴|² where x·M·x ≤ r² for the deviation x at every sample: a convex quadratic objective with convex
-quadratic constraints (Boyd and Vandenberghe, Convex Optimization, 11.7). M = I + k·O·Oᵀ is round about the tool axis O.
-The matrix of a step has 3 by 3 blocks on seven diagonals. What begins within its bounds stays there; what begins
-outside is led inside.
+Minimised is ∫w·|C‴|² + Σp·|x|² where x·M·x ≤ r² for the deviation x at every sample: a convex quadratic objective
+with convex quadratic constraints (Boyd and Vandenberghe, Convex Optimization, 11.7). M = I + k·O·Oᵀ is round about the
+tool axis O. The matrix of a step has 3 by 3 blocks on seven diagonals. What begins within its bounds stays there; what
+begins outside is led inside.
 """
 
 from __future__ import annotations
@@ -48,6 +48,8 @@ class Task:
         k > -1.
     radius : (m,) float64
         r.
+    penalty : (m,) float64
+        p, over the first part of the objective at the beginning.
     free : (c,) bool
     sample_window, span_window, control_window : int64
     windows : int
@@ -61,6 +63,7 @@ class Task:
     axis: Floats
     stretch: Floats
     radius: Floats
+    penalty: Floats
     free: Bools
     sample_window: Ints
     span_window: Ints
@@ -97,9 +100,13 @@ class Task:
         """(windows,) sums of values at the samples (m,)."""
         return np.add.reduceat(values, self.sample_first)
 
-    def cost(self, weight: Floats, jerk: Floats) -> Floats:
-        """(windows,) the objective, from third derivatives (3, spans)."""
+    def roughness(self, weight: Floats, jerk: Floats) -> Floats:
+        """(windows,) the first part of the objective, from third derivatives (3, spans)."""
         return np.add.reduceat(weight * product(jerk, jerk), self.span_first)
+
+    def cost(self, weight: Floats, jerk: Floats, penalty: Floats, off: Floats) -> Floats:
+        """(windows,) the objective, from third derivatives (3, spans) and deviations (3, m)."""
+        return self.roughness(weight, jerk) + self.total(penalty * product(off, off))
 
 
 def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float) -> Floats:
@@ -118,7 +125,7 @@ def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float
     """
     off, jerk = np.ascontiguousarray(off.T), np.ascontiguousarray(jerk.T)
     change = np.zeros((3, len(task.free)))
-    first = task.cost(task.weight, jerk)
+    first = task.roughness(task.weight, jerk)
     weight = task.weight / np.where(first > 0.0, first, 1.0)[task.span_window]
     stiff = task.smooth.bands(weight)
     many = task.total(np.ones(len(task.radius)))
@@ -126,15 +133,16 @@ def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float
     slack = (task.radius**2 - product(off, pull)) / 2.0
     inside = slack >= _LEAST_SLACK * task.radius
     room = np.where(inside, slack, _LEAST_SLACK * task.radius)
-    cost = np.where(first > 0.0, 1.0, 0.0)
+    penalty = np.where(first > 0.0, 1.0, 0.0)[task.sample_window] * task.penalty
+    cost = task.cost(weight, jerk, penalty, off)
     force = np.maximum(begin * cost / many, 1e-12)[task.sample_window] / room  # the multipliers
     ahead: Floats = np.ones(task.windows)  # part of the slope at the beginning that no multipliers hold yet
     for _ in range(STEPS):
         gap = task.total(room * force)
         bent = force / room
         barrier = (_CENTRE * gap / many)[task.sample_window] / room + bent * (room - slack)
-        right = -task.smooth.sum_rows(weight * jerk) - task.near.sum_rows(barrier * pull)
-        bands = task.near.bands(_bend(task, force, bent, pull))
+        right = -task.smooth.sum_rows(weight * jerk) - task.near.sum_rows(barrier * pull + penalty * off)
+        bands = task.near.bands(_bend(task, force, penalty, bent, pull))
         bands[..., :3] += stiff
         if task.normal is not None:
             keep_in_planes(bands, right, task.normal)
@@ -159,7 +167,7 @@ def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float
         slack = slack - by_sample * (along + 0.5 * by_sample * square)
         room = np.where(inside, slack, np.maximum(room + by_sample * step_room, slack))
         inside = inside | (slack >= room)
-        cost = task.cost(weight, jerk)
+        cost = task.cost(weight, jerk, penalty, off)
         if done.all():
             break
     return np.ascontiguousarray(change.T)
@@ -182,16 +190,17 @@ def _reach(
     return np.minimum(1.0, BACK_OFF * np.minimum.reduceat(bound, task.sample_first))
 
 
-def _bend(task: Task, force: Floats, bent: Floats, pull: Floats) -> Floats:
-    """(m, 6) second derivatives of the bounds: xx, yy, zz, xy, xz, yz."""
+def _bend(task: Task, force: Floats, penalty: Floats, bent: Floats, pull: Floats) -> Floats:
+    """(m, 6) second derivatives of the bounds and of the penalty: xx, yy, zz, xy, xz, yz."""
     x, y, z = pull
     own = task.columns
     lean = force * task.stretch
     bx, by, bz, lx, ly = bent * x, bent * y, bent * z, lean * own[0], lean * own[1]
     out = np.empty((len(force), 6))
-    out[:, 0] = force + bx * x + lx * own[0]
-    out[:, 1] = force + by * y + ly * own[1]
-    out[:, 2] = force + bz * z + lean * own[2] * own[2]
+    round_ = force + penalty
+    out[:, 0] = round_ + bx * x + lx * own[0]
+    out[:, 1] = round_ + by * y + ly * own[1]
+    out[:, 2] = round_ + bz * z + lean * own[2] * own[2]
     out[:, 3] = bx * y + lx * own[1]
     out[:, 4] = bx * z + lx * own[2]
     out[:, 5] = by * z + ly * own[2]

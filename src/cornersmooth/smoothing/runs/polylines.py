@@ -65,6 +65,11 @@ class Polylines:
         inside: Ints = np.clip(before, first[run], first[run + 1] - 2)
         return inside
 
+    def poses_around(self, run: Ints, low: Floats, high: Floats) -> tuple[Ints, Ints]:
+        """Pose at or before the start of each stretch, and pose at or after its end."""
+        before, after = self.segment_at(run, low), self.segment_at(run, high)
+        return before, after + (high > self.s[after])
+
     def at(self, run: Ints, s: Floats) -> Floats:
         """Points (m, 6) at lengths (m,) of the runs (m,)."""
         before = self.segment_at(run, s)
