@@ -20,6 +20,7 @@ from oracle.chains import cl_text, random_chains
 from oracle.command import (
     BAD_INPUT,
     BAD_OUTPUT,
+    CLOSED_PIPE,
     DONE,
     OLD,
     PATIENCE,
@@ -186,17 +187,59 @@ def test_full_disk_leaves_the_old_file_or_none(medium: Path, tmp_path: Path, old
         assert out.read_bytes() == old
 
 
-def test_closed_pipe(medium: Path) -> None:
-    with started("smooth", medium) as process:
+@pytest.mark.parametrize("more", [(), ("-o", "-"), ("--no-verify",)], ids=str)
+def test_closed_pipe(medium: Path, more: tuple[str, ...]) -> None:
+    with started("smooth", medium, *more) as process:
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.read(10)
         process.stdout.close()
         complaint = process.stderr.read()
-        assert process.wait(PATIENCE) == BAD_OUTPUT
+        assert process.wait(PATIENCE) == CLOSED_PIPE
     assert quiet(complaint)
     assert b"BrokenPipe" not in complaint
     assert b"Exception ignored" not in complaint
+
+
+#: commands, and the stream that they speak on
+SPEAKING = [
+    (("info", "FILE"), "stdout"),
+    (("controls",), "stdout"),
+    (("--help",), "stdout"),
+    (("smooth", "FILE", "-o", "OUT"), "stderr"),
+]
+
+
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+@pytest.mark.parametrize(("words", "says"), SPEAKING, ids=str)
+def test_who_closes_the_pipe_is_told_no_verdict(
+    small: Path, tmp_path: Path, words: tuple[str, ...], says: str, stream: str
+) -> None:
+    out = tmp_path / "o.nc"
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "wb") as closed:
+        done = run_process(*({"FILE": small, "OUT": out}.get(word, word) for word in words), **{stream: closed})
+    assert done.returncode == (CLOSED_PIPE if stream == says else DONE)
+    assert "OUT" not in words or out.read_bytes().endswith(b"M30\n%\n")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("smooth", "NONE", "-o", "OUT"),
+        ("time", "NONE", "--csv", "OUT"),
+        ("verify", "NONE", "OUT", "--report", "OUT"),
+        ("time", "FILE", "--text", "NONE", "--csv", "OUT"),
+    ],
+)
+def test_a_missing_input_is_named_first(small: Path, tmp_path: Path, words: tuple[str, ...]) -> None:
+    missing, out = tmp_path / "none.cls", tmp_path / "o.csv"
+    out.write_bytes(OLD)
+    done = run(*({"NONE": missing, "OUT": out, "FILE": small}.get(word, word) for word in words))
+    assert done.returncode == BAD_INPUT
+    assert message(done.stderr).startswith(f"{missing}: error: cannot read it: ")
+    assert out.read_bytes() == OLD
 
 
 def _reads(process: subprocess.Popen[bytes], data: bytes, out: Path) -> None:

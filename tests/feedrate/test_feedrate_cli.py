@@ -130,3 +130,25 @@ def test_machine_without_dynamics(tmp_path: Path, capsys: pytest.CaptureFixture[
     )
     assert run(["time", TABLE_1, *PAPER, "--machine", str(mill)]) == 2
     assert "machine mill does not say how fast its axes may go; add [dynamics.X]" in capsys.readouterr().err
+
+
+def test_the_machine_of_a_text_need_not_be_said_twice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, text, bare = ROOT / "samples" / "two_tools.cls", tmp_path / "o.nc", tmp_path / "bare.nc"
+    assert run(["smooth", str(source), "-o", str(text), "--machine", "table-ac", "-q"]) == 0
+    bare.write_text("".join(line for line in text.read_text().splitlines(True) if "MACHINE=" not in line))
+    capsys.readouterr()
+    told = []
+    for words in ([text], [bare, "--machine", "table-ac"], [text, "--text-machine", "table-ac"]):
+        assert run(["time", str(source), "--feed", "900", "--json", "--text", *map(str, words)]) == 0
+        told.append(capsys.readouterr().out)
+    assert told[0] == told[2]
+
+
+def test_a_text_is_read_before_anything_is_planned(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cornersmooth.feedrate.compare", None)
+    text = tmp_path / "o.nc"
+    text.write_text("%\nO1\nG21 G90\nG1 X1 NONSENSE\nM30\n%\n")
+    assert run(["time", TABLE_1, "--units", "mm", "--feed", "1800", "--text", str(text)]) == 3
+    assert capsys.readouterr().err.startswith(f"{text}:4: error: ")

@@ -298,3 +298,16 @@ def test_a_place_where_sums_are_kept_costs_the_rest_of_its_run_nothing(monkeypat
         assert (np.abs(rate) <= most).all()
     monkeypatch.setattr(signed_limits, "ROUNDS", 0)
     assert with_signs.total < 0.95 * plan(smoothed, Limits(), machine=machine).total
+
+
+def test_at_a_stop_the_jerk_is_that_of_the_move_that_ends() -> None:
+    """C turns 50 times as fast by the way after the stop: that move has not begun in the last digits before it."""
+    angle = np.radians([0.0, 0.2, 10.2])
+    axis = np.stack((np.sin(0.5) * np.cos(angle), np.sin(0.5) * np.sin(angle), np.full(3, np.cos(0.5))), axis=1)
+    program = Program.from_poses(np.array([[0.0, 0, 0], [10, 0, 0], [20, 0, 0]]), axis, feed=800.0)
+    law = direct(program, Limits(), "exact_stop", machine=load_machine("xyzac-trt"))
+    stop = law.times_at(law.edge[1:2])[0]
+    times = stop - np.geomspace(1e-9, 1e-5, 50)
+    assert (law.kinematics(times)[0] == law.edge[1]).any()
+    jerk, steady = law.axes_at(times)[3], law.axes_at([stop - 1e-4])[3]
+    assert np.abs(jerk - steady).max() <= 0.05 * np.abs(steady).max()

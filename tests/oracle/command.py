@@ -21,7 +21,7 @@ import pytest
 
 from oracle.chains import cl_text, random_chains
 
-DONE, USAGE, BAD_INPUT, BAD_OUTPUT = 0, 2, 3, 4
+DONE, USAGE, BAD_INPUT, BAD_OUTPUT, CLOSED_PIPE = 0, 2, 3, 4, 141
 OLD = b"old program\n"
 
 SMALL = b"""PARTNO CONTRACT

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import stat
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -59,8 +63,28 @@ def read_input(path: str) -> tuple[bytes, str]:
         if sys.stdin is None:
             raise InputError("CS100", "standard input is closed", "name a file", file="<stdin>")
         return sys.stdin.buffer.read(), "<stdin>"
-    try:
+    with _reading(path):
         return Path(path).read_bytes(), path
+
+
+def check_inputs(*paths: str) -> None:
+    """Refuse inputs that cannot be read, before any output is looked at.
+
+    Raises
+    ------
+    InputError
+        CS100: as `read_input`.
+    """
+    for path in paths:
+        with _reading(path):
+            if path != STANDARD and not stat.S_ISFIFO(os.stat(path).st_mode):  # a pipe is opened once
+                open(path, "rb").close()
+
+
+@contextlib.contextmanager
+def _reading(path: str) -> Iterator[None]:
+    try:
+        yield
     except OSError as failure:
         what = f"cannot read it: {output.reason(failure)}"
         folder = isinstance(failure, IsADirectoryError)

@@ -30,6 +30,9 @@ COMMANDS = {
 
 EXIT_INTERRUPTED = 130
 
+#: as of a program that is ended by the signal of a closed pipe: who reads has enough
+EXIT_CLOSED_PIPE = 141
+
 #: what the system says where a disk, a share of it or a file is full, or the disk is broken
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
@@ -107,9 +110,9 @@ def run(args: list[str] | None, ending: Ending) -> int:
     except CornersmoothError as failure:
         _say(str(failure))
         return failure.exit_code
-    except (ClosedPipe, BrokenPipeError):
+    except (ClosedPipe, BrokenPipeError, SystemExit):  # click and rich leave so where a pipe is closed, and else never
         _close_quietly()
-        return 4
+        return EXIT_CLOSED_PIPE
     except (click.exceptions.Abort, KeyboardInterrupt):
         return EXIT_INTERRUPTED
     except Exception as failure:  # a fault of ours: said in a line, and never with the code of a verdict
@@ -125,6 +128,9 @@ def flushed(code: int) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as failure:
+        if failure.errno == errno.EPIPE:
+            _close_quietly()
+            return EXIT_CLOSED_PIPE
         if code == 0:
             return _unwritten(failure)
         _close_quietly()  # it has been said already
@@ -133,9 +139,13 @@ def flushed(code: int) -> int:
 
 def _close_quietly() -> None:
     """Keep the interpreter from complaining about the closed pipe when it flushes at exit."""
-    if sys.stdout is None:
-        return
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        except AttributeError:  # it was closed by the caller
+            continue
 
 
 def _unwritten(failure: OSError) -> int:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_input, target_of
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
@@ -62,6 +62,7 @@ def command(source: str, text: str, **given: Any) -> int:
 
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
+    check_inputs(source, text)
     for path in given["reports"]:
         if os.path.splitext(path)[1].lower() not in _SUFFIXES:
             raise click.UsageError(f"--report {path}: let the name end in {', '.join(_SUFFIXES)}")

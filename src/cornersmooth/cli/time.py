@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.files import check_path, read_input, target_of
+from cornersmooth.cli.files import check_inputs, check_path, read_input, target_of
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
@@ -79,9 +80,11 @@ def command(source: str, **given: Any) -> int:
     for path in given["reports"]:
         if not path.lower().endswith(".html"):
             raise click.UsageError(f"--report {path}: let the name end in .html")
+    inputs = [source, given["text"]] if given["text"] else [source]
+    check_inputs(*inputs)
     for path in (given["csv"], given["plot"], *given["reports"]):
         if path:
-            check_path(path, [source], force=given["force"])
+            check_path(path, inputs, force=given["force"])
     data, name = read_input(source)
     compared = _compare(data, name, given)
     if given["reports"]:
@@ -121,18 +124,35 @@ def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
     machine = nc_text.machine_of(given)
     limits, settings = motion.limits_of(given), smoothing.settings_of(given)
     program = read(data, name=name, **reading.reading_of(given))
+    if given["text"]:  # before anything that takes long
+        how = nc_text.reading_back_of(given | _how_text_was_made(given))
+        nc = read_nc(given["text"], **how, tolerance=settings.tolerance, axis_length=settings.axis_scale)
     if not given["quiet"]:
         _tell_feeds(program, given["feed"])
     with progress_bar(given["quiet"]) as progress:
         compared = compare(program, settings, limits, machine=machine, progress=progress)
         if not given["text"]:
             return compared
-        how = nc_text.reading_back_of({**given, "machine": given["text_machine"], "no_tcp": False})
-        how |= {"tolerance": settings.tolerance, "axis_length": settings.axis_scale}
-        nc = read_nc(given["text"], **how)
         blocks = BlockLimits(given["block_time"], given["look_ahead"])
         law = plan_text(nc, limits, name=given["text"], blocks=blocks, settings=settings, machine=machine)
         return compared.with_text(law)
+
+
+def _how_text_was_made(given: dict[str, Any]) -> dict[str, Any]:
+    """Machine and mode to read the text for: its own option, what its head says, the machine that is planned for."""
+    from cornersmooth.kinematics import machine_names
+    from cornersmooth.provenance import HEAD, read_provenance
+
+    made = None
+    if os.path.isfile(given["text"]):  # a pipe can be read once
+        with open(given["text"], "rb") as file:
+            made = read_provenance(file.read(HEAD))
+    no_tcp = made is not None and not made.tcp
+    if given["text_machine"] or made is None:
+        machine = given["text_machine"] or given["machine"]
+    else:  # a name that is not known is that of a file of the user's own
+        machine = made.machine if made.machine in ("", *machine_names()) else given["machine"]
+    return {"machine": machine or None, "no_tcp": no_tcp}
 
 
 def _tell_feeds(program: Program, feed: float | None) -> None:

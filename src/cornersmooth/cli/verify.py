@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.files import STANDARD, check_path, read_input, read_lines, target_of
+from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_input, read_lines, target_of
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
@@ -86,6 +86,7 @@ def command(source: str, text: str, **given: Any) -> int:
     if source == text == STANDARD:
         raise click.UsageError("only one of the inputs can be standard input")
     return_large_arrays()
+    check_inputs(source, text)
     form = _check_outputs(source, text, given)
     data, name = read_input(source)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text

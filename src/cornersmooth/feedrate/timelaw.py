@@ -99,8 +99,21 @@ class TimeLaw:
         t = np.clip(np.atleast_1d(np.asarray(t, np.float64)), 0.0, self.total)
         if not len(self.speed):
             return (np.zeros_like(t),) * 4
-        phase = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.speed) - 1)
+        phase = self._phases(t)
         return self._inside(phase, t - self.time[phase])
+
+    def _phases(self, t: Floats) -> Ints:
+        phase: Ints = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.speed) - 1)
+        return phase
+
+    def _elements(self, t: Floats, x: Floats) -> Ints:
+        """(m,) element at times and path coordinates (m,): of those that the phase goes through.
+
+        A tip that comes to a stand is at the edge, in the last digit, before the phase ends: jerk is that of the phase.
+        """
+        last = np.searchsorted(self.edge, self.way[self._phases(t) + 1], side="left") - 1
+        element: Ints = np.minimum(np.searchsorted(self.edge, x, side="right") - 1, last)
+        return np.clip(element, 0, len(self.path) - 1)
 
     def _inside(self, phase: Ints, tau: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         v, a, j, rate = self.speed[phase], self.accel[phase], self.jerk[phase], self.rate[phase]
@@ -146,7 +159,7 @@ class TimeLaw:
         if not len(path):
             nothing = np.zeros((len(t), 3))
             return States(t, x, v, a, j, x, x > 0.0, x.astype(np.int64), nothing, nothing)
-        element = np.clip(np.searchsorted(self.edge, x, side="right") - 1, 0, len(path) - 1)
+        element = self._elements(t, x)
         local = np.clip(x - self.edge[element], 0.0, path.length[element])
         travel = np.concatenate(([0.0], np.cumsum(np.where(path.turning, 0.0, path.length))))
         turning = path.turning[element]
@@ -167,11 +180,12 @@ class TimeLaw:
         """
         if self.machine_axes is None:
             raise ValueError("the law was not planned for a machine")
+        t = np.clip(np.atleast_1d(np.asarray(t, np.float64)), 0.0, self.total)
         x, v, a, j = (order[:, None] for order in self.kinematics(t))
         path = self.path
         if not len(path):
             return (np.zeros((len(x), 5)),) * 4
-        element = np.clip(np.searchsorted(self.edge, x[:, 0], side="right") - 1, 0, len(path) - 1)
+        element = self._elements(t, x[:, 0])
         local = np.clip(x[:, 0] - self.edge[element], 0.0, path.length[element])
         q, one, two, three = self.machine_axes.orders(element, shares_at(path, element, local))
         # a tip that comes to a stand has no derivatives by its way

@@ -136,7 +136,7 @@ text_machine = click.option(
     type=str,
     metavar="NAME|FILE",
     shell_complete=completing.machines,
-    help="Machine whose rotary words --text has, if it has such.",
+    help="Machine whose rotary words --text has. [default: that of its head, else --machine]",
 )
 block_time = click.option(
     "--block-time", type=Duration(), default=0.0, help="Shortest time that the control takes for one block of --text."
