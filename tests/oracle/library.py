@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import cornersmooth
 from cornersmooth.model import Move, Program, SmoothProgram, Status
-from cornersmooth.nc import choose_form
+from cornersmooth.nc import Frame, choose_form
 from oracle.motion import Original
 from oracle.nc_text import Form, Written, parse
 
@@ -31,7 +31,8 @@ def write(
         wanted = cornersmooth.Settings(tolerance=tolerance, axis_length=axis_length)
         fitted = cornersmooth.fit_settings(wanted, choose_form("fanuc", form), program.units)
         smoothed = cornersmooth.smooth(program, fitted)
-        cornersmooth.write(smoothed, stream, control="fanuc", form=form)
+        # some real files have cycles that are refused
+        cornersmooth.write(smoothed, stream, control="fanuc", form=form, frame=Frame(skip_cycles=True))
     return parse(stream.getvalue(), form), smoothed, stream.getvalue()
 
 

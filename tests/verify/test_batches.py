@@ -147,7 +147,7 @@ def test_feed_said_long_before(used):
     """A feed may hold for many batches."""
     program = part()
     text = text_of(program)
-    assert text.count(b"F250.") == 2
+    assert text.count(b"F250.") == 3  # at the start, after a stop, and after another feed
     assert check(program, text, used, 3 if sys.platform == "linux" else 1).passed
     per_revolution = np.full(len(program), FeedMode.PER_REVOLUTION, np.uint8)
     program = Program.from_poses(

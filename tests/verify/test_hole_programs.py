@@ -55,7 +55,6 @@ REFUSED_ONCE = {
     10857: "OPSTOP before GOHOME and OPSTOP between two tool changes, where nothing moves between",
     3222: "holes that are not drilled, one above another, and a rapid to the height of the first",
     3621: "another speed right before a tool change, in the neutral form",
-    10607: "a feed to the pose of the last hole, said twice behind a tool change",
     11277: "a feed from above behind GOHOME, to where a hole has been left",
     11598: "coolant off and on between holes at the end of the path",
     20624: "holes that are not drilled, the last of them higher, and a rapid to the height of the first",
