@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any, Final, NoReturn
 
@@ -12,10 +12,10 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Units
+from cornersmooth.nc_reader.block_tables import Readable, read_lines
 from cornersmooth.nc_reader.dialects.base import INCREMENTAL
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
 from cornersmooth.nc_reader.execution import Executed, Modal, execute
-from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
 from cornersmooth.nc_reader.left_cuts import LeftCuts
 from cornersmooth.nc_reader.needed_states import (
     AxisWords,
@@ -31,6 +31,7 @@ from cornersmooth.nc_reader.needed_states import (
 from cornersmooth.nc_reader.path_elements import in_mm, path_elements
 from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane, unclamped
 from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
+from cornersmooth.nc_reader.rotary import MOST_LINES
 from cornersmooth.nc_reader.way_back import WayBack
 from cornersmooth.nc_reader.words import MOTION_CODES, Line, Table, joined_tables
 
@@ -83,6 +84,10 @@ class Reader:
         #: whether the tool has been fed from a position that was known
         self.placed = False
         self.blocks = 0
+        #: NC line from which on digits are too few for the tolerance; 0 for none
+        self.coarse = 0
+        #: what was not looked at, and the NC line
+        self.unlooked: list[tuple[int, str]] = []
         self.way_back = WayBack(name)
         self.left_cuts = LeftCuts(self.problems)
         #: the tilted plane that is on, and what has been said of it
@@ -102,6 +107,16 @@ class Reader:
         back = np.array_equal(start, near)
         self.along_tool.append((self.elements - back, bool(back)))
         return False
+
+    def lines(self, source: Readable) -> Iterator[Table | Line]:
+        """Read lines, and take note of the digits of all of them."""
+        return read_lines(_Noted(source, self.note_digits), self.name, self.dialect.lexer)
+
+    def note_digits(self, piece: bytes) -> None:
+        """Take the digits of a piece of the text where they are finer than those before."""
+        finer = self.steps.finer(self.options.steps(piece))
+        if finer != self.steps:
+            self.steps, self.rotary = finer, self.options.rotary(finer)
 
     def chunks(self, items: Iterable[Table | Line]) -> Iterator[Elements]:
         """Take runs of motion blocks and other lines, and give out the path elements as they come."""
@@ -135,8 +150,6 @@ class Reader:
             self.blocks += 1
         if self.comments is not None:
             self.comments.extend((line.number, text) for text in line.comments)
-        elif any(text.startswith(NOT_DRILLED) for text in line.comments):
-            self.event(line, "(", 0.0, NOT_DRILLED)
         row = self.dialect.row(line) if line.words else None
         if row is not None:
             self.waiting.append((line.number, row))
@@ -187,6 +200,9 @@ class Reader:
                 if self.dialect.retracts:
                     self._check_swings(rotary.swung(run, start), run)
                 run = rotary.resolve(run, start, inverse_time=before.inverse_time)
+                lines, count = np.unique(run.line, return_counts=True)
+                turned = "the way of a block that turns very far"
+                self.unlooked += [(line, turned) for line in lines[count >= MOST_LINES].tolist()]
                 levers = self.rotary.levers(run.tip)
                 self.lever = max(self.lever, float(levers.max(initial=0.0, where=~np.isnan(levers))))
             self._add(run)
@@ -307,10 +323,16 @@ class Reader:
         if self.rotary is not None:
             lever = self.lever if self._given_lever is None else self._given_lever
             steps = replace(self.rotary, tip_step=steps[0]).steps(lever)
+        widest = self._widest(second_is)
+        if not self.coarse and any(step > most for step, most in zip(steps, widest, strict=True)):
+            self.coarse = int(run.line[0])
+        steps = min(steps[0], widest[0]), min(steps[1], widest[1])
+        if self.rotary is not None:
             self._arrive_again(run, steps[0])
         elements = path_elements(run, second_is, steps, rotary=self.rotary is not None)
         if plane is not None:
-            elements.second_room[:], elements.tip_room[:] = plane.room, ASIDE * elements.tip_step
+            room = min(plane.room, self._widest("vector")[1] / 2.0)
+            elements.second_room[:], elements.tip_room[:] = room, ASIDE * elements.tip_step
         self.ready.append(elements)
         self.way_back.look_along(self.ready[-1])
         self.left_cuts.come_back(self.ready[-1], self.elements)
@@ -318,6 +340,11 @@ class Reader:
         self.curves += len(run.curves)
         if not self.placed and (run.kind != Element.RAPID).any():
             self._settle()
+
+    def _widest(self, second_is: Second) -> tuple[float, float]:
+        """Largest steps of the last printed digits, of tip and second triple, that are accounted for."""
+        tip, turn = self.options.widest
+        return tip, tip if second_is == "point" else turn
 
     def _may_go_up(self, waiting: int) -> bool:
         """Whether the last element may be a way up to a retract, which is then changed."""
@@ -435,3 +462,22 @@ class Reader:
             self._axis_words.problem(table, kind, letters, self.tip_control, code, approach),
         )
         self.problems += [problem for problem in found if problem is not None]
+
+
+class _Noted:
+    """A text of which each piece that is read is shown to somebody.
+
+    Parameters
+    ----------
+    source : Readable
+    show : callable
+    """
+
+    def __init__(self, source: Readable, show: Callable[[bytes], None]) -> None:
+        self._source, self._show = source, show
+
+    def read(self, size: int, /) -> bytes:
+        """Next bytes, at most so many; none at the end."""
+        data = self._source.read(size)
+        self._show(data)
+        return data

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.dialects import CONTROLS
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram
 from cornersmooth.nc_reader.path_elements import no_elements
@@ -74,7 +73,7 @@ def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, n
         reader = Reader(label, options, options.steps(source.head(DIGITS_SAMPLE)))
         reader.comments = []
         reader.way_back.added = reader.note_along_tool
-        parts = list(reader.chunks(read_lines(source, label, options.dialect.lexer)))
+        parts = list(reader.chunks(reader.lines(source)))
         return _program(reader, parts)
     finally:
         source.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -12,8 +13,12 @@ from cornersmooth.nc_reader.rotary import Rotary
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
 
-#: decimals are looked for in so many bytes from the first motion block on
+#: decimals are looked for in so many bytes before the first block is read, and then in all that is read
 DIGITS_SAMPLE: Final = 1 << 16
+
+#: share of the tolerance that the rounding of one number, half a step of its last digit, accounts for at most: a
+#: control reads ``I0.`` as 0 exactly, however few digits a program shows
+DIGITS_SHARE: Final = 0.5
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,11 @@ class Steps:
 
     tip: float
     second: float
+
+    def finer(self, other: Steps) -> Steps:
+        """Give the finer of two of the same text."""
+        seconds = [second for second in (self.second, other.second) if second]
+        return Steps(min(self.tip, other.tip), min(seconds, default=0.0))
 
 
 @dataclass(frozen=True)
@@ -73,12 +83,20 @@ class ReadingOptions:
         return cls(control, dialect, machine, tcp, tolerance, axis_length)
 
     def steps(self, sample: bytes) -> Steps:
-        """Printed digits, from the beginning of a text (`DIGITS_SAMPLE`)."""
+        """Printed digits of a piece of a text, as its control's format shows them."""
         tip, second = self.dialect.decimals(sample)
         return Steps(10.0**-tip, 0.0 if second is None else 10.0**-second)
+
+    @property
+    def widest(self) -> tuple[float, float]:
+        """Largest steps of tip (mm) and of a vector of length 1 that are accounted for."""
+        widest = 2.0 * DIGITS_SHARE * self.tolerance
+        return widest, widest / self.axis_length
 
     def rotary(self, steps: Steps) -> Rotary | None:
         """What resolves rotary words; None without a machine."""
         if self.machine is None:
             return None
-        return Rotary(self.machine, self.tcp, self.tolerance, self.axis_length, steps.tip, steps.second or 1.0)
+        tip, turn = self.widest
+        angle = min(steps.second or 1.0, math.degrees(turn))
+        return Rotary(self.machine, self.tcp, self.tolerance, self.axis_length, min(steps.tip, tip), angle)

@@ -9,7 +9,7 @@ know of rotary axes.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 LINE_SHARE, LEAST = 5e-3, 1e-7
 
 #: lines that one block becomes at most
-_MOST_LINES = 4096
+MOST_LINES: Final = 4096
 
 #: radians that the tool turns in a line at most, where it turns by more than a right angle
 _WIDEST = 0.2
@@ -274,7 +274,7 @@ class Rotary:
             point = here + self.axis_length * (there - chord)
             off = np.maximum(off, np.maximum(np.linalg.norm(here, axis=1), np.linalg.norm(point, axis=1)))
         # 4/3: the quarters of a parabola are as far from its chord as three quarters of the middle
-        count[rows] = np.clip(np.ceil(np.sqrt(off * 4 / 3 / self._fine)), 1, _MOST_LINES)
+        count[rows] = np.clip(np.ceil(np.sqrt(off * 4 / 3 / self._fine)), 1, MOST_LINES)
         # a turn of the tool by more than a right angle has no chord to be compared with
         wide = np.ceil(np.minimum(turn[rows], np.radians(_MANY_TURNS)) / _WIDEST).astype(np.int64)
         count[rows] = np.where(degrees[rows] > _MANY_TURNS, 2 * _LINES_A_TURN + 1, np.maximum(count[rows], wide))

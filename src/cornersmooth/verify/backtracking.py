@@ -44,6 +44,9 @@ def check_backtracking(distances: Distances, found: Findings) -> None:
     for places in (mine, theirs):
         if places is not None:
             found.violations.add(523, *places)
+    owner = match.written.trail.owner
+    lines = (int(match.nc.line[owner[vertex]]) for vertex in distances.windows.unlooked)
+    found.unlooked += [(line, "the order of the motion") for line in lines]
 
 
 def written_backwards(match: Match, written: Reached, windows: Windows) -> Found | None:
@@ -102,8 +105,7 @@ def written_elsewhere(match: Match, written: Reached, windows: Windows) -> Found
         if found and (vertex == written.vertex[found[-1]] + 1 or len(found) > _MOST_WRONG):
             found.append(row)
             continue
-        window = windows.around(vertex)
-        if window is None or window.alone:
+        if windows.disordered(vertex) is None:
             continue
         place = np.sort([written.place[row], match.place[vertex]])
         low, high = path.length_at(*_segments(path.six, place)).tolist()
@@ -128,8 +130,8 @@ def turned_elsewhere(distances: Distances) -> Found | None:
         vertex = int(written.vertex[row])
         if any(window.inner[0] <= vertex <= window.inner[1] for window in failed):
             continue  # one problem with what was found there
-        window = windows.around(vertex)
-        if window is None or window.alone:
+        window = windows.disordered(vertex)
+        if window is None:
             continue
         failed.append(window)
         if not _curved(match, window) and not _left(distances, window):

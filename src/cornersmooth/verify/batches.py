@@ -105,7 +105,7 @@ class Batches:
         #: moves of holes at whose bottom the tool waits, and ms
         self.dwells: list[tuple[int, float]] = []
         self.taps: list[int] = []
-        self.untapped: list[Problem] = []
+        self.left_out: list[Problem] = []
         self.elements = 0
 
     def of(self, chunks: Iterable[Elements]) -> Iterator[Batch]:
@@ -138,9 +138,10 @@ class Batches:
         if not ahead.has(0):
             self._lacking(0, len(original.pose) - 1)
             return
-        holes = Holes(original, ahead, self.task.axis_length, ToolChanges(original.program, self._events))
+        task, changes = self.task, ToolChanges(original.program, self._events)
+        holes = Holes(original, ahead, task.axis_length, task.tolerance, changes)
         self.holes, self.dwells = holes.elements, holes.dwells
-        self.taps, self.untapped = holes.taps, holes.untapped
+        self.taps, self.left_out = holes.taps, holes.left_out
         part: _Part | None = None
         surplus: int | None = None
         for between in holes.between():
@@ -186,6 +187,9 @@ class _Part:
         self.move, self.element = -1, first
         self.start, self.fraction, self.share = 0, 0.0, 0.0
         self.continued = False
+        #: whether a lack of motion between its stops has been said, and where the tool was at the end of it if not
+        self.told = False
+        self.origin: tuple[Floats, Floats] | None = None
         self.pending: list[tuple[int, int, int, int, float]] = []
 
     def take(self, nc: Elements) -> Iterator[Batch]:
@@ -220,8 +224,10 @@ class _Part:
             yield from self._flush()
             if self.move < self.move_last:
                 yield from self._cut_long(stop - 1, int(self.task.original.trail.last[self.move_last]), open_end=True)
-            else:  # nothing of the CL path is left for what is held: said once
+            else:  # nothing of the CL path is left for what is held: it may only stay where it is
                 yield from self._close(self.move, stop - 1)
+                at = self.element - base
+                self.origin = self.origin or (held.tip[at].copy(), held.second[at].copy())
                 self.element, self.continued = stop - 1, True
         first = min(self.pending[0][0] if self.pending else self.element, self.element) - 1
         if first > self.base:
@@ -246,7 +252,7 @@ class _Part:
                     self._six(slice(at, at + 1))[0], path, start, int(last_vertex[move + 1]) - 1
                 )
                 there = float(places[np.argmin(squares)])
-        self.move, self.element, self.continued = move, element, False
+        self.move, self.element, self.continued, self.told, self.origin = move, element, False, False, None
         self.start, self.fraction, self.share = start, 0.0, 0.0
         if there > begin:
             self.start, self.fraction = path.place_at(there)
@@ -261,7 +267,7 @@ class _Part:
         if self.move < 0:
             return
         theirs, ours = move_last > self.move, element_last > self.element
-        if theirs != ours and not self.continued:
+        if theirs != ours and not self.told:
             self._lost(move_last, element_last, theirs=theirs)
         if not (theirs and ours):
             return
@@ -381,8 +387,10 @@ class _Part:
             tip, other = nc.tip[part], nc.second[part]
             scale = task.axis_length if nc.second_is == "vector" else 1.0
             text, code = "feed moves that the CL file does not have", "CS536"
-        extent = np.abs(tip - tip[0]).max() + scale * np.abs(other - other[0]).max()
+        from_tip, from_other = (tip[0], other[0]) if theirs or self.origin is None else self.origin
+        extent = np.abs(tip - from_tip).max() + scale * np.abs(other - from_other).max()
         if extent > task.margin(nc):
+            self.told = True
             move = min(self.move + 1, len(original.pose) - 1)
             element = min(self.element + 1 - self.base, len(nc) - 1)
             line = int(program.line[original.pose[move]])

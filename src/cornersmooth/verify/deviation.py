@@ -21,9 +21,9 @@ from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import distance_between
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 
-#: rows of a batch for which tip and axis point are looked at each on its own: at a time, those that are farther than
-#: the tolerance from a common pose at a time, and at most
-_OWN_ROWS, _SOME_OWN_ROWS, _MOST_OWN_ROWS = 16, 256, 2048
+#: rows of a batch for which tip and axis point are looked at each on its own: at a time at first, and those that are
+#: farther than the tolerance from a common pose at a time
+_OWN_ROWS, _SOME_OWN_ROWS = 16, 256
 
 #: rows farther than the tolerance from which on the worst of them tell enough, if most of these are off by themselves
 _MANY_OVER = 1024
@@ -86,24 +86,24 @@ def _take(
         known[rows] = True
 
     over = np.flatnonzero(gap.larger > limit)
-    order = over[np.argsort(-gap.larger[over])[:_MOST_OWN_ROWS]]
+    order = over[np.argsort(-gap.larger[over])]
     for begin in range(0, len(order), _SOME_OWN_ROWS):
         rows = order[begin : begin + _SOME_OWN_ROWS]
         look(rows)
         off = int(np.count_nonzero(np.maximum(tip[rows], axis[rows]) > limit))
         if len(over) > _MANY_OVER and 2 * off > _SOME_OWN_ROWS:
-            break  # the text is off everywhere
+            break  # the program is off everywhere: that is found already
     for values, worst in ((tip, result.tip), (axis, result.axis_point)):
-        looked = 0
-        while looked < _MOST_OWN_ROWS:
+        some = _OWN_ROWS
+        while True:
             best = max(worst.value, float(values[known].max(initial=0.0)))
             rows = np.flatnonzero(~known & (values > best))
             if not len(rows):
                 break
-            if len(rows) > _OWN_ROWS:
-                rows = rows[np.argpartition(-values[rows], _OWN_ROWS)[:_OWN_ROWS]]
+            if len(rows) > some:
+                rows = rows[np.argpartition(-values[rows], some)[:some]]
             look(rows)
-            looked += len(rows)
+            some *= 2
         rows = np.flatnonzero(known)
         worst.update(values[rows], cl_line[rows], nc_line[rows])
     over = over[known[over]]

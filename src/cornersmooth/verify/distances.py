@@ -163,8 +163,8 @@ def _brackets(match: Match) -> tuple[Ints, Ints, Ints, Ints]:
 
 
 #: poses of a batch that are looked for on single elements: how many are many, of which those that are far off need no
-#: search, with how many tolerances far is; and how many are looked for at most
-_MANY, _FAR_OFF, _MOST_SEARCHED = 512, 10.0, 4096
+#: search, with how many tolerances far is; and how many are looked for at a time
+_MANY, _FAR_OFF, _SEARCHED_AT_ONCE = 512, 10.0, 4096
 
 #: vectors shorter than this have no direction
 _LEAST = 1e-300
@@ -204,9 +204,10 @@ def _on_bent(match: Match, point: Floats, segment: Ints, at: Floats) -> tuple[Fl
         axis[rest] = _unit_on(trail.axis, segment[rest], at[rest])
         away = point[rest, :3] - tip[rest]
         near = np.einsum("ij,ij->i", away, away) <= (_FAR_OFF * match.tolerance) ** 2
-        rest = rest[near][:_MOST_SEARCHED]
-    if len(rest):
-        tip[rest], axis[rest], _ = search_elements(match, owner[rest][:, None], point[rest])
+        rest = rest[near]
+    for begin in range(0, len(rest), _SEARCHED_AT_ONCE):
+        rows = rest[begin : begin + _SEARCHED_AT_ONCE]
+        tip[rows], axis[rows], _ = search_elements(match, owner[rows][:, None], point[rows])
     return tip, axis, place
 
 

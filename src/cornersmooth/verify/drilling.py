@@ -57,13 +57,15 @@ class Holes:
     ----------
     original : Original
     ahead : Ahead
-    axis_length : float, mm
+    axis_length, tolerance : float, mm
     changes : ToolChanges
     """
 
-    def __init__(self, original: Original, ahead: Ahead, axis_length: float, changes: ToolChanges) -> None:
+    def __init__(
+        self, original: Original, ahead: Ahead, axis_length: float, tolerance: float, changes: ToolChanges
+    ) -> None:
         self._original, self._ahead = original, ahead
-        self._search = HoleSearch(original, ahead, axis_length, changes)
+        self._search = HoleSearch(original, ahead, axis_length, tolerance, changes)
         #: elements that belong to holes, ascending, three numbers for each: its own, the first move that it may belong
         #: to, and the last: over holes that are not drilled the tool may be there for the next
         self.elements = array("q")
@@ -71,8 +73,8 @@ class Holes:
         self.dwells: list[tuple[int, float]] = []
         #: moves of the holes to be tapped in which something is fed
         self.taps: list[int] = []
-        #: CS561 for holes that are not tapped: on purpose where a comment says so
-        self.untapped: list[Problem] = []
+        #: CS561 for holes that the text leaves out and may leave out if asked: taps, cycles that are not understood
+        self.left_out: list[Problem] = []
         #: CS561 a hole is missing, CS562 a wrong depth, CS563 a rapid inside a hole, CS564 a feed that is not a hole's
         self.problems: list[Problem] = []
         #: first move behind the last run that leads somewhere
@@ -145,10 +147,10 @@ class Holes:
                 self.dwells.append((move, cycle.dwell))
             if cycle.tap and not np.isnan(cycle.depth):
                 self.taps.append(move)
-            elif cycle.tap:
+            elif np.isnan(cycle.depth) and (cycle.tap or not fed):
                 near = search.nc_line(group[0]) if group else 0
-                text = "a hole of the CL file is not tapped"
-                self.untapped.append(Problem("CS561", int(search.line[move]), near, text))
+                text = f"a hole of the CL file is not {'tapped' if cycle.tap else 'drilled'}"
+                self.left_out.append(Problem("CS561", int(search.line[move]), near, text))
 
     def _latest(self, element: int, begin: int, groups: list[list[int]], k: int, stop: int) -> int:
         """Which of the holes from `begin` on is the last that an element of one may belong to."""

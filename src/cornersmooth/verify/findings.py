@@ -199,6 +199,8 @@ class Findings:
     feeds : Runs
         Of elements with a wrong feed.
     poses : list of Poses
+    unlooked : list of (int, str)
+        What was not looked at, and the NC line.
     """
 
     largest: Largest = field(default_factory=Largest)
@@ -206,6 +208,7 @@ class Findings:
     violations: Violations = field(default_factory=Violations)
     feeds: Runs = field(default_factory=Runs)
     poses: list[Poses] = field(default_factory=list)
+    unlooked: list[tuple[int, str]] = field(default_factory=list)
 
     def take(self, other: Findings) -> None:
         """Take over what is found elsewhere."""
@@ -214,3 +217,4 @@ class Findings:
         self.violations.extend(other.violations)
         self.feeds.follow(other.feeds)
         self.poses += other.poses
+        self.unlooked += other.unlooked

@@ -33,12 +33,14 @@ class HoleLines:
     ----------
     original : Original
     ahead : Ahead
-    axis_length : float, mm
+    axis_length, tolerance : float, mm
     changes : ToolChanges
     """
 
-    def __init__(self, original: Original, ahead: Ahead, axis_length: float, changes: ToolChanges) -> None:
-        self.ahead, self.axis_length = ahead, axis_length
+    def __init__(
+        self, original: Original, ahead: Ahead, axis_length: float, tolerance: float, changes: ToolChanges
+    ) -> None:
+        self.ahead, self.axis_length, self.tolerance = ahead, axis_length, tolerance
         self._changes, self._pose = changes, original.pose
         program = original.program
         self.tip, self.axis = program.tip[original.pose], program.axis[original.pose]
@@ -49,7 +51,8 @@ class HoleLines:
     def room(self) -> float:
         """Distance that the printed digits account for, mm."""
         nc = self.ahead.nc
-        return _STEPS * (nc.tip_step + nc.second_step * (self.axis_length if nc.second_is == "vector" else 1.0))
+        axis_step = nc.second_step * (self.axis_length if nc.second_is == "vector" else 1.0)
+        return min(_STEPS * (nc.tip_step + axis_step), self.tolerance)
 
     def of_its_tool(self, move: int) -> tuple[int, int]:
         """First element that a move may have, and the first behind those, as far as tool changes tell."""

@@ -21,8 +21,8 @@ _SAMPLES = 32
 #: segments of the original that are looked at beyond both ends of a curve
 _BESIDE = 3
 
-#: curves searched in one batch at most, and those of them that leave the tolerance at knots already
-_MOST_CURVES, _MOST_KNOWN = 20000, 256
+#: curves searched at a time, and those at most that leave the tolerance at knots: these are found already
+_CURVES_AT_ONCE, _MOST_KNOWN = 1 << 12, 256
 
 #: part of the largest deviation of a curve's ends by which its hull may exceed it unsearched
 _HULL_SLACK = 1e-3
@@ -46,7 +46,7 @@ def hull_gaps(match: Match, limit: float) -> tuple[Floats, Ints, Floats, Floats]
     # curves that leave the tolerance at their knots already are said to: of those only the farthest are looked at
     known = np.flatnonzero(at_knots > limit)
     known = known[np.argsort(-reached[known], kind="stable")[:_MOST_KNOWN]]
-    element = element[np.sort(np.append(np.flatnonzero(at_knots <= limit), known))][:_MOST_CURVES]
+    element = element[np.sort(np.append(np.flatnonzero(at_knots <= limit), known))]
     if not len(element):
         return None
     trail, first = match.written.trail, match.written.first
@@ -58,8 +58,10 @@ def hull_gaps(match: Match, limit: float) -> tuple[Floats, Ints, Floats, Floats]
     reach = np.exp2(np.ceil(np.log2(_BESIDE + (high - low + 1) // 2))).astype(np.int64)
     tip, axis = np.zeros(len(element)), np.zeros(len(element))
     for size in np.unique(reach).tolist():
-        rows = np.flatnonzero(reach == size)
-        tip[rows], axis[rows] = _searched(match, element[rows], (low[rows] + high[rows]) // 2, size)
+        of_size = np.flatnonzero(reach == size)
+        for start in range(0, len(of_size), _CURVES_AT_ONCE):
+            rows = of_size[start : start + _CURVES_AT_ONCE]
+            tip[rows], axis[rows] = _searched(match, element[rows], (low[rows] + high[rows]) // 2, size)
     return match.place[end - 1], element, tip, axis
 
 

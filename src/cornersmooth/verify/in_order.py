@@ -28,7 +28,7 @@ _ANCHORS: Final = 32
 #: pairs of a written and an original segment that are looked at, at most
 MOST_PAIRS: Final = 100_000
 
-#: windows of a batch that may be out of order before no more are looked at: the text is off then
+#: windows of a batch that may be out of order, tips and axis points alone too, before no more are looked at
 _MOST_FAILED: Final = 8
 
 
@@ -85,19 +85,28 @@ class Windows:
         self.match = match
         self.known: list[Window] = []
         self.failed = 0
+        #: vertices whose order was asked for and not looked at
+        self.unlooked: list[int] = []
         self.length = match.path.length_at(match.segment, match.fraction)
 
     def around(self, vertex: int) -> Window | None:
-        """Return the piece around a vertex; None where it belongs to none, or too many have failed."""
+        """Return the piece around a vertex; None where it is too long, or too many have failed."""
         for window in self.known:
             if window.inner[0] <= vertex <= window.inner[1]:
                 return window
         if self.failed >= _MOST_FAILED or not self.match.on[vertex]:
             return None
         found = self._of(vertex)
-        self.failed += found is None or not found.passed
+        self.failed += found is not None and not found.alone
         self.known += [] if found is None else [found]
         return found
+
+    def disordered(self, vertex: int) -> Window | None:
+        """Return the piece around a vertex where not even tips and axis points are in order, each on its own."""
+        found = self.around(vertex)
+        if found is None:
+            self.unlooked.append(vertex)
+        return None if found is None or found.alone else found
 
     def _of(self, vertex: int) -> Window | None:
         match, length = self.match, self.length

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -78,11 +78,13 @@ class Verification:
         NC lines, and blocks of the user's own, that were not compared with the CL file. Line 0: all statements of a
         kind. `unverified` names those that may bear on the motion.
     unverified : str
-        What of the text was not looked at and may bear on the motion; empty where all of it was.
+        What of the text was not looked at and may bear on the motion, and its line; empty where all of it was.
+    left_out : int
+        Holes that the text leaves out, as the caller allowed.
+    taken_from_head : tuple of str
+        Words of the program's own head that say how it is measured, as ``E=0.04``.
     rewinds : tuple of (int, int)
         NC lines where a cut is left along the tool, and where the tool comes back into it.
-    left_out : int
-        Holes that the text leaves out, as its comments say.
     """
 
     passed: bool
@@ -111,11 +113,20 @@ class Verification:
     unverified: str = ""
     rewinds: tuple[tuple[int, int], ...] = ()
     left_out: int = 0
+    taken_from_head: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
-        """The worst that applies."""
+        """How the program turned out."""
         return Verdict.of(problems=self.problem_count, unverified=bool(self.unverified), left_out=self.left_out)
+
+    def with_problem(self, problem: Problem) -> Verification:
+        """Return the same with one more problem, in front of the others."""
+        return replace(self, passed=False, problems=(problem, *self.problems), problem_count=self.problem_count + 1)
+
+    def not_verified(self, *what: str) -> Verification:
+        """Return the same with more that was not looked at."""
+        return replace(self, unverified="; ".join(text for text in (self.unverified, *what) if text))
 
     @property
     def max_tip_deviation_mm(self) -> float:
@@ -158,6 +169,7 @@ class Verification:
             "problem_count": self.problem_count,
             "not_verified": self.unverified,
             "left_out": self.left_out,
+            "taken_from_head": list(self.taken_from_head),
             "rewinds": [{"nc_line": out, "back_nc_line": back} for out, back in self.rewinds],
             "trusted": [{"nc_line": line, "text": text} for line, text in self.trusted],
             **{key: _finite(where.value) for key, where in places.items()},

@@ -15,6 +15,9 @@ from cornersmooth.verify.polyline import Original, Polyline, original_motion
 #: last printed digits by which the next segment must be nearer to be taken
 MARGIN_STEPS = 4.0
 
+#: share of the tolerance that these are at most
+MARGIN_SHARE = 0.5
+
 
 @dataclass(frozen=True)
 class Task:
@@ -75,9 +78,9 @@ class Task:
         return np.degrees(2.0 * np.arcsin(np.minimum(np.asarray(off) / (2.0 * self.axis_length), 1.0)))
 
     def margin(self, nc: Elements) -> float:
-        """Distance that printed digits may account for, mm."""
+        """Distance that printed digits may account for, mm: never more than a share of the tolerance."""
         axis_step = nc.second_step * (self.axis_length if nc.second_is == "vector" else 1.0)
-        return MARGIN_STEPS * max(nc.tip_step, axis_step)
+        return min(MARGIN_STEPS * max(nc.tip_step, axis_step), MARGIN_SHARE * self.tolerance)
 
 
 def length_of(tolerance: float, axis_tolerance: float) -> float:

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self
 
+import numpy as np
+
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Ints, Program, Units
-from cornersmooth.nc_reader.block_tables import read_lines
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
-from cornersmooth.nc_reader.hole_cycles import NOT_DRILLED
 from cornersmooth.nc_reader.machine_positions import MachinePositions
 from cornersmooth.nc_reader.needed_states import CONTROL_WORDS
 from cornersmooth.nc_reader.reader import Reader
@@ -80,6 +80,8 @@ class Verifier:
         Those that curves have, where that is known: any other is a problem, even if the curve stays within ε.
     slower : bool
         Whether feeds may be below those of the CL file, as where the text has those of a plan.
+    skip_cycles : bool
+        Whether the text may leave out holes to be tapped and those of cycles that are not understood.
     processes : int
         Processes to work on long texts with, where the system can fork; the result does not depend on it.
 
@@ -106,6 +108,7 @@ class Verifier:
         trusted: Sequence[str] = (),
         weights: Sequence[float] | None = None,
         slower: bool = False,
+        skip_cycles: bool = False,
         processes: int = 1,
     ) -> None:
         self._axis_tolerance = axis_tolerance
@@ -116,6 +119,7 @@ class Verifier:
         self._program, self._words = program, words
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
         self._trusted, self._weights, self._slower = tuple(trusted), weights, slower
+        self._skip_cycles = skip_cycles
         self._machine = machine
         said = () if machine is None else (word for axis in machine.axes for word in axis.clamp or ())
         self._clamps = frozenset(float(word[1:]) for word in said)
@@ -150,7 +154,9 @@ class Verifier:
         if isinstance(self._text, Source):
             self._text.finish()
         found: Verification = self._work() if self._helper is None else self._helper.result()
-        return found if found.passed or not may_be_left_out(self._program) else self._gone_over() or found
+        if found.passed or not (self._skip_cycles and may_be_left_out(self._program)):
+            return found
+        return self._gone_over() or found
 
     def _gone_over(self) -> Verification | None:
         """What is found with holes that the text leaves out as rapids over them, if all is right then."""
@@ -163,7 +169,8 @@ class Verifier:
             if isinstance(self._text, Source):
                 self._text.begin_again()
             if (found := self._work()).passed:
-                return found
+                count = int(np.count_nonzero(program.kind != other.kind))
+                return replace(found, left_out=found.left_out + count)
         return None
 
     def _work(self) -> Verification:
@@ -179,9 +186,10 @@ class Verifier:
         elements, events = OwnRapids(task).left_out(nc)
         text = _Text(iter([elements.at_most() if self._slower else elements]), events)
         measured = _measure(task, text, words=self._words, processes=self._processes)
+        measured.skip_cycles = self._skip_cycles
         found = measured.verification(list(nc.problems), nc.units, nc.unsaid, blocks=nc.blocks, curves=len(nc.curves))
-        unverified = "the words of the text: they are looked at where it is read, not afterwards"
-        return replace(found, unverified=unverified, rewinds=tuple((out, back) for *_, out, back in nc.left_cuts))
+        found = found.not_verified("the words of the text: they are looked at where it is read, not afterwards")
+        return replace(found, rewinds=tuple((out, back) for *_, out, back in nc.left_cuts))
 
     def _of_text(self, source: Source) -> Verification:
         options = self._options
@@ -192,7 +200,7 @@ class Verifier:
         if rotary is not None:
             lever = float(rotary.levers(task.original.trail.tip).max(initial=0.0))
         reader = Reader(self._name, options, steps, lever)
-        lines = read_lines(source, self._name, options.dialect.lexer)
+        lines = reader.lines(source)
         room = options.tolerance / self._program.mm_per_unit
         machine = self._machine if options.dialect.retracts else None
         positions = MachinePositions(machine, self._program.mm_per_unit)
@@ -204,15 +212,16 @@ class Verifier:
         measured = _measure(task, text, words=self._words, processes=self._processes)
         problems = [*reader.problems, *check.problems]
         own = KINDS & set(self._trusted)
-        measured.own, measured.clamps = own, self._clamps
+        measured.own, measured.clamps, measured.skip_cycles = own, self._clamps, self._skip_cycles
+        measured.coarse = reader.coarse
+        measured.findings.unlooked += reader.unlooked
         found = measured.verification(
             problems, reader.units, reader.dialect.unsaid, blocks=reader.blocks, curves=reader.curves
         )
         rewinds = tuple((out, back) for *_, out, back in reader.left_cuts.found)
         trusted = [(0, _own_table(own - _OF_MOTION))] if own - _OF_MOTION else []
-        return replace(
-            found, trusted=(*trusted, *check.trusted), unverified=self._unverified(check, own), rewinds=rewinds
-        )
+        found = found.not_verified(self._unverified(check, own))
+        return replace(found, trusted=(*trusted, *check.trusted), rewinds=rewinds)
 
     def _unverified(self, check: WordCheck, own: Set[str]) -> str:
         """What of the text was not looked at and may bear on the motion."""
@@ -267,6 +276,8 @@ class _Measured:
     words: bool
     own: frozenset[str] = frozenset()  #: kinds of statements that the user says in words of his own
     clamps: frozenset[float] = frozenset()  #: M words that clamp a rotary axis or let it turn
+    skip_cycles: bool = False  #: whether holes may be left out
+    coarse: int = 0  #: NC line from which on digits are too few for the tolerance; 0 for none
 
     def verification(
         self,
@@ -285,12 +296,13 @@ class _Measured:
             problems.append(Problem("CS505", 0, 1, text))
         problems += self.batches.problems + self.findings.feeds.problems + self.findings.violations.problems()
         problems += half_turns(program)
-        left_out = sum(event.letter == "(" and event.text.startswith(NOT_DRILLED) for event in self.places.events)
-        if left_out < len(self.batches.untapped):
-            problems += self.batches.untapped
+        left_out = self.batches.left_out
+        if not self.skip_cycles:
+            problems += left_out
         if self.words and self.batches.elements:  # without any motion nothing has a place
             of_statements, at_home = self.places.problems(self.batches, unsaid, self.own, self.clamps)
             problems = [one for one in problems if one.text != GONE_ON or one.nc_line not in at_home] + of_statements
+        problems = self._told_by_digits(problems)
         found = Verification.of(
             self.findings,
             self.poses,
@@ -301,7 +313,31 @@ class _Measured:
             elements=self.batches.elements,
             curves=curves,
         )
-        return replace(found, left_out=left_out)
+        found = replace(found, left_out=len(left_out) if self.skip_cycles else 0)
+        return found.not_verified(*_texts(self.findings.unlooked))
+
+    def _told_by_digits(self, problems: list[Problem]) -> list[Problem]:
+        """Take out poses missed within the tolerance where digits are too few for it: these are not verified."""
+        if not self.coarse:
+            return problems
+        limit = self.task.tolerance
+        missed = [one for one in problems if one.code in ("CS524", "CS531") and one.amount <= limit]
+        text = f"exact poses: the digits are too few for {limit:g} mm"
+        self.findings.unlooked += [(one.nc_line, text) for one in missed]
+        return [one for one in problems if one not in missed] if missed else problems
+
+
+def _texts(unlooked: list[tuple[int, str]]) -> list[str]:
+    """What was not looked at: the first line of each kind, and how often."""
+    first: dict[str, int] = {}
+    count: dict[str, int] = {}
+    for line, text in sorted(unlooked):
+        first.setdefault(text, line)
+        count[text] = count.get(text, 0) + 1
+    return [
+        f"{text} at NC line {line}" + (f" and {count[text] - 1:,} more places" if count[text] > 1 else "")
+        for text, line in first.items()
+    ]
 
 
 def _measure(task: Task, text: _Text, *, words: bool, processes: int) -> _Measured:

@@ -129,10 +129,14 @@ class Dialect:
                 second = max(second or 0, len(fraction))
             else:
                 tip = max(tip, len(fraction))
+        for fraction in _VECTOR_K.findall(b"\n".join(shapes)) if b"IJ" in self.digits.pattern else ():
+            second = max(second or 0, len(fraction))
         return tip, second
 
 
 _COMMENT = re.compile(rb"\([^)\n]*\)|;[^\n]*")
+#: K of a vector; alone it is a knot
+_VECTOR_K = re.compile(rb"J[-+]?\d*\.?\d*[ ]*K[-+]?\d*\.(\d*)")
 _ONE_DIGIT = bytes.maketrans(b"0123456789", b"0" * 10)
 
 
