@@ -247,7 +247,7 @@ def postprocess(
                 axis_tolerance=smoothed.settings.axis_tolerance,
                 weights=provenance.weights,
                 slower=provenance.planned_feeds,
-                skip_cycles=True,  # the writer refuses those that it was not asked to leave out
+                skip_cycles=frame.skip_cycles,
                 processes=processes,
                 **back | {"trusted": (*back["trusted"], *_users_blocks(frame, form, program, smoothed.settings))},
             )

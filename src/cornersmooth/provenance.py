@@ -70,7 +70,7 @@ class Provenance:
             "FORM": self.form,
             **({"MACHINE": self.machine} if self.machine else {}),
             **({} if self.tcp else {"TCP": "no"}),
-            **({"WEIGHTS": self._weights_word} if self._weights_word else {}),
+            **({"WEIGHTS": self.weights_word} if self.weights_word else {}),
             **({"FEEDS": "plan"} if self.planned_feeds else {}),
             **({"OFFSET": self.work_offset} if self.work_offset else {}),
         }
@@ -84,7 +84,7 @@ class Provenance:
         return tuple(lines)
 
     @property
-    def _weights_word(self) -> str:
+    def weights_word(self) -> str:
         """Weights as they are written; nothing where all are 1."""
         if self.weights is None:
             return "any"

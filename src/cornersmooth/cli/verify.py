@@ -7,6 +7,7 @@ import hashlib
 import os
 import stat
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -23,7 +24,7 @@ from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.model import Program
-    from cornersmooth.nc_reader import NcProgram
+    from cornersmooth.nc_reader import NcProgram, Problem
     from cornersmooth.report.along import Distribution
     from cornersmooth.verify import Verification, Where
 
@@ -33,12 +34,15 @@ _PROBLEMS_SHOWN = 20
 #: rewinds shown
 _REWINDS_SHOWN = 5
 
+#: share by which numbers may differ that are alike
+_ALIKE = 1e-9
+
 
 @click.command(
     "verify",
     cls=ShopCommand,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 the text keeps the tolerance; 1 it does not, or something else is wrong with it; "
+    epilog="Exit codes: 0 PASSED; 1 FAILED, NOT VERIFIED or INCOMPLETE; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
 )
 @click.argument("source", type=PATH, metavar="IN")
@@ -50,6 +54,8 @@ _REWINDS_SHOWN = 5
 @nc_text.machine
 @nc_text.no_tcp
 @nc_text.trusted
+@nc_text.slower
+@nc_text.skip_cycles
 @reading.reading_options
 @reading.tool_options
 @outputs.found_reports
@@ -64,7 +70,8 @@ def command(source: str, text: str, **given: Any) -> int:
     Tip and axis point must stay within the tolerance of their paths, in order; rapids, statements, feeds and exact
     poses must be where the CL file has them. Shares no code with what smooths and writes.
 
-    A text that cornersmooth has written says in its head how; options say it of other texts, and otherwise.
+    A program that cornersmooth has written says in its head how it was made; options come before it. What is taken
+    from the head is named, and where it loosens the check without an option the verdict is NOT VERIFIED.
 
     \b
     Examples:
@@ -90,7 +97,7 @@ def command(source: str, text: str, **given: Any) -> int:
     form = _check_outputs(source, text, given)
     data, name = read_input(source)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
-    remark, weights = _take_over(given, nc, data)
+    head = _take_over(given, nc, data)
     own = own_words(nc_text.control_of(given))
     smoothing.check_one_of_axis(given)
     reader = nc_text.reading_back_of(given)
@@ -101,17 +108,21 @@ def command(source: str, text: str, **given: Any) -> int:
     if given["plot"] or given["verbose"] or pages:  # it is looked at more than once
         nc = readable_twice(nc)
     trusted = [line for path in given["trusted"] for line in read_lines(path)]
-    if remark:  # first: what follows may be hard to understand without it
-        click.echo(f"{text}: warning: {remark}", err=True)
+    if head.remark:  # first: what follows may be hard to understand without it
+        click.echo(f"{text}: warning: {head.remark}", err=True)
     found = verify(
         program,
         nc,
         **how,
         trusted=(*own, *trusted),
-        weights=weights,
-        slower=given.get("slower", False),
+        weights=head.weights,
+        slower=given["slower"],
+        skip_cycles=given["skip_cycles"],
         processes=useful_processes(),
     )
+    found = replace(found, taken_from_head=head.taken).not_verified(*head.loose)
+    if head.problem is not None:
+        found = found.with_problem(head.problem)
     _write_reports(program, found, [path for path in given["reports"] if path not in pages])
     if pages:
         from cornersmooth.page import verified_page
@@ -140,46 +151,99 @@ def command(source: str, text: str, **given: Any) -> int:
         if given["verbose"]:
             for line in _along(found, deviation_along(program, nc, **how)):
                 click.echo(line)
-    return 0 if found.passed else 1
+    return 0 if found.verdict == Verdict.PASSED else 1
 
 
-def _take_over(
-    given: dict[str, Any], nc: bytes | str | os.PathLike[str], source: bytes
-) -> tuple[str, tuple[float, ...] | None]:
-    """Take what the text says of how it was made for options that were not given.
+@dataclass(frozen=True)
+class _Head:
+    """What was taken from the head of a program.
 
-    Returns
-    -------
-    str
+    Parameters
+    ----------
+    taken : tuple of str
+        Words that took the place of options that were not given.
+    loose : tuple of str
+        What is not verified because the program itself loosens the check.
+    weights : tuple of float or None
+        Weights of its curves; None for any.
+    remark : str
         What is strange about it; empty for nothing.
-    tuple of float or None
-        Weights of its curves, where it says so.
+    problem : Problem or None
     """
+
+    taken: tuple[str, ...] = ()
+    loose: tuple[str, ...] = ()
+    weights: tuple[float, ...] | None = None
+    remark: str = ""
+    problem: Problem | None = None
+
+
+def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source: bytes) -> _Head:
+    """Take what the head of a program says of how it was made for options that were not typed."""
     from cornersmooth.kinematics import machine_names
     from cornersmooth.nc import control_names
+    from cornersmooth.nc_reader import Problem
     from cornersmooth.provenance import read_provenance
 
-    head = _head(nc)
+    head = _beginning(nc)
     made = read_provenance(head)
     context = click.get_current_context()
     if made is None:
-        return _recognise(given, head, context), None
-    said: dict[str, Any] = {"tolerance": made.tolerance, "axis_length": made.axis_length, "no_tcp": not made.tcp}
-    if context.get_parameter_source("axis_length") != click.core.ParameterSource.COMMANDLINE:
-        said["axis_tolerance"] = made.axis_tolerance
-    said |= {"control": made.control} if made.control in control_names() else {}
-    said |= {"machine": made.machine or None} if made.machine in ("", *machine_names()) else {}
-    typed = click.core.ParameterSource.COMMANDLINE
-    given["slower"] = made.planned_feeds
-    given |= {name: value for name, value in said.items() if context.get_parameter_source(name) != typed}
+        return _Head(remark=_recognise(given, head, context))
+    words: dict[str, tuple[str, Any]] = {"tolerance": ("E", made.tolerance), "axis_length": ("H", made.axis_length)}
+    if not _typed(context, "axis_length"):
+        words["axis_tolerance"] = ("AXIS", made.axis_tolerance)
+    words |= {"control": ("CONTROL", made.control)} if made.control in control_names() else {}
+    words |= {"machine": ("MACHINE", made.machine or None)} if made.machine in ("", *machine_names()) else {}
+    words |= {"no_tcp": ("TCP", not made.tcp), "slower": ("FEEDS", made.planned_feeds)}
+    words = {name: word for name, word in words.items() if not _typed(context, name)}
+    if "axis_length" in words and (_typed(context, "axis_tolerance") or made.axis_tolerance is not None):
+        del words["axis_length"]  # H is no measure where the axis has a tolerance of its own
+    before = dict(given)
+    given |= {name: value for name, (_, value) in words.items()}
     if made.machine and not given["machine"]:
         raise SettingsError("CS225", f"the text is for the machine {made.machine}", "name its file with --machine")
+    spelled = {"machine": made.machine, "no_tcp": "no", "slower": "plan"}
+    taken = [
+        f"{word}={spelled.get(name, f'{value:.9g}' if isinstance(value, float) else value)}"
+        for name, (word, value) in words.items()
+        if value not in (None, False)
+    ]
+    taken += [] if made.weights_word == "" else [f"WEIGHTS={made.weights_word}"]
+    problem = None
     if made.sha256 and made.sha256 != hashlib.sha256(source).hexdigest():
-        return "it was made from another CL file, or that has changed since: its SHA-256 is another", made.weights
-    return "", made.weights
+        text = "the program was made from another CL file, or that has changed since: its SHA-256 is another"
+        problem = Problem("CS508", 0, 1, text)
+    loose = tuple(_loose(before, given, set(words)))
+    return _Head(tuple(taken), loose, made.weights, problem=problem)
 
 
-def _head(nc: bytes | str | os.PathLike[str]) -> bytes:
+def _typed(context: click.Context, name: str) -> bool:
+    """Whether an option was given on the command line."""
+    return context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
+
+
+def _loose(before: dict[str, Any], given: dict[str, Any], taken: set[str]) -> Iterator[str]:
+    """Say where words of the head make the check looser than the options and settings do without them."""
+    from cornersmooth.verify.task import length_of
+
+    def lever(options: dict[str, Any]) -> float:
+        """Distance from the tip at which the axis is off by the tolerance where it is off by what it may."""
+        own = options["axis_tolerance"]
+        return float(options["axis_length"] if own is None else length_of(options["tolerance"], own))
+
+    was, now = before["tolerance"], given["tolerance"]
+    if "tolerance" in taken and now > was * (1.0 + _ALIKE):
+        yield f"the tolerance {now:g} mm is the program's own word, looser than {was:g} mm: name it with -e"
+    looser = lever(given) < lever(before) * (1.0 - _ALIKE) and now / lever(given) > was / lever(before) * (1.0 + _ALIKE)
+    if looser and taken & {"axis_length", "axis_tolerance"}:
+        name = "-H" if given["axis_tolerance"] is None else "--axis-tolerance"
+        yield f"the tolerance of the tool axis is the program's own word, looser than without: name it with {name}"
+    if "slower" in taken and given["slower"]:
+        yield "feeds: that they may be lower is the program's own word: name it with --planned-feeds"
+
+
+def _beginning(nc: bytes | str | os.PathLike[str]) -> bytes:
     """Beginning of the text; empty where it cannot be read twice."""
     from cornersmooth.provenance import HEAD
 
@@ -261,6 +325,8 @@ def _summary(found: Verification) -> Iterator[str]:
     """Label and text of everything measured."""
     from cornersmooth.verify.deviation import TOGETHER
 
+    if found.taken_from_head:
+        yield f"{'from the head':<18}{' '.join(found.taken_from_head)}"
     own_axis = found.axis_tolerance is not None
     second = f"tool axis {found.axis_tolerance:g} deg" if own_axis else f"axis point at {found.axis_length:g} mm"
     yield f"{'tolerance':<18}{found.tolerance:g} mm, {second}"

@@ -46,6 +46,9 @@ class Drilling:
         Whether the spindle turns with the feed, and back on the way out.
     feed_out : bool
         Whether the tool comes out at feed.
+    clearance, retract : float, mm
+        Above the pose, where rapids into the hole end, and where the tool leaves its line; NaN where the statement
+        leaves it open.
     """
 
     depth: float = math.nan
@@ -54,6 +57,14 @@ class Drilling:
     dwell: float = 0.0
     tap: bool = False
     feed_out: bool = False
+    clearance: float = math.nan
+    retract: float = math.nan
+
+    @property
+    def level(self) -> float:
+        """Height above the pose, mm, below which no rapid leads from hole to hole."""
+        known = [height for height in (self.retract, self.clearance) if not math.isnan(height)]
+        return known[0] if known else 0.0
 
     @property
     def if_drilled(self) -> Drilling:
@@ -106,14 +117,20 @@ def drilling(args: tuple[float | str, ...], program: Program, speed: float = 0.0
     if in_turns and (not speed or not dwell):
         return Drilling()
     dwell = float(round(1000.0 * (dwell * 60.0 / speed if in_turns else dwell)))
+    above = _height(values, ("RAPTO",) if program.source.dialect == "hsm" else ("RAPTO", "CLEAR"), unit)
+    retract = _height(values, _RETURNS, unit)
     if "TAP" not in kinds:
         feed_out = bool(kinds & _AT_FEED)
-        return Drilling(depth * program.mm_per_unit, feed, per_revolution, dwell, feed_out=feed_out)
+        return Drilling(depth * unit, feed, per_revolution, dwell, feed_out=feed_out, clearance=above, retract=retract)
     if len(kinds) > 1 or math.isnan(feed) or not (per_revolution or speed):
         return Drilling()
-    return Drilling(
-        depth * program.mm_per_unit, feed if per_revolution else feed / speed, True, dwell, tap=True, feed_out=True
-    )
+    pitch = feed if per_revolution else feed / speed
+    return Drilling(depth * unit, pitch, True, dwell, tap=True, feed_out=True, clearance=above, retract=retract)
+
+
+def _height(values: dict[str, float], words: tuple[str, ...], unit: float) -> float:
+    """Height above the pose that the first of some words says, mm; NaN for none. HSM's CLEAR is an absolute height."""
+    return next((values[word] * unit for word in words if word in values), math.nan)
 
 
 def _goes_on(before: tuple[float | str, ...], args: tuple[float | str, ...], *, fixed: bool) -> tuple[float | str, ...]:

@@ -112,6 +112,12 @@ header = click.option(
     help="Lines to write behind the head; {program} and {units} are filled in.",
 )
 footer = click.option("--footer", type=PATH, metavar="FILE", help="Lines to write before the tail.")
+slower = click.option(
+    "--planned-feeds",
+    "slower",
+    is_flag=True,
+    help="Feeds of the program may be lower than those of the CL file, as --feedrate plan of smooth writes them.",
+)
 trusted = click.option(
     "--trust",
     "trusted",
