@@ -213,7 +213,7 @@ def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source
     problem = None
     if made.sha256 and made.sha256 != hashlib.sha256(source).hexdigest():
         text = "the program was made from another CL file, or that has changed since: its SHA-256 is another"
-        problem = Problem("CS508", 0, 1, text)
+        problem = Problem("CS567", 0, 1, text)
     loose = tuple(_loose(before, given, set(words)))
     return _Head(tuple(taken), loose, made.weights, problem=problem)
 
