@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.nc_reader.reading_options import Steps
+from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, Steps
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import in_order, verify
 from oracle.command import run
@@ -74,11 +74,12 @@ def test_a_pose_that_digits_alone_explain_is_not_verified() -> None:
 
 def test_digits_of_the_whole_text_count() -> None:
     assert Steps(1.0, 0.0).finer(Steps(1e-4, 1e-7)) == Steps(1e-4, 1e-7)
-    poses = [f"GOTO/{x},0,0,0,0,1" for x in range(1, 2500)]
+    poses = [f"GOTO/{x},0,0,0,0,1" for x in range(1, 2800)]
     source = cl("RAPID", "GOTO/0,0,0,0,0,1", "FEDRAT/1000,MMPM", *poses, "RAPID", "GOTO/10.35,0.35,0,0,0,1")
-    cut = ["G0 X0 Y0 Z0 I0 J0 K1", "G1 X1 F1000.", *(f"G1 X{x} Y0 Z0 I0 J0 K1" for x in range(2, 2500))]
+    cut = ["G0 X0. Y0. Z0. I0. J0. K1.", "G1 X1. F1000.", *(f"G1 X{x}. Y0. Z0. I0. J0. K1." for x in range(2, 2800))]
+    assert sum(map(len, cut)) > DIGITS_SAMPLE
     for last, verdict in (("10.3500", Verdict.PASSED), ("10.3450", Verdict.FAILED)):
-        assert judged(source, program(*cut, f"G0 X{last} Y0.3500 Z0 I0 J0 K1"), tolerance=0.05) == verdict
+        assert judged(source, program(*cut, f"G0 X{last} Y0.3500 Z0. I0. J0. K1."), tolerance=0.05) == verdict
 
 
 def test_many_rows_that_are_only_not_synchronised_hide_nothing() -> None:
@@ -181,7 +182,7 @@ def test_the_head_loosens_nothing(tmp_path, words: str, typed: tuple[str, ...], 
     digest = hashlib.sha256(b"another" if "SHA256" in words else LINE).hexdigest()
     words = words.replace(" SHA256", "")
     head = [f"(CORNERSMOOTH 1.0: {words} METHOD=proportional CONTROL=fanuc FORM=g1)", f"(SHA256={digest} CL=part.cls)"]
-    nc.write_bytes(program(START, *CUT, start=(*head, "G54", "G43.5 H1")))
+    nc.write_bytes(program("G0 X0. Y0. I0. J0. K1.", "G0 Z50.", *CUT, start=(*head, "G54", "G43.5 H1")))
     done, quiet = run("verify", part, nc, *typed), run("verify", part, nc, *typed, "-q")
     assert done.stdout.startswith(first), done.stdout + done.stderr
     assert done.returncode == quiet.returncode == (first != b"PASSED")

@@ -41,5 +41,5 @@ def test_the_command_says_so_even_if_quiet(tmp_path: Path, capsys) -> None:
     own.write_text('name = "own"\nlike = "fanuc"\n[words]\nspindle_off = ["M50"]\n')
     assert run(["smooth", str(part), "-o", str(text), "--control", str(own), "-q"]) == 0
     capsys.readouterr()
-    assert run(["verify", str(part), str(text), "--control", str(own), "-q"]) == 0
+    assert run(["verify", str(part), str(text), "--control", str(own), "-q"]) == 1
     assert capsys.readouterr().err.startswith(f"{text}: NOT VERIFIED, 3 to check: M50, NC line ")

@@ -44,8 +44,8 @@ def text(*lines, offset=1):
     return encode([*out, *TAIL])
 
 
-def codes(program, nc):
-    return sorted({problem.code for problem in verify(program, nc, tolerance=0.01).problems})
+def codes(program, nc, **how):
+    return sorted({problem.code for problem in verify(program, nc, tolerance=0.01, **how).problems})
 
 
 PATH = [("G0", 0, 0, 5), ("G1", 10, 0, 5), ("G1", 20, 0, 5)]
@@ -172,7 +172,8 @@ def test_cycle_that_says_no_depth_may_not_be_drilled():
     program = said(cycle, OFF, kind=KINDS, tip=HOLES)
     assert codes(program, drilled()) == ["CS564"]
     over = [("G0", 0, 0, 20), ("G0", 15, 0, 20), ("G0", 15, 0, 30)]
-    assert codes(program, text("G43.5 H1", *over)) == []
+    assert codes(program, text("G43.5 H1", *over)) == ["CS561"]
+    assert codes(program, text("G43.5 H1", *over), skip_cycles=True) == []
 
 
 def test_statement_between_holes():
