@@ -109,6 +109,7 @@ def judged(one: Trial, program: Program, *, oracle: bool = True) -> tuple[str, s
             control=case.control,
             machine=form.machine,
             tcp=case.tcp,
+            skip_cycles=True,
             slower=one.planned,
         )
         problems = [f"{problem.nc_line}: {problem.code} {problem.text}" for problem in found.problems]

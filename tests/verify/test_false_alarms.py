@@ -69,6 +69,7 @@ class Alarm:
             machine=form.machine,
             tcp=self.case.tcp,
             slower=slower,
+            skip_cycles=True,
         )
 
 

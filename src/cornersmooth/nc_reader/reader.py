@@ -84,7 +84,7 @@ class Reader:
         #: whether the tool has been fed from a position that was known
         self.placed = False
         self.blocks = 0
-        #: NC line from which on digits are too few for the tolerance; 0 for none
+        #: NC line from which on digits of X Y Z are too few for the tolerance; 0 for none
         self.coarse = 0
         #: what was not looked at, and the NC line
         self.unlooked: list[tuple[int, str]] = []
@@ -324,8 +324,7 @@ class Reader:
             lever = self.lever if self._given_lever is None else self._given_lever
             steps = replace(self.rotary, tip_step=steps[0]).steps(lever)
         widest = self._widest(second_is)
-        if not self.coarse and any(step > most for step, most in zip(steps, widest, strict=True)):
-            self.coarse = int(run.line[0])
+        self.coarse = (self.coarse or int(run.line[0])) if steps[0] > widest[0] else 0
         steps = min(steps[0], widest[0]), min(steps[1], widest[1])
         if self.rotary is not None:
             self._arrive_again(run, steps[0])
