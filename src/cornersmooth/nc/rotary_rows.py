@@ -421,7 +421,8 @@ def _rates(
     """(m,) moves per minute where blocks are timed by us, NaN elsewhere; None where none is.
 
     `timed` says which rows without inserted ones; else it is every block in which only rotary axes turn, for controls
-    that want it. Where the tip stands still, the axis point runs with the feed. `left` says of rows without inserted
+    that want it. Where the tip stands still, the axis point runs with the feed: so it does where the tip stays within ε
+    and the axis point does not. `left` says of rows without inserted
     ones where the tool comes back into a cut that it has left.
     """
     if timed is None and not form.mode.timed_turns:
@@ -431,7 +432,7 @@ def _rates(
     swing = step + settings.axis_scale * np.diff(path.axis, axis=0, prepend=path.axis[:1])
     length = norm(step)
     digits = form.rounding(program.units)
-    still = length < digits
+    still = (length < digits) | ((length < settings.tolerance) & (norm(swing) > settings.tolerance))
     turn = np.abs(np.diff(path.angles, axis=0, prepend=path.angles[:1])).max(axis=1)
     chosen = _cuts(own, program) & still & (turn > _NO_TURN) if timed is None else timed[path.pose]
     if not chosen.any():

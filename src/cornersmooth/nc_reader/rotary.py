@@ -285,8 +285,9 @@ class Rotary:
     ) -> tuple[Floats, Floats]:
         """Feeds (mm/min) of blocks whose F is moves per minute, and how far they are uncertain.
 
-        Where the tip stands still the axis point runs with the feed. Without tip control the printed digits do not
-        tell whether the tip stands or creeps: either may have timed the block then, see `NcProgram.feed_room`.
+        Where the tip stands still the axis point runs with the feed; where the tip stays within ε and the axis point
+        does not, either may. Without tip control the printed digits do not tell whether the tip stands or creeps:
+        either may have timed the block then, see `NcProgram.feed_room`.
         """
         levers = self.levers(position)
         step, turn_step = self.steps(float(levers.max(initial=0.0, where=~np.isnan(levers))))
@@ -299,6 +300,9 @@ class Rotary:
         pole = self.pole_room(vector)
         off = 2 * step + np.where(still, self.axis_length * (turn_step + pole[1:] + pole[:-1]), 0.0)
         room = np.maximum(rate * off, _F_STEP * way)
+        either = ~still & (length < self.tolerance) & (swing > self.tolerance)
+        room[either] += (rate * (swing - length))[either]
+        way[either] = swing[either]
         if not self.tip_control:
             room[still] *= -1.0
         room[(rate * turn > FAST_TURN) | (~still & short)] = np.inf
