@@ -48,6 +48,7 @@ FUNCTIONS = LENGTH | {"with_z": False}  # further functions follow, or it never 
 VECTORS = {"on": r"G43\.5 H\d+", "off": "G49"}
 ANGLES = {"on": r"G43\.4 H\d+", "off": "G49"}
 HAAS = {"on": r"G234 H\d+", "off": "G49"}
+KINEMATICS = {"on": "M428", "off": "M429"}
 TRAORI = {"on": "TRAORI", "off": "TRAFOOF", "tool": "M6"}
 TCPM = {"on": "FUNCTION TCPM .*", "off": "FUNCTION RESET TCPM", "tool": r"TOOL CALL \d+ Z"}
 
@@ -57,6 +58,8 @@ def reader(control: str, form: str, machine: str = "", tcp: bool = True, units: 
     tip = int(digits or TIP_DIGITS.get(control, 4)) + (units == "inch")
     made = {"siemens": _siemens, "heidenhain": _heidenhain}.get(control, _iso)(control, form, machine, tcp, tip)
     made = replace(made, **HOMES[control])
+    if made.on == KINEMATICS["on"]:  # retracts are of the machine: tip control is off before
+        made = replace(made, retracts_on=False)
     return replace(made, scale=1.0 if units == "mm" else 25.4)
 
 
@@ -70,7 +73,7 @@ def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
     if control == "generic":
         switch = {"on": "", "off": ""}
     elif tcp and machine:
-        switch = {"haas": HAAS, "linuxcnc": FUNCTIONS}.get(control, ANGLES)
+        switch = {"haas": HAAS, "linuxcnc": KINEMATICS if machine.endswith("-trt") else FUNCTIONS}.get(control, ANGLES)
     elif tcp and form == "g1":
         switch = VECTORS
     codes = ISO + (SECONDS if control in ("haas", "linuxcnc") else MILLISECONDS)
@@ -78,7 +81,7 @@ def _iso(control: str, form: str, machine: str, tcp: bool, tip: int) -> Reader:
         codes = codes.replace(" G49", "").replace("|G54", "")
     if control == "linuxcnc":
         codes = codes.replace("M(?:", "M(?:2|").replace("M(?:2|0|1|3|4|5|7|8|9|19|30)", "M(?:0|1|2|3|4|5|7|8|9)")
-        codes += r"|S\d+\.\d{1,3} M[34]|M19 R0|G64 P(?!0\.0* )\d+\.\d+ Q0"
+        codes += r"|S\d+\.\d{1,3} M[34]|M19 R0|G64 P(?!0\.0* )\d+\.\d+ Q0|M429" + r"|G43 H\d+|G49" * tcp
     else:
         codes += "|G5 P10000|G5 P0" if (control, form) == ("mitsubishi", "g6.2") else ""
     on = "" if switch.get("with_z") else switch["on"]

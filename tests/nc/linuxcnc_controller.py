@@ -45,6 +45,13 @@ DEBIAN_PYTHON = "/usr/bin/python3"
 USER = "nobody"
 #: ours of the machine, and what LinuxCNC's configuration of it says too
 MACHINE, KINEMATICS, AXES = "xyzac-trt", "xyzac-trt-kins", "XYZAC"
+#: as LinuxCNC's own configurations have it: it starts without tip control, and M428 and M429 switch it
+IDENTITY_FIRST = f"{KINEMATICS} sparm=identityfirst"
+#: what the control needs for that, as a part of its INI; `write_remaps` writes the subroutines
+REMAPS = """SUBROUTINE_PATH = {folder}
+REMAP = M428 modalgroup=10 ngc=428remap
+REMAP = M429 modalgroup=10 ngc=429remap
+"""
 SERVO_SECONDS = 0.001
 #: mm/s
 FASTEST = 500
@@ -74,7 +81,7 @@ MACHINE = headless
 DISPLAY = {folder}/drive.py
 [RS274NGC]
 PARAMETER_FILE = {folder}/linuxcnc.var
-[KINS]
+{remaps}[KINS]
 KINEMATICS = {kinematics}
 JOINTS = 5
 [HAL]
@@ -114,7 +121,7 @@ MAX_LIMIT = {high:g}
 MAX_VELOCITY = {velocity:g}
 MAX_ACCELERATION = {acceleration:g}
 """
-HAL = """loadrt [KINS]KINEMATICS
+HAL = """loadrt {identity_first}
 loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS
 loadrt sampler depth=65536 cfg=fffffs
 addf motion-command-handler servo-thread
@@ -127,6 +134,7 @@ net j3 joint.3.motor-pos-cmd => joint.3.motor-pos-fb sampler.0.pin.3
 net j4 joint.4.motor-pos-cmd => joint.4.motor-pos-fb sampler.0.pin.4
 net kind motion.motion-type => sampler.0.pin.5
 net speed spindle.0.speed-out-rps => spindle.0.speed-in
+net kinstype-select motion.analog-out-03 => motion.switchkins-type
 setp {kinematics}.y-offset 0
 setp {kinematics}.z-offset 0
 net stop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
@@ -209,7 +217,8 @@ def write_configuration(
     dynamics = dynamics or {**dict.fromkeys("XYZ", LINEAR), **dict.fromkeys("AC", ROTARY)}
     ini = INI.format(
         folder=folder,
-        kinematics=KINEMATICS,
+        kinematics=IDENTITY_FIRST,
+        remaps=REMAPS.format(folder=folder),
         period=SERVO_SECONDS * 1e9,
         fastest=FASTEST,
         acceleration=dynamics["X"][1],
@@ -228,7 +237,8 @@ def write_configuration(
             acceleration=acceleration,
         )
     (folder / "headless.ini").write_text(ini)
-    (folder / "headless.hal").write_text(HAL.format(kinematics=KINEMATICS))
+    (folder / "headless.hal").write_text(HAL.format(kinematics=KINEMATICS, identity_first=IDENTITY_FIRST))
+    write_remaps(folder)
     (folder / "tool.tbl").write_text("".join(f"T{number} P{number} Z0 D1\n" for number in range(1, 60)))
     offsets = {**dict.fromkeys((5161, 5210, 5220, 5221, 5390), 0.0), 5223: -height}
     (folder / "linuxcnc.var").write_text("".join(f"{number} {value:g}\n" for number, value in sorted(offsets.items())))
@@ -236,6 +246,13 @@ def write_configuration(
     drive = folder / "drive.py"
     drive.write_text(DRIVE.format(python=DEBIAN_PYTHON, folder=str(folder), seconds=seconds))
     drive.chmod(0o755)
+
+
+def write_remaps(folder: Path) -> None:
+    """Subroutines of M428, which switches tip control on, and M429, as those of LinuxCNC's configurations do."""
+    for number, kind in ((428, 1), (429, 0)):
+        name = f"{number}remap"
+        (folder / f"{name}.ngc").write_text(f"o<{name}> sub\nM68 E3 Q{kind}\nM66 E0 L0\no<{name}> endsub\nM2\n")
 
 
 def run_controller(text: bytes, seconds: float, dynamics: Dynamics | None = None) -> tuple[str, Floats, float]:

@@ -197,8 +197,9 @@ class Reader:
                     raise TextError(f"{number}: rotary axes turn below the height of the retract")
                 reading.codes.append(line)
             elif match := self.above.fullmatch(line):
-                if not self.raised or self.tip_control is self.with_z or self.over is not None:
-                    raise TextError(f"{number}: a rapid without Z that comes from no retract")
+                again = self.over is not None or self.tilted(match.groups()[2:])
+                if not self.raised or self.tip_control is self.with_z or again:
+                    raise TextError(f"{number}: a rapid without Z that comes from no retract, or of a tilted tool")
                 self.over = match.groups()
                 reading.codes.append(line)
             elif match := self.straight.fullmatch(line):
@@ -208,7 +209,8 @@ class Reader:
                     raise TextError(f"{number}: move of no length")
                 self.check_motion(number, rapid, match["f"])
                 words = match.groups()[1 : 1 + len(self.words)]
-                if self.raised and self.turn != "point" and self.over != (*words[:2], *words[3:]):
+                at_once = self.turn == "point" or (self.over is None and self.tilted(words[3:]))
+                if self.raised and not at_once and self.over != (*words[:2], *words[3:]):
                     raise TextError(f"{number}: from the retract the tool must come from above: {self.over}")
                 self.raised, self.over = False, None
                 feed = None if match["f"] is None else float(match["f"])
@@ -235,6 +237,16 @@ class Reader:
         if any(left):
             raise TextError(f"end: feed mode, plane, compensation, tip control still on: {left}")
         return reading
+
+    def tilted(self, words: tuple[str, ...]) -> bool:
+        """Whether the words behind the tip lean the tool in the part: X Y alone go aside or down on the machine."""
+        numbers = [float(word) for word in words]
+        if self.turn == "great circle":
+            return numbers[2] < 1 - 1e-6
+        if self.turn != "angles":
+            return False
+        angles = {name: np.array([number]) for name, number in zip(self.words[3:], numbers, strict=True)}
+        return bool(tool_direction(self.machine, angles)[0, 2] < 1 - 1e-6)
 
     def blocks(self, text: str) -> list[tuple[int, str]]:
         """Line numbers and blocks without their own numbers; a block goes on behind ``~``."""

@@ -81,7 +81,7 @@ def where(text: tuple[str, ...], pattern: str) -> list[int]:
 
 
 RETRACT = r"G91 G28 Z0|G53 G0 Z0|SUPA G0 Z0 D0|L Z-1 R0 FMAX M91"
-TIP_CONTROL = r"G43\.4|G234|TRAORI|FUNCTION TCPM"
+TIP_CONTROL = r"G43\.4|G234|M428|TRAORI|FUNCTION TCPM"
 CHANGE = r"(T\d+ )?M6|TOOL CALL \d"
 MOTION = r"(G[01]|L) X"
 C_LIMITS = '[[axis]]\nname = "C"\nlimits = [-330, 330]\n'
@@ -120,7 +120,7 @@ def turned_before(control: str) -> str:
     text = lines(control, TWO_TOOLS)
     tip = where(text, TIP_CONTROL)
     if not tip:
-        return "with it" if where(text, r"G43 H") else "no"
+        return "no"
     before = [line for line in text[: tip[0]] if re.match(r"(G0|L) [AB]", line)]
     if not before:
         return "no"
@@ -131,11 +131,12 @@ def turned_before(control: str) -> str:
     return yes(all(word in first for word in angles), "first angles")
 
 
-def over_the_position(control: str) -> str:
+def first_block(control: str) -> str:
+    """Of a tool that leans, and of one along Z."""
     text = lines(control, TWO_TOOLS)
     motion = where(text, MOTION)
     down = [" Z" in text[next(k for k in motion if k > change)] for change in where(text, CHANGE)]
-    return "as the CL file" if all(down) else yes(not any(down))
+    return "as the CL file" if all(down) else yes(down == [True, False])
 
 
 def along_the_tool(control: str) -> str:
@@ -289,7 +290,7 @@ ROWS: dict[str, Callable[[str], str]] = {
     "work offset": work_offset,
     "retract before tools, at the end": retracts,
     "rotary axes before tip control": turned_before,
-    "over the position, then down": over_the_position,
+    "first block: X Y Z of a tilted tool, over the position along Z": first_block,
     "along the tool": along_the_tool,
     "optional stop between tools": between_tools,
     "coolant and spindle off": switched_off,

@@ -73,7 +73,8 @@ def spoilt(lines: list[str], case: Case, tip: int) -> Iterator[tuple[str, list[s
     for what, line in changes.items():
         yield what, [*lines[:first], line, *lines[first + 1 :]]
     mode = case.choose().mode
-    for what, blocks in (("never switched on", mode.on[:1]), ("never switched off", mode.off[-1:])):
+    on, off = (["M428"], ["M429"]) if mode.within_on == ("{kinematics_on}",) else (mode.on[:1], mode.off[-1:])
+    for what, blocks in (("never switched on", on), ("never switched off", off)):
         for block in blocks:
             own = re.compile(r"(\d+ )?" + re.escape(block).replace(r"\{offset\}", r"\d+"))
             yield what, [own.sub("", line, count=1).strip() for line in lines if not own.fullmatch(line)]

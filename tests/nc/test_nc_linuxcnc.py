@@ -23,6 +23,7 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
 from nc.cases import Case
 from nc.grammars import reader
+from nc.linuxcnc_controller import REMAPS, write_remaps
 from nc.reading import Reading
 from nc.rotations import tool_direction
 from oracle.chains import cl_text, random_chains
@@ -50,7 +51,7 @@ def positions(text: str, folder: Path) -> list[tuple[str, Floats]]:
     """Kind and X Y Z A B C of every move, in full precision."""
     file = folder / "program.ngc"
     # without the running controller its modules have no tool table; `accepted` lets the tools be loaded
-    file.write_text(re.sub(r"^(T\d+ M6|G43 H\d+( (?=G))?)", "", text, flags=re.MULTILINE))
+    file.write_text(re.sub(r"^(T\d+ M6|G43 H\d+( (?=G))?|M42[89]$)", "", text, flags=re.MULTILINE))
     result = subprocess.run([PYTHON, CANON, file], capture_output=True, text=True, check=False, timeout=120)
     assert result.returncode == 0, result.stderr
     rows = [line.split() for line in result.stdout.splitlines() if line.startswith(("feed ", "rapid "))]
@@ -62,9 +63,16 @@ def accepted(text: str, folder: Path) -> None:
     file, tools = folder / "program.ngc", folder / "tools.tbl"
     file.write_text(text)
     tools.write_text("".join(f"T{number} P{number} Z0 D0.001\n" for number in range(1, 60)))
+    (folder / "remaps.ini").write_text("[RS274NGC]\n" + REMAPS.format(folder=folder))
+    write_remaps(folder)
     for _ in range(3):  # where several run at once, one may be killed by a signal: that says nothing of the text
         result = subprocess.run(
-            ["rs274", "-t", tools, "-g", file], capture_output=True, text=True, check=False, timeout=120, cwd=folder
+            ["rs274", "-i", folder / "remaps.ini", "-t", tools, "-g", file],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=120,
+            cwd=folder,
         )
         if result.returncode >= 0:
             break

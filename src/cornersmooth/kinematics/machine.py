@@ -103,6 +103,9 @@ class RotaryAxis:
         return math.inf if self.limits is None else self.limits[1]
 
 
+#: block that switches tip control of the kinematics
+_SWITCH: Final = r"[MG][1-9]\d*(\.\d)?( P\d+)?"
+
 #: stands for a rotary axis that a machine has not
 _NO_AXIS: Final = RotaryAxis("", (0.0, 0.0, 1.0), "none")
 
@@ -131,6 +134,9 @@ class Machine:
     home, tool_change : tuple of (str, float)
         Axes and where they go in machine coordinates, mm or degrees, for retracts and the end of a program, and for a
         change of tool; the control's own words where nothing is said.
+    tip_control : tuple of str or None
+        Blocks that switch on and off what keeps the tip, for controls whose kinematics do; empty where these always do;
+        None where that is not known.
     part_zero : (float, float, float), mm
         Where the zero of the part sits in the coordinates in which the points of the tables are given.
     dynamics : tuple of Dynamics
@@ -151,6 +157,7 @@ class Machine:
     tool_lengths: tuple[tuple[int, float], ...] = ()
     home: tuple[tuple[str, float], ...] = ()
     tool_change: tuple[tuple[str, float], ...] = ()
+    tip_control: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         where = f"machine {self.name}"
@@ -177,6 +184,10 @@ class Machine:
                 f"{where}: preferred names {self.preferred[0]!r}",
                 f"use {', '.join(signed[:-1])} or {signed[-1]}" if signed else "leave it out",
             )
+        switch = self.tip_control or ()
+        if len(set(switch)) not in (0, 2) or not all(re.fullmatch(_SWITCH, block) for block in switch):
+            hint = 'give the blocks that switch it on and off, as in ["M428", "M429"], or [] for none'
+            raise SettingsError("CS253", f"{where}: tip_control is {list(switch)!r}", hint)
         for key in ("home", "tool_change"):
             self._check_position(f"{where}: {key}", getattr(self, key))
         for item in self.dynamics:
@@ -279,6 +290,8 @@ class Machine:
         if any(self.part_zero):
             lines.append(f"  zero of the part at ({', '.join(f'{number:g}' for number in self.part_zero)}) mm")
         lines += [f"  {item.name} from {item.low:g} to {item.high:g} mm" for item in self.travel]
+        if self.tip_control:
+            lines.append("  tip control of the kinematics on by {}, off by {}".format(*self.tip_control))
         for key, position in (("home", self.home), ("tool change", self.tool_change)):
             told = " ".join(f"{name}{value:g}" for name, value in position)
             lines += [f"  {key} at {told} of the machine"] * bool(position)

@@ -25,6 +25,7 @@ _SHELF = Shelf(
         "travel",
         "home",
         "tool_change",
+        "tip_control",
         "axis",
         "dynamics",
     ),
@@ -74,7 +75,8 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
     ----------
     text : str or dict
         Keys: ``like`` (a machine that comes with the program; then only what is different), ``name``, ``description``,
-        ``preferred`` (``"A+"``), ``tool_direction``, ``tool_length``, ``[tool_lengths]``, ``part_zero`` and up to two
+        ``preferred`` (``"A+"``), ``tip_control`` (two blocks, or none), ``tool_direction``, ``tool_length``,
+        ``[tool_lengths]``, ``part_zero`` and up to two
         tables ``[[axis]]`` (``axis = []`` for none) with ``name``, ``direction``, ``carrier``, ``point``, ``positive``,
         ``limits``, ``modulo``, ``clamp``; ``[travel]`` with ``X``, ``Y`` and ``Z``, each ``[lowest, highest]``, any of
         which may be left out; ``[home]`` and ``[tool_change]`` with any axes; and for the planning of the time tables
@@ -113,6 +115,7 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
             tool_lengths=_tool_lengths(table),
             home=_position(table, "home", (*LINEAR, *sorted(axis.name for axis in axes))),
             tool_change=_position(table, "tool_change", (*LINEAR, *sorted(axis.name for axis in axes))),
+            tip_control=_tip_control(table),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
@@ -154,6 +157,17 @@ def _tool_lengths(table: dict[str, Any]) -> tuple[tuple[int, float], ...]:
     if not isinstance(given, dict) or not all(name.isdecimal() for name in given):
         raise _SHELF.wrong("tool_lengths is not a table by number of tool", "write [tool_lengths] and 3 = 120.5 below")
     return tuple((int(name), _number(value, f"tool_lengths.{name}")) for name, value in given.items())
+
+
+def _tip_control(table: dict[str, Any]) -> tuple[str, ...] | None:
+    """Blocks that switch tip control on and off; None where the table says nothing of them."""
+    given = table.get("tip_control")
+    if given is None:
+        return None
+    if not isinstance(given, list) or not all(isinstance(block, str) for block in given):
+        hint = 'give two blocks, as in ["M428", "M429"], or [] for none'
+        raise _SHELF.wrong(f"tip_control is {given!r}", hint)
+    return tuple(given)
 
 
 def _position(table: dict[str, Any], key: str, names: tuple[str, ...]) -> tuple[tuple[str, float], ...]:

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.errors import InputError
-from cornersmooth.kinematics import machine_position
+from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc.along_tool import lifted
 from cornersmooth.nc.circles import FIRST_PLANE, Circles
 from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.curve_blocks import Curves, RowWriter
 from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.first_block import UPRIGHT
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane
 from cornersmooth.nc.polynomial_blocks import bezier_points, curves_for
@@ -28,6 +29,7 @@ from cornersmooth.nc.run import Run
 from cornersmooth.nc.spline_share import SplineShare
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.text import RowFormat, format_number, interleave, to_ticks
+from cornersmooth.vectors import unit
 
 #: steps of the last digit that a number may be below a whole one and still is it
 _ROUNDING = 1e-6
@@ -122,15 +124,22 @@ class BlockWriter:
             words, decimals, plus=motion.signs, trim=not motion.trailing_zeros, leading_zero=motion.leading_zeros
         )
 
-    def rotary_blocks(self, ticks: Ints) -> dict[str, tuple[str, ...]]:
-        """Blocks that bring the rotary axes to zero, and to where a row of ticks has them; none without such."""
+    def rotary_blocks(self, ticks: Ints, *, unwind: bool = True) -> dict[str, tuple[str, ...]]:
+        """Blocks that bring the rotary axes to zero, and to where a row of ticks has them; none without such.
+
+        Without `unwind`, endless axes go to the nearest full turn instead of zero.
+        """
         if not self.form.rotary or self.form.machine is None:
             return {"rotary_zero": (), "rotary_start": ()}
         if len(ticks) < self.columns:
             ticks = np.append(ticks, np.zeros(self.columns - len(ticks), np.int64))
-        low, high = self.form.machine.limits.T * 10.0**self.form.table.digits.angle
+        degree = 10**self.form.table.digits.angle
+        low, high = self.form.machine.limits.T * degree
         order = [self.form.machine.names.index(word) for word in self.form.other_words]
         zero = np.clip(0.0, np.ceil(low), np.floor(high))[order].astype(np.int64)
+        if not unwind:
+            endless = np.isinf(low)[order]
+            zero[endless] = 360 * degree * np.round(ticks[3:][endless] / (360 * degree))
         zero_block, start_block = (
             self._rapid(words, slice(3, None)) for words in (np.append(np.zeros(3, np.int64), zero), ticks)
         )
@@ -148,11 +157,31 @@ class BlockWriter:
     def approach(self, ticks: Ints) -> list[str]:
         """Blocks that bring the tool over a row of ticks, at the height where it is.
 
-        None where the other words are those of a second point: without Z they would turn the tool elsewhere.
+        None where it goes there in one block: a tilted tool under tool tip control, or in a tilted plane
+        (`first_block`), and words of a second point, which would turn the tool elsewhere without Z.
         """
-        if self.form.orientation == "point":
+        if self.form.orientation == "point" or self.tool_axis(ticks)[2] < UPRIGHT:
             return []
         return [self._rapid(ticks, np.arange(len(ticks)) != 2)]
+
+    def tool_axis(self, ticks: Ints) -> Floats:
+        """(3,) tool axis of a row of ticks, in the coordinates in which X and Y are said while the tool is high."""
+        machine, orientation = self.form.machine, self.form.orientation
+        axis: Floats = np.array([0.0, 0.0, 1.0])  # axes of the machine, or a tool that stays along Z
+        if self.plane is not None:
+            axis = self.plane.frame[:, 2]
+        elif orientation == "vector":
+            axis = unit(ticks[None, 3:].astype(np.float64))[0]
+        elif orientation == "angles" and machine is not None:
+            axis = tool_axis(machine, self.angles(ticks[None]))[0]
+        return axis
+
+    def tip(self, ticks: Ints) -> Floats:
+        """(3,) tip in the part, mm, of a row of ticks under tool tip control or in a tilted plane."""
+        tip: Floats = ticks[:3].astype(np.float64) * self.form.rounding(self.program.units)
+        if self.plane is not None:
+            tip = self.plane.frame @ tip
+        return tip
 
     def lifted(self, ticks: Ints, distance: float) -> Ints:
         """Row of ticks so many mm back along the tool axis."""

@@ -110,6 +110,8 @@ _BRACES: dict[str, Table] = {
     "compensation_right": {"register": 1},
     "on": {"offset": 1, "rotary": "A,C", "first": "0.", "second": "0.", "third": "0."},
     "with_z": {"offset": 1},
+    "within_on": {"kinematics_on": ""},
+    "within_off": {"kinematics_off": ""},
     "work_offset_block": {"work_offset": "G54"},
     "file_name": {"stem": "PART", "number": "0001"},
     "position": {"position": "Z0."},

@@ -9,12 +9,10 @@ import numpy as np
 
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.first_block import UPRIGHT
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
 from cornersmooth.vectors import dot
-
-#: cosine of the angle from Z beyond which a tool is tilted
-_UPRIGHT: Final = 1.0 - 1e-6
 
 #: cosine of the angle from hole to hole beyond which the tool turns between them
 _TURNED: Final = float(np.cos(np.radians(1.0)))
@@ -46,7 +44,7 @@ class MotionWarnings:
     def of_first(self, pose: int, form: Form, *, rapid: bool) -> None:
         """Say that the control turns the tool on its own before its first position, or feeds to it."""
         line = int(self.program.line[pose])
-        if form.orientation in ("vector", "point") and self.program.axis[pose][2] < _UPRIGHT:
+        if form.orientation in ("vector", "point") and self.program.axis[pose][2] < UPRIGHT:
             text = "the first motion of a tool turns it to a tilted axis; see that it is free to, or name the machine"
             self.findings.add("CS337", "warning", line, text)
         if not rapid:
@@ -84,7 +82,7 @@ class MotionWarnings:
             return
         since = slice(self._looked_until, pose)
         moved = self.program.kind[since] != Move.FROM
-        self._tilted |= bool((moved & (self.program.axis[since, 2] < _UPRIGHT)).any())
+        self._tilted |= bool((moved & (self.program.axis[since, 2] < UPRIGHT)).any())
         self._looked_until = pose
         if self._tilted:
             text = (

@@ -78,7 +78,7 @@ class MotionWriter:
         last = [*self.runs.statements.end_compensation(), *self.runs.writer.end()]
         if self.runs.last is None:
             return [*last, *self.runs.operation.end()]
-        return [*last, *self.runs.operation.end(self.runs.rotary_blocks(self.runs.last))]
+        return [*last, *self.runs.operation.end(self.runs.rotary_blocks(self.runs.last, unwind=False))]
 
     def _statements_until(self, pose: int) -> Sequence[Statement]:
         begin = self._next_statement

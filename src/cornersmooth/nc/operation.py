@@ -287,7 +287,7 @@ class Operation:
         self._tip_control = self._functions = True
         rotary = ",".join(self.form.other_words if self.form.rotary else ())
         on = [block.format(offset=self.offset, rotary=rotary, **self.plane) for block in self.mode.on]
-        within = [*self.mode.within_on, *self._extras("on", outside=False)]
+        within = [*self._expand(self.mode.within_on), *self._extras("on", outside=False)]
         if self.mode.on[-1:] == (self.mode.motion.with_z,) and not within:  # functions within want it before them
             self._with_z = on.pop()
         return [*self._extras("on", outside=True), *on, *within]
@@ -301,7 +301,7 @@ class Operation:
         if not self._functions:
             return []
         self._functions = False
-        return [*self._extras("off", outside=False), *self.mode.within_off]
+        return [*self._extras("off", outside=False), *self._expand(self.mode.within_off)]
 
     def _tip_control_off(self) -> list[str]:
         self.begun = False

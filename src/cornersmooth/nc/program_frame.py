@@ -149,12 +149,15 @@ class Frame:
             hint = f"use one like {table.work_offset}" if table.work_offset_block else "leave it out"
             raise SettingsError("CS216", f"{form.control} takes no work offset {self.work_offset!r}", hint)
         blocks = table.work_offset_block if offset else ()
+        switch = (form.machine.tip_control if form.machine is not None and form.rotary else None) or ()
         steps = (*table.start, *table.begin, *table.tool_end, *table.end)
         for name, lines in (("header", self.header), ("footer", self.footer)):
             if lines and f"{{{name}}}" not in steps:
                 raise SettingsError("CS216", f"{form.control} has no step for a {name}", f'write "{{{name}}}" into it')
         return {
             "work_offset": tuple(block.format(work_offset=offset) for block in blocks),
+            "kinematics_on": switch[:1],
+            "kinematics_off": switch[1:],
             "plane_reset": () if form.plane is None else form.plane.reset,
             "header": (*self._told(form.table.layout), *_filled(self.header, values)),
             "footer": tuple(_filled(self.footer, values)),

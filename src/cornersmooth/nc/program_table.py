@@ -72,6 +72,8 @@ STEPS = {
     "tip_control_on": "functions that stand outside, tool tip control or the length of the tool, functions within",
     "functions_off": "functions within tool tip control off",
     "tip_control_off": "tool tip control or the length of the tool off, then functions that stand outside",
+    "kinematics_on": "tip control of the kinematics on, by the block that the machine's table has for it",
+    "kinematics_off": "the same off",
     "spindle_off": "the spindle, where it turns",
     "coolant_off": "the coolant, where it flows",
     "header": "the user's lines of --header",

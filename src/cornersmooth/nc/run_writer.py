@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.kinematics.poses import continued
+from cornersmooth.kinematics.travel import nose_position
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.first_block import UPRIGHT, FirstBlock
 from cornersmooth.nc.motion_warnings import MotionWarnings
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.rewinds import refuse_compensated, retracts_before
@@ -116,12 +118,12 @@ class RunWriter:
                 other = continued(form.machine, other, near, np.array([-1]), 0.0)[0]
         return self.writer.ticks(self.program.tip[pose], other)
 
-    def rotary_blocks(self, ticks: Ints) -> dict[str, tuple[str, ...]]:
+    def rotary_blocks(self, ticks: Ints, *, unwind: bool = True) -> dict[str, tuple[str, ...]]:
         """Blocks of the rotary axes, with where a row has them; a tool that stays along Z has them at zero."""
         tilting = self.writers.tilting
         if self.writer.plane is not None and self.writer.plane.angles is not None:
             ticks = tilting.ticks(np.zeros((1, 3)), self.writer.plane.angles[None])[0]
-        return tilting.rotary_blocks(ticks)
+        return tilting.rotary_blocks(ticks, unwind=unwind)
 
     def go_to(self, ticks: Ints, move: Ints) -> Iterator[bytes]:
         """Go to a place at the feed of a move, if the tool is elsewhere."""
@@ -164,7 +166,9 @@ class RunWriter:
         yield from self.text(self.operation.go_on())
         if self.operation.retracted:
             self.operation.retracted = False
-            yield from self.text(self._approaches(first, above or self.approach * bool(run.rapid[0])))
+            height = above or self.approach * bool(run.rapid[0])
+            self._look_at_first(self.writer.lifted(first, height), int(run.move[0]))
+            yield from self.text(self._approaches(first, height))
             run = run if above else run.first_as_said(self.program)
         self.warnings.of_tool(int(run.move[0]), self.statements.tool)
         if not run.rapid.all():
@@ -205,6 +209,31 @@ class RunWriter:
             return self.writer.approach(first)
         start = self.writer.lifted(first, above)
         return [*self.writer.approach(start), self.writer.rapid(start, self.operation.take_with_z())]
+
+    def _look_at_first(self, end: Ints, move: int) -> None:
+        """Look at the block that leads a tilted tool to its first position from the height of the retract."""
+        form, axis = self.writer.form, self.writer.tool_axis(end)
+        if form.orientation not in ("angles", "fixed") or axis[2] >= UPRIGHT or not self.operation.can_rewind():
+            return
+        machine = None if form.machine is None else form.machine.with_tool(self.statements.tool)
+        angles = self.writer.angles(end[None])[0] if form.rotary else None
+        if self.writer.plane is not None:
+            angles = self.writer.plane.angles
+        line = int(self.program.line[move])
+        block = FirstBlock(form, machine, self.writer.plane, self.writer.tip(end), axis, angles, line)
+        block.check(self._nose(), self.findings, self.program.source.name)
+
+    def _nose(self) -> Floats | None:
+        """(2,) mm, where the retract has left X and Y of the spindle nose; None where that is not known."""
+        writer, machine = self.last_writer, self.writer.form.machine
+        if machine is None:
+            return None
+        change = dict(machine.tool_change)
+        if self.position is None and {"X", "Y"} <= change.keys():
+            return np.array((change["X"], change["Y"]))
+        if writer is None or self.last is None or not writer.form.rotary or {"X", "Y"} & change.keys():
+            return None
+        return nose_position(machine, writer.tip(self.last)[None], writer.angles(self.last[None]))[0, :2]
 
     def _withdraw(self) -> list[str]:
         """Blocks that bring the tool back along its axis, before a retract."""

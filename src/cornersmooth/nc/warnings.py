@@ -27,6 +27,12 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
         _feeds(smoothed.program, findings)
     if form.curves:
         _coarse_digits(form, smoothed, findings)
+    if "{kinematics_on}" in form.mode.within_on and form.machine is not None and form.machine.tip_control is None:
+        text = (
+            "the machine file names no blocks that switch tip control on and off: the kinematics must keep the tip "
+            'from the start; write tip_control = ["M428", "M429"], or [] if they do'
+        )
+        findings.add("CS393", "warning", 0, text)
     for extra in form.extras:
         if extra.warning:
             findings.add("CS339", "warning", 0, f"{extra.name} was asked for: {extra.warning}")

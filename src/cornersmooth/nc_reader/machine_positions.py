@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import TYPE_CHECKING, Final
 
 from cornersmooth.nc_reader.elements import Problem
@@ -16,10 +17,16 @@ if TYPE_CHECKING:
 #: code of positions of the machine that its file does not have, or that are missing
 POSITIONS: Final = "CS583"
 
+#: state of blocks that switch tip control of the kinematics
+_KINEMATICS: Final = "tip control of the kinematics"
+
 _AXES: Final = r"( [XYZABC][-+]?\d*\.?\d*)+"
 
 #: blocks of positions of the machine, by words that stand before and behind the axes
 _BLOCKS: Final = (f"G53 G0{_AXES}", f"SUPA G0{_AXES} D0", rf"L{_AXES} R0 F ?MAX M91")
+
+#: printed digits by which angles may differ, degrees
+SAME: Final = 1e-5
 
 #: digits by which a position may be off
 _ROOM: Final = 5e-4
@@ -34,9 +41,15 @@ class MachinePositions:
         Without positions, or without a machine, none are asked for.
     mm_per_unit : float
         Of the text.
+    switches : bool
+        `WordList.switches`.
+    tcp : bool
+        Whether words are those of the tip.
     """
 
-    def __init__(self, machine: Machine | None, mm_per_unit: float) -> None:
+    def __init__(
+        self, machine: Machine | None, mm_per_unit: float, *, switches: bool = False, tcp: bool = True
+    ) -> None:
         home = {} if machine is None else dict(machine.home)
         change = {} if machine is None else dict(machine.tool_change)
         self._home, self._change = (
@@ -45,6 +58,13 @@ class MachinePositions:
         self._at: dict[str, float] = {}
         #: names of the machine's rotary axes
         self.rotary: frozenset[str] = frozenset() if machine is None else frozenset(machine.names)
+        #: with its rotary axes
+        self.machine = machine if self.rotary else None
+        blocks = (machine.tip_control or ()) if machine is not None and self.rotary and switches else ()
+        #: rules for words that switch tip control of the kinematics
+        self.switch: tuple[WordRule, ...] = (*_switch(blocks[:1], ends=True), *_switch(blocks[1:], ends=False))
+        #: whether words are those of the tip without any that switches that on
+        self.keeps_tip = bool(switches and tcp and not blocks)
         #: rules for blocks that the control's own list need not have
         self.rules: tuple[WordRule, ...] = ()
         if home or change:
@@ -54,6 +74,20 @@ class MachinePositions:
                 for block in _BLOCKS
                 for retract, pattern in ((True, f"(?=.* Z[-+.\\d]){block}"), (False, block))
             )
+
+    @property
+    def endless(self) -> frozenset[str]:
+        """Names of rotary axes that turn without end: there a full turn is zero."""
+        axes = () if self.machine is None else self.machine.axes
+        return frozenset(axis.name for axis in axes if axis.limits is None)
+
+    def away(self, angles: Mapping[str, float]) -> list[str]:
+        """Names of axes that do not stand at zero, or at a full turn of an endless axis."""
+        return [
+            name
+            for name, angle in sorted(angles.items())
+            if abs(math.remainder(angle, 360.0) if name in self.endless else angle) > SAME
+        ]
 
     @staticmethod
     def _said(axis: str, value: float, mm_per_unit: float) -> float:
@@ -108,3 +142,22 @@ class MachinePositions:
 
     def _off(self, axis: str, value: float) -> bool:
         return axis not in self._at or abs(self._at[axis] - value) > _ROOM
+
+
+def _switch(blocks: Sequence[str], *, ends: bool) -> Iterator[WordRule]:
+    """Rules for the words of a block that switches tip control on (`ends`: another tool may not follow) or off."""
+    for block in blocks:
+        word, *others = map(re.compile, map(re.escape, block.split()))
+        yield WordRule(
+            word,
+            "tip control on" if ends else "tip control off",
+            state=_KINEMATICS,
+            must=others[0] if others else None,
+            alone=True,
+            follows=True,
+            ends=ends,
+            turned=ends,
+            off=not ends,
+            first="" if ends else "first",
+        )
+        yield from (WordRule(other, "tip control", needs=word) for other in others)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from cornersmooth.nc_reader.dialects.base import BY_WORD, CLAMPED, HIGH_SPEED, SPLINE_AXES, Dialect
+from cornersmooth.nc_reader.dialects.base import BY_WORD, CLAMPED, HIGH_SPEED, KINEMATICS, SPLINE_AXES, Dialect
 from cornersmooth.nc_reader.elements import Element, Problem
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, Table
 
@@ -23,6 +23,9 @@ TURNS: Final = "CS526"
 
 #: degrees that a rotary axis turns at most in one feed move: a mistake beyond
 MOST_TURN: Final = 360.0
+
+#: degrees at which a rotary axis counts as at zero
+_ZERO: Final = 1e-9
 
 #: what words of each kind are
 _KINDS = {
@@ -166,6 +169,33 @@ def unclamped_problems(machine: Machine, memory: Mapping[str, Any]) -> list[Prob
     """Return which rotary axes are not clamped at the end of a text."""
     free = [axis for axis in machine.axes if axis.clamp and not memory.get(CLAMPED, {}).get(axis.name, True)]
     return [Problem("CS538", 0, 0, f"{axis.name} is not clamped at the end") for axis in free]
+
+
+def kinematics_problem(
+    run: Executed, machine: Machine, memory: Mapping[str, Any], *, tip_control: bool
+) -> Problem | None:
+    """Return what is wrong with a run where the machine's file says what switches tip control of its kinematics.
+
+    Parameters
+    ----------
+    run : Executed
+        With its rotary words.
+    machine : Machine
+    memory : mapping
+        `State.memory`.
+    tip_control : bool
+        Whether the words are those of the tip; without it, of the machine's axes. With both rotary axes at zero that is
+        the same.
+    """
+    on = memory.get(KINEMATICS)
+    turned = np.abs(run.second[:, : len(machine.names)]) > _ZERO
+    if not machine.tip_control or on is tip_control or not turned.any():
+        return None
+    row = int(np.argmax(turned.any(axis=1)))
+    here, other = machine.tip_control if tip_control else machine.tip_control[::-1]
+    what = _KINDS["angles" if tip_control else "machine"]
+    before = "before any word of tip control" if on is None else f"under {other}"
+    return Problem(CONTROL_WORDS, 0, int(run.line[row]), f"{what} {before}, where {here} must be in force")
 
 
 class AxisWords:

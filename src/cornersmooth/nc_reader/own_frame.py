@@ -11,8 +11,11 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Set
 from typing import Final
 
+import numpy as np
+
 from cornersmooth.nc_reader.block_texts import shown, text_of
-from cornersmooth.nc_reader.machine_positions import MachinePositions
+from cornersmooth.nc_reader.machine_positions import SAME, MachinePositions
+from cornersmooth.nc_reader.rotary import tool_vectors
 from cornersmooth.nc_reader.word_list import WordList, WordRule
 
 #: state of the words that choose the zero of the part
@@ -42,12 +45,17 @@ _LENGTH: Final = "tool length"
 #: states of planes to which the control turns the rotary axes
 _PLANES: Final = ("tilted plane", "swivelled plane")
 
+#: state of the part as the rotary axes have turned it
+_DYNAMIC: Final = "dynamic work offset"
+
+#: angles of a plane, words of a tool vector, and the cosine of the angle from Z beyond which a tool is tilted
+_DECIMAL: Final = re.compile(r"(?<![G\d])\d+\.\d*")
+_VECTOR: Final = frozenset("IJK")
+_UPRIGHT: Final = 1.0 - 1e-6
+
 #: blocks that stop the program, and states that they end on most machines
 _STOPS: Final = frozenset(("M0", "M1", "STOP"))
 _ENDED: Final = frozenset(("spindle", "coolant", "coolant through the spindle"))
-
-#: printed digits by which angles may differ, degrees
-_SAME: Final = 1e-5
 
 
 class OwnFrame:
@@ -66,6 +74,7 @@ class OwnFrame:
 
     def __init__(self, listed: WordList, trusted: Set[str], positions: MachinePositions) -> None:
         self._list, self._trusted = listed, trusted
+        self._positions = positions
         self._at_home, self._rotary = bool(positions.rules), positions.rotary
         self._ours = False
         self._offset = ""  # that the head names
@@ -94,7 +103,7 @@ class OwnFrame:
 
     @property
     def _tip_control(self) -> bool:
-        return any(rule.ends for _, rule in self._state.values())
+        return self._positions.keeps_tip or any(rule.ends for _, rule in self._state.values())
 
     @property
     def _asked(self) -> bool:
@@ -180,10 +189,14 @@ class OwnFrame:
         first, self._moved = not self._moved, True
         if not self._asked:
             return
-        if high and "Z" in words and words.keys() & _ASIDE and not words.keys() & _POINT:
-            yield "the tool comes down from a retract before it is over its place"
+        if high and not words.keys() & _POINT:
+            tilted = self._tilted(words)
+            if tilted and not words.keys() >= _LINEAR:
+                yield "a tilted tool does not come from a retract in one block of X Y Z"
+            if tilted is False and "Z" in words and words.keys() & _ASIDE:
+                yield "the tool comes down from a retract before it is over its place"
         rotary = sorted(_ROTARY & words.keys()) if turned is not None else []
-        off = [name for name in rotary if not abs((turned or {}).get(name, math.nan) - words[name]) <= _SAME]
+        off = [name for name in rotary if not abs((turned or {}).get(name, math.nan) - words[name]) <= SAME]
         if off:
             yield f"tool tip control comes on before {' and '.join(off)} stands where the next motion has it"
         unknown = [] if zeroed is None else [name for name in sorted(_ROTARY & words.keys()) if name not in zeroed]
@@ -195,6 +208,22 @@ class OwnFrame:
         if first:
             yield from self._lost or ()
             yield from self._wrong_offset()
+
+    def _tilted(self, words: Mapping[str, float]) -> bool | None:
+        """Whether X and Y lie in another plane in the part than on the machine; None where that is not known."""
+        plane = [said for state, (said, rule) in self._state.items() if state in _PLANES and not rule.off]
+        if plane:
+            return any(map(float, _DECIMAL.findall(plane[0])))
+        if not self._tip_control and (_DYNAMIC not in self._state or self._state[_DYNAMIC][1].off):
+            return False
+        if words.keys() >= _VECTOR:
+            axis = np.array([words[name] for name in "IJK"])
+            return bool(axis[2] < _UPRIGHT * np.linalg.norm(axis))
+        machine, angles = self._positions.machine, {**self._angles, **words}
+        if machine is None or not set(machine.names) <= angles.keys():
+            return None
+        given = [angles.get(axis.name, 0.0) for axis in machine.axes]
+        return bool(tool_vectors(machine, np.array([given]))[0, 2] < _UPRIGHT)
 
     def _ended(self) -> Iterator[str]:
         """What a stop has ended, and nothing has said again."""
@@ -237,7 +266,7 @@ class OwnFrame:
             yield from (f"{word} still holds at the end" for word in self._running())
         if not self._asked or not self._moved:
             return
-        away = [name for name in sorted(self._angles) if abs(self._angles[name]) > _SAME]
+        away = self._positions.away(self._angles)
         if (away or (self._swivelled and self._machine)) and not self._at_home:
             yield f"{' and '.join(away) or 'the rotary axes'} not at zero at the end"
 

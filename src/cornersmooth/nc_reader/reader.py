@@ -21,6 +21,7 @@ from cornersmooth.nc_reader.needed_states import (
     AxisWords,
     clamp_problems,
     curve_problem,
+    kinematics_problem,
     limit_problems,
     modulo_problems,
     spline_problem,
@@ -176,7 +177,8 @@ class Reader:
                 self.problems += clamp_problems(run, before.second, self.rotary.machine, self.memory)
             approach: frozenset[int] = frozenset()
             if self.way_back.open:
-                whole, run = run, self.way_back.arrive(run, self.problems)
+                aside = table.line[~np.isnan([table.column("X"), table.column("Y")]).all(axis=0)]
+                whole, run = run, self.way_back.arrive(run, aside, self.problems)
                 approach = frozenset(whole.line.tolist()).difference(run.line.tolist())
                 if not len(run.kind):
                     continue
@@ -194,6 +196,8 @@ class Reader:
                 rotary = replace(self.rotary, tip_step=factor * self.rotary.tip_step)
                 self.problems += modulo_problems(table, rotary.machine, self.dialect.shorter_way, self.memory)
                 self.problems += limit_problems(table, run, rotary.machine, rotary.angle_step)
+                if self.dialect.switches:
+                    self._check_kinematics(run)
                 run = replace(run, second=rotary.unwrapped(run.second, before.second))
                 self.problems += turn_problems(run, before.second, rotary.machine)
                 self._check_turned(run)
@@ -435,6 +439,13 @@ class Reader:
                 place -= 1
             self.events[place:] = [replace(event, element=event.element - 1) for event in self.events[place:]]
         self.modal = self.way_back.leave(self.modal, "XYZ" if self.plane is not None else axes)
+
+    def _check_kinematics(self, run: Executed) -> None:
+        """Complain once for each state of tip control of the kinematics that the words of a run do not go with."""
+        assert self.rotary is not None
+        found = kinematics_problem(run, self.rotary.machine, self.memory, tip_control=self.rotary.tip_control)
+        if found is not None and all(found.text != problem.text for problem in self.problems):
+            self.problems.append(found)
 
     def _check_swings(self, elements: Ints, run: Executed) -> None:
         """Complain of rapids in which rotary axes lead the tool far round."""

@@ -95,9 +95,7 @@ class Rotary:
 
     def directions(self, angles: Floats) -> Floats:
         """(n, 3) unit tool vectors in the part, for (n, 2) degrees."""
-        first, second = self.machine.axes
-        tool = np.broadcast_to(self.machine.tool, (len(angles), 3))
-        return _turned(first, angles[:, 0], _turned(second, angles[:, 1], tool))
+        return tool_vectors(self.machine, angles)
 
     def carried(self, vectors: Floats, angles: Floats) -> Floats:
         """(n, 3) vectors of the machine in a part that tables have turned by (n, 2) degrees."""
@@ -391,6 +389,13 @@ class Rotary:
         good = off.max(axis=(1, 2)) * self.axis_length <= self._fine / 10
         joined = np.concatenate((bezier[:, :, :-1].reshape(len(points), -1, 7), bezier[:, -1, -1:]), axis=1)
         return joined[:, :, :6] / joined[:, :, 6:], joined[:, :, 6], good
+
+
+def tool_vectors(machine: Machine, angles: Floats) -> Floats:
+    """(n, 3) unit tool vectors in the part, for (n, 2) degrees."""
+    first, second = machine.axes
+    tool = np.broadcast_to(machine.tool, (len(angles), 3))
+    return _turned(first, angles[:, 0], _turned(second, angles[:, 1], tool))
 
 
 def _shares(count: Ints, left: Ints, turn: Floats) -> Floats:

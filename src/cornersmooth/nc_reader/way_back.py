@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import Floats
+from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.execution import Executed, Modal
 
@@ -88,12 +88,14 @@ class WayBack:
         ready[-1].tip[-1], ready[-1].second[-1] = ends.tip[0], ends.second[0]
         return True
 
-    def arrive(self, run: Executed, problems: list[Problem]) -> Executed:
+    def arrive(self, run: Executed, aside: Ints, problems: list[Problem]) -> Executed:
         """Leave out the rapids of the way back.
 
         Parameters
         ----------
         run : Executed
+        aside : (k,) int64
+            Lines with words of X or Y: others only turn the rotary axes.
         problems : list of Problem
             Takes a way back that does not end straight above where it leads to.
 
@@ -111,8 +113,8 @@ class WayBack:
                 "CS503", "a feed move where not all of the position is known", hint, file=self._name, line=line
             )
         self.open = bool(unknown.all())
-        if gone.any():
-            row = int(np.flatnonzero(gone)[-1])
+        if (places := np.flatnonzero(gone & np.isin(run.line, aside))).size:
+            row = int(places[-1])
             self._above = np.concatenate((run.tip[row], run.second[row])), int(run.line[row])
         if not self.open:
             self._arrival = self._came = int(run.line[int(np.argmin(unknown))])

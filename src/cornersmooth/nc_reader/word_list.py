@@ -8,6 +8,8 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     What may stand before that: a mark of the transfer.
 ``points``
     Addresses whose numbers need their decimal point.
+``switches``
+    Whether tip control is switched by blocks that the machine's file names.
 ``orders``
     What a comment begins with that the control would obey.
 ``[[word]]``
@@ -103,6 +105,7 @@ class WordList:
     begin, end : tuple of pattern
     header : pattern or None
     points : frozenset of str
+    switches : bool
     orders : pattern or None
     words, blocks : tuple of WordRule
         What is the control's own comes first.
@@ -112,6 +115,7 @@ class WordList:
     end: tuple[re.Pattern[str], ...] = ()
     header: re.Pattern[str] | None = None
     points: frozenset[str] = frozenset()
+    switches: bool = False
     orders: re.Pattern[str] | None = None
     words: tuple[WordRule, ...] = ()
     blocks: tuple[WordRule, ...] = field(default=())
@@ -137,6 +141,8 @@ def word_list(control: str) -> WordList:
     table = tomllib.loads(files(__package__).joinpath("word_lists", f"{control}.toml").read_text(encoding="utf-8"))
     base = word_list(table["like"]) if "like" in table else WordList()
     own: dict[str, Any] = {name: _patterns(table[name]) for name in ("begin", "end") if name in table}
+    if "switches" in table:
+        own["switches"] = table["switches"]
     if "header" in table:
         own["header"] = re.compile(table["header"])
     if "points" in table:

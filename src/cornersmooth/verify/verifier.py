@@ -20,6 +20,7 @@ from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.reading import read_styled
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.source import Source, readable_twice
+from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
 from cornersmooth.signatures import taking_what
@@ -203,7 +204,12 @@ class Verifier:
         lines = reader.lines(source)
         room = options.tolerance / self._program.mm_per_unit
         machine = self._machine if options.dialect.retracts else None
-        positions = MachinePositions(machine, self._program.mm_per_unit)
+        positions = MachinePositions(
+            machine,
+            self._program.mm_per_unit,
+            switches=word_list(self._options.control).switches,
+            tcp=self._options.tcp,
+        )
         check = WordCheck(options.control, options.dialect.lexer, room, self._trusted, self._weights, positions)
         own_rapids = OwnRapids(task)
         reader.way_back.added, reader.left_cuts.asked = own_rapids.added, own_rapids.goes_to

@@ -72,8 +72,9 @@ class WordCheck:
         weights: Iterable[float] | None = None,
         positions: MachinePositions | None = None,
     ) -> None:
-        self.list: WordList = word_list(control)
         self._positions = MachinePositions(None, 1.0) if positions is None else positions
+        listed = word_list(control)
+        self.list: WordList = replace(listed, words=(*self._positions.switch, *listed.words))
         self._rules = WordRules(self.list, self._positions.rules, lexer, tolerance)
         self.lexer = lexer
         self.problems: list[Problem] = []
@@ -335,7 +336,7 @@ class WordCheck:
                 self._by_tool = None
             if rule.then is not None:
                 self._then = (rule, number)
-            if rule.zero and (not self._angles or any(self._angles.values())):
+            if rule.zero and (not self._angles or self._positions.away(self._angles)):
                 self._unframed(NOT_LISTED, number, f"{word} without the rotary axes at zero before it")
             if rule.high and not self._high:
                 self._unframed(NOT_LISTED, number, f"{word} without a retract before it")

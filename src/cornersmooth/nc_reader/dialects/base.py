@@ -32,6 +32,9 @@ SPLINE_AXES = "spline axes"
 #: name in `State.memory` of whether each rotary axis that has been spoken of is clamped
 CLAMPED = "clamped"
 
+#: name in `State.memory` of whether the kinematics keep the tip, where the machine's file says what switches that
+KINEMATICS = "kinematics"
+
 #: word around the number of a modulo axis that sends it the shorter way; a column of tables with the axis behind it
 BY_WORD = "DC"
 
@@ -101,6 +104,8 @@ class Dialect:
     curves_need: str = ""
     #: whether SPLINEPATH says which axes are those of splines, the first three where it says nothing
     names_spline_axes: bool = False
+    #: whether tip control is switched by blocks that the machine's file names
+    switches: bool = False
     #: the first letter, or letters, of tip and second triple in the lexer, with their decimals
     digits: re.Pattern[bytes] = re.compile(rb"(?:([XYZ])|([IJUVW]))[-+]?\d*\.(\d*)")
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
 
-from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, Dialect, State
+from cornersmooth.nc_reader.dialects.base import AFTER_MOTION, HIGH_SPEED, INCREMENTAL, KINEMATICS, Dialect, State
 from cornersmooth.nc_reader.hole_cycles import INITIAL_HEIGHT, HoleCycle, drill
 from cornersmooth.nc_reader.lexer import NUMBER, Lexer, fixed, number_of
 from cornersmooth.nc_reader.planes import TiltedPlane, room_of, rotated_frame, turned_frame
@@ -140,6 +140,7 @@ class Iso(Dialect):
 
     def __init__(self, name: str, rotary: str = "") -> None:
         self.iso = ISO_WORDS[name]
+        self.switches = word_list(name).switches
         super().__init__((_LinuxLexer if self.iso.semicolon else _IsoLexer)(rotary, word_list(name).points), rotary)
         self.controls, self.unsaid, self.curves_need = self.iso.controls, self.iso.unsaid, self.iso.curves_need
         self.retracts = self.iso.retracts
@@ -150,6 +151,8 @@ class Iso(Dialect):
 
     def words(self, line: Line, state: State) -> None:
         """Interpret a line that is no motion block."""
+        if self._switched(line, state):
+            return
         codes = {word[1] for word in line.words if word[0] == "G"}
         if codes & {*_TO_REFERENCE, _IN_MACHINE}:
             self._to_machine(line, codes, state)
@@ -192,6 +195,17 @@ class Iso(Dialect):
         if self.lexer.odd_vector(motion.keys(), motion.get("G")):
             state.refuse(line, "I J K beside rotary words", "leave out --machine for a text with tool vectors")
         state.move(line, motion, later=bool(codes & self.iso.tip_control.keys()) and not late)
+
+    def _switched(self, line: Line, state: State) -> bool:
+        """Take a block that switches tip control of the kinematics; return whether it is one."""
+        blocks = state.rotary.machine.tip_control if self.switches and state.rotary is not None else None
+        given = {(word.name, word.value) for word in line.words if word.name != "N"}
+        for block, on in zip(blocks or (), (True, False), strict=False):
+            if given == {(word[0], float(word[1:])) for word in block.split()}:
+                state.change(line)
+                state.memory[KINEMATICS] = on
+                return True
+        return False
 
     def _cycle(self, line: Line, codes: set[float], state: State) -> None:
         """A hole cycle, with G98: all that it takes stands in its block."""
