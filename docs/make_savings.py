@@ -33,7 +33,6 @@ TEXTS: tuple[tuple[str, str, str, dict[str, str]], ...] = (
     ("fanuc", "g6.2", "IS-D", {}),
     ("fanuc", "g6.2", "", {}),
     ("fanuc", "g6.2", "IS-B", {}),
-    ("fanuc", "g6.2", "IS-B", {"allocation": "fair"}),
     ("fanuc", "g6.2", "IS-B", {"method": "global"}),
     ("fanuc", "g1", "IS-B", {}),
 )

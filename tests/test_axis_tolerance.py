@@ -170,8 +170,6 @@ def test_settings_bring_both_tolerances_to_the_axis_point() -> None:
     assert Settings().axis_scale == Settings().axis_length
     with pytest.raises(SettingsError, match="does not go with a tolerance"):
         Settings(tolerance=0.5, axis_tolerance=0.001)
-    with pytest.raises(SettingsError, match="leave out orientation_tolerance"):
-        Settings(axis_tolerance=0.1, orientation_tolerance=0.1)
     with pytest.raises(SettingsError, match="axis_tolerance is 90"):
         Settings(axis_tolerance=90.0)
 

@@ -47,7 +47,6 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 "the paper as published",
                 "cornersmooth.smoothing.zhang2016",
                 one_parameter=False,
-                prescribed=MappingProxyType({"shape": "paper", "allocation": "half"}),
             ),
             Method(
                 "proportional",
@@ -58,9 +57,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
                 "global",
                 "one pair of curves for a whole run of corners, as smooth as the tolerance allows",
                 "cornersmooth.smoothing.global_runs",
-                prescribed=MappingProxyType(
-                    {"shape": "paper", "allocation": "half", "weights": (1.0, 1.0), "orientation_tolerance": None}
-                ),
+                prescribed=MappingProxyType({"weights": (1.0, 1.0)}),
             ),
         )
     }

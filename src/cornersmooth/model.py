@@ -319,7 +319,6 @@ class LimitedBy(IntEnum):
     NOTHING = 0  #: not smoothed
     TOLERANCE = 1
     SEGMENT = 2
-    ORIENTATION = 3
 
 
 @dataclass(frozen=True)

@@ -312,7 +312,7 @@ def _provenance(
         with open(source, "rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     # on more knots, as angles of rotary axes need them, the same curves have other weights, but where all are 1
-    any_weights = settings.shape == "auto" or (form.rotary and set(settings.weights) != {1.0})
+    any_weights = form.rotary and set(settings.weights) != {1.0}
     return Provenance(
         version=__version__,
         tolerance=settings.tolerance,

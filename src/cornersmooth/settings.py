@@ -9,8 +9,6 @@ from typing import Any, Literal
 from cornersmooth.errors import SettingsError
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
 
-Shape = Literal["paper", "auto"]
-Allocation = Literal["half", "fair"]
 Lines = Literal["dense", "long"]
 
 
@@ -29,16 +27,10 @@ class Settings:
         τ: in place of ε at the axis point, what the tool axis may be off where the tip is within ε.
     method : str
         A name in `cornersmooth.methods.METHODS`.
-    shape : {"paper", "auto"}
-        Weights of the curves: `weights` everywhere, or w2 chosen for every corner by its turn (docs/shape.md).
-    allocation : {"half", "fair"}
-        How far transitions reach: to the middle of the shorter segment, or as neighbours leave room (docs/shape.md).
     weights : (float, float)
         w1 and w2 of the five-point curve, in (0, 3]; rounded to the three decimals that controls accept.
     ratio : float
         Second control point over first, in [0.5, 0.9]; the paper's 2/3 divides the leg so that knots need no care.
-    orientation_tolerance : float or None, degrees
-        τ: bound on the angle between the axis and the original axis; None leaves it to ε and H.
     reversal_angle : float, degrees
         A corner that turns by more (in the six-dimensional sense) stays sharp.
     max_axis_step : float, degrees
@@ -71,11 +63,8 @@ class Settings:
     axis_length: float = 10.0
     axis_tolerance: float | None = None
     method: str = DEFAULT_METHOD
-    shape: Shape = "paper"
-    allocation: Allocation = "half"
     weights: tuple[float, float] = (1.0, 1.0)
     ratio: float = 2.0 / 3.0
-    orientation_tolerance: float | None = None
     reversal_angle: float = 170.0
     max_axis_step: float = 90.0
     chord_tolerance: float | None = None
@@ -93,19 +82,13 @@ class Settings:
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise SettingsError("CS201", f"unknown method {self.method!r}", f"use {' or '.join(METHODS)}")
-        if self.shape not in ("paper", "auto"):
-            raise SettingsError("CS201", f"unknown shape {self.shape!r}", "use paper or auto")
         if self.lines not in (None, "dense", "long"):
             raise SettingsError("CS201", f"unknown lines {self.lines!r}", "use dense or long")
-        if self.allocation not in ("half", "fair"):
-            raise SettingsError("CS201", f"unknown allocation {self.allocation!r}", "use half or fair")
         prescribed = METHODS[self.method].prescribed
         if any(getattr(self, name) != value for name, value in prescribed.items()):
             names = " and ".join(prescribed)
             raise SettingsError("CS207", f"the method {self.method} has its own {names}", f"leave out {names}")
         object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
-        if self.shape == "auto" and self.weights != (1.0, 1.0):
-            raise SettingsError("CS207", "shape auto chooses the weights", "leave out the weights, or use shape paper")
         for name, (low, high) in BOUNDS.items():
             value = getattr(self, name)
             for number in value if isinstance(value, tuple) else (value,):
@@ -132,8 +115,6 @@ class Settings:
                 f"axis_tolerance {degrees:g} deg does not go with a tolerance of {self.tolerance:g} mm",
                 f"use {word} {math.degrees(bound):.2g} deg",
             )
-        if self.orientation_tolerance is not None:
-            raise SettingsError("CS207", "axis_tolerance says all of the axis", "leave out orientation_tolerance")
         return length
 
     @property
@@ -250,7 +231,6 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "axis_tolerance": (1e-4, 45.0),
     "weights": (0.001, 3.0),
     "ratio": (0.5, 0.9),
-    "orientation_tolerance": (1e-6, 90.0),
     "reversal_angle": (1.0, 180.0),
     "max_axis_step": (1.0, 90.0),
     "chord_tolerance": (1e-7, 1.0),

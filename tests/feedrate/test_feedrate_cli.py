@@ -80,12 +80,12 @@ def test_refusals(arguments: list[str], code: int, words: str, capsys: pytest.Ca
     assert words in capsys.readouterr().err
 
 
-def test_shapes_leave_the_paper_alone(capsys: pytest.CaptureFixture[str]) -> None:
+def test_weights_are_for_both_methods(capsys: pytest.CaptureFixture[str]) -> None:
     seconds = []
-    for more in ([], ["--shape", "auto", "--allocation", "fair"]):
+    for more in ([], ["--weights", "1,0.65"]):
         assert run(["time", TABLE_1, *PAPER, "--json", *more]) == 0
         seconds.append(json.loads(capsys.readouterr().out)["seconds"])
-    assert seconds[0]["zhang2016"] == seconds[1]["zhang2016"]
+    assert seconds[0]["zhang2016"] != seconds[1]["zhang2016"]
     assert seconds[0]["proportional"] != seconds[1]["proportional"]
 
 

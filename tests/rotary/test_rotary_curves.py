@@ -256,7 +256,6 @@ def test_other_ratios_and_shapes():
     for settings in (
         reserved(ratio=0.6),
         reserved(ratio=0.8, weights=(1.3, 0.4)),
-        reserved(shape="auto", allocation="fair"),
         reserved(axis_length=40.0),
     ):
         smoothed = smooth(program, settings)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from cornersmooth.model import LimitedBy, Program, Status
+from cornersmooth.model import Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs, smooth
 from oracle.share import covering_share, how_many
@@ -159,13 +159,6 @@ def test_tip_and_axis_point_keep_the_tolerance_at_one_common_parameter(wobble, a
     assert top.max() <= 0.04 + 1e-10
     assert top == pytest.approx(corners.axis_error[rows], rel=2e-3, abs=1e-6)
     assert tip == pytest.approx(corners.tip_error[rows], rel=1e-9)
-
-
-def test_orientation_tolerance_is_kept_and_said():
-    smoothed = smooth(random_program(5, 1000, wobble=0.5), Settings(tolerance=1.0, orientation_tolerance=0.2))
-    corners = smoothed.corners
-    assert (corners.limited_by == LimitedBy.ORIENTATION).any()
-    assert np.degrees(corners.orientation_error.max()) <= 0.2 * (1 + 1e-9)
 
 
 def test_reversals_and_flips_stay_sharp():

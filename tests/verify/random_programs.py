@@ -57,7 +57,7 @@ class Trial:
         said += ["native cycles"] if self.native else []
         said += [f"axis tolerance {s.axis_tolerance:g}"] if s.axis_tolerance is not None else []
         if s.method == "proportional":
-            said += [s.shape, s.allocation, *(["weights {:g},{:g}".format(*s.weights)] if s.weights != (1, 1) else [])]
+            said += ["weights {:g},{:g}".format(*s.weights)] if s.weights != (1, 1) else []
         return f"seed {self.seed}: " + " ".join(said) + " [" + " ".join(self.parts) + "]"
 
 
@@ -269,7 +269,7 @@ def trial(seed: int, *, flips: bool = True, only: str = "") -> Trial:
     native = "holes" in parts and bool(more.random() < 0.4)
     if form.long_lines and not settings.lines and more.random() < 0.25:
         settings = settings.but(lines="long")
-    if settings.orientation_tolerance is None and more.random() < 0.1:
+    if more.random() < 0.1:
         settings = _with_axis_tolerance(settings, float(np.round(10.0 ** more.uniform(-2, 0.7), 3)))
     return Trial(seed, case, settings, units, cl, tuple(parts), digits, planned, native)
 
@@ -290,18 +290,14 @@ def _settings(rng: np.random.Generator, seed: int, form: Form) -> Settings:
     if rng.random() < 0.25:
         options["method"] = "zhang2016"
     else:
-        options["shape"] = "auto" if rng.random() < 0.25 else "paper"
-        options["allocation"] = "fair" if rng.random() < 0.3 else "half"
-        if options["shape"] == "paper" and rng.random() < 0.2:
-            options["weights"] = tuple(np.round(rng.uniform(0.3, 2.5, 2), 3).tolist())
         if rng.random() < 0.2:
-            options["orientation_tolerance"] = float(np.round(10.0 ** rng.uniform(-2, 1), 4))
+            options["weights"] = tuple(np.round(rng.uniform(0.3, 2.5, 2), 3).tolist())
     if rng.random() < 0.2:
         options["reversal_angle"] = float(rng.choice([30.0, 90.0, 175.0, 180.0]))
     if rng.random() < 0.2:
         options["axis_step"] = float(rng.choice([0.1, 1.0, 10.0]))
     if form.curve in ("poly", "spl"):
-        options = {name: value for name, value in options.items() if name not in ("weights", "shape")}
+        options.pop("weights", None)
     _other_methods(np.random.default_rng((seed, 1)), form, options)
     try:
         return Settings(**options)  # type: ignore[arg-type]
@@ -315,8 +311,7 @@ def _other_methods(rng: np.random.Generator, form: Form, options: dict[str, obje
     if form.curves and form.rotary and options.get("method") == "zhang2016":
         del options["method"]
     if rng.random() < 0.25 and runs:
-        for name in ("shape", "allocation", "weights", "orientation_tolerance"):
-            options.pop(name, None)
+        options.pop("weights", None)
         options["method"] = "global"
     if form.long_lines and rng.random() < 0.4:
         options["lines"] = str(rng.choice(["long", "dense"]))

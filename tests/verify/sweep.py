@@ -127,9 +127,7 @@ def judged(one: Trial, program: Program, *, oracle: bool = True) -> tuple[str, s
 
 def with_method(one: Trial, method: str) -> Trial:
     """The trial by another method of smoothing; as it is where that has another idea of its options."""
-    s, own = one.settings, Settings()
-    plain = s.but(shape=own.shape, allocation=own.allocation, weights=own.weights, orientation_tolerance=None)
-    return replace(one, settings=plain.but(method=method))
+    return replace(one, settings=one.settings.but(weights=Settings().weights, method=method))
 
 
 def drawn(one: Trial) -> list[str]:

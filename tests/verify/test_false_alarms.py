@@ -6,7 +6,6 @@ The numbers come from random programs, cut down to the moves that matter.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -34,7 +33,6 @@ class Alarm:
     cl : str
         Statements after those that every program begins with.
     inch : bool
-    allocation : str
     """
 
     case: Case
@@ -42,7 +40,6 @@ class Alarm:
     axis_length: float
     cl: str
     inch: bool = False
-    allocation: Literal["half", "fair"] = "half"
 
     @property
     def program(self) -> Program:
@@ -54,7 +51,7 @@ class Alarm:
     @property
     def text(self) -> str:
         """What is written for it."""
-        settings = Settings(tolerance=self.tolerance, axis_length=self.axis_length, allocation=self.allocation)
+        settings = Settings(tolerance=self.tolerance, axis_length=self.axis_length)
         return written(self.program, self.case.choose(endless=True), settings)[0]
 
     def verified(self, text: str, *, slower: bool = False) -> Verification:
@@ -397,7 +394,6 @@ GOTO/-0.0112,0.0246,0.0000,0.9506282,-0.3100353,-0.0135660
 GOTO/-0.0112,0.0246,0.0000,0.9512436,-0.3081481,-0.0134286
 """,
     inch=True,
-    allocation="fair",
 )
 
 #: two cycles in one hole, a second tool between them; the way back from the first is also the next move

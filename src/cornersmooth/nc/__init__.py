@@ -100,11 +100,11 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
     """
     tolerance = settings.tolerance
     polynomial = form.curve in _POLYNOMIAL or (form.curve == "bspline" and form.rotary)
-    if polynomial and (settings.weights != (1.0, 1.0) or settings.shape != "paper"):
+    if polynomial and settings.weights != (1.0, 1.0):
         raise SettingsError(
             "CS217",
             f"{form.control} form {form.name} holds curves with weights 1 only",
-            "leave out --weights and --shape, or choose another form",
+            "leave out --weights, or choose another form",
         )
     long = form.table.lines
     lines = settings.lines or (long.lines if form.long_lines else "dense")

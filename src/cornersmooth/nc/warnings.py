@@ -52,7 +52,7 @@ def _coarse_digits(form: Form, smoothed: SmoothProgram, findings: Findings) -> N
         return
     text = (
         f"control points of transitions are {typical:.0f} steps of the last digit apart, typically: rounding bends the "
-        "curves, and the axes follow; --method global, --allocation fair or more digits cost less time"
+        "curves, and the axes follow; --method global or more digits cost less time"
     )
     findings.add("CS349", "note", 0, text)
 

@@ -25,7 +25,7 @@ _STRAIGHT = 0.5
 _EXACT = 0.02
 
 #: what becomes of a corner, as the page names it (behind the colon what limits it); its colours follow this order
-KINDS = ("out of tolerance", "sharp", "rounded: tolerance", "rounded: segment", "rounded: orientation", "rounded")
+KINDS = ("out of tolerance", "sharp", "rounded: tolerance", "rounded: segment", "rounded")
 
 
 @dataclass(frozen=True)

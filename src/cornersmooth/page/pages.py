@@ -220,7 +220,7 @@ def _settings_facts(settings: Settings) -> list[tuple[str, str]]:
     return [
         ("tolerance ε", f"{settings.tolerance:g} mm"),
         _second_fact(settings.axis_length, settings.axis_tolerance),
-        ("method", f"{settings.method}, shape {settings.shape}, allocation {settings.allocation}"),
+        ("method", settings.method),
         ("reversals", f"sharp above {settings.reversal_angle:g}°"),
     ]
 

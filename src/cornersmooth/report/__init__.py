@@ -68,7 +68,6 @@ def report(
         "smoothed": int(done.sum()),
         "limited_by_tolerance": int((corners.limited_by == LimitedBy.TOLERANCE).sum()),
         "limited_by_segment": int((corners.limited_by == LimitedBy.SEGMENT).sum()),
-        "limited_by_orientation": int((corners.limited_by == LimitedBy.ORIENTATION).sum()),
         "not_smoothed": {
             STATUS_NAMES[status]: count
             for status in Status

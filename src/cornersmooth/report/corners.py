@@ -32,7 +32,6 @@ LIMIT_NAMES = {
     LimitedBy.NOTHING: "",
     LimitedBy.TOLERANCE: "tolerance",
     LimitedBy.SEGMENT: "segment",
-    LimitedBy.ORIENTATION: "orientation",
 }
 
 Column = Floats | Ints | NDArray[np.str_]

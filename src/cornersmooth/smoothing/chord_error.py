@@ -39,7 +39,7 @@ def shape_factors(weights: Floats, ratio: Floats) -> tuple[Floats, Floats]:
         The chord error of n lines is at most ``bend·PAPER_ERROR·|b − a|/n²``, 9/4 of it on even nodes; on even nodes σ
         changes by at most ``turn/n`` in a line.
     """
-    # for w1 = 1, w2 ≤ 1 and the ratio 2/3 both are at most 6c, c the deviation factor (tests/smoothing/test_shape.py)
+    # for w1 = 1, w2 ≤ 1 and the ratio 2/3 both are at most 6c, c the deviation factor (tests/smoothing/test_weights.py)
     factor = np.maximum(6.0 * nurbs.deviation_factor(weights, ratio), 1.0)
     bend, turn = factor, factor.copy()
     other = np.flatnonzero((weights[:, 0] != 1.0) | (weights[:, 1] > 1.0) | (np.abs(ratio - 2.0 / 3.0) > 1e-12))

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Corners, Floats, Ints, Program, SmoothProgram
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.corner_table import CornerTable, Placed, Remainders, ShapedCorners
+from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
 from cornersmooth.smoothing.transition import place_corners
 
 #: what `Corners.extra` may have: largest curvature of the curve of a run beside each of its corners, 1/mm
@@ -44,13 +44,9 @@ class Construction(ABC):
         corners = place_corners(program, settings, self, progress)
         return SmoothProgram(program=program, corners=corners, settings=settings, findings=program.findings)
 
-    def room(self, table: CornerTable) -> Floats | None:
-        """Longest transition (k,) of every corner, mm, where its neighbours have a say; None for half of a segment."""
-        return None
-
     @abstractmethod
-    def place(self, shaped: ShapedCorners, settings: Settings, room: Floats | None) -> Placed:
-        """Transitions of g corners; `room` (g,) is what `room` gave for them."""
+    def place(self, shaped: ShapedCorners, settings: Settings) -> Placed:
+        """Transitions of g corners."""
 
     @abstractmethod
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:

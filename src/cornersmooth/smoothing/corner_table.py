@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from cornersmooth.model import Floats, Ints, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.legs import Legs, legs_at
-from cornersmooth.smoothing.shape import corner_weight
 
 #: corners worked on at once: their intermediate arrays fit the processor's cache
 BATCH = 16384
@@ -56,8 +55,6 @@ class CornerTable:
         """Segments at some corners, and the shape of their curves."""
         legs = legs_at(self.program, self.settings.axis_length, self.pose[rows], self.before[rows], self.after[rows])
         weights = np.broadcast_to(np.array(self.settings.weights), (len(rows), 2))
-        if self.settings.shape == "auto":
-            weights = np.stack((np.ones(len(rows)), corner_weight(legs)), axis=1)
         return ShapedCorners(legs, weights, np.broadcast_to(np.float64(self.settings.ratio), (len(rows),)))
 
 

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from cornersmooth.model import Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.allocation import fair_room
 from cornersmooth.smoothing.construction import Construction
-from cornersmooth.smoothing.corner_table import CornerTable, Placed, Remainders, ShapedCorners
+from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
 from cornersmooth.smoothing.deviation import BETWEEN_PROBES, EXACT, Bends, keep
 from cornersmooth.smoothing.legs import Legs, divide, half_angle_cosine
 from cornersmooth.vectors import dot, norm, square, unit
@@ -24,7 +23,7 @@ _TILT_PAPER, _TILT_ANY = 1.5, 0.5
 
 @dataclass(frozen=True)
 class Wanted:
-    """What g corners ask for before anyone says how much room they have.
+    """What g corners ask for.
 
     Parameters
     ----------
@@ -32,18 +31,14 @@ class Wanted:
         `Status` as far as the geometry of the corner decides it.
     length_in, length_out : (g,) float64, mm
         m(D): six-dimensional lengths of the segments.
-    by_tolerance, by_orientation : (g,) float64, mm
+    by_tolerance : (g,) float64, mm
         Transition lengths that the tolerances allow.
-    cosine : (g,) float64
-        Cosine of the six-dimensional turn.
     """
 
     status: NDArray[np.uint8]
     length_in: Floats
     length_out: Floats
     by_tolerance: Floats
-    by_orientation: Floats
-    cosine: Floats
     bends: Bends
     half_cosine: Floats
     per_length: tuple[Floats, Floats, Floats]  # deviation over length: tip, axis point, axis point less tip
@@ -67,10 +62,6 @@ def wanted(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Wa
     half_cosine = np.minimum(
         half_angle_cosine(legs.turn_in, axis_length), half_angle_cosine(legs.turn_out, axis_length)
     )
-    by_orientation = np.full_like(by_tolerance, np.inf)
-    if settings.orientation_tolerance is not None:
-        reach = axis_length * half_cosine * np.sin(np.radians(settings.orientation_tolerance))
-        by_orientation = divide(reach, per_length_turn)
 
     status = np.full(len(length_in), Status.SMOOTHED, np.uint8)
     halves = np.minimum(length_in, length_out) / 2.0
@@ -86,21 +77,19 @@ def wanted(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Wa
         length_in,
         length_out,
         by_tolerance,
-        by_orientation,
-        cosine,
         bends,
         half_cosine,
         (per_length_tip, per_length_axis, per_length_turn),
     )
 
 
-def place_proportional(asked: Wanted, room: Floats, settings: Settings) -> Placed:
-    """Give g corners the transition lengths they asked for, within their `room` (g,), mm."""
+def place_proportional(asked: Wanted, settings: Settings) -> Placed:
+    """Give g corners the transition lengths they ask for, up to half of the shorter segment."""
+    room = np.minimum(asked.length_in, asked.length_out) / 2.0
     status, bends = asked.status, asked.bends
     per_length_tip, _, per_length_turn = asked.per_length
     limited_by = np.where(asked.by_tolerance <= room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
-    limited_by[(asked.by_orientation < asked.by_tolerance) & (asked.by_orientation <= room)] = LimitedBy.ORIENTATION
-    length = np.minimum(np.minimum(room, asked.by_tolerance), asked.by_orientation)
+    length = np.minimum(room, asked.by_tolerance)
 
     # The construction runs on chords of the sphere, the promise is about b = tip + H·axis at constant H. The bound
     # |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are evaluated and shortened until they keep it.
@@ -160,26 +149,9 @@ def _largest_in_the_middle(bends: Bends, length: Floats, turned: Floats) -> NDAr
 class Proportional(Construction):
     """Tip and axis-point segment are trimmed by the same fraction, and one parameter drives both curves."""
 
-    def room(self, table: CornerTable) -> Floats | None:
-        """Share every segment fairly between its corners where the settings ask for it."""
-        if table.settings.allocation != "fair":
-            return None
-        length_in, length_out, length, cosine = np.zeros((4, len(table.pose)))
-        for _, rows in table.batches():
-            if len(rows):
-                asked = wanted(*table.shaped(rows), table.settings)
-                length_in[rows], length_out[rows], cosine[rows] = asked.length_in, asked.length_out, asked.cosine
-                length[rows] = np.where(
-                    asked.status == Status.SMOOTHED, np.minimum(asked.by_tolerance, asked.by_orientation), 0.0
-                )
-        return fair_room(table.pose, table.after, length_in, length_out, length, cosine)
-
-    def place(self, shaped: ShapedCorners, settings: Settings, room: Floats | None) -> Placed:
-        """Give every corner the length that the tolerances and its room allow."""
-        asked = wanted(*shaped, settings)
-        if room is None:
-            room = np.minimum(asked.length_in, asked.length_out) / 2.0
-        return place_proportional(asked, room, settings)
+    def place(self, shaped: ShapedCorners, settings: Settings) -> Placed:
+        """Give every corner the length that the tolerances and its segments allow."""
+        return place_proportional(wanted(*shaped, settings), settings)
 
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
         """Both curves at the same parameters."""

@@ -54,11 +54,9 @@ def place_corners(
     before, after = around.previous[pose], around.following[pose]
     status = _what_forbids(program, settings, pose, after, around.duplicate[pose])
     table = CornerTable(program, settings, pose, before, after, status)
-    room = construction.room(table)
 
     k = len(pose)
-    automatic = settings.shape == "auto"
-    weights = np.ones((k, 2)) if automatic else np.broadcast_to(np.array(settings.weights), (k, 2))
+    weights = np.broadcast_to(np.array(settings.weights), (k, 2))
     whole = Placed(
         status=status,
         limited_by=np.zeros(k, np.uint8),
@@ -71,10 +69,7 @@ def place_corners(
     def settle(batch: tuple[int, Ints]) -> int:
         start, rows = batch
         if len(rows):
-            shaped = table.shaped(rows)
-            part = construction.place(shaped, settings, None if room is None else room[rows])
-            if automatic:
-                weights[rows] = shaped.weights
+            part = construction.place(table.shaped(rows), settings)
             for name in ("status", "limited_by", *_MEASURES):
                 getattr(whole, name)[rows] = getattr(part, name)
             for name, values in part.extra.items():

@@ -144,7 +144,7 @@ class Zhang2016(Construction):
                 smoothed = replace(smoothed, corners=_left_sharp(smoothed.corners, rows))
         return smoothed
 
-    def place(self, shaped: ShapedCorners, settings: Settings, room: Floats | None) -> Placed:
+    def place(self, shaped: ShapedCorners, settings: Settings) -> Placed:
         """Trim by the paper's equations; half of each segment is the most."""
         return place_zhang2016(*shaped, settings)
 

@@ -41,25 +41,8 @@ method = click.option(
     + ". Global pays on dense five-axis paths: less time on the machine, and a block a pose in bspline and g6.2."
     + " Proportional suits every form of every control, and is the quickest.",
 )
-shape = click.option(
-    "--shape",
-    type=click.Choice(["paper", "auto"]),
-    default="paper",
-    show_default=True,
-    help="Weights of the curves: all 1 (or --weights), or chosen for every corner by its turn.",
-)
-allocation = click.option(
-    "--allocation",
-    type=click.Choice(["half", "fair"]),
-    default="half",
-    show_default=True,
-    help="How far curves reach: half of each segment, or as much as their neighbours leave.",
-)
 weights = click.option(
     "--weights", type=Weights(), default=(1.0, 1.0), help="Weights w1,w2 of the curves, up to 3. [default: 1,1]"
-)
-orientation_tolerance = click.option(
-    "--orientation-tolerance", type=float, metavar="DEG", help="Largest deviation of the tool axis besides -e and -H."
 )
 reversal_angle = click.option(
     "--reversal-angle",
@@ -92,10 +75,7 @@ _SETTINGS = {
     "axis_length": axis_length,
     "axis_tolerance": axis_tolerance,
     "method": method,
-    "shape": shape,
-    "allocation": allocation,
     "weights": weights,
-    "orientation_tolerance": orientation_tolerance,
     "reversal_angle": reversal_angle,
     "lines": lines,
     "chord_tolerance": chord_tolerance,
@@ -105,7 +85,7 @@ _SETTINGS = {
 
 def curve_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that makes curves, besides their tolerance and method."""
-    return all_of(function, (shape, allocation, weights, orientation_tolerance, reversal_angle))
+    return all_of(function, (weights, reversal_angle))
 
 
 def line_options(function: Callable[..., Any]) -> Callable[..., Any]:

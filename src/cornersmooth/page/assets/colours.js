@@ -7,7 +7,7 @@ const SEQUENTIAL_STOPS = ["#4f55b0", "#3f68ab", "#3376a2", "#298398", "#21918c",
 /** From blue over grey to orange: less material on the orange side, more on the blue. */
 const DIVERGING = ["#a63603", "#d9540d", "#f08a3c", "#eebb88", "#c9c9c9", "#9ecae1", "#5fa8d3", "#2f7fbb", "#08519c"];
 /** Of Okabe and Ito, in the order of the kinds of corners. */
-const KIND_COLOURS = ["#d55e00", "#e69f00", "#0072b2", "#56b4e9", "#009e73", "#0072b2"];
+const KIND_COLOURS = ["#d55e00", "#e69f00", "#0072b2", "#56b4e9", "#0072b2"];
 const OUTSIDE = "#d55e00";
 const PLAIN = "#8c95a0";
 /** Of the planned motions. */
