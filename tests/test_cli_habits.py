@@ -145,7 +145,8 @@ def test_what_is_missing_is_installed_as_the_package_was(tmp_path: Path, monkeyp
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     part = tmp_path / "part.cls"
     part.write_bytes(SMALL)
-    words = ("smooth", part, "-o", tmp_path / "part.nc", "--plot", tmp_path / "part.png", "--force")
+    assert run("smooth", part, "-o", tmp_path / "part.nc").returncode == DONE
+    words = ("surface", part, tmp_path / "part.nc", "--tool", "10,5", "--report", tmp_path / "part.png")
     root = SAMPLES.parent
     assert f"install it with: pip install -e '{root}[plot]'" in run(*words, cwd=tmp_path).stderr.decode()
     assert "install it with: pip install -e '.[plot]'" in run(*words, cwd=root).stderr.decode()

@@ -127,7 +127,7 @@ def test_the_command_refuses_weights_where_the_method_has_its_own(tmp_path: Path
     assert not out.exists()
 
 
-@pytest.mark.parametrize("option", ["--shape=auto", "--allocation=fair", "--orientation-tolerance=1"])
+@pytest.mark.parametrize("option", ["--shape=auto", "--allocation=fair", "--orientation-tolerance=1", "--plot=a.png"])
 def test_options_that_went_are_wrong_usage(tmp_path: Path, option: str) -> None:
     out = tmp_path / "out.nc"
     result = run("smooth", ROOT / "samples" / "paper_table1.csv", option, "-o", out)

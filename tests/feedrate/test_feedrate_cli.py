@@ -57,21 +57,11 @@ def test_csv_holds_the_motion(tmp_path: Path, law: str) -> None:
     assert run([*arguments, "--force"]) == 0
 
 
-def test_pictures_are_repeatable(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
-    first, second = tmp_path / "one.svg", tmp_path / "two.svg"
-    for path in (first, second):
-        assert run(["time", TABLE_1, *PAPER, "--plot", str(path), "-q"]) == 0
-    assert first.read_bytes() == second.read_bytes()
-    assert first.read_bytes().count(b"<path") > 6
-
-
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
         (["--period", "2min"], 2, "not a time"),
         (["--jerk", "-1"], 2, "jerk is -1"),
-        (["--plot", "picture.txt"], 2, ".svg"),
         ([], 2, "no feed is programmed"),
     ],
 )

@@ -312,24 +312,12 @@ def test_a_text_off_the_path_is_broken_in_words(tmp_path):
     assert (arrays["w_off"] > 0.02).any()
 
 
-def test_picture_of_the_path(tmp_path):
-    pytest.importorskip("matplotlib")
-    source = tmp_path / "part.cls"
-    source.write_text(PATH.format(name="PART", comment="none"))
-    for suffix, start in share((("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")), 3, 1):
-        picture = tmp_path / f"part.{suffix}"
-        done = run("smooth", source, "-e", "0.02", "-o", tmp_path / f"{suffix}.nc", "--plot", picture, "-q")
-        assert done.returncode == 0, done.stderr
-        assert picture.read_bytes().startswith(start)
-    assert run("smooth", source, "-o", tmp_path / "x.nc", "--plot", tmp_path / "part.gif").returncode == 2
-
-
 def test_surface_command(tmp_path):
     pytest.importorskip("matplotlib")
     source, nc = tmp_path / "part.cls", tmp_path / "part.nc"
     source.write_text(PATH.format(name="PART", comment="none"))
     assert run("smooth", source, "-e", "0.02", "-o", nc, "-q").returncode == 0
-    names = ["map.json", "map.csv", "map.html", "map.png", "map.svg"]
+    names = ["map.json", "map.csv", "map.html", "map.png", "map.svg", "again.svg"]
     reports = [word for name in names for word in ("--report", tmp_path / name)]
     done = run("surface", source, nc, "-e", "0.02", *reports)
     assert done.returncode == 0, done.stderr
@@ -345,6 +333,8 @@ def test_surface_command(tmp_path):
     assert len(arrays["s_off"]) == told["points"] - told["points_beyond_reach"]
     assert "overcut by up to" in meta["verdict"]
     assert arrays["h_counts"].sum() == len(arrays["s_off"])
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "map.svg").read_bytes() == (tmp_path / "again.svg").read_bytes()
     # another tool; and a file that describes none
     assert b"cutter 6 mm" in run("surface", source, nc, "-e", "0.02", "--tool", "6,1").stdout
     source.write_text(PATH.format(name="PART", comment="none").replace("TLDATA", "$$ TLDATA"))

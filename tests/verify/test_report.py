@@ -21,7 +21,6 @@ from cornersmooth.report.verification import (
 )
 from cornersmooth.verify import verify
 from cornersmooth.verify.polyline import original_motion
-from oracle.share import share
 
 from .writing import encode, job
 
@@ -90,7 +89,7 @@ def test_reports_and_refusals(files, tmp_path, capsys):
     assert [float(row["tip_deviation_mm"]) for row in table] == pytest.approx([0, 0.0353553, 0], abs=1e-6)
     assert run(["verify", source, text, "--report", str(found)]) == 4
     assert run(["verify", source, text, "--report", str(tmp_path / "found.txt")]) == 2
-    assert run(["verify", source, text, "--plot", str(tmp_path / "found.gif")]) == 2
+    assert run(["verify", source, text, "--report", str(tmp_path / "found.gif")]) == 2
     assert run(["verify", source, text, "--report", source + ".csv", "--control", "nobody"]) == 2
     assert run(["verify", "-", "-"]) == 2
     (tmp_path / "bad.nc").write_text("G1 X1.0 ???\n")
@@ -133,15 +132,3 @@ def test_distribution_along_the_path():
     assert json.loads(verification_json(found))["poses"] == len(program)
     over = verify(program, encode(lines), tolerance=0.01)
     assert histogram_lines(over)[-1].lstrip().startswith("over 0.01 mm")
-
-
-@pytest.mark.parametrize("form", share(["png", "svg"], 2))
-def test_picture(form):
-    pytest.importorskip("matplotlib")
-    from cornersmooth.report.deviationplot import draw_deviation
-
-    program, lines = job("g1")
-    along = deviation_along(program, encode(lines), tolerance=0.02)
-    picture = draw_deviation(along, 0.02, form)
-    assert picture == draw_deviation(along, 0.02, form)
-    assert picture[:4] == (b"\x89PNG" if form == "png" else b"<?xm")

@@ -65,8 +65,6 @@ class Job:
         settings is left as it is.
     skip_existing : bool
         Whether an output that exists is left as it is, whatever it was made of.
-    plot : str
-        Picture of the path; empty for none.
     tool : Tool or None
         For pages, instead of that of the file.
     plan : (int, int)
@@ -94,7 +92,6 @@ class Job:
     alone: bool = False
     batch: bool = False
     skip_existing: bool = False
-    plot: str = ""
     tool: Tool | None = None
     plan: tuple[int, int] = (0, 0)
     plan_feeds: Limits | None = None
@@ -144,7 +141,7 @@ def check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | 
     dict
         For each output, whether what stands at its place may be replaced.
     """
-    outputs = [job.target, *job.reports, *([job.plot] if job.plot else [])]
+    outputs = [job.target, *job.reports]
     replace_target = job.force or replace_target
     may_replace: dict[str, bool | None] = {}
     may_replace[job.target] = check_path(job.target, [job.source], force=replace_target)
@@ -156,8 +153,6 @@ def check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | 
             what = f"cannot tell the form of the report {path}"
             raise SettingsError("CS221", what, "let it end in .json, .csv or .html")
         may_replace[path] = check_path(path, [job.source], force=job.force, ours=_OURS[suffix])
-    if job.plot:
-        may_replace[job.plot] = check_path(job.plot, [job.source], force=job.force)
     real = [os.path.realpath(path) for path in outputs if path != STANDARD]
     if len(set(real)) < len(real):
         raise SettingsError("CS222", "two outputs have the same name", "give each its own")
@@ -274,23 +269,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         outcome.saving = saving or outcome.saving
     if job.plan[1] and not outcome.saving and result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE):
         outcome.saving = _planned(job, result)
-    if job.plot:
-        picture = _picture(job, result, contents)
-        with open_output(target_of(job.plot), replace=bool(may_replace[job.plot])) as output:
-            output.stream.write(picture)
     return contents
-
-
-def _picture(job: Job, result: Result, contents: dict[str, Any]) -> bytes:
-    from cornersmooth.page.pages import read_written
-    from cornersmooth.report.pathplot import draw_path
-    from cornersmooth.report.verdict import first_line
-
-    title = f"{os.path.basename(result.program.source.name)}\n{first_line(contents)}"
-    tolerance = result.smoothed.settings.tolerance
-    form = os.path.splitext(job.plot)[1].lower().lstrip(".")
-    nc = read_written(result, result.frame)
-    return draw_path(result.program, nc, result.smoothed, title, form, tolerance=tolerance)
 
 
 def _limits(job: Job) -> Limits:

@@ -40,7 +40,7 @@ COMMAND_TABLES = ("smooth", "verify", "time", "info", "surface")
 _OWN_TABLES = {"controls": "control", "machines": "machine"}
 
 #: options that belong to one run
-_ONE_RUN = frozenset("output directory force reports plot csv summary scheduler as_json law no_verify help".split())
+_ONE_RUN = frozenset("output directory force reports csv summary scheduler as_json law no_verify help".split())
 
 
 @dataclass(frozen=True)

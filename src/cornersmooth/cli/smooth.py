@@ -49,7 +49,6 @@ _NAMED = 3
 @outputs.jobs
 @outputs.scheduler
 @outputs.reports
-@outputs.plot_path
 @surface.tool
 @nc_text.writing_options
 @smoothing.method
@@ -156,7 +155,6 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 alone=len(files) == 1,
                 batch=bool(folder),
                 skip_existing=given["skip_existing"],
-                plot=given["plot"] or "",
                 tool=given["tool"],
                 beginning=not folder and not output and _to_terminal(),
                 plan=_plan_sizes(given),
@@ -197,21 +195,17 @@ def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:
         raise click.UsageError("several inputs need -d FOLDER; -o goes with a single input")
     if len(inputs) > 1 and STANDARD in inputs:
         raise click.UsageError("standard input goes with no other input")
-    if given["scheduler"] and (not folder or given["plot"] or given["jobs"] != 1):
-        raise click.UsageError("--scheduler is for batches, which need -d FOLDER and take no --plot and no -j")
+    if given["scheduler"] and (not folder or given["jobs"] != 1):
+        raise click.UsageError("--scheduler is for batches, which need -d FOLDER and take no -j")
     if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
         raise click.UsageError("--feed must be a positive number of mm/min")
 
 
 def _check_side_outputs(files: list[Input], given: dict[str, Any]) -> None:
-    """Refuse a summary, a picture or reports that cannot be written for these files."""
+    """Refuse a summary or reports that cannot be written for these files."""
     if given["summary"]:
         check_summary(given["summary"])
         check_path(given["summary"], [found.path for found in files], force=True)
-    if given["plot"]:
-        outputs.picture_form(given["plot"])
-        if len(files) > 1:
-            raise click.UsageError("--plot is for a single input; --report out/{stem}.html goes with several")
     if len(files) > 1 and any("{stem}" not in path for path in given["reports"]):
         raise click.UsageError("with several inputs a report needs {stem} in its name, as in 'out/{stem}.json'")
 

@@ -52,7 +52,6 @@ LAWS = tuple(_TITLES)
 @outputs.as_json
 @motion.law
 @motion.motion_csv
-@outputs.plot_motion
 @outputs.page_reports
 @surface.tool
 @outputs.force
@@ -69,12 +68,11 @@ def command(source: str, **given: Any) -> int:
     Examples:
       cornersmooth time part.cls -e 0.04
       cornersmooth time part.cls -e 0.04 --feed 1800 --accel 1000 --jerk 5000 --period 2ms --json
-      cornersmooth time part.cls -e 0.04 --csv motion.csv --plot motion.svg
+      cornersmooth time part.cls -e 0.04 --csv motion.csv
       cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
       cornersmooth time part.cls -e 0.04 --report times.html
       cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
     """
-    form = outputs.picture_form(given["plot"])
     if given["law"] == "as_written" and not given["text"]:
         raise click.UsageError("--law as_written: name the text with --text")
     for path in given["reports"]:
@@ -82,7 +80,7 @@ def command(source: str, **given: Any) -> int:
             raise click.UsageError(f"--report {path}: let the name end in .html")
     inputs = [source, given["text"]] if given["text"] else [source]
     check_inputs(*inputs)
-    for path in (given["csv"], given["plot"], *given["reports"]):
+    for path in (given["csv"], *given["reports"]):
         if path:
             check_path(path, inputs, force=given["force"])
     data, name = read_input(source)
@@ -100,12 +98,6 @@ def command(source: str, **given: Any) -> int:
         with open_output(target_of(given["csv"])) as output:
             for text in timelaw_csv(compared.laws[given["law"]]):
                 output.stream.write(text.encode("utf-8"))
-    if given["plot"]:
-        from cornersmooth.report.timeplot import draw
-
-        picture = draw({_TITLES[name]: law for name, law in compared.laws.items() if name != LAWS[0]}, form)
-        with open_output(target_of(given["plot"])) as output:
-            output.stream.write(picture)
     if given["as_json"]:
         from cornersmooth.report.timelaw import comparison_json
 

@@ -60,7 +60,6 @@ _ALIKE = 1e-9
 @reading.tool_options
 @outputs.found_reports
 @surface.tool
-@outputs.plot_deviation
 @outputs.force
 @outputs.quiet
 @outputs.verbose_found
@@ -79,7 +78,6 @@ def command(source: str, text: str, **given: Any) -> int:
       cornersmooth verify part.cls part.nc -e 0.04 -H 25 --report found.json --report poses.csv
       cornersmooth verify part.cls part.mpf -e 0.04 --control siemens
       cornersmooth verify part.cls part.ngc -e 0.04 --control linuxcnc --machine xyzac-trt
-      cornersmooth verify part.cls part.nc -e 0.04 -v --plot deviation.png
       cornersmooth verify part.cls part.nc -e 0.04 --report found.html
     """
     from cornersmooth.cl import read
@@ -94,7 +92,7 @@ def command(source: str, text: str, **given: Any) -> int:
         raise click.UsageError("only one of the inputs can be standard input")
     return_large_arrays()
     check_inputs(source, text)
-    form = _check_outputs(source, text, given)
+    _check_outputs(source, text, given)
     data, name = read_input(source)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)
@@ -105,7 +103,7 @@ def command(source: str, text: str, **given: Any) -> int:
     how = {**measures, **reader}
     program = read(data, name=name, **reading.reading_of(given))
     pages = [path for path in given["reports"] if path.lower().endswith(".html")]
-    if given["plot"] or given["verbose"] or pages:  # it is looked at more than once
+    if given["verbose"] or pages:  # it is looked at more than once
         nc = readable_twice(nc)
     trusted = [line for path in given["trusted"] for line in read_lines(path)]
     if head.remark:  # first: what follows may be hard to understand without it
@@ -131,12 +129,6 @@ def command(source: str, text: str, **given: Any) -> int:
         page = verified_page(program, text_read, found, source=data, machine=how["machine"], tool=given["tool"])
         for path in pages:
             _write(path, [page])
-    if given["plot"]:
-        from cornersmooth.report.deviationplot import draw_deviation
-
-        picture = draw_deviation(deviation_along(program, nc, **how), given["tolerance"], form)
-        with open_output(target_of(given["plot"])) as output:
-            output.stream.write(picture)
     for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
         click.echo(line, err=True)
     findings = (*program.findings, *trusted_blocks(found))
@@ -271,16 +263,12 @@ def _recognise(given: dict[str, Any], head: bytes, context: click.Context) -> st
     return f"{advice} is taken"
 
 
-def _check_outputs(source: str, text: str, given: dict[str, Any]) -> str:
-    """Refuse wrong names before anything is read; return the form of the picture."""
+def _check_outputs(source: str, text: str, given: dict[str, Any]) -> None:
+    """Refuse wrong names before anything is read."""
     for path in given["reports"]:
         if os.path.splitext(path)[1].lower() not in (".json", ".csv", ".html"):
             raise click.UsageError(f"--report {path}: let the name end in .json, .csv or .html")
-    form = outputs.picture_form(given["plot"])
-    for path in (*given["reports"], given["plot"]):
-        if path:
-            check_path(path, [source, text], force=given["force"])
-    return form
+        check_path(path, [source, text], force=given["force"])
 
 
 def _write_reports(program: Program, found: Verification, paths: list[str]) -> None:

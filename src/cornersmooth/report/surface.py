@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from io import BytesIO
 from typing import Any
 
 import numpy as np
 
-from cornersmooth.report.picture import new_figure, saved
+from cornersmooth.errors import SettingsError
+from cornersmooth.extras import install_hint
 from cornersmooth.report.thinning import thinned
 from cornersmooth.surface import SurfaceMap
 
@@ -85,16 +87,22 @@ def _histogram(surface: SurfaceMap) -> Iterator[str]:
 
 
 def draw_surface(surface: SurfaceMap, form: str) -> bytes:
-    """Picture: map of the surface above, histogram below, overcut in orange and undercut in blue.
+    """Picture as ``png``, ``svg`` or ``pdf``: map of the surface above, histogram below; same input, same bytes.
+
+    Overcut is orange, undercut blue. Needs matplotlib, which only the extra ``cornersmooth[plot]`` installs.
 
     Raises
     ------
     SettingsError
         CS262: matplotlib is not installed.
     """
-    figure = new_figure(8.0, 9.0)
-    from matplotlib.colors import LinearSegmentedColormap
-
+    try:
+        import matplotlib as mpl
+        from matplotlib.colors import LinearSegmentedColormap
+        from matplotlib.figure import Figure
+    except ImportError as missing:
+        raise SettingsError("CS262", "pictures need matplotlib", install_hint("plot")) from missing
+    figure: Any = Figure(figsize=(8.0, 9.0), layout="constrained")
     known = np.flatnonzero(surface.known)
     off, point = surface.off[known], surface.points.point[known]
     span = float(np.abs(off).max(initial=0.0)) or surface.tolerance
@@ -117,4 +125,8 @@ def draw_surface(surface: SurfaceMap, form: str) -> bytes:
     graph.set_ylabel("points")
     graph.set_yscale("log")
     graph.grid(visible=True, linewidth=0.3)
-    return saved(figure, form)
+    stream = BytesIO()
+    metadata: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
+    with mpl.rc_context({"svg.hashsalt": "cornersmooth"}):  # no date, and names of parts that stay
+        figure.savefig(stream, format=form, dpi=120, metadata=metadata)
+    return stream.getvalue()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import click
 
 from cornersmooth.cli.options.parameters import PATH, Jobs
@@ -69,27 +67,6 @@ surface_reports = click.option(
     multiple=True,
     help="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be repeated.",
 )
-plot_path = click.option("--plot", type=PATH, help="Draw the path, its corners and its deviation: .png, .svg or .pdf.")
-plot_deviation = click.option(
-    "--plot",
-    type=PATH,
-    help="Draw the deviation along the path: .png, .svg or .pdf.",
-)
-plot_motion = click.option(
-    "--plot",
-    type=PATH,
-    help="Draw speed and acceleration over time: .png, .svg or .pdf.",
-)
-
-
-def picture_form(path: str | None) -> str:
-    """Form of the picture that a name asks for: png, svg or pdf."""
-    suffix = os.path.splitext(path or "picture.png")[1].lower().lstrip(".")
-    if suffix not in ("png", "svg", "pdf"):
-        raise click.UsageError(f"--plot {path}: let the name end in .png, .svg or .pdf")
-    return suffix
-
-
 as_json = click.option("--json", "as_json", is_flag=True, help="One JSON object instead of text to read.")
 table = click.option(
     "--table", is_flag=True, help="Print the table of the name: what a TOML file of your own starts from."
