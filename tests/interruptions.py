@@ -141,7 +141,7 @@ class Bench:
         if found.code in (130, 143) and not (lines and lines[-1].startswith("interrupted")):
             found.wrong.append("it does not say that it was interrupted")
         # a batch has a line for each file that was done before, and warnings of those files
-        of_files = [line for line in lines[:-1] if one.batch and (line.startswith("PASSED") or ": warning: " in line)]
+        of_files = [line for line in lines[:-1] if one.batch and (line.startswith("PASSED") or "warning: " in line)]
         if found.code in (130, 143) and len(lines) != len(of_files) + 1:
             found.wrong.append("not one line")
         if "Traceback" in found.said or "Error" in found.said or "Exception" in found.said:

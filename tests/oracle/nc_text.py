@@ -7,6 +7,7 @@ is followed as far as the rules need it. Rules of G06.2: FANUC 15i programming m
 from __future__ import annotations
 
 import math
+import math
 import re
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -221,8 +222,12 @@ class _Grammar:
             state.over = match.groups()
             state.blocks.append(Code(number, line))
         elif match := self.line.fullmatch(line):
-            if state.raised and self.form == "g1" and state.over != (*match.groups()[1:3], *match.groups()[4:7]):
-                raise BadTextError(f"{number}: from the retract the tool must come from above: {state.over}")
+            if state.raised and self.form == "g1":
+                aside, axis = match.groups()[1:3], match.groups()[4:7]
+                upright = float(axis[2]) > (1.0 - 1e-6) * math.hypot(*map(float, axis))
+                # a tilted tool comes in one block: the plane of X and Y is tilted, too
+                if state.over != ((*aside, *axis) if upright else None):
+                    raise BadTextError(f"{number}: from the retract the tool comes in another order: {state.over}")
             state.raised, state.over = False, None
             self.straight(match, number, state)
         elif match := self.arc.fullmatch(line):
