@@ -447,7 +447,12 @@ def test_what_may_not_be_read_is_bad_input(
     closed = several[0].parent / "closed"
     closed.mkdir()
     lock(monkeypatch, several[0], closed)
-    for args in (["smooth", several[0]], ["info", several[0]], ["verify", several[0], several[1]], ["info", closed / "x"]):
+    for args in (
+        ["smooth", several[0]],
+        ["info", several[0]],
+        ["verify", several[0], several[1]],
+        ["info", closed / "x"],
+    ):
         result = run(*args)
         assert result.returncode == BAD_INPUT
         assert message(result.stderr) == f"{args[1]}: error: cannot read it: permission denied; check the path"

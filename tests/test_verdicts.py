@@ -192,8 +192,9 @@ def test_a_hole_that_is_left_out_makes_the_program_incomplete(tmp_path, capsys):
     assert line.startswith("INCOMPLETE")
     contents = json.loads(story.read_text())
     assert (contents["verdict"], contents["left_out"]) == ("INCOMPLETE", 2)
-    code, line = first_lines(capsys, "verify", source, out, "--skip-cycles")
-    assert (code, line.split(":")[0]) == (1, "INCOMPLETE")
+    for strict in ((), ("--strict",)):
+        code, line = first_lines(capsys, "verify", source, out, "--skip-cycles", *strict)
+        assert (code, line.split(":")[0]) == (len(strict), "INCOMPLETE")
     assert first_lines(capsys, "verify", source, out)[0] == 1  # FAILED: nobody asked for it
     code, line = first_lines(capsys, "smooth", source, *options, "--force", "-q")
     assert line.startswith(f"{source}: INCOMPLETE")

@@ -7,7 +7,6 @@ is followed as far as the rules need it. Rules of G06.2: FANUC 15i programming m
 from __future__ import annotations
 
 import math
-import math
 import re
 from dataclasses import dataclass, field, replace
 from itertools import pairwise

@@ -42,7 +42,7 @@ _ALIKE = 1e-9
     "verify",
     cls=ShopCommand,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 PASSED; 1 FAILED, NOT VERIFIED or INCOMPLETE; "
+    epilog="Exit codes: 0 PASSED or INCOMPLETE; 1 FAILED or NOT VERIFIED, and INCOMPLETE under --strict; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
 )
 @click.argument("source", type=PATH, metavar="IN")
@@ -56,6 +56,7 @@ _ALIKE = 1e-9
 @nc_text.trusted
 @nc_text.slower
 @nc_text.skip_cycles
+@nc_text.strict_verdict
 @reading.reading_options
 @reading.tool_options
 @outputs.found_reports
@@ -143,7 +144,8 @@ def command(source: str, text: str, **given: Any) -> int:
         if given["verbose"]:
             for line in _along(found, deviation_along(program, nc, **how)):
                 click.echo(line)
-    return 0 if found.verdict == Verdict.PASSED else 1
+    taken = (Verdict.PASSED,) if given["strict"] else (Verdict.PASSED, Verdict.INCOMPLETE)
+    return 0 if found.verdict in taken else 1
 
 
 @dataclass(frozen=True)

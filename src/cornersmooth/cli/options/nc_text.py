@@ -146,6 +146,7 @@ no_verify = click.option(
 strict = click.option(
     "--strict", is_flag=True, help="Take no verdict but PASSED: else the program goes to OUT.failed, and 1 is returned."
 )
+strict_verdict = click.option("--strict", is_flag=True, help="Take no verdict but PASSED: else 1 is returned.")
 
 
 def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:
