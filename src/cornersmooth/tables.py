@@ -9,17 +9,24 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import MISSING, dataclass, fields
+from functools import lru_cache, partial
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from cornersmooth.errors import SettingsError
 
 Table = dict[str, Any]
+Record = TypeVar("Record")
+
+#: makes a field of the value of a key; its second argument says where the value stands
+Check = Callable[[Any, str], Any]
+
+_MOST = 1_000_000
+_COUNTS = ("no", "one", "two", "three")
 
 
 class TableText(NamedTuple):
@@ -158,9 +165,102 @@ class Shelf:
                 advice = f"did you mean {close}?" if close else f"known keys are {', '.join(known)}"
                 raise SettingsError(self.unknown_key, f"unknown key {where}{key}", advice)
 
+    def record(
+        self, kind: type[Record], table: Any, where: str, given: Mapping[str, Any] | None = None, **checks: Check
+    ) -> Record:
+        """Dataclass whose fields are the keys of a table.
+
+        Parameters
+        ----------
+        kind : type
+            A dataclass; fields without a default must be in the table.
+        table : dict
+        where : str
+            Name of the table, for messages.
+        given : mapping, optional
+            Fields that are no keys, and their values.
+        **checks
+            How some values are read; the others are by the type of their field.
+
+        Raises
+        ------
+        SettingsError
+            `table` is no table, has an unknown key (with the closest known one), or lacks one, or a value is wrong.
+        """
+        given, dot = given or {}, f"{where}." if where else ""
+        keys = {item.name: item for item in fields(kind) if item.name not in given}  # type: ignore[arg-type]
+        self.check_keys(self.table(table, where), tuple(keys), dot)
+        for key, item in keys.items():
+            if key not in table and item.default is MISSING and item.default_factory is MISSING:
+                raise self.wrong(f"{dot}{key} is missing", f"add {key} = ...")
+        types = _types(kind)  # type: ignore[arg-type]
+        values = {key: (checks.get(key) or self._by_type(types[key]))(value, dot + key) for key, value in table.items()}
+        return kind(**given, **values)
+
+    def _by_type(self, hint: Any) -> Check:
+        """How a value of a field of this type is read."""
+        parts = [part for part in get_args(hint) if part not in (type(None), ...)]
+        if get_origin(hint) is tuple:
+            count = None if ... in get_args(hint) else len(parts)
+            return partial(self.texts, count=count) if parts[0] is str else partial(self.numbers, count=count)
+        plain: dict[Any, Check] = {bool: self.flag, int: self.whole, float: self.number}
+        if hint in plain:
+            return plain[hint]
+        return self._by_type(parts[0]) if type(None) in get_args(hint) else self.text
+
+    def table(self, value: Any, where: str) -> Table:
+        """Refuse what is no table."""
+        if not isinstance(value, dict):
+            raise self.wrong(f"{where} is {value!r}", f"write a table [{where}]")
+        return value
+
+    def flag(self, value: object, where: str) -> bool:
+        """Refuse what is not true or false."""
+        if not isinstance(value, bool):
+            raise self.wrong(f"{where} is {value!r}", "give true or false")
+        return value
+
+    def whole(self, value: object, where: str, least: int = 0, most: int = _MOST) -> int:
+        """Refuse what is no whole number within bounds."""
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            span = f"from {least} to {most}" if least else f"up to {most}"
+            raise self.wrong(f"{where} is {value!r}", f"give a whole number {span}")
+        return value
+
+    def number(self, value: object, where: str) -> float:
+        """Refuse what is no number."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.wrong(f"{where} is {value!r}", "give a number")
+        return float(value)
+
+    def numbers(self, value: object, where: str, count: int | None = None, hint: str = "") -> tuple[float, ...]:
+        """Refuse what is no list of so many numbers."""
+        if not isinstance(value, list) or count not in (None, len(value)):
+            raise self.wrong(f"{where} is {value!r}", hint or f"give {_COUNTS[count or 0]} numbers in brackets")
+        return tuple(self.number(each, where) for each in value)
+
+    def text(self, value: object, where: str) -> str:
+        """Refuse what is no text."""
+        if not isinstance(value, str):
+            raise self.wrong(f"{where} is {value!r}", "write it as text in quotes")
+        return value
+
+    def texts(self, value: object, where: str, count: int | None = None, hint: str = "") -> tuple[str, ...]:
+        """Refuse what is no list of so many texts."""
+        if not isinstance(value, list) or count not in (None, len(value)) or not all(isinstance(x, str) for x in value):
+            many = "a list of texts" if count is None else f"{_COUNTS[count]} texts in brackets"
+            raise self.wrong(f"{where} is {value!r}", hint or f'give {many}, as in ["M8"]')
+        return tuple(self.text(each, where) for each in value)
+
     def wrong(self, what: str, hint: str) -> SettingsError:
         """Error that says that a value is of a wrong kind."""
         return SettingsError(self.wrong_value, what, hint)
+
+
+@lru_cache(maxsize=64)
+def _types(kind: type) -> dict[str, Any]:
+    """Types of the fields of a dataclass."""
+    return get_type_hints(kind)
 
 
 @lru_cache(maxsize=64)

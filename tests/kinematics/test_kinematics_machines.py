@@ -78,7 +78,7 @@ def test_file_without_name_takes_that_of_the_file(tmp_path: Path):
         ("direction = [0, 0, 2]", "dirction = [0, 0, 2]", "unknown key axis 1.dirction; did you mean direction?"),
         ("part_zero", "zzz", "unknown key zzz; known keys are name, description, preferred"),
         ("[0, 0, 2]", "[0, 0, 0]", "rotary axis C: direction is zero; give a vector along the axis"),
-        ("[0, 0, 2]", "[0, 0]", "axis 1: direction is [0, 0]; give three numbers in brackets"),
+        ("[0, 0, 2]", "[0, 0]", "axis 1.direction is [0, 0]; give three numbers in brackets"),
         ("[0, 0, 2]", "[0, 0, nan]", "rotary axis C: direction is not a point of space"),
         ("[0, 0, 2]", "[0, 1, 0]", "machine mine: C and B are parallel; give two different directions"),
         ("[0, 1, 0]", "[0, 0, 1]", "machine mine: C and B are parallel"),
@@ -88,12 +88,12 @@ def test_file_without_name_takes_that_of_the_file(tmp_path: Path):
         ('"B-"', '"A-"', "machine mine: preferred names 'A'; use C+, C-, B+ or B-"),
         ('"B-"', '"negative"', "preferred is 'negative'; write an axis and its sign"),
         ("[-360, 360]", "[360, -360]", "rotary axis C: limits are 360 and -360; give the lower one first"),
-        ("[-360, 360]", "360", "axis 1: limits is 360; write limits = [lowest, highest] in degrees"),
+        ("[-360, 360]", "360", "axis 1.limits is 360; write limits = [lowest, highest] in degrees"),
         ("120", '"long"', "tool_length is 'long'; give a number"),
         ("120", "-1", "machine mine: tool_length is -1; give 0 mm or more"),
         ('positive = "table"', 'positive = "left"', "rotary axis C: positive is 'left'; use tool or table"),
         ('carrier = "head"', 'carrier = "head"\npositive = "table"', "rotary axis B: positive is 'table'; use tool"),
-        ('carrier = "head"\n', "", "axis 2: carrier is missing; add carrier = ..."),
+        ('carrier = "head"\n', "", "axis 2.carrier is missing; add carrier = ..."),
         ("[1, 2, 3]", "[1, 2, 3", "m.toml: error: not TOML: "),
         (
             'carrier = "table"\ndirection = [0, 0, 2]\npoint = [10, 0, 0]\npositive = "table"',
@@ -170,9 +170,9 @@ def test_dynamics_are_read_and_told():
         ("[dynamics.B]", "[dynamics.A]", "unknown key dynamics.A; known keys are X, Y, Z, C, B"),
         ("jerk = 900", "jerk = 0", "dynamics of B: jerk is 0; give a positive number"),
         ("jerk = 900", "jerk = nan", "dynamics of B: jerk is nan; give a positive number"),
-        ("jerk = 900", 'jerk = "soft"', "dynamics of B: jerk is 'soft'; give a number"),
+        ("jerk = 900", 'jerk = "soft"', "dynamics.B.jerk is 'soft'; give a number"),
         ("velocity", "velocty", "unknown key dynamics.X.velocty; did you mean velocity?"),
-        ("[dynamics.B]\njerk", "[dynamics]\njerk", "dynamics is not a table per axis; write [dynamics.X]"),
+        ("[dynamics.B]\njerk", "[dynamics]\njerk", "unknown key dynamics.jerk; known keys are X, Y, Z, C, B"),
     ],
 )
 def test_what_is_wrong_in_dynamics_is_said(old: str, new: str, message: str):
@@ -228,11 +228,11 @@ def test_every_key_of_a_table_has_a_comment(name: str):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("travel = 3", r"travel is not a table; write \[travel\]"),
-        ("[travel]\nX = 3", r"travel of X is 3; write X = \[lowest, highest\] in mm"),
+        ("travel = 3", r"travel is 3; write a table \[travel\]"),
+        ("[travel]\nX = 3", r"travel.X is 3; write X = \[lowest, highest\] in mm"),
         ("[travel]\nX = [1, 1]", "travel of X is 1 and 1; give the lower one first, in mm"),
         ("[travel]\nC = [1, 2]", "unknown key travel.C; known keys are X, Y, Z"),
-        ('[travel]\nY = ["low", 2]', "travel of Y is 'low'; give a number"),
+        ('[travel]\nY = ["low", 2]', "travel.Y is 'low'; give a number"),
         ("[travel]\nY = [-inf, 2]", "travel of Y is -inf and 2"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +35,6 @@ _SHELF = Shelf(
     unknown_key="CS252",
     wrong_value="CS253",
 )
-_AXIS_KEYS = ("name", "direction", "carrier", "point", "positive", "limits", "modulo", "clamp")
-_DYNAMICS_KEYS = ("velocity", "acceleration", "jerk")
 
 
 def machine_names() -> tuple[str, ...]:
@@ -101,139 +100,68 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
             raise _SHELF.wrong(f"{len(entries)} rotary axes are described", "write [[axis]] twice at most")
         if "axis" not in table:
             raise _SHELF.wrong("no rotary axis is described", "write [[axis]], or axis = [] for a machine without")
-        axes = tuple(_axis(entry, number) for number, entry in enumerate(entries, start=1))
-        return Machine(
-            name=_text(table, "name", name),
-            axes=axes,
-            description=_text(table, "description", ""),
-            preferred=_preferred(table),
-            tool_direction=_vector(table, "tool_direction", (0.0, 0.0, 1.0)),
-            tool_length=_number(table.get("tool_length", 0.0), "tool_length"),
-            part_zero=_vector(table, "part_zero", (0.0, 0.0, 0.0)),
-            dynamics=_dynamics(table, (*LINEAR, *(axis.name for axis in axes))),
-            travel=_travel(table),
-            tool_lengths=_tool_lengths(table),
-            home=_position(table, "home", (*LINEAR, *sorted(axis.name for axis in axes))),
-            tool_change=_position(table, "tool_change", (*LINEAR, *sorted(axis.name for axis in axes))),
-            tip_control=_tip_control(table),
+        axes = tuple(_axis(entry, f"axis {number}") for number, entry in enumerate(entries, start=1))
+        position = partial(_position, names=(*LINEAR, *sorted(axis.name for axis in axes)))
+        return _SHELF.record(
+            Machine,
+            {"name": name} | {key: value for key, value in table.items() if key != "axis"},
+            "",
+            given={"axes": axes},
+            preferred=_preferred,
+            dynamics=partial(_dynamics, names=(*LINEAR, *(axis.name for axis in axes))),
+            travel=_travel,
+            tool_lengths=_tool_lengths,
+            home=position,
+            tool_change=position,
+            tip_control=partial(_SHELF.texts, hint='give two blocks, as in ["M428", "M429"], or [] for none'),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
 
 
-def _axis(entry: dict[str, Any], number: int) -> RotaryAxis:
-    where = f"axis {number}: "
-    _SHELF.check_keys(entry, _AXIS_KEYS, f"axis {number}.")
-    for key in ("name", "direction", "carrier"):
-        if key not in entry:
-            raise _SHELF.wrong(f"{where}{key} is missing", f"add {key} = ...")
-    limits = entry.get("limits")
-    if limits is not None:
-        if not isinstance(limits, list) or len(limits) != 2:
-            raise _SHELF.wrong(f"{where}limits is {limits!r}", "write limits = [lowest, highest] in degrees")
-        limits = (_number(limits[0], f"{where}limits"), _number(limits[1], f"{where}limits"))
-    modulo = entry.get("modulo", False)
-    if not isinstance(modulo, bool):
-        raise _SHELF.wrong(f"{where}modulo is {modulo!r}", "write true or false")
-    clamp = entry.get("clamp")
-    if clamp is not None and (not isinstance(clamp, list) or [type(word) for word in clamp] != [str, str]):
-        raise _SHELF.wrong(f"{where}clamp is {clamp!r}", 'give two M words, as in ["M10", "M11"]')
-    if entry["carrier"] == "none":  # which stands for axes that are not there
-        raise _SHELF.wrong(f"{where}carrier is 'none'", "use table or head")
-    return RotaryAxis(
-        name=_text(entry, "name", ""),
-        direction=_vector(entry, "direction", (0.0, 0.0, 0.0), where),
-        carrier=entry["carrier"],
-        point=_vector(entry, "point", (0.0, 0.0, 0.0), where),
-        positive=entry.get("positive", "tool"),
-        limits=limits,
-        modulo=modulo,
-        clamp=None if clamp is None else (clamp[0], clamp[1]),
+def _axis(entry: Table, where: str) -> RotaryAxis:
+    if entry.get("carrier") == "none":  # which stands for axes that are not there
+        raise _SHELF.wrong(f"{where}.carrier is 'none'", "use table or head")
+    return _SHELF.record(
+        RotaryAxis,
+        entry,
+        where,
+        limits=partial(_SHELF.numbers, count=2, hint="write limits = [lowest, highest] in degrees"),
+        clamp=partial(_SHELF.texts, count=2, hint='give two M words, as in ["M10", "M11"]'),
     )
 
 
-def _tool_lengths(table: dict[str, Any]) -> tuple[tuple[int, float], ...]:
-    given = table.get("tool_lengths", {})
+def _tool_lengths(given: Any, where: str) -> tuple[tuple[int, float], ...]:
     if not isinstance(given, dict) or not all(name.isdecimal() for name in given):
-        raise _SHELF.wrong("tool_lengths is not a table by number of tool", "write [tool_lengths] and 3 = 120.5 below")
-    return tuple((int(name), _number(value, f"tool_lengths.{name}")) for name, value in given.items())
+        raise _SHELF.wrong(f"{where} is not a table by number of tool", f"write [{where}] and 3 = 120.5 below")
+    return tuple((int(name), _SHELF.number(value, f"{where}.{name}")) for name, value in given.items())
 
 
-def _tip_control(table: dict[str, Any]) -> tuple[str, ...] | None:
-    """Blocks that switch tip control on and off; None where the table says nothing of them."""
-    given = table.get("tip_control")
-    if given is None:
-        return None
-    if not isinstance(given, list) or not all(isinstance(block, str) for block in given):
-        hint = 'give two blocks, as in ["M428", "M429"], or [] for none'
-        raise _SHELF.wrong(f"tip_control is {given!r}", hint)
-    return tuple(given)
-
-
-def _position(table: dict[str, Any], key: str, names: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
+def _position(given: Any, where: str, names: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
     """Position of any axes, in the order of their names."""
-    given = table.get(key, {})
-    if not isinstance(given, dict):
-        raise _SHELF.wrong(f"{key} is not a table", f"write [{key}] and X = ... below, for the axes that go there")
-    _SHELF.check_keys(given, names, f"{key}.")
-    return tuple((name, _number(given[name], f"{key}.{name}")) for name in names if name in given)
+    _SHELF.check_keys(_SHELF.table(given, where), names, f"{where}.")
+    return tuple((name, _SHELF.number(given[name], f"{where}.{name}")) for name in names if name in given)
 
 
-def _travel(table: dict[str, Any]) -> tuple[Travel, ...]:
-    given = table.get("travel", {})
-    if not isinstance(given, dict):
-        raise _SHELF.wrong("travel is not a table", "write [travel] and X = [lowest, highest] below")
-    _SHELF.check_keys(given, LINEAR, "travel.")
-    found = []
-    for name in (name for name in LINEAR if name in given):
-        ends = given[name]
-        if not isinstance(ends, list) or len(ends) != 2:
-            raise _SHELF.wrong(f"travel of {name} is {ends!r}", f"write {name} = [lowest, highest] in mm")
-        found.append(Travel(name, *(_number(end, f"travel of {name}") for end in ends)))
-    return tuple(found)
+def _travel(given: Any, where: str) -> tuple[Travel, ...]:
+    _SHELF.check_keys(_SHELF.table(given, where), LINEAR, f"{where}.")
+    hint = "write {} = [lowest, highest] in mm"
+    return tuple(
+        Travel(name, *_SHELF.numbers(given[name], f"{where}.{name}", count=2, hint=hint.format(name)))
+        for name in LINEAR
+        if name in given
+    )
 
 
-def _dynamics(table: dict[str, Any], names: tuple[str, ...]) -> tuple[Dynamics, ...]:
+def _dynamics(given: Any, where: str, names: tuple[str, ...]) -> tuple[Dynamics, ...]:
     """Limits of the axes in the order of their names."""
-    given = table.get("dynamics", {})
-    if not isinstance(given, dict) or not all(isinstance(entry, dict) for entry in given.values()):
-        raise _SHELF.wrong("dynamics is not a table per axis", "write [dynamics.X] and its numbers below")
-    _SHELF.check_keys(given, names, "dynamics.")
-    found = []
-    for name in (name for name in names if name in given):
-        where = f"dynamics of {name}: "
-        _SHELF.check_keys(given[name], _DYNAMICS_KEYS, f"dynamics.{name}.")
-        found.append(Dynamics(name, **{key: _number(given[name][key], where + key) for key in given[name]}))
-    return tuple(found)
+    _SHELF.check_keys(_SHELF.table(given, where), names, f"{where}.")
+    return tuple(
+        _SHELF.record(Dynamics, given[name], f"{where}.{name}", given={"name": name}) for name in names if name in given
+    )
 
 
-def _text(table: dict[str, Any], key: str, default: str) -> str:
-    value = table.get(key, default)
-    if not isinstance(value, str):
-        raise _SHELF.wrong(f"{key} is {value!r}", "write it as text in quotes")
-    return value
-
-
-def _number(value: object, key: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _SHELF.wrong(f"{key} is {value!r}", "give a number")
-    return float(value)
-
-
-def _vector(
-    table: dict[str, Any], key: str, default: tuple[float, float, float], where: str = ""
-) -> tuple[float, float, float]:
-    value = table.get(key, default)
-    if not isinstance(value, list | tuple) or len(value) != 3:
-        raise _SHELF.wrong(f"{where}{key} is {value!r}", "give three numbers in brackets")
-    x, y, z = (_number(number, where + key) for number in value)
-    return x, y, z
-
-
-def _preferred(table: dict[str, Any]) -> tuple[str, float] | None:
-    value = table.get("preferred")
-    if value is None:
-        return None
+def _preferred(value: Any, where: str) -> tuple[str, float]:
     if not isinstance(value, str) or len(value) != 2 or value[1] not in "+-":
-        raise _SHELF.wrong(f"preferred is {value!r}", 'write an axis and its sign, as in preferred = "A+"')
+        raise _SHELF.wrong(f"{where} is {value!r}", 'write an axis and its sign, as in preferred = "A+"')
     return value[0], 1.0 if value[1] == "+" else -1.0

@@ -8,9 +8,7 @@ from typing import Literal
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Units
-from cornersmooth.nc.program_table import ProgramTable
-
-Blocks = tuple[str, ...]
+from cornersmooth.nc.program_table import Blocks, ProgramTable
 
 #: what stands beside the tip in a motion block: the tool vector, a second point on the tool axis, the words of two
 #: rotary axes with the tip (tool tip control) or with the linear axes of the machine, or nothing
@@ -206,12 +204,12 @@ class Mode:
         Of a tilted plane: blocks at the start of the program that end one which another program has left.
     """
 
-    words: tuple[str, ...]
-    on: Blocks
-    off: Blocks
-    motion: Motion
-    circles: bool
-    timed_turns: bool
+    words: tuple[str, ...] = ()
+    on: Blocks = ()
+    off: Blocks = ()
+    motion: Motion = Motion()
+    circles: bool = False
+    timed_turns: bool = False
     within_on: Blocks = ()
     within_off: Blocks = ()
     begin: Blocks | None = None
@@ -272,9 +270,9 @@ class FormTable:
     """
 
     name: str
-    description: str
     curve: CurveStyle
     modes: Mapping[Orientation, Mode]
+    description: str = ""
     upright: Mode | None = None
     plane: Mode | None = None
 
@@ -386,13 +384,13 @@ class Control:
     """
 
     name: str
-    description: str
-    like: str
-    digits: Digits
-    program: ProgramTable
-    layout: TextStyle
-    words: Words
     forms: Mapping[str, FormTable]
+    description: str = ""
+    like: str = ""
+    digits: Digits = Digits()
+    program: ProgramTable = field(default_factory=ProgramTable)
+    layout: TextStyle = TextStyle()
+    words: Words = Words()
     extras: Mapping[str, Extra] = field(default_factory=dict)
     lines: LineStyle = LineStyle()
     cycles: Cycles = Cycles()

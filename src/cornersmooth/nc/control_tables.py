@@ -7,10 +7,11 @@ keys are those of the tables in the folder ``controls``.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import fields, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, get_args
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import FeedMode
@@ -34,68 +35,14 @@ from cornersmooth.nc.program_table import STEPS, ProgramTable
 from cornersmooth.settings import Lines
 from cornersmooth.tables import Shelf, Table, is_file
 
-Record = TypeVar("Record", Digits, ProgramTable, TextStyle, Words, Motion, Extra, LineStyle, Cycles)
-
-_SHELF = Shelf(
-    "control",
-    __package__,
-    "controls",
-    keys=(
-        "name",
-        "description",
-        "digits",
-        "program",
-        "layout",
-        "words",
-        "motion",
-        "forms",
-        "extras",
-        "lines",
-        "cycles",
-    ),
-    unknown="CS210",
-    unreadable="CS212",
-    unknown_key="CS214",
-    wrong_value="CS213",
-)
-
 _FORM_KEYS = ("description", "curve", "upright", "plane", *get_args(Orientation))
-_MODE_KEYS = (
-    "words",
-    "on",
-    "off",
-    "within_on",
-    "within_off",
-    "begin",
-    "tool_end",
-    "rotations",
-    "reset",
-    "circles",
-    "timed_turns",
-    *(item.name for item in fields(Motion)),
-)
+_MOTION_KEYS = frozenset(item.name for item in fields(Motion))
 _PLANES = {"xy": 17, "zx": 18, "yz": 19}
 _FEED_MODES = {
     "per_minute": int(FeedMode.PER_MINUTE),
     "per_revolution": int(FeedMode.PER_REVOLUTION),
     "inverse_time": INVERSE_TIME,
 }
-#: keys whose values are tables
-_TABLES = (
-    "digits",
-    "digits.systems",
-    "lines",
-    "cycles",
-    "program",
-    "layout",
-    "layout.units",
-    "words",
-    "words.coolant",
-    "words.coolant_off",
-    "words.plane",
-    "words.feed_mode",
-    "motion",
-)
 _MOST_DIGITS = 9
 _MOST_LAG = 100.0
 #: what stands in braces in blocks of the program, names of steps among it
@@ -126,6 +73,48 @@ _CYCLE_BRACES: Table = dict.fromkeys(
 ) | {"milliseconds": 1, "speed": ""}
 #: the same in blocks of extras
 _EXTRA_BRACES: Table = {"blend": "0.001", "turn": "0.01"}
+
+
+class _Controls(Shelf):
+    """Tables of controls: their texts are ASCII, and hold the braces that their place has."""
+
+    def text(self, value: object, where: str) -> str:
+        """Refuse what is no text for an NC program."""
+        if not isinstance(value, str) or not value.isascii() or not (value.isprintable()):
+            raise self.wrong(f"{where} is {value!r}", "give ASCII text without line ends")
+        own = {"extras": _EXTRA_BRACES, "cycles": _CYCLE_BRACES}.get(where.partition(".")[0])
+        places = _BRACES.get(where.rpartition(".")[2], {}) if own is None else own
+        if not where.endswith("_pattern") and ("{" in value or "}" in value):
+            try:
+                value.format(**places)
+            except (KeyError, IndexError, ValueError) as error:
+                known = ", ".join(f"{{{place}}}" for place in places) or "no braces"
+                raise self.wrong(f"{where}: {value!r} has unknown braces", f"use {known}") from error
+        return value
+
+
+_SHELF = _Controls(
+    "control",
+    __package__,
+    "controls",
+    keys=(
+        "name",
+        "description",
+        "digits",
+        "program",
+        "layout",
+        "words",
+        "motion",
+        "forms",
+        "extras",
+        "lines",
+        "cycles",
+    ),
+    unknown="CS210",
+    unreadable="CS212",
+    unknown_key="CS214",
+    wrong_value="CS213",
+)
 
 
 def control_names() -> tuple[str, ...]:
@@ -182,21 +171,23 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
     """
     try:
         table, like = _SHELF.parse(text)
-        _check_tables(table)
-        return Control(
-            name=_text(table, "name", name),
-            description=_text(table, "description", ""),
-            like=like,
-            digits=_digits(table),
-            program=_program(table.get("program", {})),
-            layout=_layout(table.get("layout", {})),
-            words=_words(table.get("words", {})),
-            forms=_forms(table),
-            extras=_extras(table.get("extras", {})),
-            lines=_lines(table.get("lines", {})),
-            cycles=_record(Cycles, table.get("cycles", {}), "cycles"),
-            systems=_systems(table),
-            own=True,
+        digits = _SHELF.table(table.get("digits", {}), "digits")
+        motion = table.get("motion", {})
+        _SHELF.record(Motion, motion, "motion")
+        rest = {key: value for key, value in table.items() if key != "motion"}
+        return _SHELF.record(
+            Control,
+            {"name": name, "forms": {}, "digits": {}} | rest,
+            "",
+            given={"like": like, "systems": _systems(digits), "own": True},
+            digits=lambda _, where: _digits({key: value for key, value in digits.items() if key != "systems"}, where),
+            program=_program,
+            layout=_layout,
+            words=_words,
+            forms=lambda forms, where: _forms(forms, where, motion),
+            extras=_extras,
+            lines=_lines,
+            cycles=partial(_SHELF.record, Cycles),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
@@ -213,44 +204,24 @@ def control_table(name: str) -> str:
     return _SHELF.built_in(name)
 
 
-def _check_tables(table: Table) -> None:
-    """Refuse what is no table where one is wanted."""
-    for path in _TABLES:
-        value: Any = table
-        for key in path.split("."):
-            value = value.get(key, {})
-        _check_table(value, path)
-    _check_table(table.get("forms", {}), "forms")
-    for name, form in table.get("forms", {}).items():
-        _check_table(form, f"forms.{name}")
-        for mode in ("upright", "plane", *get_args(Orientation)):
-            _check_table(form.get(mode, {}), f"forms.{name}.{mode}")
+def _digits(table: Any, where: str) -> Digits:
+    digits = partial(_SHELF.whole, most=_MOST_DIGITS)
+    checks: dict[str, Any] = {item.name: digits for item in fields(Digits) if item.name != "lever"}
+    if isinstance(table, dict):
+        _SHELF.check_keys(table, (*checks, "lever", "systems"), f"{where}.")
+    return _SHELF.record(Digits, table, where, **checks | {"vector_length": partial(_SHELF.whole, least=1)})
 
 
-def _check_table(value: object, where: str) -> None:
-    if not isinstance(value, dict):
-        raise _SHELF.wrong(f"{where} is {value!r}", f"write a table [{where}]")
-
-
-def _digits(table: Table) -> Digits:
-    _SHELF.check_keys(table.get("digits", {}), (*(item.name for item in fields(Digits)), "systems"), "digits.")
-    return _record(Digits, {key: value for key, value in table.get("digits", {}).items() if key != "systems"}, "digits")
-
-
-def _systems(table: Table) -> dict[str, Digits]:
+def _systems(digits: Table) -> dict[str, Digits]:
     """Digits to choose from, each with those of the table where it says nothing."""
-    digits = table.get("digits", {})
+    systems = _SHELF.table(digits.get("systems", {}), "digits.systems")
     plain = {key: value for key, value in digits.items() if key != "systems"}
-    systems = {}
-    for name, entry in digits.get("systems", {}).items():
-        where = f"digits.systems.{name}"
-        _check_table(entry, where)
-        systems[name] = _record(Digits, {**plain, **entry}, where)
-    return systems
+    where = {name: f"digits.systems.{name}" for name in systems}
+    return {name: _digits(plain | _SHELF.table(entry, where[name]), where[name]) for name, entry in systems.items()}
 
 
-def _program(table: Table) -> ProgramTable:
-    program = _record(ProgramTable, table, "program")
+def _program(table: Any, where: str) -> ProgramTable:
+    program = _SHELF.record(ProgramTable, table, where)
     for key in ("name_pattern", "work_offset_pattern"):
         pattern = getattr(program, key)
         try:
@@ -264,70 +235,65 @@ def _program(table: Table) -> ProgramTable:
     return program
 
 
-def _layout(table: Table) -> TextStyle:
-    units = {"mm": "", "inch": ""} | _strings(table.get("units", {}), "layout.units", ("mm", "inch"))
-    plain = {key: value for key, value in table.items() if key != "units"}
-    _SHELF.check_keys(table, tuple(item.name for item in fields(TextStyle)), "layout.")
-    layout = _record(TextStyle, plain, "layout")
-    if len(layout.comment) != 2:
-        raise _SHELF.wrong(f"layout.comment is {plain['comment']!r}", "give what stands before and behind")
+def _layout(table: Any, where: str) -> TextStyle:
+    layout = _SHELF.record(
+        TextStyle,
+        table,
+        where,
+        units=lambda given, place: {"mm": "", "inch": ""} | _strings(given, place, ("mm", "inch")),
+        comment=partial(_SHELF.texts, count=2, hint="give what stands before and behind"),
+    )
     if layout.line_ends not in LINE_ENDS:
         raise _SHELF.wrong(f"layout.line_ends is {layout.line_ends!r}", f"use {' or '.join(LINE_ENDS)}")
-    return TextStyle(**{**vars(layout), "units": units})
+    return layout
 
 
-def _words(table: Table) -> Words:
-    _SHELF.check_keys(table, tuple(item.name for item in fields(Words)), "words.")
-    special = {"coolant", "coolant_off", "plane", "feed_mode"}
-    words = _record(Words, {key: value for key, value in table.items() if key not in special}, "words")
-    coolant, coolant_off = (
-        {word.upper(): _blocks(blocks, f"words.{key}.{word}") for word, blocks in table.get(key, {}).items()}
-        for key in ("coolant", "coolant_off")
-    )
-    planes = _strings(table.get("plane", {}), "words.plane", tuple(_PLANES))
-    modes = _strings(table.get("feed_mode", {}), "words.feed_mode", tuple(_FEED_MODES))
-    return Words(
-        **{
-            **vars(words),
-            "coolant": coolant,
-            "coolant_off": coolant_off,
-            "plane": {_PLANES[key]: block for key, block in planes.items()},
-            "feed_mode": {_FEED_MODES[key]: block for key, block in modes.items()},
-        }
+def _words(table: Any, where: str) -> Words:
+    def coolant(given: Any, place: str) -> dict[str, tuple[str, ...]]:
+        given = _SHELF.table(given, place)
+        return {word.upper(): _SHELF.texts(blocks, f"{place}.{word}") for word, blocks in given.items()}
+
+    def by_number(given: Any, place: str, numbers: Mapping[str, int]) -> dict[int, str]:
+        return {numbers[key]: block for key, block in _strings(given, place, tuple(numbers)).items()}
+
+    return _SHELF.record(
+        Words,
+        table,
+        where,
+        coolant=coolant,
+        coolant_off=coolant,
+        plane=partial(by_number, numbers=_PLANES),
+        feed_mode=partial(by_number, numbers=_FEED_MODES),
     )
 
 
-def _forms(table: Table) -> dict[str, FormTable]:
-    entries = table.get("forms", {})
-    if not isinstance(entries, dict) or not entries:
+def _forms(forms: Any, where: str, motion: Table) -> dict[str, FormTable]:
+    if not _SHELF.table(forms, where):
         raise _SHELF.wrong("there are no forms", "write a table [forms.g1]")
-    motion = table.get("motion", {})
-    _SHELF.check_keys(motion, tuple(item.name for item in fields(Motion)), "motion.")
-    return {name: _form(name, entry, motion) for name, entry in entries.items()}
+    return {name: _form(name, entry, motion) for name, entry in forms.items()}
 
 
-def _form(name: str, entry: Table, motion: Table) -> FormTable:
-    where = f"forms.{name}"
-    _SHELF.check_keys(entry, _FORM_KEYS, f"{where}.")
+def _form(name: str, entry: Any, motion: Table) -> FormTable:
+    where, orientations = f"forms.{name}", get_args(Orientation)
+    _SHELF.check_keys(_SHELF.table(entry, where), _FORM_KEYS, f"{where}.")
     curve = entry.get("curve", "")
     if curve not in get_args(CurveStyle):
         raise _SHELF.wrong(f"{where}.curve is {curve!r}", f"use one of {', '.join(get_args(CurveStyle)[1:])}")
-    modes: dict[Orientation, Mode] = {}
-    for orientation in get_args(Orientation):
-        if orientation in entry:
-            modes[orientation] = _mode(entry[orientation], motion, f"{where}.{orientation}")
-            wanted = {"vector": 3, "point": 3}.get(orientation, 0)
-            if len(modes[orientation].words) != wanted:
-                raise _SHELF.wrong(f"{where}.{orientation} has {len(modes[orientation].words)} words", f"give {wanted}")
+    mode = partial(_mode, motion=motion)
+    modes = {key: mode(entry[key], f"{where}.{key}") for key in orientations if key in entry}
+    for orientation, found in modes.items():
+        wanted = {"vector": 3, "point": 3}.get(orientation, 0)
+        if len(found.words) != wanted:
+            raise _SHELF.wrong(f"{where}.{orientation} has {len(found.words)} words", f"give {wanted}")
     if not modes:
-        raise _SHELF.wrong(f"{where} says no orientation", f"use one of {', '.join(get_args(Orientation))}")
-    upright = _mode(entry["upright"], motion, f"{where}.upright") if "upright" in entry else None
-    plane = _mode(entry["plane"], motion, f"{where}.plane") if "plane" in entry else None
-    return FormTable(name, _text(entry, "description", ""), curve, modes, upright, plane)
+        raise _SHELF.wrong(f"{where} says no orientation", f"use one of {', '.join(orientations)}")
+    rest = {key: value for key, value in entry.items() if key not in (*orientations, "curve")}
+    given = {"name": name, "curve": curve, "modes": modes}
+    return _SHELF.record(FormTable, rest, where, given=given, upright=mode, plane=mode)
 
 
-def _lines(table: Table) -> LineStyle:
-    lines = _record(LineStyle, table, "lines")
+def _lines(table: Any, where: str) -> LineStyle:
+    lines = _SHELF.record(LineStyle, table, where)
     if lines.lines not in get_args(Lines):
         raise _SHELF.wrong(f"lines.lines is {lines.lines!r}", f"use {' or '.join(get_args(Lines))}")
     for name in ("curve_share", "line_share", "blend_share", "executed_share"):
@@ -338,96 +304,23 @@ def _lines(table: Table) -> LineStyle:
     return lines
 
 
-def _extras(table: Table) -> dict[str, Extra]:
-    _check_table(table, "extras")
-    extras = {}
-    for name, entry in table.items():
-        _check_table(entry, f"extras.{name}")
-        extras[name] = _record(Extra, {**entry, "name": name}, f"extras.{name}")
-    return extras
+def _extras(table: Any, where: str) -> dict[str, Extra]:
+    entries = _SHELF.table(table, where).items()
+    return {name: _SHELF.record(Extra, entry, f"{where}.{name}", given={"name": name}) for name, entry in entries}
 
 
-def _mode(entry: Table, motion: Table, where: str) -> Mode:
-    _SHELF.check_keys(entry, _MODE_KEYS, f"{where}.")
-    own = {item.name for item in fields(Motion)}
-    rotations = _text(entry, "rotations", "")
-    if rotations and not re.fullmatch(r"(?!(.)\1)[xyz][xy][xyz]", rotations):
-        raise _SHELF.wrong(f"{where}.rotations is {rotations!r}", "give three axes, as in zxz; the second is not z")
-    return Mode(
-        words=_blocks(entry.get("words", []), f"{where}.words"),
-        on=_blocks(entry.get("on", []), f"{where}.on"),
-        off=_blocks(entry.get("off", []), f"{where}.off"),
-        within_on=_blocks(entry.get("within_on", []), f"{where}.within_on"),
-        within_off=_blocks(entry.get("within_off", []), f"{where}.within_off"),
-        begin=_blocks(entry["begin"], f"{where}.begin") if "begin" in entry else None,
-        tool_end=_blocks(entry["tool_end"], f"{where}.tool_end") if "tool_end" in entry else None,
-        rotations=rotations,
-        reset=_blocks(entry.get("reset", []), f"{where}.reset"),
-        motion=_record(Motion, {**motion, **{key: value for key, value in entry.items() if key in own}}, where),
-        circles=_flag(entry.get("circles", False), f"{where}.circles"),
-        timed_turns=_flag(entry.get("timed_turns", False), f"{where}.timed_turns"),
-    )
-
-
-def _record(kind: type[Record], table: Table, where: str) -> Record:
-    """Dataclass of plain fields from a table, each checked against the type of its default."""
-    values: Table = {}
-    _SHELF.check_keys(table, tuple(item.name for item in fields(kind)), f"{where}.")
-    plain = kind()
-    for key, value in table.items():
-        default = getattr(plain, key)
-        if isinstance(default, tuple):
-            values[key] = _blocks(value, f"{where}.{key}")
-        elif isinstance(default, bool):
-            values[key] = _flag(value, f"{where}.{key}")
-        elif isinstance(default, int):
-            most = _MOST_DIGITS if kind is Digits and key not in ("lever", "vector_length") else 1_000_000
-            least = int(key == "vector_length")
-            if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-                span = f"from {least} to {most}" if least else f"up to {most}"
-                raise _SHELF.wrong(f"{where}.{key} is {value!r}", f"give a whole number {span}")
-            values[key] = value
-        elif isinstance(default, float):
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise _SHELF.wrong(f"{where}.{key} is {value!r}", "give a number")
-            values[key] = float(value)
-        else:
-            values[key] = _string(value, f"{where}.{key}")
-    return kind(**values)
-
-
-def _blocks(value: object, where: str) -> tuple[str, ...]:
-    if not isinstance(value, list) or not all(isinstance(block, str) for block in value):
-        raise _SHELF.wrong(f"{where} is {value!r}", 'give a list of texts, as in ["M8"]')
-    return tuple(_string(block, where) for block in value)
+def _mode(entry: Any, where: str, motion: Table) -> Mode:
+    known = (*(item.name for item in fields(Mode) if item.name != "motion"), *_MOTION_KEYS)
+    _SHELF.check_keys(_SHELF.table(entry, where), known, f"{where}.")
+    own = {key: value for key, value in entry.items() if key in _MOTION_KEYS}
+    rest = {key: value for key, value in entry.items() if key not in _MOTION_KEYS}
+    mode = _SHELF.record(Mode, rest, where, given={"motion": _SHELF.record(Motion, motion | own, where)})
+    if mode.rotations and not re.fullmatch(r"(?!(.)\1)[xyz][xy][xyz]", mode.rotations):
+        what = f"{where}.rotations is {mode.rotations!r}"
+        raise _SHELF.wrong(what, "give three axes, as in zxz; the second is not z")
+    return mode
 
 
 def _strings(table: Any, where: str, keys: tuple[str, ...]) -> dict[str, str]:
-    if not isinstance(table, dict):
-        raise _SHELF.wrong(f"{where} is {table!r}", "give a table of texts")
-    _SHELF.check_keys(table, keys, f"{where}.")
-    return {key: _string(value, f"{where}.{key}") for key, value in table.items()}
-
-
-def _string(value: object, where: str) -> str:
-    if not isinstance(value, str) or not value.isascii() or not (value.isprintable()):
-        raise _SHELF.wrong(f"{where} is {value!r}", "give ASCII text without line ends")
-    own = {"extras": _EXTRA_BRACES, "cycles": _CYCLE_BRACES}.get(where.partition(".")[0])
-    places = _BRACES.get(where.rpartition(".")[2], {}) if own is None else own
-    if not where.endswith("_pattern") and ("{" in value or "}" in value):
-        try:
-            value.format(**places)
-        except (KeyError, IndexError, ValueError) as error:
-            known = ", ".join(f"{{{place}}}" for place in places) or "no braces"
-            raise _SHELF.wrong(f"{where}: {value!r} has unknown braces", f"use {known}") from error
-    return value
-
-
-def _text(table: Table, key: str, default: str) -> str:
-    return _string(table.get(key, default), key)
-
-
-def _flag(value: object, where: str) -> bool:
-    if not isinstance(value, bool):
-        raise _SHELF.wrong(f"{where} is {value!r}", "give true or false")
-    return value
+    _SHELF.check_keys(_SHELF.table(table, where), keys, f"{where}.")
+    return {key: _SHELF.text(value, f"{where}.{key}") for key, value in table.items()}

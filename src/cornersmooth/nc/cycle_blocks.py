@@ -16,9 +16,9 @@ import numpy as np
 
 from cornersmooth.kinematics import machine_position, tool_axis
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
-from cornersmooth.nc.control import Blocks
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.holes import Cycle, in_force, read_cycle
+from cornersmooth.nc.program_table import Blocks
 from cornersmooth.nc.statement_args import number_after, whole_number, words_of
 from cornersmooth.text import format_number
 

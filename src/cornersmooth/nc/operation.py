@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 
 from cornersmooth.kinematics.dynamics import LINEAR
 from cornersmooth.model import MM_PER_UNIT, Units
-from cornersmooth.nc.control import Blocks, Mode
+from cornersmooth.nc.control import Mode
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.program_table import Blocks
 from cornersmooth.text import format_number
 
 #: blocks of the steps `rotary_zero` and `rotary_start`; nothing without rotary axes

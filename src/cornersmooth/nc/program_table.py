@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from cornersmooth.nc.control import Blocks
+#: lines of a program, with places in braces
+Blocks = tuple[str, ...]
 
 
 @dataclass(frozen=True)
