@@ -120,7 +120,7 @@ def test_sections_meet_smoothly_and_are_few(control: str, tmp_path: Path) -> Non
 
 
 def test_sections_are_the_curve_of_the_run() -> None:
-    from cornersmooth.smoothing.runs.sections import SPANS, section_rows
+    from cornersmooth.smoothing.runs.rows import SPANS, section_rows
 
     program = cornersmooth.read(SAMPLES / "impeller.cls")
     smoothed = cornersmooth.smooth(

@@ -19,7 +19,7 @@ from cornersmooth.model import Program, Runs
 from cornersmooth.nc import Form, choose_form, fit_settings
 from cornersmooth.rotary import rotary_angles
 from cornersmooth.rotary.run_angles import Guide, run_angles
-from cornersmooth.smoothing.runs.lines import line_places, polylines_of
+from cornersmooth.smoothing.runs.rows import line_places, polylines_of
 from cornersmooth.smoothing.runs.splines import Splines
 from nc.cases import MACHINES, Case
 from nc.promise import random_verdict
@@ -56,7 +56,7 @@ def guide_of(
     program: Program, runs: Runs, smoothed: cornersmooth.SmoothProgram, machine: Machine, cone: float
 ) -> Guide:
     """Angles at the places of the lines of one run."""
-    from cornersmooth.smoothing.runs.lines import points_at
+    from cornersmooth.smoothing.runs.rows import points_at
 
     lines = polylines_of(runs, program.tip, program.tip + smoothed.settings.axis_length * program.axis)
     places = line_places(runs, lines, smoothed.settings)
@@ -157,7 +157,7 @@ def test_blocks_in_rotary_words_are_hardly_more_than_with_second_points() -> Non
 
 
 def test_sections_of_angles_meet_with_their_first_two_derivatives() -> None:
-    from cornersmooth.smoothing.runs.sections import section_rows
+    from cornersmooth.smoothing.runs.rows import section_rows
 
     program, machine = waves(900, tilt=0.6), load_machine("table-ac")
     smoothed, runs = smoothed_runs(program, form_of("siemens", "table-ac"), tolerance=0.0001)

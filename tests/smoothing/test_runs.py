@@ -12,17 +12,14 @@ from scipy.interpolate import BSpline
 from scipy.optimize import NonlinearConstraint, minimize
 
 from cornersmooth import Program, Settings, smooth
-from cornersmooth.smoothing.runs import groups
+from cornersmooth.smoothing.runs import solving
 from cornersmooth.smoothing.runs.banded import Gather, couplings, keep_in_planes, solve_blocks
 from cornersmooth.smoothing.runs.fitting import fit
-from cornersmooth.smoothing.runs.groups import solve_groups
 from cornersmooth.smoothing.runs.interior import COLD, Task, smoothest
-from cornersmooth.smoothing.runs.lines import largest_curvature
-from cornersmooth.smoothing.runs.polylines import Polylines
-from cornersmooth.smoothing.runs.samples import Pieces, Samples
-from cornersmooth.smoothing.runs.solving import RunCurves, solve_runs
-from cornersmooth.smoothing.runs.splines import Splines
-from cornersmooth.smoothing.runs.windows import Windows
+from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
+from cornersmooth.smoothing.runs.rows import largest_curvature
+from cornersmooth.smoothing.runs.solving import RunCurves, solve_groups, solve_runs
+from cornersmooth.smoothing.runs.splines import Splines, Windows
 from oracle.share import covering_share, how_many
 from smoothing.runs_oracle import deviation, random_runs, spline_of, through
 
@@ -371,7 +368,7 @@ def test_tip_and_axis_point_deviate_to_opposite_sides_where_that_keeps_the_lever
 def test_groups_of_runs_are_solved_as_all_of_them_by_any_number_of_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = random_runs(7, 12, 14, H)
     whole = solve_runs(lines, (0.01, 0.01), H)
-    monkeypatch.setattr(groups, "GROUP", 30)
+    monkeypatch.setattr(solving, "GROUP", 30)
     told: list[tuple[int, int]] = []
     found = [
         solve_groups(lines, (0.01, 0.01), H, lambda *now: told.append(now), processes=processes) for processes in (1, 2)

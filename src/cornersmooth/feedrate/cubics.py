@@ -12,8 +12,8 @@ import numpy as np
 
 from cornersmooth.feedrate import bezier_halves
 from cornersmooth.model import Bools, Floats, Ints, Program, Runs
-from cornersmooth.smoothing.runs.lines import polylines_of
-from cornersmooth.smoothing.runs.samples import Pieces
+from cornersmooth.smoothing.runs.polylines import Pieces
+from cornersmooth.smoothing.runs.rows import polylines_of
 from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.vectors import norm
 

@@ -12,8 +12,7 @@ from cornersmooth.model import Bools, Floats, Ints, Units
 from cornersmooth.nc.curve_blocks import Curves, KnotBlocks, NoCurves, RotaryKnotBlocks, SplineBlocks
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
-from cornersmooth.smoothing.runs.ranges import ranges
-from cornersmooth.smoothing.runs.splines import Splines
+from cornersmooth.smoothing.runs.splines import Splines, ranges
 from cornersmooth.text import RowFormat, format_number, to_ticks
 
 #: control points that a curve has more than knot intervals

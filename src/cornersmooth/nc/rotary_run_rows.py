@@ -23,10 +23,8 @@ from cornersmooth.nc.rotary_rows import CHUNK, LARGEST_TURN, InsertedPoints, who
 from cornersmooth.parts import some_runs
 from cornersmooth.rotary import fill, insertions, rapid_moves, rotary_angles, still_poses
 from cornersmooth.rotary.run_angles import Guide, RunAngles, lever_at, run_angles
-from cornersmooth.smoothing.runs.lines import line_places, polylines_of
-from cornersmooth.smoothing.runs.ranges import ranges, spread, starts
-from cornersmooth.smoothing.runs.sections import STEPS_PER_UNIT, SectionRows, section_rows
-from cornersmooth.smoothing.runs.splines import Splines
+from cornersmooth.smoothing.runs.rows import STEPS_PER_UNIT, SectionRows, line_places, polylines_of, section_rows
+from cornersmooth.smoothing.runs.splines import Splines, ranges, spread, starts
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 from cornersmooth.vectors import norm, unit
 

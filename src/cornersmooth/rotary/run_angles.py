@@ -19,8 +19,7 @@ import numpy as np
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, tool_axis
 from cornersmooth.model import Floats, Ints, Runs
-from cornersmooth.smoothing.runs.ranges import spread, starts
-from cornersmooth.smoothing.runs.splines import Splines
+from cornersmooth.smoothing.runs.splines import Splines, spread, starts
 from cornersmooth.vectors import dot, norm, unit
 
 #: rounds in which spans are halved, and steps below which one is not

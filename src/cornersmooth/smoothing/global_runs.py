@@ -13,11 +13,10 @@ from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import RUN_CURVATURE
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
-from cornersmooth.smoothing.runs.groups import AtPoses, solve_groups
-from cornersmooth.smoothing.runs.lines import TURNING
 from cornersmooth.smoothing.runs.polylines import Polylines
-from cornersmooth.smoothing.runs.ranges import ranges, spread
-from cornersmooth.smoothing.runs.solving import STEP, RunCurves
+from cornersmooth.smoothing.runs.rows import TURNING
+from cornersmooth.smoothing.runs.solving import STEP, AtPoses, RunCurves, solve_groups
+from cornersmooth.smoothing.runs.splines import ranges, spread
 from cornersmooth.smoothing.transition import place_corners
 from cornersmooth.vectors import angle_between
 

@@ -17,9 +17,8 @@ from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.corner_table import Remainders
-from cornersmooth.smoothing.runs.lines import polylines_of, run_lines
-from cornersmooth.smoothing.runs.ranges import ranges
-from cornersmooth.smoothing.runs.sections import SectionRows, section_rows
+from cornersmooth.smoothing.runs.rows import SectionRows, polylines_of, run_lines, section_rows
+from cornersmooth.smoothing.runs.splines import ranges
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 from cornersmooth.vectors import unit
 

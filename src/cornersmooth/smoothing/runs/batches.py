@@ -26,11 +26,8 @@ from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import TAPS, Gather
 from cornersmooth.smoothing.runs.fitting import holding_poses
 from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, dot, smoothest
-from cornersmooth.smoothing.runs.polylines import Polylines
-from cornersmooth.smoothing.runs.ranges import ranges, spread, starts
-from cornersmooth.smoothing.runs.samples import Pieces, Samples
-from cornersmooth.smoothing.runs.splines import Splines
-from cornersmooth.smoothing.runs.windows import Windows
+from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
+from cornersmooth.smoothing.runs.splines import Splines, Windows, ranges, spread, starts
 
 #: share of the tolerance that the samples may use
 SHARE = 0.97

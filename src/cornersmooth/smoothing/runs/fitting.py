@@ -8,11 +8,8 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import Gather, applied, solve_scalar
-from cornersmooth.smoothing.runs.polylines import Polylines
-from cornersmooth.smoothing.runs.ranges import ranges, spread
-from cornersmooth.smoothing.runs.samples import Pieces, Samples
-from cornersmooth.smoothing.runs.splines import Splines
-from cornersmooth.smoothing.runs.windows import Windows
+from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
+from cornersmooth.smoothing.runs.splines import Splines, Windows, ranges, spread
 
 #: share of the tolerances that the fit may use: the rest is for smoothness. Less in spans that hold poses: neighbouring
 #: passes get nearly the same curve only where their knots do not show.

@@ -14,8 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.smoothing.runs.polylines import Polylines
-from cornersmooth.smoothing.runs.samples import Pieces
+from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
 from cornersmooth.smoothing.runs.splines import Splines
 
 #: parts that every stretch is looked at in, first and where that is not enough
