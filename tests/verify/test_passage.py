@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cornersmooth.verify import passage as module
+from cornersmooth.verify.chain import Path, Sections
 from cornersmooth.verify.passage import CHUNK, Walk, passage
 from oracle.free_space import passes
 
@@ -112,7 +113,8 @@ def test_bent_motions_pass_only_where_they_keep_the_radius(seed, radius, divided
         t = (number - k)[:, None]
         return own[k] + t * (own[k + 1] - own[k]) - second[k] * t * (1 - t) / 2
 
-    found = Walk.along(path, radius).take(own, bend, final=True, inner=inner if divided else None)
+    walk, sections = Walk(Path.of(path, radius), radius), Sections.whole(len(own) - 1, len(path) - 1)
+    found = walk.take(own, bend, sections, inner if divided else None)
     assert len(found.place) == len(own)
     if found.passed:  # chords of a twentieth are off by a four-hundredth of the bend
         assert passes(dense.tolist(), path.tolist(), radius + bend.max() / 400, [radius + bend.max() / 400] * len(path))
@@ -183,3 +185,33 @@ def test_the_verdict_does_not_need_one_speed():
     path[1:, 3] = 0.05, 10.0
     assert passage(np.repeat(path, [40, 3, 1], axis=0), path, 0.01).passed
     assert passage(path, np.repeat(path, [1, 30, 2], axis=0), 0.01).passed
+
+
+@settings(deadline=None)
+@given(seed=SEEDS, radius=st.sampled_from([0.1, 0.3, 1.0]))
+def test_sections_are_judged_each_by_itself(seed, radius):
+    """One after the other in one motion, and with something between that nobody looks at."""
+    rng = np.random.default_rng(seed)
+    pairs = []
+    for kind in rng.choice(KINDS, 4):
+        path = walk(rng, kind, rng.integers(2, 9))
+        pairs.append((path, written(rng, path)))
+    verdicts = []
+    for path, own in pairs:
+        judged = {passes(own.tolist(), path.tolist(), r, [r] * len(path)) for r in (radius, radius * (1 - 1e-9))}
+        if len(judged) > 1:
+            return
+        verdicts += judged
+    between = rng.normal(size=(2, 6))
+    own = np.concatenate([part for _, one in pairs for part in (one, between)])
+    last = np.cumsum([len(one) + 2 for _, one in pairs]) - 3
+    stop = np.cumsum([len(path) for path, _ in pairs]) - 1
+    sizes = np.array([[len(one), len(path)] for path, one in pairs])
+    path = np.concatenate([path for path, _ in pairs])
+    sections = Sections(last + 1 - sizes[:, 0], last, stop + 1.0 - sizes[:, 1], stop.astype(float))
+    found = Walk(Path.of(path, radius), radius).take(own, np.zeros(len(own) - 1), sections)
+    number, inside = sections.of(np.arange(len(own)))
+    assert np.isnan(found.place[~inside]).all()
+    rows = np.array([one.row for one in found.breaks], int)
+    assert inside[rows].all()
+    assert sorted(set(number[rows].tolist())) == [k for k, verdict in enumerate(verdicts) if not verdict]

@@ -53,6 +53,15 @@ class Path:
     bend: Floats
     gate: Floats
 
+    @classmethod
+    def of(cls, points: Floats, radius: float, *, gate: Floats | None = None, bend: Floats | None = None) -> Path:
+        """Make it of vertices."""
+        step = points[1:] - points[:-1]
+        length = np.zeros(len(points))
+        np.cumsum(np.sqrt(np.einsum("ij,ij->i", step, step)), out=length[1:])
+        limit = np.full(len(points), radius) if gate is None else np.minimum(gate, radius)
+        return cls(points, length, np.zeros(len(step)) if bend is None else bend, limit)
+
     @property
     def segments(self) -> int:
         """How many."""
@@ -124,6 +133,45 @@ class Window:
 
 
 @dataclass(frozen=True)
+class Sections:
+    """Parts of the own motion that are run beside parts of the path, one after the other, both in order.
+
+    What lies between two of them is not looked at.
+
+    Parameters
+    ----------
+    first, last : (s,) int64
+        Own vertices.
+    start, stop : (s,) float64
+        Places on the path beside them; the latter are vertices.
+    open : bool
+        Whether the last section goes on behind its last vertex: that may be anywhere before `stop`.
+    """
+
+    first: Ints
+    last: Ints
+    start: Floats
+    stop: Floats
+    open: bool = False
+
+    @classmethod
+    def whole(cls, last: int, stop: int, *, open_end: bool = False) -> Sections:
+        """One section: all of both motions."""
+        return cls(np.array([0]), np.array([last]), np.array([0.0]), np.array([float(stop)]), open_end)
+
+    def of(self, rows: Ints) -> tuple[Ints, Bools]:
+        """Section of each row, or the one before, and whether it is inside."""
+        number = np.maximum(np.searchsorted(self.first, rows, side="right") - 1, 0)
+        return number, (rows >= self.first[number]) & (rows <= self.last[number])
+
+    def behind(self, number: int, row: int, place: float) -> Sections:
+        """The rest of them from a row in section `number` on, counted from that row."""
+        first, start = self.first[number:] - row, self.start[number:].copy()
+        first[0], start[0] = 0, place
+        return Sections(first, self.last[number:] - row, start, self.stop[number:], self.open)
+
+
+@dataclass(frozen=True)
 class Chain:
     """Places of rows, and where they prove nothing.
 
@@ -146,33 +194,35 @@ def points_at(path: Floats, place: Floats, first: int = 0) -> Floats:
     return np.ascontiguousarray((start + (place - first - k)[:, None] * (path.take(k + 1, axis=0) - start)).T)
 
 
-def chain(own: Floats, bend: Floats, path: Path, radius: float, start: float, *, final: bool) -> Chain:
+def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sections) -> Chain:
     """Go along the own polyline, and take for each vertex the nearest place around where it should be.
 
     Parameters
     ----------
     own : (3h, n) float64, mm
     bend : (n - 1,) float64, mm
-        How far the own motion may leave each segment.
+        Of each segment of it.
     path : Path
     radius : float, mm
-    start : float
-        Place of the first vertex, which is free.
-    final : bool
-        Whether the last vertex has to come to the end of the path.
+    sections : Sections
+        The first begins at the first vertex, and is free there.
     """
+    count = own.shape[1]
     step = own[:, 1:] - own[:, :-1]
-    gone = np.zeros(own.shape[1])
+    gone = np.zeros(count)
     np.cumsum(np.sqrt(np.einsum("ij,ij->j", step, step)), out=gone[1:])
-    place, near = _places(own, gone, path, radius, start)
-    place[~near] = start
-    place[0] = start
+    number, inside = sections.of(np.arange(count))
+    low, high = sections.start[number], sections.stop[number]
+    place, near = _places(own, gone, path, radius, (sections, number))
+    np.clip(place, low, high, out=place)
+    place[~near] = low[~near]
+    place[sections.first] = sections.start
+    place[~inside] = sections.stop[number[~inside]]
     np.maximum.accumulate(place, out=place)
-    if final:
-        place[-1] = path.segments
+    ends = slice(None, -1 if sections.open else None)
+    place[sections.last[ends]] = sections.stop[ends]
     away = own - points_at(path.points, place)
-    square = largest_square(away)
-    bad = square > radius * radius
+    bad = largest_square(away) > radius * radius
     rows, vertices, share = passed(own, step, path.points, place)
     beside = path.points[vertices].T - own[:, rows] - share * step[:, rows]
     beside_square = largest_square(beside)
@@ -180,18 +230,22 @@ def chain(own: Floats, bend: Floats, path: Path, radius: float, start: float, *,
     bad[rows[(beside_square > limit * limit) | (limit < 0.0)] + 1] = True
     if path.bent or bend.any():
         bad |= _bent(bend, path, radius, place, (rows, vertices, share), (away, -beside))
+    bad[~inside] = False
+    firsts = sections.first[1:]
+    bad[firsts] = largest_square(away[:, firsts]) > radius * radius  # the step to it is none of its section
     bad[0] = False
     return Chain(place, bad)
 
 
-def _places(own: Floats, gone: Floats, path: Path, radius: float, start: float) -> tuple[Floats, Bools]:
-    """Nearest places of all rows, and which of them are near."""
-    here = path.length_at(start)
-    expected = here + gone
-    place, near = np.full(len(gone), start), np.zeros(len(gone), np.bool_)
+def _places(own: Floats, gone: Floats, path: Path, radius: float, where: tuple[Sections, Ints]) -> tuple[Floats, Bools]:
+    """Nearest places of all rows, and which of them are near; the number of the section of each row is known."""
+    sections, number = where
+    begin = np.array([path.length_at(place) for place in sections.start.tolist()])
+    expected = (begin - gone[sections.first])[number] + gone
+    place, near = sections.start[number], np.zeros(len(gone), np.bool_)
     rows = np.arange(len(gone))
     for _ in range(_LOOKS):
-        low, high = float(expected[rows[0]]), float(expected[rows[-1]])
+        low, high = float(expected[rows].min()), float(expected[rows].max())
         slack = _SLACK * (high - low) + _RADII * radius
         window = Window.of(path, low - slack, high + slack)
         found = window.nearest(own[:, rows] if len(rows) < len(gone) else own, expected[rows])
@@ -201,22 +255,23 @@ def _places(own: Floats, gone: Floats, path: Path, radius: float, start: float) 
         rows = rows[~near[rows]]
         if not len(rows) or len(rows) == len(gone):
             break
-        # from the last row before that is near
+        # from the last row of the section before that is near
         last = np.where(near, np.arange(len(gone)), 0)
         np.maximum.accumulate(last, out=last)
-        last = last[rows]
+        last = np.maximum(last, sections.first[number])[rows]
         k = np.minimum(place[last].astype(np.int64), path.segments - 1)
         there = path.length[k] + (place[last] - k) * (path.length[k + 1] - path.length[k])
         expected[rows] = there + gone[rows] - gone[last]
     return place, near
 
 
-def near_places(own: Floats, path: Path, radius: float, start: float) -> list[tuple[int, float]]:
+def near_places(own: Floats, path: Path, radius: float, start: float, stop: float) -> list[tuple[int, float]]:
     """The first row (3h, n) that is near the path, if any, and its place; the path was left at `start`."""
     step = own[:, 1:] - own[:, :-1]
     gone = np.concatenate(([0.0], np.cumsum(np.sqrt(np.einsum("ij,ij->j", step, step)))))
-    place, near = _places(own, gone, path, radius, start)
-    first = np.flatnonzero(near)[:1].tolist()
+    only = Sections(np.array([0]), np.array([len(gone) - 1]), np.array([start]), np.array([stop]))
+    place, near = _places(own, gone, path, radius, (only, np.zeros(len(gone), np.int64)))
+    first = np.flatnonzero(near & (place >= start) & (place <= stop))[:1].tolist()
     return [(row, float(place[row])) for row in first]
 
 
