@@ -1,4 +1,4 @@
-"""The command line as shops and scripts rely on it: design section 5, one test for each promise in it."""
+"""The command line as shops and scripts rely on it: one test for each promise of docs/smooth.md."""
 
 from __future__ import annotations
 

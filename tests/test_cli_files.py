@@ -1,4 +1,4 @@
-"""What the command line does to files: refusals, full disks, interruptions, many inputs (design section 5)."""
+"""What the command line does to files: refusals, full disks, interruptions, many inputs."""
 
 from __future__ import annotations
 

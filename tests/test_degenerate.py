@@ -1,4 +1,4 @@
-"""Chains that geometry textbooks leave out, and CL files do not: design 3.3.
+"""Chains that geometry textbooks leave out, and CL files do not (docs/method.md).
 
 Each goes through reader, smoothing and both writers with numpy's warnings as errors. The strict parser sees to it that
 no NaN, no negative zero and no zero-length move is written; the oracle that no pose is lost and the tolerance is kept.

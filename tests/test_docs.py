@@ -52,6 +52,17 @@ def test_examples_run_and_print_what_the_page_says(name: str, tmp_path: Path) ->
         assert (ROOT / "docs" / picture).exists()
 
 
+def test_comments_name_documents_that_are_here() -> None:
+    for path in (*(ROOT / "src").rglob("*.py"), *(ROOT / "tests").rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        named = {
+            *re.findall(r"\bdocs/[a-z_]+\.md\b", text),
+            *re.findall(r"\b(?:reference|shared)/[a-z_-]+\.md\b", text),
+        }
+        assert [name for name in named if not (ROOT / name).is_file()] == [], path
+        assert not re.search(r"\b[Dd]esign (?:section )?\d", text), path
+
+
 def commands(text: str) -> Iterator[str]:
     """Commands of cornersmooth in indented lines, without their remarks, and those between the words of a page."""
     for line in text.splitlines():

@@ -35,7 +35,7 @@ class CornersmoothError(Exception):
         Where. `line` and `column` count from 1.
     """
 
-    #: exit code of the command line (design section 5)
+    #: exit code of the command line (docs/smooth.md)
     exit_code = 3
 
     def __init__(

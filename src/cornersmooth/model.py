@@ -1,6 +1,6 @@
 """The data that travels through the program: a tool path as arrays, and its statements as a side table.
 
-Words (design section 1): a *pose* is one tool tip with its axis; a *move* takes the tool from one pose to the next;
+Words: a *pose* is one tool tip with its axis; a *move* takes the tool from one pose to the next;
 a *chain* is a run of linear feed moves; a *corner* is an inner pose of a chain; a *statement* is what the CL file says
 between moves. Lengths are millimetres throughout; `Program.units` says what the file spoke
 and what the NC text will speak.
@@ -392,9 +392,9 @@ class Corners:
 class Runs:
     """Pairs of cubic B-splines, tip and axis point, that each replace a whole run of segments: r runs in path order.
 
-    Poses and knots stand at whole steps of the parameter s, which is the six-dimensional length (design 3.2) but for
-    the rounding to `step`. Knots of a run start at 0; the first and the last stand four-fold in its knot vector, so a
-    run with m + 1 knots has m + 3 control points.
+    Poses and knots stand at whole steps of the parameter s, which is the six-dimensional length (docs/method.md)
+    but for the rounding to `step`. Knots of a run start at 0; the first and the last stand four-fold in its knot
+    vector, so a run with m + 1 knots has m + 3 control points.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ class Settings:
     Parameters
     ----------
     tolerance : float, mm
-        ε: bound on the deviation of the written tip path and axis-point path (design section 4).
+        ε: bound on the deviation of the written tip path and axis-point path (docs/method.md).
     axis_length : float, mm
         H: distance of the axis point from the tip. Choose the length of the cutting edge. An axis tolerance takes its
         place: H follows from it then, whatever is given.

@@ -1,4 +1,4 @@
-"""The JSON and CSV reports of a smoothed program: design section 7."""
+"""The JSON and CSV reports of a smoothed program (docs/smooth.md)."""
 
 from __future__ import annotations
 

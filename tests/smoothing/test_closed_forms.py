@@ -1,4 +1,4 @@
-"""The closed forms of design 3.4, the paper's table, and the promises that need no NC text."""
+"""The closed forms of docs/method.md, the paper's table, and the promises that need no NC text."""
 
 from __future__ import annotations
 

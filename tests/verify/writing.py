@@ -1,6 +1,6 @@
 """Small, plain writer of correct NC texts: proportional rounding, no regard for speed of reading or of writing.
 
-Shares no code with the package; it knows the NC text contract and formula (L) of the design, nothing else.
+Shares no code with the package; it knows the NC text contract and formula for L of docs/method.md, nothing else.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from cornersmooth.cl.points_messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Move, Program, Source, Units
 
-#: largest ||v|−1| of an axis vector; three printed decimals leave 1e-3 (reference/cl-formats.md, fact 13)
+#: largest ||v|−1| of an axis vector; three printed decimals leave 1e-3
 UNIT_TOLERANCE: Final = 1e-2
 
 #: largest spread of |B−A| over its mean in a file of second points

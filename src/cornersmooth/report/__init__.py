@@ -36,7 +36,7 @@ def report(
     verification: Verification | None = None,
     unverified: str = "",
 ) -> dict[str, Any]:
-    """Everything the JSON report says (design section 7); keys carry their unit.
+    """Everything the JSON report says (docs/smooth.md); keys carry their unit.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The report's table of corners: design section 7, one row a corner."""
+"""The report's table of corners, one row a corner (docs/smooth.md)."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bo
     Returns
     -------
     dict
-        Column name, with its unit, to an array of g values; the columns of design section 7, and those
+        Column name, with its unit, to an array of g values; those of docs/smooth.md, and those
         that only the method has.
     """
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings

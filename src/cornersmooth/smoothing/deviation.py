@@ -1,7 +1,7 @@
 """How far proportional transitions are from the original motion at constant H, and how long they may be for it.
 
 The construction runs on chords of the sphere, controls keep tip and direction: what is measured is b = tip + H·axis
-(design 3.2, section 4).
+(docs/method.md).
 """
 
 from __future__ import annotations

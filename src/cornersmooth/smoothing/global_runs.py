@@ -1,4 +1,4 @@
-"""`method="global"`: one pair of cubic B-splines for a whole run of corners (design 3.6, docs/global.md)."""
+"""`method="global"`: one pair of cubic B-splines for a whole run of corners (docs/global.md)."""
 
 from __future__ import annotations
 

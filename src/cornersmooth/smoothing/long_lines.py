@@ -3,7 +3,7 @@
 Many controls run the faster, the longer lines are: each must be able to stop within those that it has read. From every
 vertex a line goes to the farthest vertex that it can reach within ε. Vertices are points of the smoothed motion.
 
-A line is compared with the original motion at a common parameter, as transitions are (design 3.2): both run evenly
+A line is compared with the original motion at a common parameter, as transitions are (docs/method.md): both run evenly
 between two points at which the original is known, so that their tips are farthest apart at one of these. Rotary words
 bend the motion between these points, so they are also compared halfway. The parameter is the length of the original in
 six dimensions. It never runs backwards, so the paths are as near, both ways.

@@ -23,7 +23,7 @@ KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0)
 
 
 def deviation_factor(weights: Floats, ratio: Floats) -> Floats:
-    """C of design 3.2: deviation at u = ½ over the length of the difference of the legs.
+    """The factor c of docs/method.md: deviation at u = ½ over the length of the difference of the legs.
 
     Parameters
     ----------

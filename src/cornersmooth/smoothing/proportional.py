@@ -1,4 +1,4 @@
-"""`method="proportional"`: tip and axis-point segment are trimmed by the same fraction on each side (design 3.2)."""
+"""`method="proportional"`: tip and axis-point segment are cut by the same fraction on each side (docs/method.md)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """What every pose contributes to the written motion: straight remainders, transitions, and how many lines each takes.
 
-Design 3.5. How many lines a transition takes follows from its geometry. With all weights 1 the first half of the curve
+How many lines a transition takes follows from its geometry. With all weights 1 the first half of the curve
 is, in s = 2u, the straight leg plus s³ times the deviation, so the chord error of a step Δs is proportional to s·Δs²;
 nodes s = (j/n)^(2/3) make it the same in every step and n = sqrt(bend/(18·chord)), 15 % more for the first step, where
 s³ is not yet parabolic.

@@ -1,4 +1,4 @@
-"""Where the path is rounded and how far each transition reaches: design 3.1 to 3.3.
+"""Where the path is rounded and how far each transition reaches (docs/method.md).
 
 Every function works on whole arrays of corners; memory is bounded by working through them in batches.
 """

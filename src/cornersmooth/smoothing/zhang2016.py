@@ -1,4 +1,4 @@
-"""`method="zhang2016"`: the paper as published (design 3.1)."""
+"""`method="zhang2016"`: the paper as published (docs/method.md)."""
 
 from __future__ import annotations
 

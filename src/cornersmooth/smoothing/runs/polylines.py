@@ -36,7 +36,7 @@ class Polylines:
         Poses of each run, at least 2.
     s : (n,) float64
         Length from the start of the run in steps of `step`, whole numbers, by m(D) = √((|D_A|² + |D_B|²)/2): pure
-        rotations count (design 3.2).
+        rotations count (docs/method.md).
     step : float, mm
         Poses and knots stand at whole steps, so that knots can be written with few digits. It is small beside ε, so
         the parameter is the length but for what nobody can see.
