@@ -1,0 +1,164 @@
+"""Verification of a program against a program: all outside of runs byte for byte, and runs by what a control does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cornersmooth.errors import CornersmoothError
+from cornersmooth.filter.motion import Stretch, motion, program_of
+from cornersmooth.filter.runs import Reading, Run
+from cornersmooth.filter.state import State
+from cornersmooth.filter.writing import Job
+from cornersmooth.verify import Verification, verify
+from cornersmooth.verify.motions import written_motion
+from cornersmooth.verify.passage import passage
+
+#: share of ε by which `nc_reader` may leave the motion in rotary words
+_RESOLVED = 5e-3
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a run of the old program is in the new one.
+
+    Parameters
+    ----------
+    run : Run
+    first, stop : int
+        Lines of the new program, from 0; the latter excluded.
+    """
+
+    run: Run
+    first: int
+    stop: int
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """Something wrong with the new program: its line, from 1, or 0, and what."""
+
+    line: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found.
+
+    Parameters
+    ----------
+    wrong : tuple of Wrong
+    tip, axis_point : float, mm
+        Largest deviation.
+    """
+
+    wrong: tuple[Wrong, ...]
+    tip: float = 0.0
+    axis_point: float = 0.0
+
+
+def places(old: Reading, new: Reading) -> tuple[list[Place], list[Wrong]]:
+    """Find the runs of a program in another one, between lines that must be the same."""
+    found: list[Place] = []
+    line_of = lambda at: int(np.searchsorted(new.start, at))  # noqa: E731 - used here only
+    at, behind = 0, 0
+    for k, run in enumerate(old.runs):
+        before = old.lines(behind, run.first)
+        if new.data[at : at + len(before)] != before:
+            return found, [_first_other(old, new, behind, at)]
+        at += len(before)
+        stop = old.runs[k + 1].first if k + 1 < len(old.runs) else len(old.why)
+        after = old.lines(run.stop, stop)
+        end = _found(new, after, at, last=k + 1 == len(old.runs))
+        if end is None:
+            return found, [Wrong(line_of(at) + 1, f"the lines after line {run.stop} of the old program are not there")]
+        if new.data[at:end] != old.lines(run.first, run.stop):
+            found.append(Place(run, line_of(at), line_of(end)))
+        at, behind = end, run.stop
+    if new.data[at:] != old.lines(behind, len(old.why)):
+        return found, [_first_other(old, new, behind, at)]
+    return found, []
+
+
+def _found(new: Reading, text: bytes, at: int, *, last: bool) -> int | None:
+    """Where whole lines begin in the rest of a program; at its end if they are the last."""
+    if last:
+        end = len(new.data) - len(text)
+        return end if end >= at and new.data.endswith(text) else None
+    end = new.data.find(text, at)
+    while end > 0 and new.data[end - 1 : end] != b"\n":
+        end = new.data.find(text, end + 1)
+    return None if end < 0 else end
+
+
+def _first_other(old: Reading, new: Reading, line: int, at: int) -> Wrong:
+    """Say which line outside of runs is another one."""
+    mine = int(np.searchsorted(new.start, at))
+    for step in range(len(old.why) - line):
+        if mine + step >= len(new.why) or old.line(line + step) != new.line(mine + step):
+            return Wrong(mine + step + 1, f"line {line + step + 1} of the old program, outside of runs, is another one")
+    return Wrong(mine + 1, "there is more than in the old program")
+
+
+def check(job: Job, old: Reading, new: Reading, where: Sequence[Place], states: Sequence[State]) -> Checked:
+    """Measure the runs that have changed, and compare what holds after each."""
+    wrong: list[Wrong] = []
+    largest = [0.0, 0.0]
+    for place, state in zip(where, states, strict=True):
+        text = _left_otherwise(place.run, state)
+        if text:
+            wrong.append(Wrong(place.stop, text))
+    for unit in sorted({place.run.state.unit for place in where}):
+        own = [place for place in where if place.run.state.unit == unit]
+        try:
+            found = _measure(job, old, new, own)
+        except CornersmoothError as error:
+            wrong.append(Wrong(error.line or own[0].first + 1, error.what))
+            continue
+        wrong += [Wrong(problem.nc_line, problem.text) for problem in found[0].problems] + found[1]
+        largest = [max(pair) for pair in zip(largest, (found[0].tip.value, found[0].axis_point.value), strict=True)]
+    return Checked(tuple(sorted(wrong, key=lambda one: one.line)), *largest)
+
+
+def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[Verification, list[Wrong]]:
+    """Measure runs with the same units."""
+    settings = job.settings
+    before = motion([job.stretch(old, place.run) for place in where], job.form, job.spelling, settings)
+    after = motion(
+        [Stretch(place.run, new.lines(place.first, place.stop), place.first + 1) for place in where],
+        job.form,
+        job.spelling,
+        settings,
+    )
+    found = verify(
+        program_of(before),
+        after,
+        tolerance=settings.tolerance,
+        axis_length=settings.axis_length,
+        axis_tolerance=settings.axis_tolerance,
+        words=False,
+        processes=job.processes,
+    )
+    return found, []
+
+
+def _left_otherwise(run: Run, state: State) -> str:
+    """Say what holds after the blocks of a run that does not after the run; empty where all is the same."""
+    place = [state.place[letter] for letter in state.axes]
+    if not np.allclose(place, run.place[-1], rtol=0.0, atol=1e-9):
+        return f"the run ends at {_told(state.axes, place)}, not at {_told(state.axes, run.place[-1].tolist())}"
+    mine = (state.absolute, state.feed_mode, state.unit, state.motion)
+    theirs = (run.state.absolute, run.state.feed_mode, run.state.unit, 1.0)
+    if mine != theirs:
+        return "G90, G91, G93, G94 or the kind of motion is another one after the run"
+    if run.state.feed_mode == 94 and not math.isclose(state.feed, run.feed, rel_tol=1e-9):
+        return f"the feed after the run is {state.feed:g}, not {run.feed:g}"
+    return ""
+
+
+def _told(axes: Sequence[str], place: Sequence[float]) -> str:
+    return " ".join(f"{axis}{value:g}" for axis, value in zip(axes, place, strict=True))

@@ -1,0 +1,145 @@
+"""What a control does in runs: their own bytes, behind a head that says the state they begin in, read by `nc_reader`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cornersmooth.errors import InputError
+from cornersmooth.filter.runs import Run
+from cornersmooth.filter.spelling import Spelling
+from cornersmooth.filter.state import INVERSE_TIME
+from cornersmooth.model import Floats, Ints, Move, Program, Statement
+from cornersmooth.nc.form import Form
+from cornersmooth.nc_reader import NcProgram, read_nc
+from cornersmooth.nc_reader.elements import Element
+from cornersmooth.pipeline import reading_back
+from cornersmooth.settings import Settings
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Blocks that stand for a run, in the program itself or in another.
+
+    Parameters
+    ----------
+    run : Run
+        Says the state before the blocks.
+    text : bytes
+        Whole lines.
+    line : int
+        Number of the first, from 1.
+    """
+
+    run: Run
+    text: bytes
+    line: int
+
+
+def motion(stretches: Sequence[Stretch], form: Form, spelling: Spelling, settings: Settings) -> NcProgram:
+    """Read stretches as the control runs them.
+
+    Returns
+    -------
+    NcProgram
+        A rapid to the start of each stretch, and what its blocks do; `line` is that of the program.
+
+    Raises
+    ------
+    InputError
+        The blocks are none that can be read.
+    """
+    inch = stretches[0].run.state.unit != 1.0
+    parts, lines = [_head(form, inch=inch)], [np.zeros(1, np.int64)]
+    lines[0] = np.zeros(parts[0].count(b"\n"), np.int64)
+    for stretch in stretches:
+        start = _start(stretch.run, form, spelling)
+        text = stretch.text if stretch.text.endswith(b"\n") else stretch.text + b"\n"
+        parts += [start, text]
+        first = np.full(start.count(b"\n"), -stretch.line, np.int64)
+        lines += [first, stretch.line + np.arange(text.count(b"\n"))]
+    back = {name: value for name, value in reading_back(form).items() if name != "trusted"}
+    nc = read_nc(
+        b"".join(parts), **back, tolerance=settings.tolerance, axis_length=settings.axis_scale
+    )
+    own = np.concatenate(lines)
+    nc.line[:] = own[nc.line - 1]
+    problems = [replace(one, nc_line=int(own[one.nc_line - 1])) for one in nc.problems if own[one.nc_line - 1] > 0]
+    return replace(nc, problems=tuple(problems))
+
+
+def program_of(nc: NcProgram, marks: bool = False) -> Program:
+    """Tool path of stretches; a comment ``RUN`` before each where marks are wanted.
+
+    Raises
+    ------
+    InputError
+        CS503 where a block is no line, or where the stretches are not begun by rapids.
+    """
+    rapid = (nc.kind == Element.RAPID) | (nc.line < 0)
+    if not rapid[:1].all() or not np.isin(nc.kind, (Element.RAPID, Element.LINE)).all():
+        raise InputError("CS503", "a block of a run is no line", "please report this with the program")
+    if nc.second_is != "vector":
+        raise InputError("CS503", "a run in points of the tool axis", "please report this with the program")
+    starts = np.flatnonzero(rapid) if marks else []
+    return Program.from_poses(
+        nc.tip,
+        nc.second,
+        kind=np.where(rapid, Move.RAPID, Move.LINEAR).astype(np.uint8),
+        feed=np.where(rapid, np.nan, nc.feed),
+        line=np.abs(nc.line),
+        statements=tuple(Statement(int(pose), 0, "PPRINT", ("RUN",), "RUN") for pose in starts),
+        units=nc.units,
+    )
+
+
+def in_places(run: Run, form: Form, spelling: Spelling) -> bytes:
+    """Blocks of a run that says distances (G91), in places and each with its feed of the run."""
+    return b"".join(_block(place, run.state.axes, form, spelling, rapid=False) for place in run.place)
+
+
+def stop_of(run: Run) -> Floats:
+    """(c,) where a run ends."""
+    end: Floats = run.place[-1]
+    return end
+
+
+def _head(form: Form, *, inch: bool) -> bytes:
+    table = form.table
+    units = table.layout.units["inch" if inch else "mm"]
+    head = next((line for line in table.program.start if "{units}" in line), "{units}")
+    lines = [head.replace("{units}", units).replace("{program}", "A")]
+    lines += [block.replace("{offset}", "1") for block in form.mode.on]
+    return "".join(f"{line}\n" for line in lines).encode()
+
+
+def _start(run: Run, form: Form, spelling: Spelling) -> bytes:
+    """Blocks that bring the machine to the start of a run and say what holds there."""
+    state, words = run.state, form.table.words.feed_mode
+    lines = [_block(run.start, state.axes, form, spelling, rapid=True)]
+    if 2 in words:
+        lines.append(words[2 if state.feed_mode == INVERSE_TIME else 0].encode() + b"\n")
+    code = b"" if form.mode.motion.line in ("L", "LN") else b"G1"
+    feed = b" F%.5f" % state.feed if state.feed_mode != INVERSE_TIME and not math.isnan(state.feed) else b""
+    if state.motion == 1.0 or feed:
+        lines.append((code or form.mode.motion.line.encode()) + feed + b"\n")
+    return b"".join(lines)
+
+
+def _block(place: Floats, axes: Sequence[str], form: Form, spelling: Spelling, *, rapid: bool) -> bytes:
+    """Block that goes to a place."""
+    look = form.mode.motion
+    words = dict(zip((*"XYZ", *_words(form, axes)), zip(place.tolist(), _decimals(place, spelling), strict=True), strict=True))
+    text = " ".join(f"{word}{value:{'+' if look.signs else ''}.{digits}f}" for word, (value, digits) in words.items())
+    return f"{look.rapid if rapid else look.line} {text}{look.rapid_end if rapid else ''}\n".encode()
+
+
+def _words(form: Form, axes: Sequence[str]) -> Sequence[str]:
+    return form.mode.words if axes[3:] == ("I", "J", "K") else axes[3:]
+
+
+def _decimals(place: Floats, spelling: Spelling) -> list[int]:
+    return [max(spelling.tip, 1)] * 3 + [max(spelling.other, 1)] * (len(place) - 3)

@@ -1,0 +1,198 @@
+"""A finished program in, the same with smooth runs out; and any two programs compared."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from itertools import islice
+
+from cornersmooth.filter.checking import Checked, Place, check, places
+from cornersmooth.filter.runs import ProgramReader, Reading, Run
+from cornersmooth.filter.spelling import SAMPLE, Spelling
+from cornersmooth.filter.writing import Job, blocks, smoothed
+from cornersmooth.nc import fit_settings
+from cornersmooth.nc.form import Form
+from cornersmooth.settings import Settings
+from cornersmooth.verdict import Verdict
+
+
+@dataclass(frozen=True)
+class Left:
+    """Cuts that stay as they are.
+
+    Parameters
+    ----------
+    reason : str
+    line : int
+        The first of them, from 1.
+    count : int
+    """
+
+    reason: str
+    line: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What became of a program.
+
+    Parameters
+    ----------
+    data : bytes
+        The new program.
+    lines, new_lines : int
+        Of the old program and of the new one.
+    cuts, smoothed, runs : int
+        Cuts of the old program, those of them in runs that were replaced, and those runs.
+    left : tuple of Left
+        Why the others stay.
+    checked : Checked or None
+        None where it was not asked for.
+    """
+
+    data: bytes
+    lines: int
+    new_lines: int
+    cuts: int
+    smoothed: int
+    runs: int
+    left: tuple[Left, ...]
+    checked: Checked | None
+
+    @property
+    def verdict(self) -> Verdict:
+        """How the program turned out."""
+        if self.checked is None:
+            return Verdict.NOT_VERIFIED
+        return Verdict.of(problems=len(self.checked.wrong))
+
+
+def filter_program(
+    data: bytes,
+    form: Form,
+    settings: Settings | None = None,
+    *,
+    tip_from_start: bool = False,
+    inch: bool = False,
+    verify: bool = True,
+    processes: int = 1,
+) -> Filtered:
+    """Smooth the cutting runs of a finished NC program.
+
+    Parameters
+    ----------
+    data : bytes
+        The program. What is not known in it is let through.
+    form : Form
+        What `cornersmooth.choose_form` gives for the control, the machine and the form of the new blocks.
+    settings : Settings, optional
+        ε 0.01 mm, H 10 mm, the proportional method.
+    tip_from_start : bool
+        Whether tool tip control is on already where the program begins.
+    inch : bool
+        Whether the program is in inches where it does not say so itself.
+    verify : bool
+        Whether both programs are read and compared. Runs that do not pass stay as they are.
+    processes : int
+
+    Raises
+    ------
+    SettingsError
+        The form cannot hold what the settings ask for.
+    """
+    settings = Settings() if settings is None else settings
+    job, old = _read(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
+    made, why = smoothed(job, old)
+    texts = {run.first: blocks(job, old, run, made[run.first]) for run in old.runs if run.first in made}
+    for run in old.runs:
+        if texts.get(run.first) == old.lines(run.first, run.stop):
+            del texts[run.first]
+            why[run.first] = "nothing in it is to be rounded"
+    while True:
+        new, where = _spliced(old, texts)
+        if not verify or not where:
+            return _result(old, new, texts, why, Checked(()) if verify else None)
+        checked = _checked(job, old, new, where)
+        bad = {place.run.first: one.text for place in where for one in checked.wrong if place.first < one.line <= place.stop}
+        if not bad:
+            return _result(old, new, texts, why, checked)
+        for first, text in bad.items():
+            del texts[first]
+            why[first] = f"verification found: {text}"
+
+
+def verify_programs(
+    old: bytes,
+    new: bytes,
+    form: Form,
+    settings: Settings | None = None,
+    *,
+    tip_from_start: bool = False,
+    inch: bool = False,
+    processes: int = 1,
+) -> Checked:
+    """Compare a program with the one that it was made from, whoever made it; parameters as of `filter_program`."""
+    settings = Settings() if settings is None else settings
+    job, before = _read(old, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
+    after = job.reader.read(new)
+    where, wrong = places(before, after)
+    if wrong:
+        return Checked(tuple(wrong))
+    return _checked(job, before, new, where)
+
+
+def _read(
+    data: bytes, form: Form, settings: Settings, *, tip_from_start: bool, inch: bool, processes: int
+) -> tuple[Job, Reading]:
+    tcp = form.orientation != "machine"
+    reader = ProgramReader(form.table.dialect, form.machine, tcp=tcp, tip_from_start=tip_from_start, inch=inch)
+    old = reader.read(data)
+    cuts = (old.line(k) for run in old.runs for k in range(run.first, run.stop))
+    spelling = Spelling.of(islice(cuts, SAMPLE), len(reader.axes))
+    if old.runs:
+        units = "inch" if old.runs[0].state.unit != 1.0 else "mm"
+        fit_settings(settings, spelling.form(form, rounding=False), units)
+    return Job(reader, form, spelling, settings, processes), old
+
+
+def _spliced(old: Reading, texts: dict[int, bytes]) -> tuple[bytes, list[Place]]:
+    """Put blocks in the places of runs."""
+    parts: list[bytes] = []
+    where: list[Place] = []
+    at, line = 0, 0
+    for run in old.runs:
+        if run.first not in texts:
+            continue
+        text = texts[run.first]
+        parts += [old.lines(at, run.first), text]
+        first = line + run.first - at
+        line = first + text.count(b"\n") + (not text.endswith(b"\n"))
+        where.append(Place(run, first, line))
+        at = run.stop
+    parts.append(old.lines(at, len(old.why)))
+    return b"".join(parts), where
+
+
+def _checked(job: Job, old: Reading, new: bytes, where: list[Place]) -> Checked:
+    after = job.reader.read(new, [place.stop for place in where])
+    return check(job, old, after, where, [after.at[place.stop] for place in where])
+
+
+def _result(
+    old: Reading, new: bytes, texts: dict[int, bytes], why: dict[int, str], checked: Checked | None
+) -> Filtered:
+    replaced = [run for run in old.runs if run.first in texts]
+    for run in old.runs:
+        if run.first in why:
+            old.why[run.first : run.stop] = old.number(why[run.first])
+    return Filtered(
+        data=new,
+        lines=len(old.why),
+        new_lines=new.count(b"\n") + (not new.endswith(b"\n")),
+        cuts=old.cuts,
+        smoothed=sum(map(len, replaced)),
+        runs=len(replaced),
+        left=tuple(Left(*one) for one in old.left()),
+        checked=checked,
+    )

@@ -1,0 +1,334 @@
+"""A program as a filter reads it: runs of plain cuts whose state is surely known, and why other cuts are left."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.filter.state import CORNER_WORDS, INVERSE_TIME, State
+from cornersmooth.filter.vocabulary import ANGLES, ANY, COMPUTED, JUMPS, NONE, VECTOR, VOCABULARIES
+from cornersmooth.kinematics import Machine
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.nc_reader.block_tables import CHUNK, LetteredLines
+from cornersmooth.nc_reader.dialects import dialect_of
+from cornersmooth.nc_reader.line_patterns import LinePatterns, lines_of
+
+#: degrees that a rotary word may change by in a cut: from half a turn on controls do not agree on the way
+_HALF_TURN: Final = 180.0
+
+#: cuts of a run, at least: one alone has no corner
+LEAST: Final = 2
+
+#: what `Reading.why` says of lines that are no cuts, and of plain cuts
+_NO_CUT, _CUT = 0, 1
+
+#: lines before the first block: they name the program
+_TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
+_WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
+_MARK: Final = b"\xef\xbb\xbf"
+
+
+@dataclass(frozen=True)
+class Run:
+    """Plain cuts that follow one another.
+
+    Parameters
+    ----------
+    first, stop : int
+        Lines, from 0; the latter excluded.
+    state : State
+        Before the first.
+    place : (n, c) float64
+        Last words of each axis (`State.axes`) at the end of each cut, in units of the program: all cuts where the
+        program says distances (G91), else the last one only.
+    low, high : (c,) float64
+        Least and largest of them, start included.
+    feed : float
+        As written, of the last.
+    """
+
+    first: int
+    stop: int
+    state: State
+    place: Floats
+    low: Floats
+    high: Floats
+    feed: float
+
+    def __len__(self) -> int:
+        return self.stop - self.first
+
+    @property
+    def start(self) -> Floats:
+        """(c,) where the machine is before the run."""
+        return np.array([self.state.place[letter] for letter in self.state.axes])
+
+
+@dataclass
+class Reading:
+    """What was read.
+
+    Parameters
+    ----------
+    data : bytes
+    start : (l + 1,) int64
+        First byte of each line, and the end.
+    runs : list of Run
+    why : (l,) uint16
+        For each line 0 where it is no cut, 1 for a plain cut, else 2 plus the number of the reason in `reasons`.
+    reasons : list of str
+    state : State
+        At the end.
+    at : dict of int to State
+        Before the lines that were asked for.
+    """
+
+    data: bytes
+    start: Ints
+    state: State
+    runs: list[Run] = field(default_factory=list)
+    why: NDArray[np.uint16] = field(init=False)
+    reasons: list[str] = field(default_factory=list)
+    at: dict[int, State] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.why = np.zeros(len(self.start) - 1, np.uint16)
+
+    def line(self, number: int) -> bytes:
+        """Bytes of a line, its end included."""
+        return self.lines(number, number + 1)
+
+    def lines(self, first: int, stop: int) -> bytes:
+        """Bytes of lines that follow one another."""
+        return self.data[int(self.start[first]) : int(self.start[stop])]
+
+    def left(self) -> list[tuple[str, int, int]]:
+        """Why cuts are left, with the first line, from 1, and their number."""
+        found = Counter(self.why[self.why > _CUT].tolist())
+        return [(self.reasons[k - 2], int(np.argmax(self.why == k)) + 1, n) for k, n in found.most_common()]
+
+    @property
+    def cuts(self) -> int:
+        """Cuts, plain or not."""
+        return int((self.why > _NO_CUT).sum())
+
+    def number(self, reason: str) -> int:
+        """Value of `why` for a reason."""
+        if reason not in self.reasons:
+            self.reasons.append(reason)
+        return 2 + self.reasons.index(reason)
+
+
+class ProgramReader:
+    """Reads programs of one control and machine.
+
+    Parameters
+    ----------
+    control : str
+    machine : Machine or None
+        That the rotary words are for; None for tool vectors.
+    tcp : bool
+        False where X Y Z are the machine's own axes.
+    tip_from_start : bool
+        Whether tool tip control is on already where the program begins.
+    inch : bool
+        Units where the program says none.
+    """
+
+    def __init__(
+        self,
+        control: str,
+        machine: Machine | None,
+        *,
+        tcp: bool = True,
+        tip_from_start: bool = False,
+        inch: bool = False,
+    ) -> None:
+        names = ("I", "J", "K") if machine is None else machine.names
+        self.axes = ("X", "Y", "Z", *names)
+        self.wanted = NONE if not tcp else VECTOR if machine is None else ANGLES if names else ANY
+        self.lexer = dialect_of(control, "" if machine is None else "".join(names)).lexer
+        self._weak_feed = "F" in self.lexer.points  # in inches a feed without a point may count otherwise
+        self.lexer.points = self.lexer.points - {"F"}
+        self._first = State(VOCABULARIES[control], self.axes, unit=25.4 if inch else 1.0)
+        if tip_from_start:
+            self._first.tip = self.wanted
+
+    def read(self, data: bytes, stops: Iterable[int] = ()) -> Reading:
+        """Read a program, whatever it is; remember the state before some lines."""
+        start = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n")) + 1
+        start = np.unique(np.concatenate(([0], start, [len(data)]))).astype(np.int64)
+        found = Reading(data, start, self._first.copy())
+        patterns = LinePatterns(self.lexer)
+        targets, corners = _targets(found), _near(_lines_with(CORNER_WORDS, found), len(found.why))
+        first, started = _begin(found), False
+        asked = np.array(sorted(set(stops)), np.int64)
+        while first < len(found.why):
+            stop = min(max(int(np.searchsorted(start, start[first] + CHUNK)), first + 1), len(found.why))
+            while stop < len(found.why) and found.line(stop - 1).rstrip().endswith(b"~"):
+                stop += 1
+            for item in self._items(found, first, stop, targets, patterns):
+                if isinstance(item[1], bytes):
+                    block = self.lexer.comment.sub("", item[1].decode("latin-1")).strip()
+                    if block and (started or not _TITLE.fullmatch(block)):
+                        started = True
+                        self._take_line(found, item[0], item[1], known=item[0] not in targets)
+                else:
+                    started = True
+                    self._take_rows(found, item[0], item[1], corners, asked)
+                if isinstance(item[1], bytes) and len(asked) and item[0] + 1 in asked:
+                    found.at[item[0] + 1] = found.state.copy()
+            first = stop
+        return found
+
+    def _items(
+        self, found: Reading, first: int, stop: int, targets: set[int], patterns: LinePatterns
+    ) -> Iterator[tuple[int, bytes] | tuple[int, dict[str, Floats]]]:
+        """Lines in order: the first of some motion blocks with their columns, and other lines as they are."""
+        chunk = found.lines(first, stop).removeprefix(_MARK if first == 0 else b"")
+        chunk = chunk if chunk.endswith(b"\n") else chunk + b"\n"
+        text = self.lexer.unfolded(chunk)
+        lines = lines_of(text, patterns) or LetteredLines(text, self.lexer)
+        bulk = lines.bulk().copy()
+        bulk[[number - first for number in targets if first <= number < stop]] = False
+        if b"~" in chunk:
+            bulk[[k for k in range(stop - first) if b"~" in found.line(first + k)]] = False
+        ends = np.concatenate(([0], np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1))
+        edges = np.flatnonzero(np.diff(bulk, prepend=~bulk[0], append=~bulk[-1]))
+        for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            columns = lines.columns(np.arange(a, b)) if bulk[a] else None
+            if columns is not None:
+                yield first + a, columns
+                continue
+            for k in range(a, b):
+                yield first + k, text[int(ends[k]) : int(ends[k + 1])]
+
+    def _take_line(self, found: Reading, number: int, text: bytes, *, known: bool) -> None:
+        """Take a line that is no plain motion block."""
+        if not known:  # who jumps here may come from anywhere
+            found.state.lose_all()
+        why = found.state.take(text, self.lexer)
+        if why:
+            found.why[number] = found.number(found.state.why_not(self.wanted) or why)
+
+    def _take_rows(
+        self, found: Reading, first: int, columns: dict[str, Floats], corners: Bools, asked: Ints
+    ) -> None:
+        """Take motion blocks; note the runs among them."""
+        state, count = found.state, len(next(iter(columns.values())))
+        blank = np.full(count, np.nan)
+        code, _ = _filled(columns.get("G", blank), state.motion)
+        feed, _ = _filled(columns.get("F", blank), state.feed)
+        text = found.lines(first, first + count)
+        if state.feed_mode == INVERSE_TIME:
+            feed = columns.get("F", blank)
+        elif self._weak_feed and state.unit != 1.0 and _WEAK_FEED.search(text):
+            feed = blank
+        arc = (code == 2.0) | (code == 3.0)
+        odd = np.zeros(count, np.bool_)
+        for name in columns.keys() - {"G", "F", *self.axes}:
+            odd |= ~np.isnan(columns[name])
+        lost = (odd & ~arc) | ~(arc | (code == 0.0) | (code == 1.0))
+        place, said = np.empty((count + 1, len(self.axes))), np.zeros(count, np.bool_)
+        for k, letter in enumerate(self.axes):
+            words = columns.get(letter, blank)
+            words = np.where(arc, np.nan, words) if letter in "IJK" else words
+            said |= ~np.isnan(words)
+            place[0, k] = state.place[letter]
+            place[1:, k] = self._places(words, state, letter, lost)
+        cut = (code == 1.0) & said
+        plain = cut & ~odd & np.isfinite(place[1:]).all(axis=1) & np.isfinite(place[:-1]).all(axis=1)
+        why = np.where(cut, found.number("the place before or after it is not known"), _NO_CUT).astype(np.uint16)
+        why[plain & ~np.isfinite(feed)] = found.number("its feed is not known")
+        plain &= np.isfinite(feed) & (feed > 0.0)
+        moved = np.abs(np.diff(place, axis=0))
+        still = plain & ~(moved[:, :3] > 0.0).any(axis=1)
+        why[still] = found.number("the tip stays where it is")
+        wide = plain & (moved[:, 3:] >= _HALF_TURN).any(axis=1) & (self.wanted != VECTOR)
+        why[wide] = found.number("a rotary axis turns by half a turn or more in it")
+        shaped = plain & corners[first : first + count]
+        why[shaped] = found.number("the program rounds its corner by words of its own")
+        if (arc & (said | odd)).any():
+            why[arc] = found.number("an arc")
+        plain &= ~(still | wide | shaped)
+        reason = state.why_not(self.wanted)
+        if reason:
+            why[cut | arc] = found.number(reason)
+            plain[:] = False
+        edges = np.flatnonzero(np.diff(plain, prepend=False, append=False))
+        for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            if b - a < LEAST:
+                why[a:b] = found.number("a single cut between other blocks: it has no corner")
+                continue
+            why[a:b] = _CUT
+            begin = state.after(place[a], code[a - 1], feed[a - 1]) if a else state.copy()
+            own = place[a : b + 1]
+            kept = own[1:] if not state.absolute else own[-1:]
+            run = Run(first + a, first + b, begin, kept.copy(), own.min(axis=0), own.max(axis=0), float(feed[b - 1]))
+            found.runs.append(run)
+        found.why[first : first + count] = why
+        for stop in asked[np.searchsorted(asked, first + 1) : np.searchsorted(asked, first + count, side="right")].tolist():
+            k = stop - first
+            found.at[stop] = state.after(place[k], code[k - 1], feed[k - 1])
+        found.state = state.after(place[-1], code[-1], feed[-1])
+
+    def _places(self, words: Floats, state: State, letter: str, lost: Bools) -> Floats:
+        """(n,) where an axis is after each block."""
+        if state.absolute is None:
+            lost = lost | ~np.isnan(words)
+        if state.absolute is False and letter not in "IJK":
+            known = np.where(np.logical_or.accumulate(lost), np.nan, 0.0)
+            return state.place[letter] + np.cumsum(np.nan_to_num(words)) + known
+        value, last = _filled(np.where(lost, np.nan, words), state.place[letter])
+        gone = np.maximum.accumulate(np.where(lost, np.arange(len(words)), -1))
+        return np.where((gone >= 0) & (gone >= last), np.nan, value)
+
+
+def _filled(values: Floats, before: float) -> tuple[Floats, Ints]:
+    """Give what was said last in each row, and in which row, -1 for before."""
+    last = np.maximum.accumulate(np.where(np.isnan(values), -1, np.arange(len(values))))
+    return np.where(last < 0, before, values[last]), last
+
+
+def _lines_with(pattern: re.Pattern[bytes], found: Reading) -> Ints:
+    """Lines in which something occurs."""
+    at = np.array([match.end() - 1 for match in pattern.finditer(found.data)], np.int64)
+    return np.unique(np.searchsorted(found.start, at, side="right") - 1)
+
+
+def _near(lines: Ints, count: int) -> Bools:
+    """(count,) whether a line, or the one before or after it, is one of some."""
+    near = np.zeros(count + 2, np.bool_)
+    for step in (0, 1, 2):
+        near[lines + step] = True
+    return near[1:-1]
+
+
+def _targets(found: Reading) -> set[int]:
+    """Lines to which the program may jump: those of all numbers that stand beside jumps."""
+    jumps = [match[0] for match in JUMPS.finditer(found.data)]
+    if not jumps:
+        return set()
+    numbers = {int(word) for jump in jumps for word in re.findall(rb"\d{1,9}", jump)}
+    if COMPUTED.search(b"\n".join(jumps)):
+        pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*\d+")
+    else:
+        some = b"|".join(b"0*%d" % number for number in sorted(numbers)) or rb"(?!)"
+        pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*(?:%b)(?!\d)" % some)
+    return set(_lines_with(pattern, found).tolist())
+
+
+def _begin(found: Reading) -> int:
+    """Line from which on the program is executed: that of the first ``%``, if a listing stands before it."""
+    for match in re.finditer(rb"(?m)^[ \t]*%[ \t]*\r?$", found.data):
+        before, behind = found.data[: match.start()], found.data[match.end() :]
+        if behind.strip() and not re.search(rb"(?i)\bM(?:0?2|30)\b|^[ \t]*(?:N\d+[ \t]*)?G\d", before, re.MULTILINE):
+            return int(np.searchsorted(found.start, match.start(), side="right")) - 1
+        break
+    return 0

@@ -1,0 +1,320 @@
+"""What is surely known of a control between two blocks of a program: NaN and None stand for what is not."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Final
+
+from cornersmooth.errors import InputError
+from cornersmooth.filter.vocabulary import ANGLES, BOTH, NONE, VECTOR, Does, Vocabulary
+from cornersmooth.nc_reader.lexer import Lexer
+from cornersmooth.nc_reader.words import Line, Word
+
+#: feed modes by their G word
+PER_MINUTE, INVERSE_TIME, PER_REVOLUTION = 94, 93, 95
+
+#: G words of units, with millimetres per unit
+_UNITS: Final = {20.0: 25.4, 21.0: 1.0, 70.0: 25.4, 71.0: 1.0, 700.0: 25.4, 710.0: 1.0}
+
+#: words beside an end that shape the corner there: it belongs to the blocks on both sides
+CORNER_WORDS: Final = re.compile(rb"(?i),\s*[RC]\s*[\d.]|\b(?:RNDM?|CHF|CHR|FRCM?)\b")
+
+_ASSIGNMENT: Final = re.compile(r"\s*(#|Q[LRS]?\d+\s*=|[A-Z_]\w*(\[[^]]*\])?\s*=(?!=)|DEF\s|FN ?[0-8] ?:)")
+#: a word whose number is worked out by the control
+_WORKED_OUT: Final = re.compile(
+    r"([A-Z]+\d*)\s*=?\s*[-+]?(?:#(?:<[^>]*>|\d+|\[[^]]*\])|\[[^]]*\]|Q[LRS]?\d+|"
+    r"(?<==)(?:AC|IC|DC|ACP|ACN)\([^()]*\)|(?<==)[A-Z_$][^\s]*)"
+)
+
+
+@dataclass
+class State:
+    """What holds between two blocks.
+
+    Parameters
+    ----------
+    vocabulary : Vocabulary
+    axes : tuple of str
+        Letters of X Y Z and of the words of the tool axis, as the lexer names them.
+    place : dict of str to float
+        Last word of each, in units of the program; where the machine is, if that is known.
+    motion : float
+        0 to 3.
+    absolute : bool or None
+    unit : float, mm
+    feed : float
+        As written.
+    feed_mode : int or None
+    tip : str or None
+        Kind of tool tip control.
+    even : bool
+        Whether words of the tool axis run as they are by themselves: angles evenly, vectors on the great circle.
+    compensated : bool or None
+        Whether the radius of the cutter is taken account of.
+    frames : frozenset of str
+        Words that turn or scale the places of the part.
+    offset : str
+        Work offset in force.
+    rounding : str
+        Words that say how exactly corners are passed.
+    """
+
+    vocabulary: Vocabulary
+    axes: tuple[str, ...]
+    place: dict[str, float] = field(default_factory=dict)
+    motion: float = math.nan
+    absolute: bool | None = True
+    unit: float = 1.0
+    feed: float = math.nan
+    feed_mode: int | None = PER_MINUTE
+    tip: str | None = NONE
+    even: bool = True
+    compensated: bool | None = False
+    frames: frozenset[str] = frozenset()
+    offset: str = ""
+    rounding: str = ""
+
+    def __post_init__(self) -> None:
+        self.place = self.place or dict.fromkeys(self.axes, math.nan)
+
+    def copy(self) -> State:
+        """Return the same state, to be changed on its own."""
+        return replace(self, place=dict(self.place))
+
+    def after(self, place: Iterable[float], motion: float, feed: float) -> State:
+        """Return the state after motion blocks that change nothing else."""
+        places = dict(zip(self.axes, map(float, place), strict=True))
+        return replace(self, place=places, motion=float(motion), feed=float(feed))
+
+    def lose_place(self, letters: Iterable[str] | None = None) -> None:
+        """Take the places of some axes, or of all, as unknown."""
+        for letter in self.axes if letters is None else letters:
+            if letter in self.place:
+                self.place[letter] = math.nan
+
+    def lose_all(self) -> None:
+        """Take all as unknown."""
+        self.lose_place()
+        self.motion = self.feed = self.unit = math.nan
+        self.absolute = self.feed_mode = self.tip = self.compensated = None
+        self.offset = self.rounding = ""
+
+    def or_not(self, other: State) -> None:
+        """Take as unknown what another state, which may hold instead, has not the same."""
+        for name in (one.name for one in fields(State)):
+            mine, theirs = getattr(self, name), getattr(other, name)
+            if name == "place":
+                self.place = {k: v if v == theirs[k] else math.nan for k, v in mine.items()}
+            elif name == "frames":
+                self.frames = mine | theirs
+            elif mine != theirs and name not in ("vocabulary", "axes"):
+                lost: Any = math.nan if isinstance(mine, float) else "" if name in ("offset", "rounding") else None
+                setattr(self, name, bool(mine and theirs) if name == "even" else lost)
+
+    def why_not(self, wanted: str) -> str:
+        """Say why cuts in this state are left as they are; empty where they need not be.
+
+        Parameters
+        ----------
+        wanted : str
+            Kind of tool tip control that must be on; `NONE` where it must be off, ``"any"`` where it is of no account.
+        """
+        if self.frames:
+            return f"places of the part are turned, scaled or called by a macro ({', '.join(sorted(self.frames))})"
+        if self.tip is None:
+            return "it is not known whether tool tip control is on"
+        if wanted == NONE and self.tip != NONE:
+            return "tool tip control is on, and --no-tcp says that it is not"
+        if wanted in (ANGLES, VECTOR) and self.tip not in (wanted, BOTH):
+            off = self.tip == NONE
+            return "tool tip control is off" if off else f"tool tip control is for {self.tip}, not for {wanted}"
+        if not self.even and wanted in (ANGLES, VECTOR):
+            return f"the control turns the tool by a law of its own between {wanted}"
+        if self.compensated is not False:
+            return "the radius of the cutter is taken account of, or that is not known"
+        if self.absolute is None or math.isnan(self.unit) or self.feed_mode is None:
+            return "units, distances (G90, G91) or the kind of feed are not known"
+        return "feed per revolution (G95)" if self.feed_mode == PER_REVOLUTION else ""
+
+    def take(self, text: bytes, lexer: Lexer) -> str:
+        """Take a line that is no plain motion block; say why it is left where it cuts, else nothing."""
+        try:
+            line = lexer.line(text, 0, None)
+        except InputError:
+            return self._take_unread(text, lexer)
+        if not line.skipped:
+            return self._take_line(line)
+        before = self.copy()
+        why = self._take_line(line)
+        self.or_not(before)
+        return "the operator may skip the block" if why else ""
+
+    def _take_line(self, line: Line) -> str:
+        words = line.words
+        if line.tape:
+            self.lose_all()
+        elif words and words[0].name == "block":
+            self._take_block(words[0].text.upper())
+        elif words and (words[0].name == "O" or (len(words) == 1 and words[0].name not in "GMTSFDH" and len(words[0].name) == 1 and words[0].name not in self.axes)):
+            self.lose_all()
+        elif words:
+            return self._take_words(words)
+        return ""
+
+    def _take_words(self, words: Iterable[Word]) -> str:
+        done: set[Does] = set()
+        given: dict[str, float] = {}
+        names = {word.name for word in words}
+        for word in words:
+            if word.name in ("G", "M"):
+                done |= self._code(word)
+            elif len(word.name) > 1 and not self._spelt(word):
+                done |= self._do(word.name + ("()" if re.search(r"\(\s*\)", word.text) else ""), "(" in word.text)
+            elif word.name in "DTH=" and len(word.name) == 1:
+                does = self.vocabulary.does(word.name)
+                done |= {does} if does is not Does.ALL else {Does.LENGTH} if word.name in "DH" else set()
+            else:
+                given[word.name] = word.value
+        if self.rounding.startswith("G64") and {"P", "Q"} & names and "G" in names:
+            self.rounding = " ".join(word.text for word in words if word.name in "PQ" or word.text[1:] in ("64", "64.0"))
+        if "L" in names or "LN" in names:  # Klartext says anew in each block what it is
+            self.motion = 0.0 if "RAPID" in names else 1.0
+        return self._move(given, done, names)
+
+    def _spelt(self, word: Word) -> bool:
+        """Whether a word of several letters is a part of a motion block of Klartext."""
+        return word.name in ("RAPID", "LN", "side", "turn", "circle", "centre") or word.name.startswith(("centre ", "DC "))
+
+    def _move(self, given: Mapping[str, float], done: set[Does], names: set[str]) -> str:
+        """Take the places and the feed of a block, after what its other words do."""
+        axes = [letter for letter in self.axes if letter in given]
+        if done & {Does.DWELL}:
+            return ""
+        if "F" in given:
+            self.feed = given["F"]
+        if Does.ALL in done:
+            self.lose_all()
+        if Does.MACHINE in done:
+            self.lose_place(axes or None)
+        elif done & {Does.PLACE, Does.CHANGE, Does.FRAME, Does.LEVEL, Does.MOVE} or "=" in names:
+            self.lose_place()
+        elif "centre" not in names:
+            if done & {Does.LENGTH, Does.OFFSET}:
+                self.lose_place(None if Does.OFFSET in done else "XYZ")
+            on_arc = self.motion in (2.0, 3.0)
+            for letter in axes:
+                if not (on_arc and letter in "IJK"):
+                    self._go(letter, given[letter])
+        if names & {"U", "V", "W", "circle"} or any(name.startswith("DC ") for name in names):
+            self.lose_place()
+        foreign = (set("ABC") & given.keys()) - set(self.axes)
+        if foreign and "I" not in self.axes:
+            self.frames |= {f"axis {letter}, which the machine has not" for letter in foreign}
+        if "side" in names:
+            self.compensated = given.get("side", 40.0) != 40.0
+        cuts = bool(axes) and self.motion in (1.0, 2.0, 3.0) and not done & {Does.MACHINE}
+        return "other words in the block" if cuts else ""
+
+    def _go(self, letter: str, value: float) -> None:
+        if self.absolute is None:
+            self.place[letter] = math.nan
+        else:
+            self.place[letter] = value + (0.0 if self.absolute else self.place[letter])
+
+    def _code(self, word: Word) -> set[Does]:
+        """Take a G or M word; return what it does beside changing the state."""
+        value, name = word.value, f"{word.name}{word.value:g}"
+        if word.name == "G" and value in (0.0, 1.0, 2.0, 3.0):
+            self.motion = value
+        elif word.name == "G" and value in _UNITS and not (value in (70.0, 71.0) and "TRAORI" not in self.vocabulary.tip_control):
+            if self.unit != _UNITS[value]:
+                self.feed = math.nan
+                self.lose_place("XYZ")
+            self.unit = _UNITS[value]
+        elif name in ("G90", "G91"):
+            self.absolute = name == "G90"
+        elif name in ("G93", "G94", "G95"):
+            self.feed = self.feed if self.feed_mode == int(value) else math.nan
+            self.feed_mode = int(value)
+        elif name in ("G40", "G41", "G42", "G41.1", "G42.1"):
+            self.compensated = name != "G40"
+        elif word.name == "G" and re.fullmatch(self.vocabulary.offsets, name):
+            same, self.offset = name == self.offset and name != "G154" and "." not in name, name
+            return set() if same else {Does.OFFSET}
+        elif re.fullmatch(r"G6(0|1|4)(\.\d)?", name):
+            self.rounding = word.text.replace(" ", "")
+        elif name == "M136" or name == "M137":
+            self.feed_mode = PER_REVOLUTION if name == "M136" else PER_MINUTE
+        else:
+            return self._do(name, False)
+        return set()
+
+    def _do(self, name: str, with_arguments: bool) -> set[Does]:
+        """Do what a word says, by the vocabulary."""
+        words = self.vocabulary
+        if name in ("ROT", "SCALE", "MIRROR", "TRANS") and not with_arguments:
+            name = "ROT0" if "TRAORI" in words.tip_control else name
+        if name.startswith("ORI"):
+            kind = {"ORIVECT": VECTOR, "ORIPLANE": VECTOR, "ORIWKS": VECTOR, "ORIAXES": ANGLES, "ORIMKS": ANGLES}
+            wanted = VECTOR if "I" in self.axes else ANGLES
+            self.even = kind.get(name, "") == wanted
+        does = words.does(name)
+        if name in words.tip_control:
+            self.tip = words.tip_control[name]
+            does = Does.LENGTH if does in (Does.LENGTH,) else Does.PLACE
+        if does is Does.CHANGE and not words.change_keeps_tip and name not in words.tip_control:
+            self.tip = None
+        if does is Does.FRAME:
+            self.frames |= {name}
+        elif does is Does.LEVEL:
+            ended = words.ends_frame.get(name, ".*")
+            self.frames = frozenset(one for one in self.frames if not re.fullmatch(ended, one))
+        elif does is Does.MOVE:
+            self.motion = math.nan
+        return set() if does is Does.NOTHING else {does}
+
+    def _take_block(self, text: str) -> None:
+        """Take a whole block of Klartext."""
+        if text.startswith("BEGIN PGM"):
+            self.unit, self.absolute = 25.4 if text.endswith("INCH") else 1.0, True
+        elif text.startswith("FUNCTION RESET TCPM"):
+            self.tip = NONE
+            self.lose_place()
+        elif text.startswith("FUNCTION TCPM"):
+            law = VECTOR if "PATHCTRL VECTOR" in text else ANGLES if "PATHCTRL AXIS" in text else None
+            plain = "F TCP" in text and "AXIS POS" in text and "REFPNT" not in text.replace("REFPNT TIP-TIP", "")
+            self.tip = law if plain else None
+            self.lose_place()
+        else:
+            done = self._do(text, False)
+            if Does.ALL in done:
+                self.lose_all()
+            elif done - {Does.DWELL}:
+                self.lose_place()
+
+    def _take_unread(self, text: bytes, lexer: Lexer) -> str:
+        """Take a line that is not made of words alone: variables, jumps, what nobody knows."""
+        plain = lexer.comment.sub(" ", text.decode("latin-1").upper()).strip()
+        plain = re.sub(r"^/?\d?\s*(N?\d+\s+|N\d+)?\s*", "", plain)
+        if _ASSIGNMENT.match(plain) and not plain.startswith("$") and "FRAME" not in plain:
+            self.lose_place()
+            return ""
+        lost = [match[1] for match in _WORKED_OUT.finditer(plain)]
+        rest = _WORKED_OUT.sub(" ", plain)
+        try:
+            line = lexer.line(rest.encode("latin-1"), 0, None) if lost else None
+        except InputError:
+            line = None
+        if line is None or {"G", "M"} & set(lost) or (line.words and line.words[0].name == "block"):
+            self.lose_all()
+            return ""
+        before = self.motion
+        self._take_line(line)
+        self.motion = self.motion if line.words else before
+        self.lose_place(self.axes if set(lost) - {*"XYZABCFSQRP"} - set(self.axes) else lost)
+        if "F" in lost:
+            self.feed = math.nan
+        return "words that the control works out" if self.motion in (1.0, 2.0, 3.0) else ""
