@@ -298,7 +298,8 @@ class Rotary:
         pole = self.pole_room(vector)
         off = 2 * step + np.where(still, self.axis_length * (turn_step + pole[1:] + pole[:-1]), 0.0)
         room = np.maximum(rate * off, _F_STEP * way)
-        either = ~still & (length < self.tolerance) & (swing > self.tolerance)
+        printed = 2 * step + self.axis_length * turn_step  # who timed the block knew its length before it was rounded
+        either = ~still & (length < self.tolerance + printed) & (swing > self.tolerance - printed)
         room[either] += (rate * (swing - length))[either]
         way[either] = swing[either]
         if not self.tip_control:
