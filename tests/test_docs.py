@@ -132,7 +132,9 @@ def execute(line: str, folder: Path) -> None:
         subprocess.run(["bash", "-c", line], cwd=folder, env=os.environ | around, check=True, capture_output=True)
         return
     _, command, *words = shlex.split(line)
-    with_force = command in ("smooth", "verify", "time", "surface") and "--help" not in words and "-h" not in words
+    with_force = (
+        command in ("smooth", "filter", "verify", "time", "surface") and "--help" not in words and "-h" not in words
+    )
     mill = 'like = "table-ac"\n'
     (folder / "mill.toml").write_text(mill)
     (folder / "mine.toml").write_text(mill if command == "machines" else 'like = "siemens"\n')

@@ -15,6 +15,7 @@ Step by step, with the numbers in between; the form says which digits the contro
     found = cornersmooth.verify(program, "part.nc", tolerance=0.04)
 
 - `sample` gives points on the smoothed path, `corner_table` its corners, `report` the whole story as a dictionary
+- `filter_program` smooths the runs of a finished NC program
 - `plan` and `direct` say how long a machine takes for the smoothed and the original path, `compare` both
 - `choose_form`, `load_control` and `load_machine` take names or TOML files; `Frame` holds what stands around the motion
 - `CornersmoothError` is what everything here raises; its text says where, what, and what to do
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from cornersmooth.cl import read
     from cornersmooth.errors import CornersmoothError, Finding, VerdictError
     from cornersmooth.feedrate import Limits, TimeLaw, compare, direct, plan
+    from cornersmooth.filter import filter_program
     from cornersmooth.kinematics import load_machine
     from cornersmooth.model import Corners, Program, SmoothProgram, Statement
     from cornersmooth.nc import Frame, choose_form, fit_settings, load_control, write
@@ -68,6 +70,7 @@ _HOME = {
     "compare": "feedrate",
     "corner_table": "report.corners",
     "direct": "feedrate",
+    "filter_program": "filter",
     "fit_settings": "nc",
     "from_poses": "model",
     "load_control": "nc",
@@ -102,6 +105,7 @@ __all__ = [
     "compare",
     "corner_table",
     "direct",
+    "filter_program",
     "fit_settings",
     "from_poses",
     "load_control",

@@ -17,6 +17,7 @@ from cornersmooth.cli.ending import Ending
 #: name of each command, its module and its line in the list of commands
 COMMANDS = {
     "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC text."),
+    "filter": ("cornersmooth.cli.filter", "Smooth the cutting runs of a finished NC program."),
     "verify": ("cornersmooth.cli.verify", "Measure NC text against the CL file it was made from."),
     "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
     "surface": ("cornersmooth.cli.surface", "Measure what the NC text leaves of the surface of the CL file."),

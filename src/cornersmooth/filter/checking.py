@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -13,12 +15,14 @@ from cornersmooth.filter.motion import Stretch, motion, program_of
 from cornersmooth.filter.runs import Reading, Run
 from cornersmooth.filter.state import State
 from cornersmooth.filter.writing import Job
+from cornersmooth.model import Floats
 from cornersmooth.verify import Verification, verify
-from cornersmooth.verify.motions import written_motion
-from cornersmooth.verify.passage import passage
 
-#: share of ε by which `nc_reader` may leave the motion in rotary words
-_RESOLVED = 5e-3
+#: words that are the same number, and directions that are the same in six digits
+_SAME, _SAME_DIRECTION = 1e-9, 2e-6
+
+#: the last block of a run in distances
+_DISTANCES: Final = re.compile(rb"G91(?=[ \t]*\r?\n?\Z)")
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,6 @@ class Checked:
 def places(old: Reading, new: Reading) -> tuple[list[Place], list[Wrong]]:
     """Find the runs of a program in another one, between lines that must be the same."""
     found: list[Place] = []
-    line_of = lambda at: int(np.searchsorted(new.start, at))  # noqa: E731 - used here only
     at, behind = 0, 0
     for k, run in enumerate(old.runs):
         before = old.lines(behind, run.first)
@@ -75,13 +78,20 @@ def places(old: Reading, new: Reading) -> tuple[list[Place], list[Wrong]]:
         after = old.lines(run.stop, stop)
         end = _found(new, after, at, last=k + 1 == len(old.runs))
         if end is None:
-            return found, [Wrong(line_of(at) + 1, f"the lines after line {run.stop} of the old program are not there")]
+            return found, [
+                Wrong(_line(new, at) + 1, f"the lines after line {run.stop} of the old program are not there")
+            ]
         if new.data[at:end] != old.lines(run.first, run.stop):
-            found.append(Place(run, line_of(at), line_of(end)))
+            found.append(Place(run, _line(new, at), _line(new, end)))
         at, behind = end, run.stop
     if new.data[at:] != old.lines(behind, len(old.why)):
         return found, [_first_other(old, new, behind, at)]
     return found, []
+
+
+def _line(new: Reading, at: int) -> int:
+    """Line that begins at a byte."""
+    return int(np.searchsorted(new.start, at))
 
 
 def _found(new: Reading, text: bytes, at: int, *, last: bool) -> int | None:
@@ -97,7 +107,7 @@ def _found(new: Reading, text: bytes, at: int, *, last: bool) -> int | None:
 
 def _first_other(old: Reading, new: Reading, line: int, at: int) -> Wrong:
     """Say which line outside of runs is another one."""
-    mine = int(np.searchsorted(new.start, at))
+    mine = _line(new, at)
     for step in range(len(old.why) - line):
         if mine + step >= len(new.why) or old.line(line + step) != new.line(mine + step):
             return Wrong(mine + step + 1, f"line {line + step + 1} of the old program, outside of runs, is another one")
@@ -119,22 +129,22 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place], states: 
         except CornersmoothError as error:
             wrong.append(Wrong(error.line or own[0].first + 1, error.what))
             continue
-        wrong += [Wrong(problem.nc_line, problem.text) for problem in found[0].problems] + found[1]
-        largest = [max(pair) for pair in zip(largest, (found[0].tip.value, found[0].axis_point.value), strict=True)]
+        wrong += [Wrong(problem.nc_line, problem.text) for problem in found.problems]
+        largest = [max(pair) for pair in zip(largest, (found.tip.value, found.axis_point.value), strict=True)]
     return Checked(tuple(sorted(wrong, key=lambda one: one.line)), *largest)
 
 
-def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[Verification, list[Wrong]]:
+def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Verification:
     """Measure runs with the same units."""
     settings = job.settings
-    before = motion([job.stretch(old, place.run) for place in where], job.form, job.spelling, settings)
+    before = motion([job.stretch(old, place.run) for place in where], job.own, job.spelling, settings)
     after = motion(
-        [Stretch(place.run, new.lines(place.first, place.stop), place.first + 1) for place in where],
+        [Stretch(place.run, _absolute(new.lines(place.first, place.stop)), place.first + 1) for place in where],
         job.form,
         job.spelling,
         settings,
     )
-    found = verify(
+    return verify(
         program_of(before),
         after,
         tolerance=settings.tolerance,
@@ -143,13 +153,22 @@ def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tu
         words=False,
         processes=job.processes,
     )
-    return found, []
+
+
+def _absolute(text: bytes) -> bytes:
+    """Blocks of a run without the word that says distances again behind it."""
+    return _DISTANCES.sub(b"", text)
 
 
 def _left_otherwise(run: Run, state: State) -> str:
     """Say what holds after the blocks of a run that does not after the run; empty where all is the same."""
     place = [state.place[letter] for letter in state.axes]
-    if not np.allclose(place, run.place[-1], rtol=0.0, atol=1e-9):
+    there, wanted = np.array(place), run.place[-1]
+    if state.axes[3:] == ("I", "J", "K"):  # only the direction counts, in its printed digits
+        there = np.append(there[:3], _unit(there[3:]))
+        wanted = np.append(wanted[:3], _unit(wanted[3:]))
+    room = np.where(np.arange(len(there)) < 3, _SAME, _SAME_DIRECTION if len(there) > 5 else _SAME)
+    if not (np.abs(there - wanted) <= room).all():
         return f"the run ends at {_told(state.axes, place)}, not at {_told(state.axes, run.place[-1].tolist())}"
     mine = (state.absolute, state.feed_mode, state.unit, state.motion)
     theirs = (run.state.absolute, run.state.feed_mode, run.state.unit, 1.0)
@@ -158,6 +177,11 @@ def _left_otherwise(run: Run, state: State) -> str:
     if run.state.feed_mode == 94 and not math.isclose(state.feed, run.feed, rel_tol=1e-9):
         return f"the feed after the run is {state.feed:g}, not {run.feed:g}"
     return ""
+
+
+def _unit(vector: Floats) -> Floats:
+    unit: Floats = vector / np.linalg.norm(vector)
+    return unit
 
 
 def _told(axes: Sequence[str], place: Sequence[float]) -> str:

@@ -1,4 +1,4 @@
-"""What a control does in runs: their own bytes, behind a head that says the state they begin in, read by `nc_reader`."""
+"""What a control does in runs: their bytes, after a head that says the state they begin in, read by `nc_reader`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cornersmooth.errors import InputError
 from cornersmooth.filter.runs import Run
 from cornersmooth.filter.spelling import Spelling
 from cornersmooth.filter.state import INVERSE_TIME
-from cornersmooth.model import Floats, Ints, Move, Program, Statement
+from cornersmooth.model import Floats, Move, Program, Statement
 from cornersmooth.nc.form import Form
 from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
@@ -62,9 +62,7 @@ def motion(stretches: Sequence[Stretch], form: Form, spelling: Spelling, setting
         first = np.full(start.count(b"\n"), -stretch.line, np.int64)
         lines += [first, stretch.line + np.arange(text.count(b"\n"))]
     back = {name: value for name, value in reading_back(form).items() if name != "trusted"}
-    nc = read_nc(
-        b"".join(parts), **back, tolerance=settings.tolerance, axis_length=settings.axis_scale
-    )
+    nc = read_nc(b"".join(parts), **back, tolerance=settings.tolerance, axis_length=settings.axis_scale)
     own = np.concatenate(lines)
     nc.line[:] = own[nc.line - 1]
     problems = [replace(one, nc_line=int(own[one.nc_line - 1])) for one in nc.problems if own[one.nc_line - 1] > 0]
@@ -84,14 +82,14 @@ def program_of(nc: NcProgram, marks: bool = False) -> Program:
         raise InputError("CS503", "a block of a run is no line", "please report this with the program")
     if nc.second_is != "vector":
         raise InputError("CS503", "a run in points of the tool axis", "please report this with the program")
-    starts = np.flatnonzero(rapid) if marks else []
+    starts = np.flatnonzero(rapid if marks else np.zeros(0)).tolist()
     return Program.from_poses(
         nc.tip,
         nc.second,
         kind=np.where(rapid, Move.RAPID, Move.LINEAR).astype(np.uint8),
         feed=np.where(rapid, np.nan, nc.feed),
         line=np.abs(nc.line),
-        statements=tuple(Statement(int(pose), 0, "PPRINT", ("RUN",), "RUN") for pose in starts),
+        statements=tuple(Statement(pose, 0, "PPRINT", ("RUN",), "RUN") for pose in starts),
         units=nc.units,
     )
 
@@ -131,15 +129,10 @@ def _start(run: Run, form: Form, spelling: Spelling) -> bytes:
 
 def _block(place: Floats, axes: Sequence[str], form: Form, spelling: Spelling, *, rapid: bool) -> bytes:
     """Block that goes to a place."""
-    look = form.mode.motion
-    words = dict(zip((*"XYZ", *_words(form, axes)), zip(place.tolist(), _decimals(place, spelling), strict=True), strict=True))
-    text = " ".join(f"{word}{value:{'+' if look.signs else ''}.{digits}f}" for word, (value, digits) in words.items())
+    look, vector = form.mode.motion, axes[3:] == ("I", "J", "K")
+    other = place[3:] / np.linalg.norm(place[3:]) if vector else place[3:]
+    words = [*"XYZ", *(form.mode.words if vector else axes[3:])]
+    digits = [max(spelling.tip, 1)] * 3 + [max(spelling.other, form.table.digits.vector if vector else 1)] * len(other)
+    numbers = zip(words, [*place[:3].tolist(), *other.tolist()], digits, strict=True)
+    text = " ".join(f"{word}{value:{'+' if look.signs else ''}.{places}f}" for word, value, places in numbers)
     return f"{look.rapid if rapid else look.line} {text}{look.rapid_end if rapid else ''}\n".encode()
-
-
-def _words(form: Form, axes: Sequence[str]) -> Sequence[str]:
-    return form.mode.words if axes[3:] == ("I", "J", "K") else axes[3:]
-
-
-def _decimals(place: Floats, spelling: Spelling) -> list[int]:
-    return [max(spelling.tip, 1)] * 3 + [max(spelling.other, 1)] * (len(place) - 3)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 
+from cornersmooth.errors import SettingsError
 from cornersmooth.filter.checking import Checked, Place, check, places
-from cornersmooth.filter.runs import ProgramReader, Reading, Run
+from cornersmooth.filter.runs import ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
 from cornersmooth.filter.writing import Job, blocks, smoothed
-from cornersmooth.nc import fit_settings
+from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.verdict import Verdict
@@ -114,7 +114,8 @@ def filter_program(
         if not verify or not where:
             return _result(old, new, texts, why, Checked(()) if verify else None)
         checked = _checked(job, old, new, where)
-        bad = {place.run.first: one.text for place in where for one in checked.wrong if place.first < one.line <= place.stop}
+        lines = [(one.line, one.text) for one in checked.wrong]
+        bad = {p.run.first: text for p in where for line, text in lines if p.first < line <= p.stop}
         if not bad:
             return _result(old, new, texts, why, checked)
         for first, text in bad.items():
@@ -151,9 +152,40 @@ def _read(
     cuts = (old.line(k) for run in old.runs for k in range(run.first, run.stop))
     spelling = Spelling.of(islice(cuts, SAMPLE), len(reader.axes))
     if old.runs:
-        units = "inch" if old.runs[0].state.unit != 1.0 else "mm"
-        fit_settings(settings, spelling.form(form, rounding=False), units)
-    return Job(reader, form, spelling, settings, processes), old
+        spelling = _fine(spelling, form, settings, inch=old.runs[0].state.unit != 1.0)
+    return Job(reader, form, _own_form(form), spelling, settings, processes), old
+
+
+def _fine(spelling: Spelling, form: Form, settings: Settings, *, inch: bool) -> Spelling:
+    """Give the digits of the program, or where ε is finer than they can hold, those of the control.
+
+    Raises
+    ------
+    SettingsError
+        The form cannot hold what the settings ask for.
+    """
+    try:
+        fit_settings(settings, spelling.form(form, rounding=False), "inch" if inch else "mm")
+    except SettingsError:
+        spelling = spelling.with_digits(form.table.digits, inch=inch)
+        fit_settings(settings, spelling.form(form, rounding=False), "inch" if inch else "mm")
+    return spelling
+
+
+def _own_form(form: Form) -> Form:
+    """Lines of the control with the words that the program has.
+
+    Raises
+    ------
+    SettingsError
+        CS241: a form whose words the program has not.
+    """
+    line = next(name for name, one in form.table.forms.items() if not one.curve)
+    own = choose_form(form.table, line, machine=form.machine, tcp=form.orientation != "machine")
+    if own.orientation != form.orientation:
+        what = f"{form.control} form {form.name} has other words for the tool axis than the program"
+        raise SettingsError("CS241", what, f"use -f {line}, or name your machine with --machine")
+    return own
 
 
 def _spliced(old: Reading, texts: dict[int, bytes]) -> tuple[bytes, list[Place]]:

@@ -31,6 +31,8 @@ _NO_CUT, _CUT = 0, 1
 #: lines before the first block: they name the program
 _TITLE: Final = re.compile(r"(?i)(%.*|[O:]\s*(\d+|<[^>]*>|[A-Z][^#\[(]*))")
 _WEAK_FEED: Final = re.compile(rb"(?i)F[ \t]*\d+(?![\d.])")
+#: numbers of lines, beside jumps and calls
+_TARGET: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|REPEATB?|LBL|(?<![A-Z])[NPQ])\s*(\d{1,9})")
 _MARK: Final = b"\xef\xbb\xbf"
 
 
@@ -217,9 +219,7 @@ class ProgramReader:
         if why:
             found.why[number] = found.number(found.state.why_not(self.wanted) or why)
 
-    def _take_rows(
-        self, found: Reading, first: int, columns: dict[str, Floats], corners: Bools, asked: Ints
-    ) -> None:
+    def _take_rows(self, found: Reading, first: int, columns: dict[str, Floats], corners: Bools, asked: Ints) -> None:
         """Take motion blocks; note the runs among them."""
         state, count = found.state, len(next(iter(columns.values())))
         blank = np.full(count, np.nan)
@@ -273,7 +273,9 @@ class ProgramReader:
             run = Run(first + a, first + b, begin, kept.copy(), own.min(axis=0), own.max(axis=0), float(feed[b - 1]))
             found.runs.append(run)
         found.why[first : first + count] = why
-        for stop in asked[np.searchsorted(asked, first + 1) : np.searchsorted(asked, first + count, side="right")].tolist():
+        for stop in asked[
+            np.searchsorted(asked, first + 1) : np.searchsorted(asked, first + count, side="right")
+        ].tolist():
             k = stop - first
             found.at[stop] = state.after(place[k], code[k - 1], feed[k - 1])
         found.state = state.after(place[-1], code[-1], feed[-1])
@@ -315,7 +317,7 @@ def _targets(found: Reading) -> set[int]:
     jumps = [match[0] for match in JUMPS.finditer(found.data)]
     if not jumps:
         return set()
-    numbers = {int(word) for jump in jumps for word in re.findall(rb"\d{1,9}", jump)}
+    numbers = {int(word) for jump in jumps for word in _TARGET.findall(jump)}
     if COMPUTED.search(b"\n".join(jumps)):
         pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*\d+")
     else:

@@ -9,7 +9,6 @@ from typing import Final
 
 from cornersmooth.nc.control import Digits, Mode
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.program_table import ProgramTable
 
 #: cuts that are looked at
 SAMPLE: Final = 5000
@@ -109,15 +108,18 @@ class Spelling:
         """
         table = form.table
         program = replace(
-            table.program,
-            **{name: () for name in ("retract", "start", "begin", "tool_end", "between_tools", "end")},
-            position="",
+            table.program, retract=(), position="", start=(), begin=(), tool_end=(), between_tools=(), end=()
         )
         digits = self._digits(table.digits)
         layout = replace(table.layout, block_number="", longest_block=0)
         lines = table.lines if rounding else replace(table.lines, rounding="")
         bare = replace(table, program=program, digits=digits, layout=layout, lines=lines)
         return replace(form, table=bare, mode=self._mode(form.mode), upright=None, plane=None, extras=())
+
+    def with_digits(self, digits: Digits, *, inch: bool) -> Spelling:
+        """Return the same with no fewer digits than a control has."""
+        tip = max(self.tip, digits.inch if inch else digits.mm)
+        return replace(self, tip=tip, other=max(self.other, digits.angle))
 
     def _digits(self, digits: Digits) -> Digits:
         tip = self.tip or digits.mm

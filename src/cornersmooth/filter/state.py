@@ -158,7 +158,15 @@ class State:
             self.lose_all()
         elif words and words[0].name == "block":
             self._take_block(words[0].text.upper())
-        elif words and (words[0].name == "O" or (len(words) == 1 and words[0].name not in "GMTSFDH" and len(words[0].name) == 1 and words[0].name not in self.axes)):
+        elif words and (
+            words[0].name == "O"
+            or (
+                len(words) == 1
+                and words[0].name not in "GMTSFDH"
+                and len(words[0].name) == 1
+                and words[0].name not in self.axes
+            )
+        ):
             self.lose_all()
         elif words:
             return self._take_words(words)
@@ -179,14 +187,18 @@ class State:
             else:
                 given[word.name] = word.value
         if self.rounding.startswith("G64") and {"P", "Q"} & names and "G" in names:
-            self.rounding = " ".join(word.text for word in words if word.name in "PQ" or word.text[1:] in ("64", "64.0"))
+            self.rounding = " ".join(
+                word.text for word in words if word.name in "PQ" or word.text[1:] in ("64", "64.0")
+            )
         if "L" in names or "LN" in names:  # Klartext says anew in each block what it is
             self.motion = 0.0 if "RAPID" in names else 1.0
         return self._move(given, done, names)
 
     def _spelt(self, word: Word) -> bool:
         """Whether a word of several letters is a part of a motion block of Klartext."""
-        return word.name in ("RAPID", "LN", "side", "turn", "circle", "centre") or word.name.startswith(("centre ", "DC "))
+        return word.name in ("RAPID", "LN", "side", "turn", "circle", "centre") or word.name.startswith(
+            ("centre ", "DC ")
+        )
 
     def _move(self, given: Mapping[str, float], done: set[Does], names: set[str]) -> str:
         """Take the places and the feed of a block, after what its other words do."""
@@ -229,7 +241,11 @@ class State:
         value, name = word.value, f"{word.name}{word.value:g}"
         if word.name == "G" and value in (0.0, 1.0, 2.0, 3.0):
             self.motion = value
-        elif word.name == "G" and value in _UNITS and not (value in (70.0, 71.0) and "TRAORI" not in self.vocabulary.tip_control):
+        elif (
+            word.name == "G"
+            and value in _UNITS
+            and not (value in (70.0, 71.0) and "TRAORI" not in self.vocabulary.tip_control)
+        ):
             if self.unit != _UNITS[value]:
                 self.feed = math.nan
                 self.lose_place("XYZ")

@@ -36,7 +36,9 @@ class Job:
     ----------
     reader : ProgramReader
     form : Form
-        Of the control.
+        Of the new blocks.
+    own : Form
+        Lines in the words that the program has.
     spelling : Spelling
     settings : Settings
     processes : int
@@ -44,6 +46,7 @@ class Job:
 
     reader: ProgramReader
     form: Form
+    own: Form
     spelling: Spelling
     settings: Settings
     processes: int = 1
@@ -58,7 +61,7 @@ class Job:
     def _in_places(self, run: Run, text: bytes) -> bytes:
         """Blocks that say distances, in places, with their own feeds."""
         feeds = [re.search(rb"F[ \t]*[\d.]+", line.upper()) for line in text.splitlines()]
-        blocks = in_places(run, self.form, self.spelling).splitlines()
+        blocks = in_places(run, self.own, self.spelling).splitlines()
         pairs = zip(blocks, feeds, strict=True)
         return b"".join(block + b" " + (feed[0] if feed else b"") + b"\n" for block, feed in pairs)
 
@@ -113,7 +116,7 @@ def _attempt(
 
 def _write(job: Job, reading: Reading, runs: Sequence[Run]) -> list[list[bytes] | None]:
     """Blocks of each run; None where the rotary axes would begin or end elsewhere."""
-    nc = motion([job.stretch(reading, run) for run in runs], job.form, job.spelling, job.settings)
+    nc = motion([job.stretch(reading, run) for run in runs], job.own, job.spelling, job.settings)
     program = program_of(nc, marks=True)
     form = job.spelling.form(job.form, rounding=bool(runs[0].state.rounding))
     if job.form.machine is not None:
@@ -171,7 +174,9 @@ class _Held:
         mode, rounding, feed = self._mode, self._rounding, self._feed
         begin = self._turned(rapids)
         self._turned(kept)
-        away = not self._form.curves and not (self._same(begin, run.start, run) and self._same(self._angles, run.place[-1], run))
+        away = not self._form.curves and not (
+            self._same(begin, run.start, run) and self._same(self._angles, run.place[-1], run)
+        )
         said = next((k for k, line in enumerate(kept) if not self._is_mode(line)), 0)
         for line in kept:
             if line in (_INVERSE, _MINUTE):
@@ -190,7 +195,7 @@ class _Held:
             head.append(rounding)
         if b"F" not in kept[said] and feed and mode == _MINUTE and not self._form.curves:
             kept[said] += (b" " if self._look.spaces else b"") + feed
-        tail = [] if not self._form.curves else [in_places(run, self._form, job.spelling).splitlines()[-1]]
+        tail = [] if not self._form.curves else [in_places(run, job.own, job.spelling).splitlines()[-1]]
         tail += [own] if self._mode != own else []
         if self._mode == _INVERSE and own == _MINUTE:
             tail.append(f"{self._look.feed}{run.feed:g}".encode())

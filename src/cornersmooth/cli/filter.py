@@ -1,0 +1,192 @@
+"""``cornersmooth filter``: finished NC programs in, the same with smooth runs out."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.inputs import Input, find_inputs, named_input
+from cornersmooth.cli.options import nc_text, outputs, smoothing
+from cornersmooth.cli.options.parameters import PATH
+from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.show import console, print_line
+from cornersmooth.errors import CornersmoothError
+from cornersmooth.output import make_folder, open_output
+from cornersmooth.verdict import Verdict
+
+if TYPE_CHECKING:
+    from cornersmooth.filter import Filtered
+    from cornersmooth.nc import Form
+
+#: names of NC programs, for folders
+PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia", "*.iso", "*.gcode")
+
+#: reasons shown without -v
+_SHOWN = 10
+
+tip_control = click.option(
+    "--tip-control",
+    is_flag=True,
+    help="Tool tip control is on where the program begins, as in a subprogram, or where the kinematics are always on.",
+)
+units = click.option("--units", type=click.Choice(["mm", "inch"]), help="Units of a program that does not say them.")
+
+
+@click.command(
+    "filter",
+    cls=ShopCommand,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit codes: 0 done; 1 the program FAILED, or is not PASSED under --strict; 2 wrong usage or configuration; "
+    "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
+)
+@click.argument("inputs", type=PATH, nargs=-1, required=True, metavar="IN...")
+@smoothing.tolerance
+@outputs.output
+@nc_text.control
+@nc_text.machine
+@nc_text.no_tcp
+@tip_control
+@units
+@nc_text.form
+@smoothing.axis_length
+@smoothing.axis_tolerance
+@outputs.directory
+@outputs.glob
+@smoothing.method
+@smoothing.line_options
+@nc_text.no_verify
+@nc_text.strict
+@outputs.force
+@outputs.quiet
+@outputs.verbose
+def command(inputs: tuple[str, ...], **given: Any) -> int:
+    """Smooth the cutting runs of the finished NC programs IN; every other byte stays.
+
+    Runs of plain cuts are replaced where the state of the control is surely known. What the program does there today
+    is what the new blocks stay within the tolerance of. Both programs are read again and compared. All other cuts stay
+    as they are, and a table says why. - is standard input.
+
+    \b
+    Examples:
+      cornersmooth filter part.ngc --control linuxcnc --machine xyzac-trt -e 0.01 -o smooth.ngc
+      cornersmooth filter part.mpf --control siemens -e 0.01 -o smooth.mpf
+      cornersmooth filter part.nc -e 0.01 --lines long -o smooth.nc
+      cornersmooth filter *.mpf --control siemens -d smooth/
+      cat part.nc | cornersmooth filter - > smooth.nc
+    """
+    folder, output = given["directory"], given["output"]
+    _check_usage(inputs, given)
+    form, settings = form_of(given), smoothing.settings_of(given)
+    files = find_inputs(inputs, given["glob"] or PATTERNS) if folder else [named_input(inputs[0])]
+    targets = [_target(one, folder) if folder else output or STANDARD for one in files]
+    if len(set(targets)) < len(targets):
+        raise click.UsageError("two inputs would be written to one name; give each a -d of its own")
+    for target in targets:
+        check_path(target, [one.path for one in files], force=given["force"])
+    if folder:
+        make_folder(folder)
+    worst = 0
+    for one, target in zip(files, targets, strict=True):
+        try:
+            worst = max(worst, _filter(one.path, target, form, settings, given))
+        except CornersmoothError as error:
+            if len(files) == 1:
+                raise
+            print_line(f"{one.path}: {error}")
+            worst = max(worst, error.exit_code)
+    return worst
+
+
+def form_of(given: dict[str, Any]) -> Form:
+    """Form of the control that blocks are read and written in.
+
+    Raises
+    ------
+    SettingsError
+        CS240: a control whose programs are not read as a filter.
+    """
+    from cornersmooth.errors import SettingsError
+    from cornersmooth.filter.vocabulary import VOCABULARIES
+    from cornersmooth.nc import choose_form
+
+    control = nc_text.control_of(given)
+    if control.dialect not in VOCABULARIES:
+        known = ", ".join(sorted(VOCABULARIES))
+        raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", f"use one of {known}")
+    return choose_form(control, given.get("form"), machine=nc_text.machine_of(given), tcp=not given["no_tcp"])
+
+
+def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:
+    if given["directory"] and given["output"]:
+        raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
+    if given["glob"] and not given["directory"]:
+        raise click.UsageError("--glob is for folders, which need -d FOLDER")
+    if len(inputs) > 1 and (not given["directory"] or STANDARD in inputs):
+        raise click.UsageError("several inputs need -d FOLDER, and standard input goes with no other input")
+    if given["no_verify"] and given["strict"]:
+        raise click.UsageError("--no-verify and --strict exclude each other")
+
+
+def _target(one: Input, folder: str) -> str:
+    path = os.path.join(folder, one.stem + os.path.splitext(one.path)[1])
+    os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+    return path
+
+
+def _filter(source: str, target: str, form: Form, settings: Any, given: dict[str, Any]) -> int:
+    """Filter one program; return the exit code."""
+    from cornersmooth.filter import filter_program
+    from cornersmooth.verify import useful_processes
+
+    data, name = read_input(source)
+    found = filter_program(
+        data,
+        form,
+        settings,
+        tip_from_start=given["tip_control"],
+        inch=given["units"] == "inch",
+        verify=not given["no_verify"],
+        processes=useful_processes(),
+    )
+    bad = found.verdict is Verdict.FAILED or (given["strict"] and found.verdict is not Verdict.PASSED)
+    with open_output(target_of(target), hold=bad, replace=given["force"]) as output:
+        output.failed = bad
+        output.stream.write(found.data)
+    if not given["quiet"]:
+        _show(name, found, settings.tolerance, given["verbose"])
+    return int(bad)
+
+
+def _show(name: str, found: Filtered, tolerance: float, verbose: int) -> None:
+    """Print the verdict, what was measured, and what was left as it is."""
+    out = console()
+    out.print(first_line(found, tolerance), style="bold")
+    out.print(f"{name}: {found.lines} lines, {found.new_lines} after; all outside of runs is the same byte for byte")
+    if found.checked is not None:
+        for one in found.checked.wrong:
+            print_line(f"{name}:{one.line}: error: {one.text}")
+    left = found.left if verbose else found.left[:_SHOWN]
+    if left:
+        out.print(f"{'left as it is':>13}  first line  reason")
+    for cuts in left:
+        out.print(f"{cuts.count:>13}  {cuts.line:>10}  {cuts.reason}")
+    if len(left) < len(found.left):
+        out.print(f"... {len(found.left) - len(left)} more reasons; -v shows them")
+    if found.cuts and not found.smoothed and any("tool tip control is off" in one.reason for one in found.left):
+        out.print("--tip-control says that tool tip control is on where the program begins")
+
+
+def first_line(found: Filtered, tolerance: float) -> str:
+    """Give the verdict in one line."""
+    what = f"{found.smoothed} of {found.cuts} cuts smoothed in {found.runs} runs"
+    if found.checked is None:
+        return f"{found.verdict}: {what}; it was not asked for"
+    if found.checked.wrong:
+        return f"{found.verdict}: {len(found.checked.wrong)} problems; {what}"
+    if not found.runs:
+        return f"{found.verdict}: {what}; the program is the same byte for byte"
+    tip, point = found.checked.tip, found.checked.axis_point
+    return f"{found.verdict}: {what} within {tolerance:g} mm: tip {tip:.4g} mm, axis point {point:.4g} mm"

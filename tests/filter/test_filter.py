@@ -1,0 +1,217 @@
+"""Finished programs as a filter: what is smoothed, what stays, and what is put back."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+import cornersmooth as cs
+from cornersmooth.filter import Filtered, filter_program, verify_programs
+from cornersmooth.verdict import Verdict
+from filter.programs import ISO, PROGRAMS, WORDS, cuts
+
+EPS = 0.02
+
+
+def form_of(control: str, machine: str, form: str = "g1") -> cs.nc.Form:
+    return cs.choose_form(control, form, machine=cs.load_machine(machine) if machine else None)
+
+
+def filtered(control: str, machine: str, text: str, *, form: str = "g1", lines: str | None = None) -> Filtered:
+    settings = cs.Settings(tolerance=EPS, lines=lines)
+    return filter_program(text.encode("latin-1"), form_of(control, machine, form), settings)
+
+
+def fanuc(body: str, on: str = "G43.4 H1") -> Filtered:
+    return filtered("fanuc", "table-ac", ISO.format(on=on, start="A20. C30.", cuts=body))
+
+
+@pytest.mark.parametrize("lines", ["dense", "long"])
+@pytest.mark.parametrize("name", list(PROGRAMS))
+def test_smooths_programs_of_each_control(name: str, lines: str) -> None:
+    control, machine, text = PROGRAMS[name]
+    found = filtered(control, machine, text, lines=lines)
+    assert found.verdict is Verdict.PASSED, found.checked
+    arcs = text.count("G2 X")
+    assert found.smoothed == found.cuts - arcs >= 20
+    assert [(one.reason, one.count) for one in found.left] == [("an arc", 1)] * arcs
+    old, new = text.encode().splitlines(keepends=True), found.data.splitlines(keepends=True)
+    first = next(k for k, line in enumerate(old) if old[k] != new[k])
+    assert re.match(rb"(?i)(N?\d+ )?(N\d+ )?(G0?1|LN?|X)", old[first]) or b"G93" in old[first - 1]
+    assert old[-3:] == new[-3:]
+    assert old[:first] == new[:first]
+    # what is looked for by the block numbers is found once
+    numbers = re.findall(rb"(?m)^N\d+", found.data)
+    assert len(numbers) == len(set(numbers))
+    assert set(numbers) <= set(re.findall(rb"(?m)^N\d+", text.encode()))
+    assert (b"\r\n" in found.data) == ("\r\n" in text)
+
+
+@pytest.mark.parametrize(
+    ("name", "form"), [("siemens words", "bspline"), ("heidenhain words", "spl"), ("fanuc words", "g6.2")]
+)
+def test_writes_curves_of_the_control(name: str, form: str) -> None:
+    control, machine, text = PROGRAMS[name]
+    found = filtered(control, machine, text, form=form)
+    assert found.verdict is Verdict.PASSED
+    assert found.smoothed == 24
+    assert {"bspline": b"BSPLINE", "spl": b"SPL", "g6.2": b"G6.2"}[form] in found.data
+
+
+def test_modes_are_put_back() -> None:
+    control, machine, text = PROGRAMS["haas, inch, G93"]
+    lines = filtered(control, machine, text).data.decode().splitlines()
+    assert lines[lines.index("G93") + 1] == "G94"
+    assert lines[-6:-3] == ["G93", "G94", "G0 Z50."]
+    control, machine, text = PROGRAMS["linuxcnc, G64, an arc inside"]
+    lines = filtered(control, machine, text).data.decode().splitlines()
+    assert lines[lines.index("G2 X60 Y5 I5 J0") - 1] == "G64 P0.02 Q0.01"
+    control, machine, text = PROGRAMS["linuxcnc, G91"]
+    lines = filtered(control, machine, text).data.decode().splitlines()
+    assert lines[lines.index("G91 G1 F1000") + 1] == "G90"
+    assert lines[-5:-3] == ["G91", "G90"]
+
+
+RUN = cuts(WORDS, feed="F1000.")
+
+
+@pytest.mark.parametrize(
+    ("before", "reason"),
+    [
+        ("G49\n", "tool tip control is off"),
+        ("M6\n", "it is not known whether tool tip control is on"),
+        ("G68.2 X0 Y0 Z0 I0 J30. K0\n", "places of the part are turned"),
+        ("G68 X0 Y0 R30.\n", "places of the part are turned"),
+        ("G51 X0 Y0 Z0 P2.\n", "places of the part are turned"),
+        ("G66 P9000\n", "places of the part are turned"),
+        ("G41 D1\n", "the radius of the cutter"),
+        ("G95\n", "feed per revolution"),
+        ("M98 P1000\n", "it is not known whether"),
+        ("G65 P1000 A1\n", "it is not known whether"),
+        ("IF [#1 EQ 1] GOTO 5\n", "it is not known whether"),
+        ("G777\n", "it is not known whether"),
+        ("/G49\n", "it is not known whether"),
+    ],
+)
+def test_leaves_what_is_not_surely_known(before: str, reason: str) -> None:
+    found = fanuc(before + RUN)
+    assert found.smoothed == 0
+    assert found.verdict is Verdict.PASSED
+    assert found.data == ISO.format(on="G43.4 H1", start="A20. C30.", cuts=before + RUN).encode()
+    assert reason in found.left[0].reason
+    assert found.left[0].count == 24
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        "M200\n",
+        "#100=5\n",
+        "G28 Z0\n",
+        "G91 G28 Z0\nG90\n",
+        "G55\n",
+        "G53 G0 Z0\n",
+        "G92 X0\n",
+        "G1 X#5 F100.\n",
+        "/G0 X5.\n",
+    ],
+)
+def test_the_cut_after_a_lost_place_stays_and_those_after_it_do_not(before: str) -> None:
+    found = fanuc(before + RUN)
+    assert found.verdict is Verdict.PASSED
+    assert found.smoothed == 23
+    assert RUN.splitlines()[0].encode() in found.data.splitlines()
+
+
+@pytest.mark.parametrize("before", ["M8\n", "(A COMMENT)\n", "\n", "G17\n", "G54\n", "G61\n", "T5\n", "G90 G21\n"])
+def test_words_that_change_nothing_lose_nothing(before: str) -> None:
+    assert fanuc(before + RUN).smoothed == 24
+
+
+def test_what_is_jumped_to_is_left() -> None:
+    lines = [f"N{k} {line}\n" for k, line in enumerate(RUN.splitlines(), start=1)]
+    text = ISO.format(on="G43.4 H1", start="A20. C30.", cuts="".join(lines)).replace("M30", "IF [#1 EQ 1] GOTO 12\nM30")
+    found = filtered("fanuc", "table-ac", text)
+    assert found.smoothed == 11
+    assert "".join(lines[11:]).encode() in found.data
+
+
+def test_corners_that_the_program_rounds_itself_stay() -> None:
+    lines = RUN.splitlines(keepends=True)
+    lines[10] = lines[10].replace("\n", " ,R0.5\n")
+    found = fanuc("".join(lines))
+    assert found.verdict is Verdict.PASSED
+    assert "".join(lines[9:12]).encode() in found.data
+    assert 0 < found.smoothed < 24
+
+
+@pytest.mark.parametrize(
+    ("control", "machine", "text"),
+    [
+        ("haas", "table-bc", "%\nO1\nG21 G90 G94\nG54\nG0 B30. C0.\nG254\nG43 H1\nG0 X0. Y0. Z5.\n{}G255\nM30\n%\n"),
+        ("fanuc", "table-ac", "G21 G90\nG68.2 X0 Y0 Z0 I0 J30. K0\nG53.1\nG43 H1\nG0 X0. Y0. Z5.\n{}G49\nG69\nM30\n"),
+        ("siemens", "", 'TRAORI\nCYCLE800(0,"",0,57,0,0,0,30,0,0,0,0,0,-1)\nG0 X0 Y0 Z5\n{}CYCLE800()\nM30\n'),
+        ("siemens", "", "G90 G71\nTRAORI\nG54\nAROT Y90\nG0 X0 Y0 Z5 A3=0 B3=0 C3=1\n{}TRANS\nM30\n"),
+        (
+            "heidenhain",
+            "table-ac",
+            "0 BEGIN PGM X MM\nPLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX\nL X+0 Y+0 Z+5 FMAX\n{}PLANE RESET STAY\n",
+        ),
+    ],
+)
+def test_tilted_planes_come_out_byte_for_byte(control: str, machine: str, text: str) -> None:
+    cut = "L X{x:+.3f} Y{y:+.3f} Z{z:+.3f}" if control == "heidenhain" else "G1 X{x:.3f} Y{y:.3f} Z{z:.3f}"
+    whole = text.format(cuts(cut, feed="F500"))
+    found = filtered(control, machine, whole)
+    assert found.data == whole.encode()
+    assert found.verdict is Verdict.PASSED
+    assert found.left
+
+
+def test_the_turn_of_the_program_is_kept() -> None:
+    body = cuts(WORDS, feed="F1000.")
+    turned = re.sub(r"C([\d.]+)", lambda match: f"C{float(match[1]) - 720:.3f}", body)
+    text = ISO.format(on="G43.4 H1", start="A20. C-690.", cuts=turned)
+    found = filtered("fanuc", "table-ac", text)
+    assert found.verdict is Verdict.PASSED
+    assert found.smoothed == 24
+    angles = [float(one) for one in re.findall(rb"C(-?[\d.]+)", found.data)]
+    assert all(-691 < angle < -648 for angle in angles)
+
+
+def test_a_listing_and_a_mark_before_the_program_are_let_through() -> None:
+    listing = "\xef\xbb\xbfInformation listing\nG1 is not a block here, says the list\n\n"
+    text = listing + PROGRAMS["fanuc words"][2]
+    found = filtered("fanuc", "table-ac", text)
+    assert found.smoothed == 24
+    assert found.data.startswith(listing.encode("latin-1"))
+
+
+def test_without_words_for_tip_control_it_has_to_be_said() -> None:
+    text = PROGRAMS["linuxcnc, G91"][2].replace("M428\n", "").replace("M429\n", "").encode()
+    form, settings = form_of("linuxcnc", "xyzac-trt"), cs.Settings(tolerance=EPS)
+    assert filter_program(text, form, settings).data == text
+    assert filter_program(text, form, settings, tip_from_start=True).smoothed == 20
+
+
+def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
+    control, machine, text = PROGRAMS["fanuc words"]
+    form, settings, old = form_of(control, machine), cs.Settings(tolerance=EPS), text.encode()
+    good = filter_program(old, form, settings).data
+    assert verify_programs(old, good, form, settings).wrong == ()
+    assert verify_programs(old, old, form, settings).wrong == ()
+    lines = good.splitlines(keepends=True)
+    middle = len(lines) // 2
+    x = float(re.search(rb"X([\d.]+)", lines[middle])[1])  # type: ignore[index]
+    moved = lines[middle].replace(b"X%.3f" % x, b"X%.3f" % (x + 3 * EPS))
+    assert moved != lines[middle]
+    for wrong, line in [
+        ([*lines[:middle], moved, *lines[middle + 1 :]], middle + 1),
+        ([*lines[:5], b"S8000 M3\n", *lines[6:]], 6),
+        ([*lines[:-4], b"G0 Z49.\n", *lines[-3:]], None),
+        ([one.replace(b"F1000.", b"F900.") for one in lines], 10),
+    ]:
+        found = verify_programs(old, b"".join(wrong), form, settings).wrong
+        assert found
+        assert line is None or any(one.line == line for one in found), (line, found)
