@@ -80,7 +80,7 @@ def test_one_is_not_several(tmp_path: Path) -> None:
     assert run("smooth", IMPELLER, "-o", out).returncode == DONE
     out.write_bytes(out.read_bytes().replace(b"F250.", b"F251.", 1))
     said = run("verify", IMPELLER, out).stdout.decode()
-    assert said.startswith("FAILED: 1 problem, first in NC line 20: ")
+    assert said.startswith("FAILED: 1 problem, first in NC line 19: ")
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def program_of(name: str) -> bytes:
         " ".join(f"{letter}{word:.4f}" for letter, word in zip("XYZAC", row[[0, 1, 2, 3, 5]], strict=True))
         for row in place
     ]
-    head = ["G21 G90 G94 G17 G40 G49 G80", f"G64 P{blend} Q0", "G0 X0 Y0 Z0 A0 C0"]
+    head = ["G21 G90 G94 G17 G40 G49 G80", f"G64 P{blend} Q0", "M428", "G0 X0 Y0 Z0 A0 C0"]
     return "\n".join([*head, *(f"G1 {block} F{feed}" for block in blocks[1:]), "M2", ""]).encode()
 
 
