@@ -16,7 +16,12 @@ from cornersmooth.filter.runs import Reading, Run
 from cornersmooth.filter.state import State
 from cornersmooth.filter.writing import Job
 from cornersmooth.model import Floats
+from cornersmooth.nc_reader import NcProgram
+from cornersmooth.nc_reader.rotary import LINE_SHARE
+from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
+from cornersmooth.verify.motions import written_motion
+from cornersmooth.verify.passage import passage
 
 #: words that are the same number, and directions that are the same in six digits
 _SAME, _SAME_DIRECTION = 1e-9, 2e-6
@@ -125,17 +130,17 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place], states: 
     for unit in sorted({place.run.state.unit for place in where}):
         own = [place for place in where if place.run.state.unit == unit]
         try:
-            found = _measure(job, old, new, own)
+            found, others = _measure(job, old, new, own)
         except CornersmoothError as error:
-            wrong.append(Wrong(error.line or own[0].first + 1, error.what))
+            wrong.append(Wrong(own[0].first + 1, error.what))
             continue
-        wrong += [Wrong(problem.nc_line, problem.text) for problem in found.problems]
+        wrong += others + [Wrong(abs(problem.nc_line), problem.text) for problem in found.problems]
         largest = [max(pair) for pair in zip(largest, (found.tip.value, found.axis_point.value), strict=True)]
     return Checked(tuple(sorted(wrong, key=lambda one: one.line)), *largest)
 
 
-def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Verification:
-    """Measure runs with the same units."""
+def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[Verification, list[Wrong]]:
+    """Measure runs with the same units, and decide whether both motions can be run beside each other."""
     settings = job.settings
     before = motion([job.stretch(old, place.run) for place in where], job.own, job.spelling, settings)
     after = motion(
@@ -144,7 +149,7 @@ def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Ve
         job.spelling,
         settings,
     )
-    return verify(
+    found = verify(
         program_of(before),
         after,
         tolerance=settings.tolerance,
@@ -153,6 +158,22 @@ def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Ve
         words=False,
         processes=job.processes,
     )
+    return found, _apart(before, after, settings)
+
+
+def _apart(before: NcProgram, after: NcProgram, settings: Settings) -> list[Wrong]:
+    """Where the motions of two programs cannot be run beside each other within ε, both forward only."""
+    own_axis = settings.axis_tolerance is not None
+    ways = [written_motion(nc, settings.tolerance, settings.axis_scale, own_axis=own_axis) for nc in (before, after)]
+    old, new = ways
+    bends = [np.maximum(way.bend, LINE_SHARE * settings.tolerance) for way in ways]
+    found = passage(new.six, old.six, settings.tolerance, own_bend=bends[1], path_bend=bends[0])
+    lines = np.abs(after.line[new.owner[[one.row for one in found.breaks]]]).tolist()
+    if not (found.breaks or found.whole):
+        lines = [int(abs(after.line[0]))]
+    return [
+        Wrong(line, "the motion cannot be run beside that of the old program within the tolerance") for line in lines
+    ]
 
 
 def _absolute(text: bytes) -> bytes:

@@ -239,6 +239,8 @@ class State:
     def _code(self, word: Word) -> set[Does]:
         """Take a G or M word; return what it does beside changing the state."""
         value, name = word.value, f"{word.name}{word.value:g}"
+        if word.name == "G" and "M128" in self.vocabulary.tip_control:  # a block of DIN/ISO among those of Klartext
+            return {Does.ALL}
         if word.name == "G" and value in (0.0, 1.0, 2.0, 3.0):
             self.motion = value
         elif (
