@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.filter.state import CORNER_WORDS, INVERSE_TIME, State
-from cornersmooth.filter.vocabulary import ANGLES, ANY, COMPUTED, JUMPS, NONE, VECTOR, VOCABULARIES
+from cornersmooth.filter.state import CORNER_SIGNS, CORNER_WORDS, INVERSE_TIME, State
+from cornersmooth.filter.vocabulary import ANGLES, ANY, COMPUTED, JUMP_SIGNS, JUMPS, NONE, VECTOR, VOCABULARIES
 from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.block_tables import CHUNK, LetteredLines
@@ -168,7 +168,7 @@ class ProgramReader:
         start = np.unique(np.concatenate(([0], start, [len(data)]))).astype(np.int64)
         found = Reading(data, start, self._first.copy())
         patterns = LinePatterns(self.lexer)
-        targets, corners = _targets(found), _near(_lines_with(CORNER_WORDS, found), len(found.why))
+        targets, corners = _targets(found), _near(_lines_with(CORNER_WORDS, CORNER_SIGNS, found), len(found.why))
         first, started = _begin(found), False
         asked = np.array(sorted(set(stops)), np.int64)
         while first < len(found.why):
@@ -298,10 +298,18 @@ def _filled(values: Floats, before: float) -> tuple[Floats, Ints]:
     return np.where(last < 0, before, values[last]), last
 
 
-def _lines_with(pattern: re.Pattern[bytes], found: Reading) -> Ints:
-    """Lines in which something occurs."""
+def _lines_with(pattern: re.Pattern[bytes], signs: Sequence[bytes], found: Reading) -> Ints:
+    """Lines in which something occurs, of which one of some signs is a part."""
+    if not _any_in(signs, found.data):
+        return np.zeros(0, np.int64)
     at = np.array([match.end() - 1 for match in pattern.finditer(found.data)], np.int64)
     return np.unique(np.searchsorted(found.start, at, side="right") - 1)
+
+
+def _any_in(signs: Sequence[bytes], data: bytes) -> bool:
+    """Whether any of some capitals is in a text, capital or not: fast where none is."""
+    capitals = data.upper()
+    return any(sign in capitals for sign in signs)
 
 
 def _near(lines: Ints, count: int) -> Bools:
@@ -314,6 +322,8 @@ def _near(lines: Ints, count: int) -> Bools:
 
 def _targets(found: Reading) -> set[int]:
     """Lines to which the program may jump: those of all numbers that stand beside jumps."""
+    if not _any_in(JUMP_SIGNS, found.data):
+        return set()
     jumps = [match[0] for match in JUMPS.finditer(found.data)]
     if not jumps:
         return set()
@@ -323,7 +333,7 @@ def _targets(found: Reading) -> set[int]:
     else:
         some = b"|".join(b"0*%d" % number for number in sorted(numbers)) or rb"(?!)"
         pattern = re.compile(rb"(?im)^[ \t/]*N[ \t]*(?:%b)(?!\d)" % some)
-    return set(_lines_with(pattern, found).tolist())
+    return set(_lines_with(pattern, (b"N",), found).tolist())
 
 
 def _begin(found: Reading) -> int:

@@ -22,6 +22,9 @@ _UNITS: Final = {20.0: 25.4, 21.0: 1.0, 70.0: 25.4, 71.0: 1.0, 700.0: 25.4, 710.
 #: words beside an end that shape the corner there: it belongs to the blocks on both sides
 CORNER_WORDS: Final = re.compile(rb"(?i),\s*[RC]\s*[\d.]|\b(?:RNDM?|CHF|CHR|FRCM?)\b")
 
+#: one of these is in every line with such words
+CORNER_SIGNS: Final = (b",", b"RND", b"CHF", b"CHR", b"FRC")
+
 _ASSIGNMENT: Final = re.compile(r"\s*(#|Q[LRS]?\d+\s*=|[A-Z_]\w*(\[[^]]*\])?\s*=(?!=)|DEF\s|FN ?[0-8] ?:)")
 #: a word whose number is worked out by the control
 _WORKED_OUT: Final = re.compile(

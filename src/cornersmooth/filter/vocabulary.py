@@ -183,7 +183,9 @@ VOCABULARIES: Final[Mapping[str, Vocabulary]] = {
     ),
 }
 
-#: what sends a control to other lines of the program; the numbers beside it may be those of the lines
-JUMPS: Final = re.compile(rb"(?im)^[^(;\n]*?\b(?:GOTO[BFCS]?|M9[6-9]|M198|G6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*")
+#: what sends a control to other lines of the program; the numbers after it may be those of the lines
+JUMPS: Final = re.compile(rb"(?i)(?:GOTO[BFCS]?|M9[6-9]|M198|G6[56]|THEN|REPEATB?|CALL|UNTIL)[^\n]*")
+#: one of these is in every such line
+JUMP_SIGNS: Final = (b"GOTO", b"M9", b"M198", b"G6", b"THEN", b"REPEAT", b"CALL", b"UNTIL")
 #: a jump to a line that the program works out
 COMPUTED: Final = re.compile(rb"(?i)GOTO[BFCS]?\s*[^\d\s]|M9[6-9][^\n]*P\s*[#\[]")

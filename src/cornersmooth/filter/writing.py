@@ -142,15 +142,9 @@ def _within(machine: Machine, runs: Sequence[Run], settings: Settings) -> Machin
 def _split(job: Job, form: Form, text: bytes, runs: Sequence[Run]) -> list[list[bytes] | None]:
     """Cut a text with a comment before each run into blocks that stand for themselves."""
     before, behind = form.table.layout.comment
-    mark = f"{before}RUN{behind}".encode()
-    whole: list[list[bytes]] = []
-    for line in text.splitlines():
-        if line == mark:
-            whole.append([])
-        elif whole:
-            whole[-1].append(line)
+    _, *whole = text.split(f"{before}RUN{behind}\n".encode())
     held = _Held(form)
-    return [held.blocks(job, run, lines) for run, lines in zip(runs, whole, strict=True)]
+    return [held.blocks(job, run, part.splitlines()) for run, part in zip(runs, whole, strict=True)]
 
 
 class _Held:
@@ -169,8 +163,9 @@ class _Held:
 
     def blocks(self, job: Job, run: Run, lines: Sequence[bytes]) -> list[bytes] | None:
         """Blocks of a run; None where the rotary axes begin or end elsewhere."""
-        rapids = [line for line in lines if self._is_rapid(line)]
-        kept = [line for line in lines if not self._is_rapid(line)]
+        cut = next((k for k, line in enumerate(lines) if not (self._is_mode(line) or self._is_rapid(line))), len(lines))
+        rapids = [line for line in lines[:cut] if not self._is_mode(line)]
+        kept = [*(line for line in lines[:cut] if self._is_mode(line)), *lines[cut:]]
         mode, rounding, feed = self._mode, self._rounding, self._feed
         begin = self._turned(rapids)
         self._turned(kept)
@@ -179,12 +174,12 @@ class _Held:
         )
         said = next((k for k, line in enumerate(kept) if not self._is_mode(line)), 0)
         for line in kept:
-            if line in (_INVERSE, _MINUTE):
-                self._mode = line
-            elif _ROUNDING.match(line):
-                self._rounding = line
-            elif match := _FEED.search(line):
+            if b"F" in line and (match := _FEED.search(line)):
                 self._feed = match[0]
+            elif line in (_INVERSE, _MINUTE):
+                self._mode = line
+            elif line.startswith(b"G6") and _ROUNDING.match(line):
+                self._rounding = line
         if away or not kept:
             return None
         own = _INVERSE if run.state.feed_mode == INVERSE_TIME else _MINUTE
