@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cornersmooth import Settings, choose_form, read, smooth, write
-from cornersmooth.report.along import Distribution, deviation_along
+from cornersmooth.report.deviation_profile import Distribution, deviation_along
 
 HERE = Path(__file__).resolve().parent
 TOLERANCES = (0.078, 0.15)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth import extras
+from cornersmooth import optional_packages
 from cornersmooth.cli.files import Beginning
 from cornersmooth.nc import control_aliases, control_names, load_control
 from oracle.command import DONE, SMALL, USAGE, run, seen_on_a_terminal
@@ -150,7 +150,8 @@ def test_what_is_missing_is_installed_as_the_package_was(tmp_path: Path, monkeyp
     root = SAMPLES.parent
     assert f"install it with: pip install -e '{root}[plot]'" in run(*words, cwd=tmp_path).stderr.decode()
     assert "install it with: pip install -e '.[plot]'" in run(*words, cwd=root).stderr.decode()
-    monkeypatch.setattr(extras, "__file__", str(tmp_path / "site-packages" / "cornersmooth" / "extras.py"))
+    elsewhere = tmp_path / "site-packages" / "cornersmooth" / "optional_packages.py"
+    monkeypatch.setattr(optional_packages, "__file__", str(elsewhere))
     assert "install it with: pip install 'cornersmooth[plot]'" in run(*words, cwd=tmp_path).stderr.decode()
 
 

@@ -15,10 +15,10 @@ from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine, endless, with_dynamics
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
-from cornersmooth.parts import some_poses
 from cornersmooth.pipeline import read_back
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import Settings
+from cornersmooth.slices import some_poses
 
 #: of the digits of a text, mm and radians: a pose of it is the same as one of the CL file
 _SAME = 1e-3

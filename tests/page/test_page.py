@@ -212,7 +212,7 @@ def test_thinning_of_a_long_path_hides_no_corner_out_of_tolerance(monkeypatch):
     from cornersmooth.verify import verify
 
     monkeypatch.setattr(module, "MOST_POINTS", 500)
-    monkeypatch.setattr("cornersmooth.page.planned.MOST_MOVES", 0)  # its speed is not looked at
+    monkeypatch.setattr("cornersmooth.page.planned_speeds.MOST_MOVES", 0)  # its speed is not looked at
     x = np.linspace(0.0, 600.0, 1201)
     tips = np.stack((x, np.where(np.arange(1201) % 2, 1.0, 0.0), np.zeros(1201)), axis=1)
     up = np.broadcast_to([0.0, 0.0, 1.0], tips.shape)

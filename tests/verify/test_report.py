@@ -11,7 +11,7 @@ import pytest
 from cornersmooth.cli import run
 from cornersmooth.nc_reader import read_nc
 from cornersmooth.nc_reader.tool import written_at
-from cornersmooth.report.along import deviation_along
+from cornersmooth.report.deviation_profile import deviation_along
 from cornersmooth.report.verification import (
     CSV_COLUMNS,
     along_lines,

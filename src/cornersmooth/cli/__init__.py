@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 def main() -> NoReturn:
     """Run the command line as a process of its own and leave with its exit code."""
-    from cornersmooth.cli.ending import Ending
+    from cornersmooth.cli.shutdown import Shutdown
 
-    ending = Ending()
+    ending = Shutdown()
     ending.install()
     import os
     import sys
@@ -29,6 +29,6 @@ def main() -> NoReturn:
 def run(args: list[str]) -> int:
     """Run the command line within another program, whose signals are its own; returns the exit code."""
     from cornersmooth.cli import group
-    from cornersmooth.cli.ending import Ending
+    from cornersmooth.cli.shutdown import Shutdown
 
-    return group.run(args, Ending())
+    return group.run(args, Shutdown())

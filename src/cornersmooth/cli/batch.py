@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
 
-from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.job import Job, Outcome, run_job
+from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.verdict import Verdict
 
 #: what becomes of a file: a verdict, nothing as before, or none of both
@@ -42,7 +42,7 @@ class Batch:
         self.counts: Counter[str] = Counter()
         self._processes = min(processes or os.cpu_count() or 1, len(jobs))
 
-    def run(self, ending: Ending) -> Iterator[Outcome]:
+    def run(self, ending: Shutdown) -> Iterator[Outcome]:
         """Outcomes in the order of the inputs; a file that fails does not stop the others."""
         ending.say = self._interrupted
         if self._scheduler:
@@ -62,7 +62,7 @@ class Batch:
             self._progress("files", self.counts.total(), len(self.jobs))
         return outcome
 
-    def _beside(self, ending: Ending) -> Iterator[Outcome]:
+    def _beside(self, ending: Shutdown) -> Iterator[Outcome]:
         from cornersmooth.cli.worker import Worker
 
         workers = [Worker() for _ in range(self._processes)]

@@ -19,7 +19,7 @@ from cornersmooth import __version__
 from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.errors import SettingsError
-from cornersmooth.extras import install_hint
+from cornersmooth.optional_packages import install_hint
 from cornersmooth.output import make_folder, processes_of_leftovers, remove_leftovers, temporary_name
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from cornersmooth import __version__
-from cornersmooth.cli.ending import Ending
+from cornersmooth.cli.shutdown import Shutdown
 
 #: name of each command, its module and its line in the list of commands
 COMMANDS = {
@@ -86,7 +86,7 @@ def cli() -> None:
     """
 
 
-def run(args: list[str] | None, ending: Ending) -> int:
+def run(args: list[str] | None, ending: Shutdown) -> int:
     """Run the command line with the given arguments; returns the exit code."""
     from cornersmooth.cli.job import EXIT_INTERNAL, internal_error
     from cornersmooth.errors import CornersmoothError

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from cornersmooth.cli.batch import Batch
-from cornersmooth.cli.ending import Ending
 from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_lines
 from cornersmooth.cli.inputs import Input, find_inputs, named_input
 from cornersmooth.cli.job import Job, Outcome, check, run_job
@@ -18,6 +17,7 @@ from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothin
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import more, print_line, progress_bar, show_findings, show_summary, show_verdict
+from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.cli.summary import check_summary, counts_line, line_of, row_of, write_summary
 from cornersmooth.output import make_folder
 from cornersmooth.verdict import Verdict
@@ -64,7 +64,7 @@ _NAMED = 3
 @outputs.quiet
 @outputs.verbose
 @click.pass_obj
-def command(ending: Ending, /, inputs: tuple[str, ...], **given: Any) -> int:
+def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
     """Round the corners of the CL files IN and write NC text.
 
     IN is an APT/CL file (NX, CATIA, Creo, ...) or a table of points (x y z i j k, or two points); - is standard input.

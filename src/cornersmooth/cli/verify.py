@@ -25,7 +25,7 @@ from cornersmooth.verdict import Verdict
 if TYPE_CHECKING:
     from cornersmooth.model import Program
     from cornersmooth.nc_reader import NcProgram, Problem
-    from cornersmooth.report.along import Distribution
+    from cornersmooth.report.deviation_profile import Distribution
     from cornersmooth.verify import Verification, Where
 
 #: problems shown without -v
@@ -85,7 +85,7 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.nc import own_words
     from cornersmooth.nc_reader.source import readable_twice
     from cornersmooth.report import findings_table
-    from cornersmooth.report.along import deviation_along
+    from cornersmooth.report.deviation_profile import deviation_along
     from cornersmooth.report.verdict import judge, trusted_blocks
     from cornersmooth.verify import useful_processes, verify
 

@@ -17,9 +17,9 @@ import threading
 from collections.abc import Iterator
 from typing import BinaryIO, NoReturn
 
-from cornersmooth.cli.ending import SIGNALS
 from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
+from cornersmooth.cli.shutdown import SIGNALS
 from cornersmooth.output import ClosedPipe, remove_leftovers, remove_unfinished
 
 _COMMAND = "from cornersmooth.cli.worker import serve; serve()"

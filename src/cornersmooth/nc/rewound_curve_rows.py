@@ -19,8 +19,8 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows, whole_rows
 from cornersmooth.nc.rotary_run_rows import rotary_run_rows
-from cornersmooth.parts import some_poses, some_runs
 from cornersmooth.rotary import rapid_moves, rewound_angles, still_poses
+from cornersmooth.slices import some_poses, some_runs
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 
 

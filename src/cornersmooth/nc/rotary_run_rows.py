@@ -20,9 +20,9 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.nc.rotary_curve_rows import warn_of_curves
 from cornersmooth.nc.rotary_rows import CHUNK, LARGEST_TURN, InsertedPoints, whole_rows
-from cornersmooth.parts import some_runs
 from cornersmooth.rotary import fill, insertions, rapid_moves, rotary_angles, still_poses
 from cornersmooth.rotary.run_angles import Guide, RunAngles, lever_at, run_angles
+from cornersmooth.slices import some_runs
 from cornersmooth.smoothing.runs.rows import STEPS_PER_UNIT, SectionRows, line_places, polylines_of, section_rows
 from cornersmooth.smoothing.runs.splines import Splines, ranges, spread, starts
 from cornersmooth.smoothing.sampling import Rows, dense_rows

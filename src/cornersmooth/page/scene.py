@@ -14,7 +14,7 @@ from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.corners import KINDS, CornerList, measured_corners, smoothed_corners
 from cornersmooth.page.packing import Pack
-from cornersmooth.page.planned import Planned, axis_loads, feed_seconds, plan_all, speeds_along, speeds_over
+from cornersmooth.page.planned_speeds import Planned, axis_loads, feed_seconds, plan_all, speeds_along, speeds_over
 from cornersmooth.report.paths import OriginalPath, WrittenPath, original_path, written_path
 from cornersmooth.report.thinning import thinned
 from cornersmooth.settings import Settings

@@ -10,7 +10,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import written_at
-from cornersmooth.report.along import deviation_along
+from cornersmooth.report.deviation_profile import deviation_along
 from cornersmooth.smoothing.arcs import arc_points
 from cornersmooth.vectors import angle_between, dot, norm
 

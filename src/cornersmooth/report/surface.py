@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.extras import install_hint
+from cornersmooth.optional_packages import install_hint
 from cornersmooth.report.thinning import thinned
 from cornersmooth.surface import SurfaceMap
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cornersmooth.model import Floats, Program
-from cornersmooth.report.along import Distribution
+from cornersmooth.report.deviation_profile import Distribution
 from cornersmooth.verify import Verification
 
 CSV_COLUMNS = (

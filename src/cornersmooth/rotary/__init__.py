@@ -1,8 +1,8 @@
 """Rotary angles along a path: one solution for every pose, points where angles need them, curves of angles."""
 
 from cornersmooth.rotary.angle_path import RotaryPath, rapid_moves, rotary_angles, still_poses
-from cornersmooth.rotary.insertion import FilledPath, Insertions, fill, insertions
 from cornersmooth.rotary.rewinding import rewound_angles
+from cornersmooth.rotary.subdivision import FilledPath, Insertions, fill, insertions
 
 __all__ = [
     "FilledPath",

@@ -34,9 +34,9 @@ from cornersmooth.rotary.angle_fit import (
     measured,
 )
 from cornersmooth.rotary.corner_lines import CornerLines, corner_lines
-from cornersmooth.rotary.insertion import Insertions
 from cornersmooth.rotary.nurbs_knots import SPANS, CurveGroup, refinement, weight_factors
-from cornersmooth.rotary.straight_motion import RotaryMotion, lever_points, rotary_motion
+from cornersmooth.rotary.remainders import RotaryMotion, lever_points, rotary_motion
+from cornersmooth.rotary.subdivision import Insertions
 from cornersmooth.settings import WEIGHT_DECIMALS
 from cornersmooth.smoothing import nurbs
 

@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
-from cornersmooth.rotary.straight_motion import tip_points
+from cornersmooth.rotary.remainders import tip_points
 from cornersmooth.settings import WEIGHT_DECIMALS
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.nurbs import KNOTS

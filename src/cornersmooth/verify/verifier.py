@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from cornersmooth.copied_signature import taking_what
 from cornersmooth.errors import SettingsError
 from cornersmooth.model import Ints, Program, Units
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram, Problem
@@ -23,7 +24,6 @@ from cornersmooth.nc_reader.source import Source, readable_twice
 from cornersmooth.nc_reader.word_list import word_list
 from cornersmooth.processes import Helper, can_fork, map_in_processes
 from cornersmooth.settings import BOUNDS
-from cornersmooth.signatures import taking_what
 from cornersmooth.statements.comparison import KINDS
 from cornersmooth.statements.left_out import gone_over, may_be_left_out
 from cornersmooth.verify.batches import Batch, Batches

@@ -4,7 +4,7 @@ In a straight block every axis runs evenly from word to word. With tool centre p
 but the tool axis follows its rotary angles and not the shortest turn, and near the pole the two differ much; without it
 the tip leaves its line too.
 
-Which division is enough is for `cornersmooth.rotary.interpolation_error` to say, and to prove.
+Which division is enough is for `cornersmooth.rotary.chord_error` to say, and to prove.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import solutions, wrap
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.rotary.axis_findings import limit_error
-from cornersmooth.rotary.interpolation_error import InterpolationError, Intervals, ruled
+from cornersmooth.rotary.chord_error import InterpolationError, Intervals, ruled
 
 #: Rounds of division.
 ROUNDS = 28

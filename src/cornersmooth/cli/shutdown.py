@@ -22,7 +22,7 @@ SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP"
 _TIDY_TERMINAL = b"\r\x1b[2K\x1b[?25h"
 
 
-class Ending:
+class Shutdown:
     """What is done when the run is told to end.
 
     Attributes

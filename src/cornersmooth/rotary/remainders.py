@@ -3,7 +3,7 @@
 A control that is given rotary words runs them evenly along a straight block. So a segment whose angles may run evenly
 from pose to pose within the tolerance does so here: its joints then stand on that line, and a corner between two such
 segments is rounded in its angles exactly as it is in its tip. On all other segments the joints have the angles of the
-ruled motion, and the straight remainder is divided as `cornersmooth.rotary.insertion` says.
+ruled motion, and the straight remainder is divided as `cornersmooth.rotary.subdivision` says.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, pole_distance, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.rotary.angle_path import rapid_moves, rotary_angles, still_poses
-from cornersmooth.rotary.insertion import Insertions, insertions
+from cornersmooth.rotary.subdivision import Insertions, insertions
 from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.segments import Segments, segments_of
 from cornersmooth.vectors import unit
