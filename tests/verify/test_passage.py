@@ -178,6 +178,15 @@ def test_what_lies_too_far_back_is_not_proved(monkeypatch):
     assert passage(own, path, 1.0).breaks[0].proved
 
 
+@pytest.mark.parametrize(("seed", "radius"), [(0, 1.0), (7, 1.0), (16, 0.6)])
+def test_looks_back_beyond_the_chunk(seed, radius):
+    """Only rows of an earlier chunk show which way of a path to and fro leads on."""
+    rng = np.random.default_rng(seed)
+    path = walk(rng, "fold", rng.integers(1, 14))
+    own, path = written(rng, path)[:, 3:], path[:, 3:]
+    assert all(passage(own, path, radius, chunk=chunk).passed for chunk in (2, 3, 5, CHUNK))
+
+
 def test_the_verdict_does_not_need_one_speed():
     """One motion stands while the other goes on."""
     path = np.zeros((3, 6))

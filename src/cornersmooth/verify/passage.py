@@ -185,7 +185,7 @@ class Walk:
         part = _Part(self, own, bend, sections)
         part.decide(inner)
         if sections.open:
-            kept = max(part.last - LOOK_BACK[-1], int(part.first[-1]), 0)
+            kept = max(part.last - LOOK_BACK[-1], int(part.known[-1]), 0)
             self._own, self._bend, self._place = part.own[kept:], part.bend[kept:], part.place[kept:]
             self._known = max(int(part.known[-1]) - kept, -1)
         else:
