@@ -31,11 +31,12 @@ def comment_lines(text: str, marks: tuple[str, str] = ("(", ")"), orders: tuple[
     orders : tuple of str
         First words that the control would obey.
     """
-    rest = plain_text(text)
+    plain, at = plain_text(text), 0
     lines = []
-    while rest:
-        part = rest[:_LONGEST]
-        rest = rest[_LONGEST:].lstrip()
+    while at < len(plain):
+        part = plain[at : at + _LONGEST]
+        at += _LONGEST
+        at += plain[at : at + 1] == " "  # there are no two blanks side by side
         if part.upper().startswith(orders):
             part = f"- {part}"
         lines.append(f"{marks[0]}{part}{marks[1]}".rstrip())

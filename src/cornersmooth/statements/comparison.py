@@ -72,6 +72,13 @@ class _Nearness:
         # a pose is a rounding off, and its place as far from it as the room
         return self.apart(place, nearest) > 2 * self.room + ours.room
 
+    def beyond(self, place: float, there: float, spare: float) -> bool:
+        """Whether any token at least as far along as one place is away from the other: `apart` grows on its way.
+
+        `spare` is what no token is uncertain by more, its reach included.
+        """
+        return abs(place - there) > self.room + spare and self.apart(place, there) > 2 * self.room + spare
+
 
 def compare(
     asked_for: list[Token],
@@ -236,10 +243,12 @@ def _without_unasked(
     ours: list[Token], theirs: list[Token], changes: list[int], near: _Nearness, certain_first: bool
 ) -> list[Token]:
     """Tokens without the habits, where those asked for are looked for in one of two orders."""
-    unasked = [k for k, token in enumerate(ours) if token.value == _ENDED[token.kind]]
+    unasked = {k for k, token in enumerate(ours) if token.value == _ENDED[token.kind]}
     begins_again = {k for k in unasked if k + 1 < len(ours) and _goes_on(ours[k], ours[k + 1], changes)}
+    around = _Around.of(ours, sorted(unasked), near)
     for other in theirs:
-        alike = [k for k in unasked if other.value == ours[k].value and not near.away(other.place, ours[k])]
+        alike = [k for k in around.tokens(other.place) if k in unasked and other.value == ours[k].value]
+        alike = sorted(k for k in alike if not near.away(other.place, ours[k]))
         ranks = []
         for k in alike:
             doubts = (ours[k].reach > near.room, k in begins_again)
@@ -247,6 +256,47 @@ def _without_unasked(
         if alike:
             unasked.remove(alike[ranks.index(min(ranks))])
     return [token for k, token in enumerate(ours) if k not in begins_again or k not in unasked]
+
+
+@dataclass(frozen=True)
+class _Around:
+    """Tokens by their places: those that may be near a place are found without looking at all.
+
+    Parameters
+    ----------
+    tokens_anywhere : list of int
+        Those with other places, or of which it is not known how far along they are.
+    ordered : list of int
+        All others, by place.
+    places : list of float, mm
+        Of these, ascending.
+    spare : float, mm
+        What none of these is uncertain by more.
+    near : _Nearness
+    """
+
+    tokens_anywhere: list[int]
+    ordered: list[int]
+    places: list[float]
+    spare: float
+    near: _Nearness
+
+    @classmethod
+    def of(cls, ours: list[Token], chosen: list[int], near: _Nearness) -> _Around:
+        anywhere = [k for k in chosen if ours[k].others or ours[k].reach > near.room]
+        ordered = sorted(set(chosen).difference(anywhere), key=lambda k: ours[k].place)
+        spare = max((ours[k].room + ours[k].reach for k in ordered), default=0.0)
+        return cls(anywhere, ordered, [ours[k].place for k in ordered], spare, near)
+
+    def tokens(self, place: float) -> Iterator[int]:
+        """Tokens that may be near a place, and a few more."""
+        yield from self.tokens_anywhere
+        at = bisect_left(self.places, place)
+        for way in (range(at, len(self.places)), range(at - 1, -1, -1)):
+            for k in way:
+                if self.near.beyond(place, self.places[k], self.spare):
+                    break
+                yield self.ordered[k]
 
 
 def _goes_on(off: Token, on: Token, changes: list[int]) -> bool:
