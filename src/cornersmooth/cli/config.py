@@ -6,6 +6,7 @@ import click
 
 from cornersmooth.cli import shop
 from cornersmooth.cli.options.parameters import PATH
+from cornersmooth.cli.show import say_line
 
 
 @click.command(
@@ -36,5 +37,5 @@ def command(source: str) -> int:
             rows.append((shop.keys(option)[0], told, shop.origin(context, str(option.name))))
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
     for key, value, origin in rows:
-        click.echo(f"{key:<{widths[0]}}  {value:<{widths[1]}}  {origin}")
+        say_line(f"{key:<{widths[0]}}  {value:<{widths[1]}}  {origin}")
     return 0

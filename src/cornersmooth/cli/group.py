@@ -98,7 +98,7 @@ def run(args: list[str] | None, ending: Shutdown) -> int:
     except click.exceptions.Exit as leaving:
         return leaving.exit_code
     except click.exceptions.NoArgsIsHelpError as helping:
-        _say(helping.ctx.get_help() if helping.ctx else "")
+        click.echo(helping.ctx.get_help() if helping.ctx else "", err=True)
         return 2
     except click.UsageError as wrong:
         where = f"{wrong.ctx.command_path} --help" if wrong.ctx else "cornersmooth --help"
@@ -160,5 +160,7 @@ def _unwritten(failure: OSError) -> int:
 
 def _say(text: str) -> None:
     """Print a line of error; where standard error is full, the exit code must do."""
+    from cornersmooth.cli.show import print_line
+
     with contextlib.suppress(OSError):
-        click.echo(text, err=True)
+        print_line(text)

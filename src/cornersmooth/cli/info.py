@@ -11,6 +11,7 @@ from cornersmooth.cli.files import read_input
 from cornersmooth.cli.options import outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.show import say_line
 
 if TYPE_CHECKING:
     from cornersmooth.report.info import Info, Spread
@@ -51,11 +52,11 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     rows = [row for part in (_file(info), _motion(info), _axis(info), _corners(info)) for row in part]
     width = max(len(label) for label, _ in rows)
     for label, text in rows:
-        click.echo(f"{label:<{width}}  {text}".rstrip())
+        say_line(f"{label:<{width}}  {text}".rstrip())
     for finding in info.findings:
         place = f"{name}:{finding.line}" if finding.line else name
         times = f" ({finding.count} times)" if finding.count > 1 else ""
-        click.echo(f"{place}: {finding.severity}: {finding.text}{times}")
+        say_line(f"{place}: {finding.severity}: {finding.text}{times}")
     return 0
 
 

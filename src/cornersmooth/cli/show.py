@@ -89,7 +89,7 @@ def show_verdict(contents: dict[str, Any], saving: Saving | None = None) -> None
     """Print the verdict, in one line."""
     from cornersmooth.report.verdict import first_line
 
-    console().print(first_line(contents, saving), style="bold")
+    console().print(printable(first_line(contents, saving)), style="bold")
 
 
 def show_summary(contents: dict[str, Any], verbose: int) -> None:
@@ -104,7 +104,7 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
     out = console()
 
     def say(label: str, text: str) -> None:
-        out.print(Text.assemble((f"{label:<{_LABEL}}", "bold"), text))
+        out.print(Text.assemble((f"{label:<{_LABEL}}", "bold"), printable(text)))
 
     say("input", f"{given['name']}: {given['dialect']}, {given['poses']} poses, {given['units']}")
     sharp = ", ".join(f"{count} {reason}" for reason, count in summary["not_smoothed"].items())
@@ -152,6 +152,21 @@ def more(count: int, thing: str) -> str:
     return f"{count:,} more {thing}{'s' * (count != 1)}"
 
 
+def printable(text: str) -> str:
+    """Return one line that a terminal only shows: what would move, colour or hide something is escaped.
+
+    Names of files and words of CL files come from strangers.
+    """
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() else one.encode("unicode_escape", "surrogatepass").decode() for one in text)
+
+
 def print_line(text: str) -> None:
-    """Print plain text to standard error, as it is: no markup, no wrapping."""
-    print(text, file=sys.stderr)  # noqa: T201
+    """Print a line to standard error: no markup, no wrapping."""
+    print(printable(text), file=sys.stderr)  # noqa: T201
+
+
+def say_line(text: str) -> None:
+    """Print a line to standard output."""
+    print(printable(text))  # noqa: T201

@@ -11,6 +11,7 @@ from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_inpu
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.show import say_line
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
 
@@ -92,7 +93,7 @@ def command(source: str, text: str, **given: Any) -> int:
                 output.stream.write(part)
     if not given["quiet"]:
         for line in surface_lines(found):
-            click.echo(line)
+            say_line(line)
     return 0 if found.kept else 1
 
 

@@ -12,7 +12,7 @@ from cornersmooth.cli.files import check_inputs, check_path, read_input, target_
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import print_line, progress_bar
+from cornersmooth.cli.show import print_line, progress_bar, say_line
 from cornersmooth.methods import METHODS
 from cornersmooth.output import open_output
 
@@ -104,7 +104,7 @@ def command(source: str, **given: Any) -> int:
         click.echo(comparison_json(compared.as_dict()), nl=False)
     elif not given["quiet"]:
         for line in _tables(compared):
-            click.echo(line)
+            say_line(line)
     return 0
 
 

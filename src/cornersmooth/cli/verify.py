@@ -16,7 +16,7 @@ from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_inpu
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import more, show_findings
+from cornersmooth.cli.show import more, print_line, say_line, show_findings
 from cornersmooth.errors import SettingsError
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import open_output
@@ -108,7 +108,7 @@ def command(source: str, text: str, **given: Any) -> int:
         nc = readable_twice(nc)
     trusted = [line for path in given["trusted"] for line in read_lines(path)]
     if head.remark:  # first: what follows may be hard to understand without it
-        click.echo(f"{text}: warning: {head.remark}", err=True)
+        print_line(f"{text}: warning: {head.remark}")
     found = verify(
         program,
         nc,
@@ -131,19 +131,19 @@ def command(source: str, text: str, **given: Any) -> int:
         for path in pages:
             _write(path, [page])
     for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
-        click.echo(line, err=True)
+        print_line(line)
     findings = (*program.findings, *trusted_blocks(found))
     if given["quiet"]:
         if found.verdict not in (Verdict.PASSED, Verdict.FAILED):
-            click.echo(f"{text}: {judge(found, findings).text}", err=True)
+            print_line(f"{text}: {judge(found, findings).text}")
     else:
         show_findings(name, findings_table(findings), given["verbose"])
-        click.echo(judge(found, findings).text)
+        say_line(judge(found, findings).text)
         for line in _summary(found):
-            click.echo(line)
+            say_line(line)
         if given["verbose"]:
             for line in _along(found, deviation_along(program, nc, **how)):
-                click.echo(line)
+                say_line(line)
     taken = (Verdict.PASSED,) if given["strict"] else (Verdict.PASSED, Verdict.INCOMPLETE)
     return 0 if found.verdict in taken else 1
 

@@ -1,0 +1,52 @@
+"""Words of files and names of files come from strangers: a terminal must only show them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cornersmooth.cli.show import printable
+from oracle.command import SMALL, run
+
+ESCAPE, BELL = "\x1b[2J", "\x07"
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("part.cls: tilt 30° → done", "part.cls: tilt 30° → done"),
+        ("a\x1b[31mb", r"a\x1b[31mb"),
+        ("a\nPASSED", r"a\nPASSED"),
+        ("\u202egnp", r"\u202egnp"),
+        ("a\udcffb", r"a\udcffb"),
+    ],
+)
+def test_what_is_not_printable_is_escaped(text: str, shown: str) -> None:
+    assert printable(text) == shown
+
+
+@pytest.mark.parametrize(
+    "words", [f"FO{ESCAPE}O/1\n", f"UNITS/{ESCAPE}\n", f"FEDRAT/{BELL}{ESCAPE}\n", f"HI{BELL}G\n", f"COOLNT/{ESCAPE}\n"]
+)
+@pytest.mark.parametrize("command", ["info", "smooth", "verify", "time"])
+def test_words_of_a_file_are_never_raw(command: str, words: str, tmp_path: Path) -> None:
+    source = tmp_path / "part.cls"
+    source.write_bytes(SMALL.replace(b"FINI", words.encode() + b"FINI"))
+    more = {"smooth": ["-o", tmp_path / "o.nc"], "verify": [tmp_path / "x.nc"]}.get(command, [])
+    (tmp_path / "x.nc").write_bytes(f"%\n{ESCAPE}\n({ESCAPE})\nG1 X{BELL}\n".encode())
+    found = run(command, source, *more)
+    assert b"\x1b" not in found.stdout + found.stderr
+    assert b"\x07" not in found.stdout + found.stderr
+
+
+def test_a_name_forges_no_line(tmp_path: Path) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    (folder / f"a\n9 files: 9 PASSED{ESCAPE}.cls").write_bytes(SMALL)
+    (folder / "b\nerror.cls").write_bytes(b"GOTO/x\n")
+    found = run("smooth", folder, "-d", tmp_path / "out")
+    lines = found.stderr.decode().splitlines()
+    assert not [line for line in lines if line.startswith(("9 files", "error"))]
+    assert b"\x1b" not in found.stderr
+    assert lines[-1].startswith("2 files: 1 ")
