@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +11,7 @@ import cornersmooth as cs
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.verdict import Verdict
 from filter.programs import ISO, PROGRAMS, WORDS, cuts
+from oracle.command import BAD_INPUT, DONE, run
 
 EPS = 0.02
 
@@ -186,6 +188,29 @@ def test_a_listing_and_a_mark_before_the_program_are_let_through() -> None:
     found = filtered("fanuc", "table-ac", text)
     assert found.smoothed == 24
     assert found.data.startswith(listing.encode("latin-1"))
+
+
+def test_commands_know_programs(tmp_path: Path) -> None:
+    control, machine, text = PROGRAMS["linuxcnc, G64, an arc inside"]
+    (tmp_path / "part.ngc").write_text(text)
+    on = ("--control", control, "--machine", machine)
+    made = run("filter", "part.ngc", *on, "-o", "new.ngc", cwd=tmp_path)
+    assert made.returncode == DONE
+    assert made.stderr.decode().startswith("PASSED: 24 of 25 cuts smoothed in 2 runs within 0.01 mm")
+    assert re.search(r"1 +\d+  an arc\n", made.stderr.decode())
+    assert run("filter", "-", *on, data=text.encode(), cwd=tmp_path).stdout == (tmp_path / "new.ngc").read_bytes()
+    found = run("verify", "part.ngc", "new.ngc", *on, cwd=tmp_path)
+    assert found.returncode == DONE
+    assert found.stdout.startswith(b"PASSED: within 0.01 mm")
+    wrong = (tmp_path / "new.ngc").read_text().replace("G2 X60 Y5", "G2 X61 Y5")
+    (tmp_path / "new.ngc").write_text(wrong)
+    found = run("verify", "part.ngc", "new.ngc", *on, cwd=tmp_path)
+    assert found.returncode == 1
+    assert b"the lines after line 15 of the old program are not there" in found.stderr
+    assert b"an NC program, looks like linuxcnc" in run("info", "part.ngc", cwd=tmp_path).stdout
+    refused = run("smooth", "part.ngc", cwd=tmp_path)
+    assert refused.returncode == BAD_INPUT
+    assert b"cornersmooth filter" in refused.stderr
 
 
 def test_without_words_for_tip_control_it_has_to_be_said() -> None:

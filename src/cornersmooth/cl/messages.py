@@ -68,7 +68,10 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS189": ("numbers in columns 73 to 80, but not on every long line in order", "remove columns 73 to 80"),
     "CS190": ("a line number in front of {text!r}, and not on every line in order", "remove the line numbers"),
     "CS196": ("{word} has a number too large for any machine", "correct the number"),
-    "CS198": ("{word} is a block of an NC program, no CL statement", "give the CL file that the program was made of"),
+    "CS198": (
+        "{word} is a block of an NC program, no CL statement",
+        "give the CL file that it was made of, or smooth the program itself with 'cornersmooth filter'",
+    ),
     "CS193": ("RETRCT cannot be carried out: {why}", "{want}"),
     "CS181": ("{word} inside a CYCLE, which is drilled at every position", "put CYCLE/OFF before it"),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,20 +13,21 @@ from cornersmooth.cli.inputs import Input, find_inputs, named_input
 from cornersmooth.cli.options import nc_text, outputs, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import console, print_line
+from cornersmooth.cli.show import console, more, print_line
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.output import make_folder, open_output
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.filter import Filtered
+    from cornersmooth.filter.checking import Wrong
     from cornersmooth.nc import Form
 
 #: names of NC programs, for folders
 PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia", "*.iso", "*.gcode")
 
-#: reasons shown without -v
-_SHOWN = 10
+#: reasons shown without -v, and problems
+_SHOWN, _WRONG_SHOWN = 10, 20
 
 tip_control = click.option(
     "--tip-control",
@@ -160,14 +162,57 @@ def _filter(source: str, target: str, form: Form, settings: Any, given: dict[str
     return int(bad)
 
 
+def verify_with_program(old: bytes, path: str, given: dict[str, Any]) -> int:
+    """Compare an NC program with what was made of it; return the exit code of ``verify``."""
+    from cornersmooth.filter import verify_programs
+    from cornersmooth.verify import useful_processes
+
+    new, name = read_input(path)
+    settings = smoothing.settings_of(given)
+    found = verify_programs(old, new, form_of(given), settings, processes=useful_processes())
+    verdict = Verdict.of(problems=len(found.wrong))
+    _show_wrong(name, found.wrong)
+    if not given["quiet"]:
+        measured = f"within {settings.tolerance:g} mm: tip {found.tip:.4g} mm, axis point {found.axis_point:.4g} mm"
+        click.echo(f"{verdict}: {_problems(found.wrong) or measured}")
+    return int(verdict is not Verdict.PASSED)
+
+
+def describe_program(data: bytes, name: str) -> str:
+    """Say what an NC program holds, as far as words tell that need no machine."""
+    from cornersmooth.filter.runs import ProgramReader
+    from cornersmooth.filter.vocabulary import VOCABULARIES
+    from cornersmooth.nc_reader.recognition import recognise_control
+    from cornersmooth.provenance import HEAD
+
+    control = recognise_control(data[:HEAD])
+    reading = ProgramReader(control if control in VOCABULARIES else "fanuc", None).read(data)
+    looks = f", looks like {control}" if control else ""
+    return (
+        f"file   {name}: an NC program{looks}, {len(reading.why)} lines\n"
+        f"cuts   {reading.cuts}\n"
+        "       'cornersmooth filter' smooths them, and says which cannot be; name the control and the machine there"
+    )
+
+
+def _problems(wrong: Sequence[Wrong]) -> str:
+    return f"{len(wrong)} problem{'s' * (len(wrong) != 1)}" if wrong else ""
+
+
+def _show_wrong(name: str, wrong: Sequence[Wrong]) -> None:
+    for one in wrong[:_WRONG_SHOWN]:
+        print_line(f"{name}:{one.line}: error: {one.text}")
+    if len(wrong) > _WRONG_SHOWN:
+        print_line(f"{name}: {more(len(wrong) - _WRONG_SHOWN, 'problem')}")
+
+
 def _show(name: str, found: Filtered, tolerance: float, verbose: int) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
     out = console()
     out.print(first_line(found, tolerance), style="bold")
     out.print(f"{name}: {found.lines} lines, {found.new_lines} after; all outside of runs is the same byte for byte")
     if found.checked is not None:
-        for one in found.checked.wrong:
-            print_line(f"{name}:{one.line}: error: {one.text}")
+        _show_wrong(name, found.checked.wrong)
     left = found.left if verbose else found.left[:_SHOWN]
     if left:
         out.print(f"{'left as it is':>13}  first line  reason")
@@ -185,7 +230,7 @@ def first_line(found: Filtered, tolerance: float) -> str:
     if found.checked is None:
         return f"{found.verdict}: {what}; it was not asked for"
     if found.checked.wrong:
-        return f"{found.verdict}: {len(found.checked.wrong)} problems; {what}"
+        return f"{found.verdict}: {_problems(found.checked.wrong)}; {what}"
     if not found.runs:
         return f"{found.verdict}: {what}; the program is the same byte for byte"
     tip, point = found.checked.tip, found.checked.axis_point

@@ -42,9 +42,15 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
       cornersmooth info part.cls --json > part.json
     """
     from cornersmooth.cl import read
+    from cornersmooth.cli.filter import describe_program
+    from cornersmooth.nc_reader.recognition import looks_like_program
+    from cornersmooth.provenance import HEAD
     from cornersmooth.report.info import describe, info_json
 
     data, name = read_input(source)
+    if looks_like_program(data[:HEAD]):
+        click.echo(describe_program(data, name))
+        return 0
     info = describe(read(data, name=name, **reading.reading_of(given)), tolerance, axis_length)
     if as_json:
         click.echo(info_json(info), nl=False)

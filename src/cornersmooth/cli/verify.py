@@ -82,8 +82,11 @@ def command(source: str, text: str, **given: Any) -> int:
       cornersmooth verify part.cls part.nc -e 0.04 --report found.html
     """
     from cornersmooth.cl import read
+    from cornersmooth.cli.filter import verify_with_program
     from cornersmooth.nc import own_words
+    from cornersmooth.nc_reader.recognition import looks_like_program
     from cornersmooth.nc_reader.source import readable_twice
+    from cornersmooth.provenance import HEAD
     from cornersmooth.report import findings_table
     from cornersmooth.report.deviation_profile import deviation_along
     from cornersmooth.report.verdict import judge, trusted_blocks
@@ -95,6 +98,8 @@ def command(source: str, text: str, **given: Any) -> int:
     check_inputs(source, text)
     _check_outputs(source, text, given)
     data, name = read_input(source)
+    if looks_like_program(data[:HEAD]):
+        return verify_with_program(data, text, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)
     own = own_words(nc_text.control_of(given))

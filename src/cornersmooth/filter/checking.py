@@ -134,7 +134,9 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place], states: 
         except CornersmoothError as error:
             wrong.append(Wrong(own[0].first + 1, error.what))
             continue
-        wrong += others + [Wrong(abs(problem.nc_line), problem.text) for problem in found.problems]
+        wrong += others + [
+            Wrong(abs(one.nc_line), one.text.replace("CL file", "old program")) for one in found.problems
+        ]
         largest = [max(pair) for pair in zip(largest, (found.tip.value, found.axis_point.value), strict=True)]
     return Checked(tuple(sorted(wrong, key=lambda one: one.line)), *largest)
 
