@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import Flag, IntEnum, auto
 from functools import cached_property
 from typing import Any, Literal
 
@@ -296,21 +296,64 @@ def _refuse(wrong: Bools | np.bool_, what: str, values: Floats, hint: str) -> No
         raise InputError("CS167", f"the {what} of pose {pose} is {told}", hint)
 
 
-class Status(IntEnum):
-    """What became of a corner (`Corners.status`)."""
+class Trait(Flag):
+    """What follows from a status."""
 
-    SMOOTHED = 0
-    STRAIGHT = 1  #: turns by less than the output can show
-    REVERSAL = 2  #: turns by more than `Settings.reversal_angle`
-    AXIS_STEP = 3  #: the axis turns by more than `Settings.max_axis_step` on one side
-    FEED_CHANGE = 4  #: the feed changes here and the output form cannot change it inside a curve
-    KEPT = 5  #: `Program.keep` asks for the pose itself
-    DUPLICATE = 6  #: repeats the pose before it
-    TOO_SHORT = 7  #: no room for a transition, or less than the output can show
-    FEED_PER_REVOLUTION = 8  #: the output form has no curves at a feed per revolution
-    IN_RUN = 9  #: rounded together with its neighbours, by the curves of `SmoothProgram.runs`
-    STRAYS = 10  #: the method's own construction would leave the path by more than it promises
-    STATEMENT = 11  #: a statement acts here (`ACTING_WORDS`)
+    NOTHING = 0
+    ROUNDED = auto()  #: a curve is in its place
+    NO_CORNER = auto()  #: the path goes straight on, or repeats a pose
+    PASSED_BY = auto()  #: long lines may pass by it; all others are passed exactly
+    ENDS_RUN = auto()  #: no curve of a whole run goes through it
+
+
+class Status(IntEnum):
+    """What became of a corner (`Corners.status`): an entry holds all that the rest of the program has to know of it."""
+
+    traits: Trait
+
+    def __new__(cls, code: int, traits: Trait = Trait.NOTHING) -> Status:
+        """Member with its code and what follows from it."""
+        member = int.__new__(cls, code)
+        member._value_, member.traits = code, traits
+        return member
+
+    SMOOTHED = 0, Trait.ROUNDED | Trait.PASSED_BY
+    #: turns by less than the output can show
+    STRAIGHT = 1, Trait.NO_CORNER | Trait.PASSED_BY
+    #: turns by more than `Settings.reversal_angle`
+    REVERSAL = 2, Trait.ENDS_RUN
+    #: the axis turns by more than `Settings.max_axis_step` on one side
+    AXIS_STEP = 3, Trait.ENDS_RUN
+    #: the feed changes here and the output form cannot change it inside a curve
+    FEED_CHANGE = 4, Trait.ENDS_RUN
+    #: `Program.keep` asks for the pose itself
+    KEPT = 5, Trait.ENDS_RUN
+    #: repeats the pose before it
+    DUPLICATE = 6, Trait.NO_CORNER | Trait.PASSED_BY
+    #: no room for a transition, or less than the output can show
+    TOO_SHORT = 7, Trait.PASSED_BY
+    #: the output form has no curves at a feed per revolution
+    FEED_PER_REVOLUTION = 8, Trait.ENDS_RUN
+    #: rounded together with its neighbours, by the curves of `SmoothProgram.runs`
+    IN_RUN = 9, Trait.ROUNDED
+    #: the method's own construction would leave the path by more than it promises
+    STRAYS = 10
+    #: a statement acts here (`ACTING_WORDS`)
+    STATEMENT = 11, Trait.ENDS_RUN
+    #: an arc meets a line or another arc here; no row of `Corners`
+    ARC = 12
+    #: a rapid that leads nowhere is between two cuts; no row of `Corners`
+    RAPID = 13
+
+    @property
+    def key(self) -> str:
+        """Its name in reports; on the screen blanks stand for the underscores."""
+        return self.name.lower()
+
+    @classmethod
+    def having(cls, trait: Trait) -> tuple[Status, ...]:
+        """All with a trait."""
+        return tuple(status for status in cls if trait & status.traits)
 
 
 class LimitedBy(IntEnum):
@@ -319,6 +362,11 @@ class LimitedBy(IntEnum):
     NOTHING = 0  #: not smoothed
     TOLERANCE = 1
     SEGMENT = 2
+
+    @property
+    def key(self) -> str:
+        """Its name in reports; empty for nothing."""
+        return self.name.lower() if self else ""
 
 
 @dataclass(frozen=True)
@@ -384,7 +432,7 @@ class Corners:
     @property
     def rounded(self) -> Bools:
         """(k,) bool: smoothed rows, and those that the curve of a run rounds."""
-        rounded: Bools = self.smoothed | (self.status == Status.IN_RUN)
+        rounded: Bools = np.isin(self.status, Status.having(Trait.ROUNDED))
         return rounded
 
 

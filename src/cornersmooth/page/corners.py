@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.model import Floats, Ints, Program, SmoothProgram, Status
-from cornersmooth.report.corners import LIMIT_NAMES, STATUS_NAMES, corner_table
+from cornersmooth.model import Floats, Ints, LimitedBy, Program, SmoothProgram, Status
+from cornersmooth.report.corners import corner_table
 from cornersmooth.smoothing.sharp import other_corners, sharp_rows
 from cornersmooth.vectors import angle_between
 from cornersmooth.verify import Verification
@@ -99,17 +99,12 @@ def smoothed_corners(smoothed: SmoothProgram, found: Verification | None, *, den
     if found is not None:
         tip = np.where(np.isfinite(found.pose_tip[pose]), found.pose_tip[pose], tip)
         axis = np.where(np.isfinite(found.pose_axis_point[pose]), found.pose_axis_point[pose], axis)
-    names = (
-        *(STATUS_NAMES[item].replace("_", " ") for item in Status),
-        *(name for name in LIMIT_NAMES.values() if name),
-        "arc",
-        "rapid",
-    )
+    names = (*(each.key.replace("_", " ") for each in Status), *(each.key for each in LimitedBy if each))
     reason = np.where(corners.smoothed[rows], len(Status) - 1 + corners.limited_by[rows], status[rows]).astype(np.int64)
     return _ranked(
         pose,
         np.append(kind[rows], np.ones(len(others.pose), np.int64)),
-        np.append(reason, np.where(others.reason == "arc", len(names) - 2, len(names) - 1)),
+        np.append(reason, others.status),
         names,
         np.append(table["tip_angle_deg"], others.tip_turn),
         np.append(table["axis_angle_deg"], others.axis_turn),

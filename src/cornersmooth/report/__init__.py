@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cornersmooth.errors import Finding
-from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status
-from cornersmooth.report.corners import STATUS_NAMES, corner_table, worst_corners
+from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status, Trait
+from cornersmooth.report.corners import corner_table, worst_corners
 from cornersmooth.report.verdict import judge, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import dot, norm
@@ -69,9 +69,9 @@ def report(
         "limited_by_tolerance": int((corners.limited_by == LimitedBy.TOLERANCE).sum()),
         "limited_by_segment": int((corners.limited_by == LimitedBy.SEGMENT).sum()),
         "not_smoothed": {
-            STATUS_NAMES[status]: count
+            status.key: count
             for status in Status
-            if status not in (Status.SMOOTHED, Status.IN_RUN) and (count := int((corners.status == status).sum()))
+            if not status.traits & Trait.ROUNDED and (count := int((corners.status == status).sum()))
         },
         "sharp": sharp,
         "max_tip_error_mm": max(worst.tip_error, _largest(runs.tip_bound) if runs is not None else 0.0),

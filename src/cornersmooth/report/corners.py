@@ -14,26 +14,6 @@ from cornersmooth.smoothing.construction import RUN_CURVATURE, construction_of
 from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.vectors import angle_between, norm
 
-STATUS_NAMES = {
-    Status.SMOOTHED: "smoothed",
-    Status.STRAIGHT: "straight",
-    Status.REVERSAL: "reversal",
-    Status.AXIS_STEP: "axis_step",
-    Status.FEED_CHANGE: "feed_change",
-    Status.KEPT: "kept",
-    Status.DUPLICATE: "duplicate",
-    Status.TOO_SHORT: "too_short",
-    Status.FEED_PER_REVOLUTION: "feed_per_revolution",
-    Status.IN_RUN: "in_run",
-    Status.STRAYS: "strays",
-    Status.STATEMENT: "statement",
-}
-LIMIT_NAMES = {
-    LimitedBy.NOTHING: "",
-    LimitedBy.TOLERANCE: "tolerance",
-    LimitedBy.SEGMENT: "segment",
-}
-
 Column = Floats | Ints | NDArray[np.str_]
 
 #: parameters at which the curvature of a transition is looked at; it peaks at or near the middle
@@ -88,15 +68,15 @@ def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bo
         "axis_error_mm": axis_error,
         "orientation_error_deg": np.degrees(corners.orientation_error[rows]),
         "curvature_max_per_mm": _largest_curvature(smoothed, rows),
-        "limited_by": _names(LIMIT_NAMES, corners.limited_by[rows]),
-        "status": _names(STATUS_NAMES, corners.status[rows]),
+        "limited_by": _names(LimitedBy, corners.limited_by[rows]),
+        "status": _names(Status, corners.status[rows]),
     }
     columns.update(construction_of(settings.method).report_columns(corners, rows))
     return columns
 
 
-def _names(names: dict[Status, str] | dict[LimitedBy, str], codes: NDArray[np.uint8]) -> NDArray[np.str_]:
-    return np.array([names[code] for code in sorted(names)])[codes]  # type: ignore[index]
+def _names(kind: type[Status] | type[LimitedBy], codes: NDArray[np.uint8]) -> NDArray[np.str_]:
+    return np.array([each.key for each in kind])[codes]
 
 
 def _largest_curvature(smoothed: SmoothProgram, rows: Ints) -> Floats:

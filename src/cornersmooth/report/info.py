@@ -10,8 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from cornersmooth.errors import Finding
-from cornersmooth.model import Bools, Corners, FeedMode, Floats, LimitedBy, Move, Program, Status
-from cornersmooth.report.corners import STATUS_NAMES
+from cornersmooth.model import Bools, Corners, FeedMode, Floats, LimitedBy, Move, Program, Status, Trait
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.axis_steps import axis_step_findings
 from cornersmooth.smoothing.construction import construction_of
@@ -295,10 +294,9 @@ def _corners(program: Program, settings: Settings) -> CornerSummary:
         limited_by_tolerance=int(np.count_nonzero(corners.limited_by == LimitedBy.TOLERANCE)),
         limited_by_segment=int(np.count_nonzero(corners.limited_by == LimitedBy.SEGMENT)),
         not_smoothed={
-            STATUS_NAMES[status]: count
+            status.key: count
             for status in Status
-            if status not in (Status.SMOOTHED, Status.IN_RUN)
-            and (count := int(np.count_nonzero(corners.status == status)))
+            if not status.traits & Trait.ROUNDED and (count := int(np.count_nonzero(corners.status == status)))
         },
         deviation_mm=Spread.of(np.maximum(corners.tip_error, corners.axis_error)[done]),
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cornersmooth.errors import Finding
-from cornersmooth.model import SmoothProgram
+from cornersmooth.model import SmoothProgram, Status
 from cornersmooth.report.corners import corner_table
 from cornersmooth.smoothing.sharp import STRAIGHT_ON, other_corners, sharp_rows
 from cornersmooth.verdict import Verdict
@@ -31,15 +31,14 @@ _LEAST_TOLD = 0.005
 def sharp_corners(smoothed: SmoothProgram) -> tuple[int, list[dict[str, Any]]]:
     """Number of corners that stay sharp, and the first of them in path order: CL line, reason, turn.
 
-    The turn is that of the tip path, or of the axis-point path where the tip goes straight on. The reason is a status,
-    or one of `OtherCorners`.
+    The turn is that of the tip path, or of the axis-point path where the tip goes straight on.
     """
     rows, others = sharp_rows(smoothed), other_corners(smoothed.program, smoothed.settings.axis_length)
     table = corner_table(smoothed, rows[:_LISTED])
     pose = np.concatenate((np.asarray(table["corner"]), others.pose[:_LISTED]))
     tip = np.concatenate((np.asarray(table["tip_angle_deg"], np.float64), others.tip_turn[:_LISTED]))
     axis = np.concatenate((np.asarray(table["axis_angle_deg"], np.float64), others.axis_turn[:_LISTED]))
-    status = [*table["status"].tolist(), *others.reason[:_LISTED].tolist()]
+    status = [*table["status"].tolist(), *(Status(code).key for code in others.status[:_LISTED])]
     turn, line = np.where(tip < STRAIGHT_ON, axis, tip), smoothed.program.line[pose]
     return len(rows) + len(others.pose), [
         {"line": int(line[k]), "status": status[k], "turn_deg": float(turn[k])}

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from cornersmooth.errors import Finding
-from cornersmooth.model import Bools, Corners, Ints, LimitedBy, Program, Runs, SmoothProgram, Status
+from cornersmooth.model import Bools, Corners, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import RUN_CURVATURE
 from cornersmooth.smoothing.neighbours import find_neighbours
@@ -19,16 +19,6 @@ from cornersmooth.smoothing.runs.solving import STEP, AtPoses, RunCurves, solve_
 from cornersmooth.smoothing.runs.splines import ranges, spread
 from cornersmooth.smoothing.transition import place_corners
 from cornersmooth.vectors import angle_between
-
-#: corners that a run ends at: what keeps the pose, or what no curve within ε can follow
-ENDS_RUN = (
-    Status.REVERSAL,
-    Status.AXIS_STEP,
-    Status.FEED_CHANGE,
-    Status.KEPT,
-    Status.FEED_PER_REVOLUTION,
-    Status.STATEMENT,
-)
 
 #: degrees: where the axis turns by more in a segment, output in curves (which cannot change F inside one) has no run.
 #: Between two control points so far apart nothing but the curve itself tells where the tool is.
@@ -83,7 +73,7 @@ def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[I
     status[corners.pose] = corners.status
     inner = np.zeros(len(pose), np.bool_)
     inner[1:-1] = (chain[1:-1] == chain[:-2]) & (chain[1:-1] == chain[2:])
-    joins = inner & ~np.isin(status[pose], ENDS_RUN)
+    joins = inner & ~np.isin(status[pose], Status.having(Trait.ENDS_RUN))
     bent = joins & np.isin(status[pose], (Status.SMOOTHED, Status.TOO_SHORT))
     # a run is a row of segments whose inner poses all join; segment i leads from pose i to pose i + 1
     segment = np.flatnonzero(chain[1:] == chain[:-1])

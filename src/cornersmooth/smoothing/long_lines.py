@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
+from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status, Trait
 from cornersmooth.vectors import dot, norm, square
 
 #: rows after which a line ends in any case; so many parts are worked on side by side
@@ -24,9 +24,6 @@ LANE = 512
 
 #: rows at which lines are tested at once: intermediate arrays fit the processor's cache
 _TOGETHER = 1 << 16
-
-#: corners that lines may pass by; all others are passed exactly
-_PASSED_BY = (Status.SMOOTHED, Status.STRAIGHT, Status.DUPLICATE, Status.TOO_SHORT)
 
 #: mm by which the parameter goes on while a word changes by one
 _PER_WORD = 1e-3
@@ -170,7 +167,7 @@ def _fixed(smoothed: SmoothProgram, move: Ints, at_pose: Bools) -> Bools:
     program, corners = smoothed.program, smoothed.corners
     n = len(program)
     exact = np.ones(n, np.bool_)
-    exact[corners.pose[np.isin(corners.status, _PASSED_BY)]] = False
+    exact[corners.pose[np.isin(corners.status, Status.having(Trait.PASSED_BY))]] = False
     spoken = np.zeros(n + 1, np.int64)
     np.add.at(spoken, [min(statement.pose, n) for statement in program.statements], 1)
     said = np.concatenate(([0], np.cumsum(spoken)))  # statements before pose i stand in said[i + 1]

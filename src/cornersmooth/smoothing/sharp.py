@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status
+from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, Trait
 from cornersmooth.smoothing.arcs import arc_tangents
 from cornersmooth.smoothing.corner_table import BATCH
 from cornersmooth.smoothing.legs import legs_at
@@ -20,9 +20,6 @@ from cornersmooth.vectors import angle_between
 #: degrees below which the path goes straight on: numbers of arcs are rounded in CL files
 STRAIGHT_ON = 1.0
 
-#: no corner: it turns by less than the output can show, or repeats a pose
-_NO_CORNER = (Status.STRAIGHT, Status.DUPLICATE)
-
 
 def sharp_rows(smoothed: SmoothProgram) -> Ints:
     """Rows of `Corners` that are not rounded although the path turns there, ascending.
@@ -30,7 +27,7 @@ def sharp_rows(smoothed: SmoothProgram) -> Ints:
     What forbids to round a pose says nothing of its turn, so that is looked at here, as `Status.STRAIGHT` is found.
     """
     corners, program, settings = smoothed.corners, smoothed.program, smoothed.settings
-    rows = np.flatnonzero(~corners.rounded & ~np.isin(corners.status, _NO_CORNER))
+    rows = np.flatnonzero(~corners.rounded & ~np.isin(corners.status, Status.having(Trait.NO_CORNER)))
     turns = corners.after[rows] >= 0
     known = rows[turns]
     straight = [np.zeros(0, np.bool_)]
@@ -48,14 +45,14 @@ class OtherCorners(NamedTuple):
     Parameters
     ----------
     pose : (g,) int64
-    reason : (g,) str
-        ``arc``: an arc meets a line or another arc. ``rapid``: a rapid that leads nowhere is between two cuts.
+    status : (g,) uint8
+        `Status.ARC` or `Status.RAPID`.
     tip_turn, axis_turn : (g,) float64, degrees
         Change of direction of the tip path and of the axis-point path.
     """
 
     pose: Ints
-    reason: NDArray[np.str_]
+    status: NDArray[np.uint8]
     tip_turn: Floats
     axis_turn: Floats
 
@@ -80,5 +77,5 @@ def other_corners(program: Program, axis_length: float) -> OtherCorners:
     tip = np.degrees(angle_between(ends[one], begins[other]))
     axis = np.degrees(angle_between(ends[one] + turn[one], begins[other] + turn[other]))
     bent = np.maximum(tip, axis) > STRAIGHT_ON
-    reason = np.where(arc[one] | arc[other], "arc", "rapid")
-    return OtherCorners(one[bent], reason[bent], tip[bent], axis[bent])
+    status = np.where(arc[one] | arc[other], Status.ARC, Status.RAPID).astype(np.uint8)
+    return OtherCorners(one[bent], status[bent], tip[bent], axis[bent])
