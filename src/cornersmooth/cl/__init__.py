@@ -40,6 +40,7 @@ def read(
     lenient: bool = False,
     tool_number: int | None = None,
     spindle: tuple[float, str] | None = None,
+    size_limit: bool = True,
 ) -> Program:
     """Read a tool path.
 
@@ -63,6 +64,8 @@ def read(
         Of the tool, for inputs that load none.
     spindle : (float, str) or None
         Revolutions per minute, and ``CLW`` or ``CCLW``, for inputs that start no spindle.
+    size_limit : bool
+        Refuse inputs of more than 2 GB, and gzip files that grow 200-fold.
 
     Returns
     -------
@@ -84,7 +87,7 @@ def read(
     ):
         if value is not None and value not in choices:
             raise unknown(what, value, choices)
-    data, name = load(source, name)
+    data, name = load(source, name, size_limit=size_limit)
     if format is None:
         format = _recognise(data)
     if format == "points":

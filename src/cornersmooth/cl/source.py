@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import gzip
+import io
 import os
 import zlib
-from typing import Final
+from typing import Final, Protocol
 
 from cornersmooth.cl.messages import error
 
@@ -13,11 +14,16 @@ _GZIP: Final = b"\x1f\x8b"
 _UTF8_BOM: Final = b"\xef\xbb\xbf"
 _UTF16_BOMS: Final = (b"\xff\xfe", b"\xfe\xff")
 
+#: bytes that are read of an input, and of a gzip file: text of CL files is a tenth of itself when it is packed
+LARGEST: Final = 2 << 30
+_LARGEST_RATIO: Final = 200
+_ALWAYS: Final = 1 << 26
+
 #: DOS end of file, still written by old posts
 _CTRL_Z: Final = b"\x1a"
 
 
-def load(source: str | os.PathLike[str] | bytes, name: str | None) -> tuple[bytes, str]:
+def load(source: str | os.PathLike[str] | bytes, name: str | None, *, size_limit: bool = True) -> tuple[bytes, str]:
     """Return the contents and the name for messages.
 
     Parameters
@@ -25,11 +31,13 @@ def load(source: str | os.PathLike[str] | bytes, name: str | None) -> tuple[byte
     source : path or bytes
     name : str or None
         None for the path itself, or ``"<memory>"``.
+    size_limit : bool
+        Whether inputs larger than `LARGEST`, and gzip files that grow 200-fold, are refused.
 
     Raises
     ------
     InputError
-        CS100 where the file cannot be read, CS103 where it is no complete gzip file.
+        CS100 where the file cannot be read, CS103 where it is no complete gzip file, CS199 where it is too large.
     """
     if isinstance(source, bytes):
         data, name = source, name or "<memory>"
@@ -37,15 +45,35 @@ def load(source: str | os.PathLike[str] | bytes, name: str | None) -> tuple[byte
         name = name or os.fspath(source)
         try:
             with open(source, "rb") as file:
-                data = file.read()
+                data = read_bounded(file, name, size_limit=size_limit)
         except OSError as why:
             raise error("CS100", name, None, why=why.strerror or why) from why
     if data.startswith(_GZIP):
+        most = min(LARGEST, max(_LARGEST_RATIO * len(data), _ALWAYS))
         try:
-            data = gzip.decompress(data)
+            with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
+                data = read_bounded(file, name, size_limit=size_limit, most=most)
         except (OSError, EOFError, zlib.error) as why:
             raise error("CS103", name, None, why=why) from why
     return data, name
+
+
+class _Reader(Protocol):
+    def read(self, size: int, /) -> bytes: ...
+
+
+def read_bounded(file: _Reader, name: str, *, size_limit: bool = True, most: int = LARGEST) -> bytes:
+    """Read a file to its end, if it has one.
+
+    Raises
+    ------
+    InputError
+        CS199: it holds more than `most` bytes, and there is a limit of size.
+    """
+    data = file.read(most + 1 if size_limit else -1)
+    if size_limit and len(data) > most:
+        raise error("CS199", name, None, limit=f"{most / 1e6:,.0f} MB")
+    return data
 
 
 def clean(data: bytes, name: str) -> bytes:

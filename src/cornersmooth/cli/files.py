@@ -7,7 +7,6 @@ import os
 import stat
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import BinaryIO
 
 from cornersmooth import output
@@ -51,20 +50,22 @@ class Beginning:
         self._stream.flush()
 
 
-def read_input(path: str) -> tuple[bytes, str]:
+def read_input(path: str, *, size_limit: bool = True) -> tuple[bytes, str]:
     """Contents and display name of an input; ``-`` is standard input.
 
     Raises
     ------
     InputError
-        CS100: the file cannot be read.
+        CS100: the file cannot be read; CS199: it is too large.
     """
+    from cornersmooth.cl.source import read_bounded
+
     if path == STANDARD:
         if sys.stdin is None:
             raise InputError("CS100", "standard input is closed", "name a file", file="<stdin>")
-        return sys.stdin.buffer.read(), "<stdin>"
-    with _reading(path):
-        return Path(path).read_bytes(), path
+        return read_bounded(sys.stdin.buffer, "<stdin>", size_limit=size_limit), "<stdin>"
+    with _reading(path), Path(path).open("rb") as file:
+        return read_bounded(file, path, size_limit=size_limit), path
 
 
 def check_inputs(*paths: str) -> None:

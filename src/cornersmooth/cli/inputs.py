@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import stat
 from dataclasses import dataclass
 from fnmatch import fnmatch
 
 from cornersmooth.cli.files import STANDARD
+from cornersmooth.cli.show import print_line
 from cornersmooth.errors import SettingsError
 
 #: names of CL files, for folders
@@ -71,8 +73,19 @@ def _inside(folder: str, patterns: tuple[str, ...]) -> list[Input]:
         for name in sorted(names):
             if any(fnmatch(name.lower(), pattern.lower()) for pattern in patterns):
                 path = os.path.join(here, name)
+                if _endless(path):
+                    print_line(f"{path}: skipped: it is a pipe, a device or a socket; name it by itself to read it")
+                    continue
                 found.append(Input(path, _stem(os.path.relpath(path, folder))))
     return found
+
+
+def _endless(path: str) -> bool:
+    """Whether it is no file, so that reading it may never end; what is not there says so when it is read."""
+    try:
+        return not stat.S_ISREG(os.stat(path).st_mode)
+    except OSError:
+        return False
 
 
 def _stem(path: str) -> str:

@@ -65,12 +65,22 @@ spindle = click.option(
 )
 lenient = click.option("--lenient", is_flag=True, help="Go on after errors in the input where it is safe.")
 
+size_limit = click.option(
+    "--no-size-limit",
+    "size_limit",
+    is_flag=True,
+    flag_value=False,
+    default=True,
+    help="Read inputs of more than 2 GB, and gzip files that grow 200-fold.",
+)
+
 _READING = {
     "format": input_format,
     "dialect": dialect,
     "units": units,
     "arc_rule": arc_rule,
     "lenient": lenient,
+    "size_limit": size_limit,
 }
 _TOOL = {"tool_number": tool_number, "spindle": spindle}
 
