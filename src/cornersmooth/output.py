@@ -10,10 +10,12 @@ from __future__ import annotations
 import contextlib
 import errno
 import filecmp
+import functools
 import glob
 import hashlib
 import json
 import os
+import platform
 import secrets
 import shutil
 import stat
@@ -321,7 +323,8 @@ def _temporary(folder: str, name: str, mode: int = 0o666) -> Iterator[tuple[Bina
 @contextlib.contextmanager
 def temporary_name(folder: str, name: str) -> Iterator[str]:
     """Yield a name for a file that exists no longer than the block, whatever ends that."""
-    path = os.path.join(folder, f".{name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+    _remove_abandoned(folder, name)
+    path = os.path.join(folder, f".{name}.{os.getpid()}-{secrets.token_hex(4)}-{_machine()}.part")
     _unfinished.add(path)  # before it exists: a signal at any moment finds a name to remove
     try:
         yield path
@@ -329,6 +332,33 @@ def temporary_name(folder: str, name: str) -> Iterator[str]:
         with contextlib.suppress(OSError):
             os.unlink(path)
         _unfinished.discard(path)
+
+
+def _remove_abandoned(folder: str, name: str) -> None:
+    """Remove what killed runs on this computer have left of an output; those of others may still be at work."""
+    for left in glob.glob(os.path.join(glob.escape(folder), glob.escape(f".{name}.") + f"*-{_machine()}.part")):
+        process = os.path.basename(left).removeprefix(f".{name}.").partition("-")[0]
+        if process.isdigit() and not _is_running(int(process)):
+            with contextlib.suppress(OSError):
+                os.unlink(left)
+
+
+def _is_running(process: int) -> bool:
+    if os.name == "nt":  # there, signal 0 is Ctrl-C
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # it is somebody else's, or no number of a process
+        return True
+    return True
+
+
+@functools.cache
+def _machine() -> str:
+    """Tell computers apart that share a folder."""
+    return hashlib.new(_HASH, platform.node().encode()).hexdigest()[:8]
 
 
 @contextlib.contextmanager

@@ -1,10 +1,11 @@
-"""Inputs without end: pipes and devices in a folder, and files that grow without bound when they are unpacked."""
+"""What strangers leave: pipes and devices in a folder, files that grow without bound, and files of killed runs."""
 
 from __future__ import annotations
 
 import gzip
 import os
 import socket
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import pytest
 from cornersmooth import read
 from cornersmooth.cl import source
 from cornersmooth.errors import InputError
+from cornersmooth.output import _machine
 from oracle.command import SMALL, run
 
 unix = pytest.mark.skipif(sys.platform == "win32", reason="pipes in folders are of Unix")
@@ -60,3 +62,20 @@ def test_a_gzip_file_that_grows_without_measure_is_refused(monkeypatch: pytest.M
     assert refused.value.code == "CS199"
     assert len(read(gzip.compress(whole), size_limit=False)) == len(read(SMALL))
     assert len(read(gzip.compress(SMALL))) == len(read(SMALL))
+
+
+@unix
+def test_what_a_killed_run_has_left_goes_with_the_next_run(tmp_path: Path) -> None:
+    (tmp_path / "part.cls").write_bytes(SMALL)
+    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
+    left = tmp_path / f".o.nc.{int(gone.stdout)}-01234567-{_machine()}.part"
+    others = (
+        tmp_path / f".o.nc.{os.getpid()}-01234567-{_machine()}.part",  # of a process that is at work
+        tmp_path / f".o.nc.{int(gone.stdout)}-01234567-0badcafe.part",  # of another computer
+        tmp_path / f".other.nc.{int(gone.stdout)}-01234567-{_machine()}.part",
+    )
+    for path in (left, *others):
+        path.touch()
+    assert run("smooth", tmp_path / "part.cls", "-o", tmp_path / "o.nc").returncode == 0
+    assert not left.exists()
+    assert all(path.exists() for path in others)
