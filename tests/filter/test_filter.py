@@ -94,6 +94,7 @@ RUN = cuts(WORDS, feed="F1000.")
         ("IF [#1 EQ 1] GOTO 5\n", "it is not known whether"),
         ("G777\n", "it is not known whether"),
         ("/G49\n", "it is not known whether"),
+        ("G54.4 P1\n", "places of the part are turned"),
     ],
 )
 def test_leaves_what_is_not_surely_known(before: str, reason: str) -> None:
@@ -114,6 +115,7 @@ def test_leaves_what_is_not_surely_known(before: str, reason: str) -> None:
         "G91 G28 Z0\nG90\n",
         "G55\n",
         "G53 G0 Z0\n",
+        "G0 X5\n",
         "G92 X0\n",
         "G1 X#5 F100.\n",
         "/G0 X5.\n",
@@ -129,6 +131,28 @@ def test_the_cut_after_a_lost_place_stays_and_those_after_it_do_not(before: str)
 @pytest.mark.parametrize("before", ["M8\n", "(A COMMENT)\n", "\n", "G17\n", "G54\n", "G61\n", "T5\n", "G90 G21\n"])
 def test_words_that_change_nothing_lose_nothing(before: str) -> None:
     assert fanuc(before + RUN).smoothed == 24
+
+
+def test_vectors_with_missing_words_are_left() -> None:
+    control, machine, text = PROGRAMS["fanuc vectors"]
+    lines = text.splitlines(keepends=True)
+    lines[20] = re.sub(r"J[-\d.]+", "", lines[20])
+    found = filtered(control, machine, "".join(lines))
+    assert found.verdict is Verdict.PASSED
+    assert "".join(lines[20:22]).encode() in found.data
+    assert found.smoothed == 22
+
+
+def test_paths_of_klartext_that_are_not_known_lose_the_place() -> None:
+    control, machine, text = PROGRAMS["heidenhain words"]
+    lines = text.splitlines(keepends=True)
+    lines.insert(12, "50 L IX+1 IY-2\n")
+    lines.insert(20, "51 L M140 MB MAX\n")
+    found = filtered(control, machine, "".join(lines))
+    assert found.verdict is Verdict.PASSED
+    # after each the feed is not known until the program says it again
+    assert found.smoothed == 8
+    assert "".join(lines[12:]).encode() in found.data
 
 
 def test_what_is_jumped_to_is_left() -> None:

@@ -158,7 +158,7 @@ def _filter(source: str, target: str, form: Form, settings: Any, given: dict[str
         output.failed = bad
         output.stream.write(found.data)
     if not given["quiet"]:
-        _show(name, found, settings.tolerance, given["verbose"])
+        _show(name, found, settings.tolerance, given["verbose"], given["units"])
     return int(bad)
 
 
@@ -206,13 +206,15 @@ def _show_wrong(name: str, wrong: Sequence[Wrong]) -> None:
         print_line(f"{name}: {more(len(wrong) - _WRONG_SHOWN, 'problem')}")
 
 
-def _show(name: str, found: Filtered, tolerance: float, verbose: int) -> None:
+def _show(name: str, found: Filtered, tolerance: float, verbose: int, given_units: str | None) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
     out = console()
     out.print(first_line(found, tolerance), style="bold")
     out.print(f"{name}: {found.lines} lines, {found.new_lines} after; all outside of runs is the same byte for byte")
     if found.checked is not None:
         _show_wrong(name, found.checked.wrong)
+    if not found.units_said and given_units is None:
+        print_line(f"{name}: warning: the program does not say its units: millimetres are taken; --units says others")
     left = found.left if verbose else found.left[:_SHOWN]
     if left:
         out.print(f"{'left as it is':>13}  first line  reason")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from itertools import islice
+from typing import Final
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.filter.checking import Checked, Place, check, places
@@ -14,6 +16,9 @@ from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
 from cornersmooth.verdict import Verdict
+
+#: words that say the units of a program
+_UNITS: Final = re.compile(rb"(?i)G(20|21|70|71|700|710)(?!\d)|BEGIN PGM")
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,8 @@ class Filtered:
         Why the others stay.
     checked : Checked or None
         None where it was not asked for.
+    units_said : bool
+        Whether the program says its units.
     """
 
     data: bytes
@@ -59,6 +66,7 @@ class Filtered:
     runs: int
     left: tuple[Left, ...]
     checked: Checked | None
+    units_said: bool = True
 
     @property
     def verdict(self) -> Verdict:
@@ -227,4 +235,5 @@ def _result(
         runs=len(replaced),
         left=tuple(Left(*one) for one in old.left()),
         checked=checked,
+        units_said=_UNITS.search(old.data) is not None,
     )

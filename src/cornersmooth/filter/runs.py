@@ -235,6 +235,9 @@ class ProgramReader:
         for name in columns.keys() - {"G", "F", *self.axes}:
             odd |= ~np.isnan(columns[name])
         lost = (odd & ~arc) | ~(arc | (code == 0.0) | (code == 1.0))
+        if self.wanted == VECTOR:  # what missing words of a vector are is not known
+            given = np.sum([~np.isnan(columns.get(letter, blank)) for letter in "IJK"], axis=0)
+            lost |= ~arc & (given > 0) & (given < 3)
         place, said = np.empty((count + 1, len(self.axes))), np.zeros(count, np.bool_)
         for k, letter in enumerate(self.axes):
             words = columns.get(letter, blank)
@@ -243,7 +246,7 @@ class ProgramReader:
             place[0, k] = state.place[letter]
             place[1:, k] = self._places(words, state, letter, lost)
         cut = (code == 1.0) & said
-        plain = cut & ~odd & np.isfinite(place[1:]).all(axis=1) & np.isfinite(place[:-1]).all(axis=1)
+        plain = cut & ~lost & np.isfinite(place[1:]).all(axis=1) & np.isfinite(place[:-1]).all(axis=1)
         why = np.where(cut, found.number("the place before or after it is not known"), _NO_CUT).astype(np.uint16)
         why[plain & ~np.isfinite(feed)] = found.number("its feed is not known")
         plain &= np.isfinite(feed) & (feed > 0.0)

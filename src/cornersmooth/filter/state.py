@@ -148,10 +148,11 @@ class State:
             line = lexer.line(text, 0, None)
         except InputError:
             return self._take_unread(text, lexer)
-        if not line.skipped:
-            return self._take_line(line)
         before = self.copy()
         why = self._take_line(line)
+        self.lose_place(word.name for word in line.words if lexer.without_point(word))  # in which unit, nobody says
+        if not line.skipped:
+            return why
         self.or_not(before)
         return "the operator may skip the block" if why else ""
 
@@ -223,6 +224,8 @@ class State:
             for letter in axes:
                 if not (on_arc and letter in "IJK"):
                     self._go(letter, given[letter])
+            if not on_arc and 0 < len({"I", "J", "K"} & set(axes)) < 3:  # what the others are then is not known
+                self.lose_place("IJK")
         if names & {"U", "V", "W", "circle"} or any(name.startswith("DC ") for name in names):
             self.lose_place()
         foreign = (set("ABC") & given.keys()) - set(self.axes)
@@ -323,6 +326,10 @@ class State:
         if _ASSIGNMENT.match(plain) and not plain.startswith("$") and "FRAME" not in plain:
             self.lose_place()
             return ""
+        if re.match(r"LN? ", plain) and not re.search(r"M12[89]", plain):  # a path of Klartext
+            self.lose_place()
+            self.feed = math.nan
+            return "words that are not known"
         lost = [match[1] for match in _WORKED_OUT.finditer(plain)]
         rest = _WORKED_OUT.sub(" ", plain)
         try:

@@ -72,8 +72,8 @@ _ISO: Final[Table] = {
 
 _FANUC: Final[Table] = {
     **_ISO,
-    Does.NOTHING: _ISO[Does.NOTHING] + r"|G(5\.1|8|0?5\.4)",
-    Does.FRAME: r"G(68(\.[234])?|51(\.1)?|16|12\.1|66(\.1)?)",
+    Does.NOTHING: _ISO[Does.NOTHING] + r"|G(5|5\.[14]|8)",
+    Does.FRAME: r"G(68(\.[234])?|51(\.1)?|16|12\.1|66(\.1)?|54\.[24])",
     Does.LEVEL: r"G(69|50(\.1)?|15|13\.1|67)",
 }
 
@@ -99,7 +99,7 @@ class Vocabulary:
     table: Table
     tip_control: Mapping[str, str] = field(default_factory=dict)
     ends_frame: Mapping[str, str] = field(default_factory=dict)
-    offsets: str = r"G(5[4-9](\.\d)?|154)"
+    offsets: str = r"G(5[4-9]|54\.1|59\.[1-3]|154)"
     change_keeps_tip: bool = False
 
     def does(self, word: str) -> Does:
