@@ -79,3 +79,62 @@ def test_what_a_killed_run_has_left_goes_with_the_next_run(tmp_path: Path) -> No
     assert run("smooth", tmp_path / "part.cls", "-o", tmp_path / "o.nc").returncode == 0
     assert not left.exists()
     assert all(path.exists() for path in others)
+
+
+@pytest.mark.parametrize(
+    "block", ["{program.__class__.__mro__}", "{program:>999999999}", "{program!r}", "{program[0]}", "{}", "{0}"]
+)
+def test_braces_are_filled_by_name_only(block: str, tmp_path: Path) -> None:
+    table = tmp_path / "own.toml"
+    table.write_text(f'like = "fanuc"\n[program]\nstart = ["O1", "({block})"]\n')
+    (tmp_path / "part.cls").write_bytes(SMALL)
+    found = run("smooth", tmp_path / "part.cls", "--control", table, "-o", tmp_path / "o.nc")
+    assert found.returncode == 2
+    assert b"unknown braces" in found.stderr
+    (tmp_path / "head.txt").write_text(f"({block})\n")
+    found = run("smooth", tmp_path / "part.cls", "--header", tmp_path / "head.txt", "-o", tmp_path / "o.nc")
+    assert found.returncode == 2
+    assert b"unknown braces" in found.stderr
+
+
+@pytest.mark.parametrize("pattern", ["(a+)+$", "(a|a)*b", "(?:a*)*", "a*a*a*a*a*b", "(", "x" * 201, "([)]){3}"])
+def test_patterns_of_tables_cannot_run_without_end(pattern: str, tmp_path: Path) -> None:
+    table = tmp_path / "own.toml"
+    table.write_text(f"like = 'fanuc'\n[program]\nname_pattern = '{pattern}'\n")
+    (tmp_path / "part.cls").write_bytes(SMALL)
+    found = run(
+        "smooth", tmp_path / "part.cls", "--control", table, "-o", tmp_path / "o.nc", "--program-name", "a" * 40
+    )
+    assert found.returncode == 2
+    assert b"name_pattern" in found.stderr
+
+
+@pytest.mark.parametrize("where", ["table", "settings"])
+def test_nesting_without_end_is_no_toml(where: str, tmp_path: Path) -> None:
+    deep = "x = " + 100_000 * "[" + "\n"
+    (tmp_path / "part.cls").write_bytes(SMALL)
+    more = []
+    if where == "table":
+        (tmp_path / "own.toml").write_text(deep)
+        more = ["--control", tmp_path / "own.toml"]
+    else:
+        (tmp_path / "cornersmooth.toml").write_text(deep)
+    found = run("smooth", tmp_path / "part.cls", "-o", tmp_path / "o.nc", *more)
+    assert found.returncode == 2
+    assert b"nested too deeply" in found.stderr
+
+
+@unix
+@pytest.mark.parametrize("quiet", [(), ("-q",)])
+def test_settings_that_loosen_or_that_anybody_may_write_are_named(quiet: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "part.cls").write_bytes(SMALL)
+    settings = tmp_path / "cornersmooth.toml"
+    settings.write_text("[smooth]\ntolerance = 5\n")
+    settings.chmod(0o644)
+    command = ("smooth", tmp_path / "part.cls", "-o", tmp_path / "o.nc", "--force", *quiet)
+    said = run(*command).stderr.decode()
+    assert said.startswith("warning: the tolerance is 5 mm, larger than the default 0.01 mm: ")
+    assert "anybody" not in said
+    settings.chmod(0o666)
+    assert "these settings are obeyed, and anybody may change them" in run(*command).stderr.decode()
+    assert "larger than the default" not in run(*command, "-e", "5").stderr.decode()

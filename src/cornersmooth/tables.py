@@ -15,6 +15,7 @@ from dataclasses import MISSING, dataclass, fields
 from functools import lru_cache, partial
 from importlib import resources
 from pathlib import Path
+from string import Formatter
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from cornersmooth.errors import SettingsError
@@ -26,6 +27,9 @@ Record = TypeVar("Record")
 Check = Callable[[Any, str], Any]
 
 _MOST = 1_000_000
+
+#: repeats in a pattern, whose number is the power with which the time of a search grows, and its characters
+_MOST_REPEATS, _LONGEST_PATTERN = 4, 200
 _COUNTS = ("no", "one", "two", "three")
 
 
@@ -266,7 +270,59 @@ def _types(kind: type) -> dict[str, Any]:
 @lru_cache(maxsize=64)
 def _read(text: str) -> Table:
     """Return the table of a TOML text; it must not be changed."""
-    return tomllib.loads(text)
+    return read_toml(text)
+
+
+def read_toml(text: str) -> Table:
+    """Return the table of a TOML text.
+
+    Raises
+    ------
+    TOMLDecodeError
+        It is no TOML, or is nested without end.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise tomllib.TOMLDecodeError("nested too deeply") from None
+
+
+def filled(text: str, values: Mapping[str, object]) -> str:
+    """Fill the braces of a block by name: nothing but the values gets into it.
+
+    Raises
+    ------
+    ValueError
+        A brace holds more than a known name: an attribute, an index, a width.
+    """
+    for _, name, form, conversion in Formatter().parse(text):
+        if name is not None and (name not in values or form or conversion):
+            raise ValueError(name)
+    return text.format(**values)
+
+
+def check_pattern(pattern: str) -> None:
+    """Refuse a regular expression that is none, or whose search may take without end.
+
+    Raises
+    ------
+    ValueError
+        It says why. Groups must not be repeated, and only `_MOST_REPEATS` things may be.
+    """
+    try:
+        re.compile(pattern)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise ValueError(f"{error}") from error
+    bare = re.sub(r"\\.", "x", pattern)
+    bare = re.sub(r"\[\^?\]?[^\]]*\]", "x", bare)
+    if (
+        len(pattern) > _LONGEST_PATTERN
+        or re.search(r"\)[*+{]", bare)
+        or len(re.findall(r"[*+{]", bare)) > _MOST_REPEATS
+    ):
+        raise ValueError(
+            f"a group that is repeated, more than {_MOST_REPEATS} repeats, or more than {_LONGEST_PATTERN} characters"
+        )
 
 
 def _merged(base: Table, changes: Table) -> Table:

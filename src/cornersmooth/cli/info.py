@@ -47,7 +47,7 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     from cornersmooth.provenance import HEAD
     from cornersmooth.report.info import describe, info_json
 
-    data, name = read_input(source, size_limit=given["size_limit"])
+    data, name = read_input(source, size_limit=not given["no_size_limit"])
     if looks_like_program(data[:HEAD]):
         click.echo(describe_program(data, name))
         return 0

@@ -226,7 +226,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
     """Make text and reports; a verdict that is not good enough goes to the outcome, and why there was nothing to do."""
     from cornersmooth.pipeline import postprocess
 
-    source, name = read_input(job.source, size_limit=job.reading.get("size_limit", True))
+    source, name = read_input(job.source, size_limit=job.reading["size_limit"])
     made_of = ""
     replace_target: bool | None = False
     if job.batch:

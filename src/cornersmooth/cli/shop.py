@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,6 +32,7 @@ from typing import Any
 
 import click
 
+from cornersmooth.cli.show import print_line
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import reason
 
@@ -92,13 +94,39 @@ class ShopCommand(click.Command):
         first, control = _first_look(self, ctx, list(args))
         _check_environment(self)
         shop = Shop(find_files(first))
+        for file in shop.files:
+            _name_strangers(file.path)
         ctx.meta[__name__] = shop
         ctx.default_map = defaults(self, shop, control)
         rest = super().parse_args(ctx, args)
         for kind, name in _OWN_TABLES.items():
             if isinstance(ctx.params.get(name), str):
                 ctx.params[name] = _own(shop, kind, ctx.params[name])
+        _name_what_is_loose(ctx)
         return rest
+
+
+def _name_strangers(path: str) -> None:
+    """Say of settings that somebody else may have written that they are obeyed."""
+    if not hasattr(os, "getuid"):
+        return
+    found = os.stat(path)
+    if found.st_uid not in (os.getuid(), 0):
+        print_line(f"{path}: warning: these settings are obeyed, and belong to another user")
+    elif found.st_mode & stat.S_IWOTH:
+        print_line(f"{path}: warning: these settings are obeyed, and anybody may change them")
+
+
+def _name_what_is_loose(ctx: click.Context) -> None:
+    """Say where a tolerance is from that is larger than the default, and was not typed."""
+    option = next((one for one in settable(ctx.command) if one.name == "tolerance"), None)
+    if option is None or (where := origin(ctx, "tolerance")) in ("command line", "default"):
+        return
+    from cornersmooth.settings import Settings
+
+    least = Settings.tolerance
+    if (value := ctx.params["tolerance"]) is not None and value > least:
+        print_line(f"warning: the tolerance is {value:g} mm, larger than the default {least:g} mm: {where}")
 
 
 def origin(ctx: click.Context, name: str) -> str:
@@ -222,8 +250,10 @@ def _checked(option: click.Option, value: Any, file: str, where: str) -> Any:
 def _read(path: Path) -> ShopFile:
     import tomllib
 
+    from cornersmooth.tables import read_toml
+
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors put a mark before it
+        tables = read_toml(path.read_text(encoding="utf-8-sig"))  # some editors put a mark before it
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as wrong:
         why = reason(wrong) if isinstance(wrong, OSError) else wrong
         raise SettingsError("CS240", f"cannot read it: {why}", "correct the file", file=str(path)) from wrong

@@ -69,7 +69,7 @@ def command(source: str, text: str, **given: Any) -> int:
             raise click.UsageError(f"--report {path}: let the name end in {', '.join(_SUFFIXES)}")
         check_path(path, [source, text], force=given["force"])
     how = nc_text.reading_back_of(given)
-    data, name = read_input(source, size_limit=given["size_limit"])
+    data, name = read_input(source, size_limit=not given["no_size_limit"])
     program = read(data, name=name, **reading.reading_of(given))
     tool = _tool(program, given["tool"])
     nc = read_nc(

@@ -83,7 +83,7 @@ def command(source: str, **given: Any) -> int:
     for path in (given["csv"], *given["reports"]):
         if path:
             check_path(path, inputs, force=given["force"])
-    data, name = read_input(source, size_limit=given["size_limit"])
+    data, name = read_input(source, size_limit=not given["no_size_limit"])
     compared = _compare(data, name, given)
     if given["reports"]:
         from cornersmooth.page import times_page

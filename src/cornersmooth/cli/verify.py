@@ -97,7 +97,7 @@ def command(source: str, text: str, **given: Any) -> int:
     return_large_arrays()
     check_inputs(source, text)
     _check_outputs(source, text, given)
-    data, name = read_input(source, size_limit=given["size_limit"])
+    data, name = read_input(source, size_limit=not given["no_size_limit"])
     if looks_like_program(data[:HEAD]):
         return verify_with_program(data, text, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text

@@ -33,7 +33,7 @@ from cornersmooth.nc.control import (
 )
 from cornersmooth.nc.program_table import STEPS, ProgramTable
 from cornersmooth.settings import Lines
-from cornersmooth.tables import Shelf, Table, is_file
+from cornersmooth.tables import Shelf, Table, check_pattern, filled, is_file
 
 _FORM_KEYS = ("description", "curve", "upright", "plane", *get_args(Orientation))
 _MOTION_KEYS = frozenset(item.name for item in fields(Motion))
@@ -86,8 +86,8 @@ class _Controls(Shelf):
         places = _BRACES.get(where.rpartition(".")[2], {}) if own is None else own
         if not where.endswith("_pattern") and ("{" in value or "}" in value):
             try:
-                value.format(**places)
-            except (KeyError, IndexError, ValueError) as error:
+                filled(value, places)
+            except ValueError as error:
                 known = ", ".join(f"{{{place}}}" for place in places) or "no braces"
                 raise self.wrong(f"{where}: {value!r} has unknown braces", f"use {known}") from error
         return value
@@ -225,9 +225,9 @@ def _program(table: Any, where: str) -> ProgramTable:
     for key in ("name_pattern", "work_offset_pattern"):
         pattern = getattr(program, key)
         try:
-            re.compile(pattern)
-        except re.error as error:
-            raise _SHELF.wrong(f"program.{key} is {pattern!r}: {error}", "give a regular expression") from error
+            check_pattern(pattern)
+        except ValueError as error:
+            raise _SHELF.wrong(f"program.{key} is {pattern!r}: {error}", "give a plain regular expression") from error
     for key in ("start", "begin", "tool_end", "between_tools", "end", "retract"):
         for block in getattr(program, key):
             if any(f"{{{step}}}" in block and block != f"{{{step}}}" for step in STEPS):

@@ -19,6 +19,7 @@ from cornersmooth.nc.cycle_blocks import tool_loads
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.program_table import Blocks, ProgramTable
 from cornersmooth.settings import Settings
+from cornersmooth.tables import filled as filled_in
 from cornersmooth.text import format_number
 
 #: decimals of how far the control may round the corners of lines, and the step of the last
@@ -296,8 +297,8 @@ def _filled(lines: Sequence[str], values: dict[str, str]) -> list[str]:
     filled = []
     for line in lines:
         try:
-            text = line.format(**values) if "{" in line or "}" in line else line
-        except (KeyError, IndexError, ValueError) as error:
+            text = filled_in(line, values) if "{" in line or "}" in line else line
+        except ValueError as error:
             known = ", ".join(f"{{{name}}}" for name in values)
             raise SettingsError("CS216", f"{line!r} has unknown braces", f"use {known}") from error
         if not (text.isascii() and text.isprintable()):

@@ -65,13 +65,8 @@ spindle = click.option(
 )
 lenient = click.option("--lenient", is_flag=True, help="Go on after errors in the input where it is safe.")
 
-size_limit = click.option(
-    "--no-size-limit",
-    "size_limit",
-    is_flag=True,
-    flag_value=False,
-    default=True,
-    help="Read inputs of more than 2 GB, and gzip files that grow 200-fold.",
+no_size_limit = click.option(
+    "--no-size-limit", is_flag=True, help="Read inputs of more than 2 GB, and gzip files that grow 200-fold."
 )
 
 _READING = {
@@ -80,14 +75,13 @@ _READING = {
     "units": units,
     "arc_rule": arc_rule,
     "lenient": lenient,
-    "size_limit": size_limit,
 }
 _TOOL = {"tool_number": tool_number, "spindle": spindle}
 
 
 def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that reads CL files."""
-    return all_of(function, _READING.values())
+    return all_of(function, (*_READING.values(), no_size_limit))
 
 
 def tool_options(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -97,4 +91,5 @@ def tool_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def reading_of(given: dict[str, Any]) -> dict[str, Any]:
     """Keyword arguments of `cornersmooth.read` that were given."""
-    return {name: given[name] for name in (*_READING, *_TOOL) if name in given}
+    found = {name: given[name] for name in (*_READING, *_TOOL) if name in given}
+    return found | {"size_limit": not given["no_size_limit"]}
