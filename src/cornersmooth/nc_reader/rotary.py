@@ -301,7 +301,7 @@ class Rotary:
         printed = 2 * step + self.axis_length * turn_step  # who timed the block knew its length before it was rounded
         either = ~still & (length < self.tolerance + printed) & (swing > self.tolerance - printed)
         room[either] += (rate * (swing - length))[either]
-        way[either] = swing[either]
+        way = np.where(~still & (length < self.tolerance) & (swing > self.tolerance), swing, way)
         if not self.tip_control:
             room[still] *= -1.0
         room[(rate * turn > FAST_TURN) | (~still & short)] = np.inf
