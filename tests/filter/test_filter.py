@@ -9,6 +9,7 @@ import pytest
 
 import cornersmooth as cs
 from cornersmooth.filter import Filtered, filter_program, verify_programs
+from cornersmooth.filter.vocabulary import VOCABULARIES
 from cornersmooth.verdict import Verdict
 from filter.programs import ISO, PROGRAMS, WORDS, cuts
 from oracle.command import BAD_INPUT, DONE, run
@@ -48,6 +49,25 @@ def test_smooths_programs_of_each_control(name: str, lines: str) -> None:
     assert len(numbers) == len(set(numbers))
     assert set(numbers) <= set(re.findall(rb"(?m)^N\d+", text.encode()))
     assert (b"\r\n" in found.data) == ("\r\n" in text)
+
+
+GOLDEN = sorted((Path(__file__).parents[1] / "nc" / "golden").glob("*-g1*.nc"))
+
+
+@pytest.mark.parametrize("path", GOLDEN, ids=[path.stem for path in GOLDEN])
+def test_smooths_what_smooth_has_written(path: Path) -> None:
+    """Lines of every control and machine, with positions of the machine's axes, too."""
+    parts = re.fullmatch(r"\w+\.(\w+)-g1-?(.*?)(-axes)?", path.stem)
+    assert parts is not None
+    control, machine, axes = parts.groups()
+    if control not in VOCABULARIES:
+        return
+    form = cs.choose_form(control, "g1", machine=cs.load_machine(machine) if machine else None, tcp=not axes)
+    found = filter_program(path.read_bytes(), form, cs.Settings(tolerance=EPS))
+    assert found.verdict is Verdict.PASSED, found.checked
+    assert found.smoothed > found.cuts / 2
+    stays = ("a single cut", "an arc", "the tip stays")
+    assert all(one.reason.startswith(stays) for one in found.left), found.left
 
 
 @pytest.mark.parametrize(

@@ -99,12 +99,6 @@ def in_places(run: Run, form: Form, spelling: Spelling) -> bytes:
     return b"".join(_block(place, run.state.axes, form, spelling, rapid=False) for place in run.place)
 
 
-def stop_of(run: Run) -> Floats:
-    """(c,) where a run ends."""
-    end: Floats = run.place[-1]
-    return end
-
-
 def _head(form: Form, *, inch: bool) -> bytes:
     table = form.table
     units = table.layout.units["inch" if inch else "mm"]

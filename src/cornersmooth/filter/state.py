@@ -162,15 +162,7 @@ class State:
             self.lose_all()
         elif words and words[0].name == "block":
             self._take_block(words[0].text.upper())
-        elif words and (
-            words[0].name == "O"
-            or (
-                len(words) == 1
-                and words[0].name not in "GMTSFDH"
-                and len(words[0].name) == 1
-                and words[0].name not in self.axes
-            )
-        ):
+        elif words and (words[0].name == "O" or (words[0].name == "L" and words[0].text != "L")):  # a call of Siemens
             self.lose_all()
         elif words:
             return self._take_words(words)
@@ -290,7 +282,7 @@ class State:
             self.tip = words.tip_control[name]
             does = Does.LENGTH if does in (Does.LENGTH,) else Does.PLACE
         if does is Does.CHANGE and not words.change_keeps_tip and name not in words.tip_control:
-            self.tip = None
+            self.tip = None if self.tip else self.tip
         if does is Does.FRAME:
             self.frames |= {name}
         elif does is Does.LEVEL:
@@ -321,7 +313,7 @@ class State:
 
     def _take_unread(self, text: bytes, lexer: Lexer) -> str:
         """Take a line that is not made of words alone: variables, jumps, what nobody knows."""
-        plain = lexer.comment.sub(" ", text.decode("latin-1").upper()).strip()
+        plain = lexer.comment.sub(" ", text.upper().decode("latin-1")).strip()
         plain = re.sub(r"^/?\d?\s*(N?\d+\s+|N\d+)?\s*", "", plain)
         if _ASSIGNMENT.match(plain) and not plain.startswith("$") and "FRAME" not in plain:
             self.lose_place()

@@ -193,7 +193,7 @@ class _Held:
         tail = [] if not self._form.curves else [in_places(run, job.own, job.spelling).splitlines()[-1]]
         tail += [own] if self._mode != own else []
         if self._mode == _INVERSE and own == _MINUTE:
-            tail.append(f"{self._look.feed}{run.feed:g}".encode())
+            tail.append(f"{self._look.feed}{run.feed:.10g}".encode())
         if self._rounding and run.state.rounding:
             tail.append(run.state.rounding.encode())
         return [*head, *kept, *tail, *([] if run.state.absolute else [b"G91"])]
