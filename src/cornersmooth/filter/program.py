@@ -12,6 +12,7 @@ from cornersmooth.filter.checking import Checked, Place, check, places
 from cornersmooth.filter.runs import ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
 from cornersmooth.filter.writing import Job, blocks, smoothed
+from cornersmooth.memory import return_free_memory
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc.form import Form
 from cornersmooth.settings import Settings
@@ -112,7 +113,8 @@ def filter_program(
     settings = Settings() if settings is None else settings
     job, old = _read(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
     made, why = smoothed(job, old)
-    texts = {run.first: blocks(job, old, run, made[run.first]) for run in old.runs if run.first in made}
+    texts = {run.first: blocks(job, old, run, made.pop(run.first)) for run in old.runs if run.first in made}
+    return_free_memory()  # verification takes as much again
     for run in old.runs:
         if texts.get(run.first) == old.lines(run.first, run.stop):
             del texts[run.first]
