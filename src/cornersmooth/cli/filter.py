@@ -20,7 +20,7 @@ from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.filter import Filtered
-    from cornersmooth.filter.checking import Wrong
+    from cornersmooth.filter.checking import Checked, Wrong
     from cornersmooth.nc import Form
 
 #: names of NC programs, for folders
@@ -173,8 +173,7 @@ def verify_with_program(old: bytes, path: str, given: dict[str, Any]) -> int:
     verdict = Verdict.of(problems=len(found.wrong))
     _show_wrong(name, found.wrong)
     if not given["quiet"]:
-        measured = f"within {settings.tolerance:g} mm: tip {found.tip:.4g} mm, axis point {found.axis_point:.4g} mm"
-        click.echo(f"{verdict}: {_problems(found.wrong) or measured}")
+        click.echo(f"{verdict}: {_problems(found.wrong) or _measured(found, settings.tolerance)}")
     return int(verdict is not Verdict.PASSED)
 
 
@@ -197,6 +196,11 @@ def describe_program(data: bytes, name: str) -> str:
 
 def _problems(wrong: Sequence[Wrong]) -> str:
     return f"{len(wrong)} problem{'s' * (len(wrong) != 1)}" if wrong else ""
+
+
+def _measured(found: Checked, tolerance: float) -> str:
+    point = f", axis point {found.axis_point:.4g} mm" if found.axis_point == found.axis_point else ""
+    return f"within {tolerance:g} mm: tip {found.tip:.4g} mm{point}"
 
 
 def _show_wrong(name: str, wrong: Sequence[Wrong]) -> None:
@@ -235,5 +239,4 @@ def first_line(found: Filtered, tolerance: float) -> str:
         return f"{found.verdict}: {_problems(found.checked.wrong)}; {what}"
     if not found.runs:
         return f"{found.verdict}: {what}; the program is the same byte for byte"
-    tip, point = found.checked.tip, found.checked.axis_point
-    return f"{found.verdict}: {what} within {tolerance:g} mm: tip {tip:.4g} mm, axis point {point:.4g} mm"
+    return f"{found.verdict}: {what} {_measured(found.checked, tolerance)}"

@@ -67,7 +67,7 @@ class Checked:
 
     wrong: tuple[Wrong, ...]
     tip: float = 0.0
-    axis_point: float = 0.0
+    axis_point: float = 0.0  # NaN where the tool axis has a tolerance of its own
 
 
 def places(old: Reading, new: Reading) -> tuple[list[Place], list[Wrong]]:
@@ -137,7 +137,7 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place], states: 
         wrong += others + [
             Wrong(abs(one.nc_line), one.text.replace("CL file", "old program")) for one in found.problems
         ]
-        largest = [max(pair) for pair in zip(largest, (found.tip.value, found.axis_point.value), strict=True)]
+        largest = np.maximum(largest, (found.tip.value, found.axis_point.value)).tolist()  # NaN stays
     return Checked(tuple(sorted(wrong, key=lambda one: one.line)), *largest)
 
 

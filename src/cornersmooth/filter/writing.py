@@ -129,7 +129,8 @@ def _write(job: Job, reading: Reading, runs: Sequence[Run]) -> list[list[bytes] 
 
 def _within(machine: Machine, runs: Sequence[Run], settings: Settings) -> Machine:
     """Machine whose rotary axes go no further than in some runs: so turn and solution are those of the program."""
-    slack = math.degrees(settings.tolerance / settings.axis_scale)
+    # by ε the axis may leave that of the program, and by as much its own angles near the pole
+    slack = 2 * math.degrees(settings.tolerance / settings.axis_scale)
     low = np.min([run.low[3:] for run in runs], axis=0) - slack
     high = np.max([run.high[3:] for run in runs], axis=0) + slack
     limits = dict(zip(machine.names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
