@@ -47,8 +47,11 @@ def estimate_saving(
     Returns
     -------
     Saving or None
-        None where nothing can be planned: without any feed, or out of reach of the machine.
+        None where nothing can be planned: without any feed, or out of reach of the machine; and where the control
+        blends lines by a law that the planner does not have.
     """
+    if form.table.lines.lag:
+        return None
     machine = with_dynamics(form.machine)
     if machine is not None and form.rewind:
         machine = endless(machine)

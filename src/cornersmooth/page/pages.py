@@ -79,7 +79,7 @@ def page_and_saving(
     notes = [f"{finding.severity}, line {finding.line}: {finding.text}" for finding in result.findings[:_MOST_NOTES]]
 
     meta, pack = scene(subject, Story(result.program.source.name, "", badge, facts, notes))
-    saving = _saving(meta["totals"], result.program)
+    saving = None if form.table.lines.lag else _saving(meta["totals"], result.program)
     if saving is None and badge not in (Verdict.FAILED, Verdict.NOT_VERIFIED):
         saving = estimate_saving(
             result.program, settings, form, limits, poses=TIMED_POSES_VERBOSE, stretches=TIMED_STRETCHES_VERBOSE
