@@ -1,9 +1,8 @@
-"""What smoothing saves of the time: planned for short programs, estimated from some stretches of long ones."""
+"""What smoothing saves of the time: both programs planned as they are written."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,25 +12,20 @@ from cornersmooth.errors import CornersmoothError
 from cornersmooth.feedrate import Limits, direct, plan_text
 from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine, endless, with_dynamics
-from cornersmooth.model import Floats, Ints, Move, Program
+from cornersmooth.model import Ints, Move, Program
 from cornersmooth.nc import Form
 from cornersmooth.pipeline import read_back
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import Settings
-from cornersmooth.slices import some_poses
 
 #: of the digits of a text, mm and radians: a pose of it is the same as one of the CL file
 _SAME = 1e-3
 
 
-def estimate_saving(
-    program: Program, settings: Settings, form: Form, limits: Limits, *, poses: int, stretches: int
-) -> Saving | None:
-    """Plan evenly spaced stretches of a program, each smoothed and written by itself, and infer the whole from them.
+def planned_saving(program: Program, settings: Settings, form: Form, limits: Limits) -> Saving | None:
+    """Plan a program as it was and as it is written, under the limits of the axes of its machine.
 
-    The time of all of the original is taken to be to its time at programmed feed as it is on the stretches. Each begins
-    and ends at rest, which makes both times a little too long. Holes are only gone over in both: what a cycle takes is
-    in the text, and nowhere in the CL file.
+    Holes are only gone over in both: what a cycle takes is in the text, and nowhere in the CL file.
 
     Parameters
     ----------
@@ -40,39 +34,32 @@ def estimate_saving(
         Those the program is smoothed with.
     form : Form
     limits : Limits
-    poses : int
-        Of all stretches together; a program of no more is planned as a whole.
-    stretches : int
 
     Returns
     -------
     Saving or None
-        None where nothing can be planned: without any feed, or out of reach of the machine; and where the control
-        blends lines by a law that the planner does not have.
+        None where a time would be of something that nobody runs: without limits of the axes, without any feed, out of
+        reach of the machine, and on LinuxCNC, whose planner has a law of its own (`feedrate.linuxcnc`).
     """
-    if form.table.lines.lag:
+    machine = timed_machine(form)
+    if machine is None:
         return None
-    machine = with_dynamics(form.machine)
-    if machine is not None and form.rewind:
-        machine = endless(machine)
     program = without_holes(program)
-    feed = feed_times(program, limits)
-    before = after = at_feed = 0.0
-    planned = 0
+    if not np.isin(program.kind[1:], (Move.LINEAR, Move.ARC)).any():
+        return None
     try:
-        for first, last in _stretches(len(program), poses, stretches):
-            part = _part(program, first, last)
-            if np.isin(part.kind[1:], (Move.LINEAR, Move.ARC)).any():
-                before += direct(part, limits, "velocity_jump", settings=settings, machine=machine).total
-                after += _written_time(part, settings, form, limits, machine)
-                at_feed += float(feed[first + 1 : last].sum())
-            planned += last - first
+        before = direct(program, limits, "velocity_jump", settings=settings, machine=machine).total
+        return Saving(before, _written_time(program, settings, form, limits, machine))
     except CornersmoothError:
         return None
-    if not at_feed > 0.0:
+
+
+def timed_machine(form: Form) -> Machine | None:
+    """Give the machine whose limits a time of a program would be under; None where a time would say nothing."""
+    machine = with_dynamics(form.machine)
+    if machine is None or form.table.lines.lag:  # a control that blends lines by itself plans them by itself
         return None
-    scale = 1.0 if planned == len(program) else float(feed.sum()) / at_feed
-    return Saving(scale * before, scale * after, planned / len(program))
+    return endless(machine) if form.rewind else machine
 
 
 def without_holes(program: Program) -> Program:
@@ -82,36 +69,6 @@ def without_holes(program: Program) -> Program:
         return program
     kept = tuple(statement for statement in program.statements if statement.word != "CYCLE")
     return replace(program, kind=np.where(holes, np.uint8(Move.RAPID), program.kind), statements=kept)
-
-
-def feed_times(program: Program, limits: Limits) -> Floats:
-    """Time (n,) s of the move into each pose along its chord at programmed feed, or at rapid speed."""
-    step = np.zeros(len(program))
-    step[1:] = np.linalg.norm(np.diff(program.tip, axis=0), axis=1)
-    feed = program.feed if limits.feed is None else np.full(len(program), limits.feed)
-    slow = np.isin(program.kind, (Move.LINEAR, Move.ARC)) & (feed > 0.0) & (program.feed_mode == 0)
-    found: Floats = 60.0 * step / np.where(slow, feed, limits.rapid)
-    return found
-
-
-def _stretches(count: int, poses: int, stretches: int) -> Iterator[tuple[int, int]]:
-    """First pose of each stretch, and the one behind its last."""
-    if count <= poses:
-        yield 0, count
-        return
-    size = poses // stretches
-    for first in np.linspace(0, count - size, stretches).astype(np.int64).tolist():
-        yield first, first + size
-
-
-def _part(program: Program, first: int, last: int) -> Program:
-    """Poses from `first` up to `last`, and what is said between them."""
-    part = some_poses(program, first, last, earlier=False)
-    if not first:
-        return part
-    kind = part.kind.copy()
-    kind[:1] = Move.RAPID  # whatever led there is no part of it
-    return replace(part, kind=kind)
 
 
 def _written_time(program: Program, settings: Settings, form: Form, limits: Limits, machine: Machine | None) -> float:

@@ -18,7 +18,7 @@ from cornersmooth.kinematics import Dynamics, Machine, load_machine
 from cornersmooth.nc import Frame, choose_form, fit_settings, write
 from cornersmooth.nc_reader import read_nc, reader
 from cornersmooth.rotary import rewound_angles
-from cornersmooth.saving import estimate_saving
+from cornersmooth.saving import planned_saving
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
@@ -218,7 +218,7 @@ def test_reports_and_pages_name_the_places() -> None:
     result = postprocess(program_text(), text, Settings(tolerance=EPS), form=form)
     found = result.report()["verification"]["rewinds"]
     assert [place["back_nc_line"] > place["nc_line"] for place in found] == [True]
-    saving = estimate_saving(result.program, result.smoothed.settings, form, Limits(), poses=10_000, stretches=1)
+    saving = planned_saving(result.program, result.smoothed.settings, form, Limits())
     assert saving is not None
     assert "expect a mark on the part" in page_of(result)
 

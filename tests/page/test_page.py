@@ -51,7 +51,7 @@ def test_the_verdict_names_the_sharp_corner(page, result):
     assert meta["verdict"].startswith(
         "PASSED, 2 to check: within 0.02 mm everywhere; 1 corner stays sharp, first :12 reversal 17"
     )
-    assert re.search(r"(saves|takes) \d+\.\d s", meta["verdict"])
+    assert "saves" not in meta["verdict"]  # no limits of axes are known
     assert meta["badge"] == "PASSED"
     facts = dict(meta["facts"])
     assert facts["SHA-256 of the CL file"] == hashlib.sha256(b"part").hexdigest()
@@ -255,7 +255,6 @@ def test_commands_write_pages(tmp_path):
     assert "part.cls:12 reversal 17" in said
     # the page says the same words
     assert values_of(page.read_text())[0]["verdict"] == said.splitlines()[0]
-    assert re.search(r"; (saves|takes) \d+\.\d s ", said.splitlines()[0])
     first = page.read_bytes()
     # a page of ours is replaced without being asked; anything else is not
     assert run("smooth", source, "-e", "0.02", "-o", nc, "--report", page, "--force").returncode == 0
@@ -273,24 +272,22 @@ def test_commands_write_pages(tmp_path):
     assert run("time", source, "--report", tmp_path / "times.json").returncode == 2
 
 
-def test_the_time_of_long_paths_is_estimated(tmp_path):
+def test_the_time_is_that_of_the_whole_program_or_none(tmp_path):
     source, nc = tmp_path / "long.cls", tmp_path / "long.nc"
-    rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(301))
+    rows = "".join(f"GOTO/{x}.0,{x % 2}.0,0.0\n" for x in range(1001))
     source.write_text(f"TOOL PATH/LONG,TOOL,T\nFEDRAT/MMPM,1500.0\n{rows}END-OF-PATH\n")
     verdicts = []
     for more in ((), ("-v",), ("-q",), ("--report", tmp_path / "long.html")):
-        done = run("smooth", source, "-e", "0.02", "-o", nc, "--force", *more)
+        done = run("smooth", source, "-e", "0.02", "-o", nc, "--force", "--machine", "table-ac", *more)
         assert done.returncode == 0, done.stderr
         verdicts.append(done.stderr.decode().split("\n")[0])
-    opening = r"PASSED, \d to check: within 0.02 mm everywhere; no corner stays sharp; "
-    about = re.fullmatch(opening + r"saves about (\d+) s of (\d+) s \(estimated from 66.4 % of the path\)", verdicts[0])
-    planned = re.fullmatch(opening + r"saves (\d+\.\d) s of (\d+\.\d) s", verdicts[1])
-    for found, right in zip(about.groups(), planned.groups(), strict=True):
-        assert float(found) == pytest.approx(float(right), rel=0, abs=0.5 + 0.02 * float(right))
+    opening = r"PASSED, \d to check: within 0.02 mm everywhere; no corner stays sharp"
+    assert re.fullmatch(opening, verdicts[0])  # too long to be planned unasked
+    planned = re.fullmatch(opening + r"; saves (\d+\.\d) s of (\d+\.\d) s", verdicts[1])
     assert verdicts[2] == ""
     # the page has planned all of it; its words are those of the terminal
     assert verdicts[3] == values_of((tmp_path / "long.html").read_text())[0]["verdict"]
-    shown = re.fullmatch(opening + r"saves (\d+\.\d) s of (\d+\.\d) s", verdicts[3])
+    shown = re.fullmatch(opening + r"; saves (\d+\.\d) s of (\d+\.\d) s", verdicts[3])
     for found, right in zip(shown.groups(), planned.groups(), strict=True):
         assert float(found) == pytest.approx(float(right), rel=0.01, abs=0.3)
 

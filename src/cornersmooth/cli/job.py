@@ -93,7 +93,7 @@ class Job:
     batch: bool = False
     skip_existing: bool = False
     tool: Tool | None = None
-    plan: tuple[int, int] = (0, 0)
+    plan: int = 0
     plan_feeds: Limits | None = None
     beginning: bool = False
     run: str = ""
@@ -267,7 +267,8 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
     for path in job.reports:
         saving = _write_report(path, job, bool(may_replace[path]), source, result, contents)
         outcome.saving = saving or outcome.saving
-    if job.plan[1] and not outcome.saving and result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE):
+    good = result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE)
+    if good and not outcome.saving and len(result.program) <= job.plan:
         outcome.saving = _planned(job, result)
     return contents
 
@@ -279,11 +280,9 @@ def _limits(job: Job) -> Limits:
 
 
 def _planned(job: Job, result: Result) -> Saving | None:
-    from cornersmooth.saving import estimate_saving
+    from cornersmooth.saving import planned_saving
 
-    poses, stretches = job.plan
-    settings = result.smoothed.settings
-    return estimate_saving(result.program, settings, result.form, _limits(job), poses=poses, stretches=stretches)
+    return planned_saving(result.program, result.smoothed.settings, result.form, _limits(job))
 
 
 def _write_report(

@@ -157,7 +157,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 skip_existing=given["skip_existing"],
                 tool=given["tool"],
                 beginning=not folder and not output and _to_terminal(),
-                plan=_plan_sizes(given),
+                plan=_planned_poses(given),
             )
         )
     _check_targets(jobs)
@@ -169,13 +169,13 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     return jobs
 
 
-def _plan_sizes(given: dict[str, Any]) -> tuple[int, int]:
-    """Poses up to which the whole path is planned for the verdict, and else how many stretches of it."""
-    from cornersmooth.settings import TIMED_POSES, TIMED_POSES_VERBOSE, TIMED_STRETCHES, TIMED_STRETCHES_VERBOSE
+def _planned_poses(given: dict[str, Any]) -> int:
+    """Poses up to which a program is planned for the verdict."""
+    from cornersmooth.settings import TIMED_POSES, TIMED_POSES_VERBOSE
 
     if given["quiet"] or given["directory"]:
-        return 0, 0
-    return (TIMED_POSES_VERBOSE, TIMED_STRETCHES_VERBOSE) if given["verbose"] else (TIMED_POSES, TIMED_STRETCHES)
+        return 0
+    return TIMED_POSES_VERBOSE if given["verbose"] else TIMED_POSES
 
 
 def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:

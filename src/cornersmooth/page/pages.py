@@ -18,8 +18,8 @@ from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.page.document import document
 from cornersmooth.page.scene import Story, Subject, scene
 from cornersmooth.report.verdict import Saving, first_line, judge, saving_text, times_text, trusted_blocks
-from cornersmooth.saving import estimate_saving
-from cornersmooth.settings import TIMED_POSES_VERBOSE, TIMED_STRETCHES_VERBOSE, Settings
+from cornersmooth.saving import planned_saving, timed_machine
+from cornersmooth.settings import TIMED_POSES_VERBOSE, Settings
 from cornersmooth.surface.tool import Tool
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, verify
@@ -79,11 +79,10 @@ def page_and_saving(
     notes = [f"{finding.severity}, line {finding.line}: {finding.text}" for finding in result.findings[:_MOST_NOTES]]
 
     meta, pack = scene(subject, Story(result.program.source.name, "", badge, facts, notes))
-    saving = None if form.table.lines.lag else _saving(meta["totals"], result.program)
-    if saving is None and badge not in (Verdict.FAILED, Verdict.NOT_VERIFIED):
-        saving = estimate_saving(
-            result.program, settings, form, limits, poses=TIMED_POSES_VERBOSE, stretches=TIMED_STRETCHES_VERBOSE
-        )
+    saving = None if timed_machine(form) is None else _saving(meta["totals"], result.program)
+    short = len(result.program) <= TIMED_POSES_VERBOSE
+    if short and saving is None and badge not in (Verdict.FAILED, Verdict.NOT_VERIFIED):
+        saving = planned_saving(result.program, settings, form, limits)
     meta["verdict"] = first_line(contents, saving)
     return document(meta, pack), saving
 

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 #: sharp corners that a report lists
 _LISTED = 100
 
-#: part of the time below which an estimated saving is none
-_ALIKE = 0.005
-
 #: limits that the sentence about times names
 _LIMITS_TOLD = 2
 _LEAST_TOLD = 0.005
@@ -58,13 +55,10 @@ class Saving:
     Parameters
     ----------
     direct, written : float, s
-    part : float
-        Part of the poses that was planned; below 1 both times are estimated from it.
     """
 
     direct: float
     written: float
-    part: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -188,14 +182,6 @@ def first_line(contents: Mapping[str, Any], saving: Saving | None = None) -> str
 def saving_text(saving: Saving) -> str:
     """Say what smoothing saves of the time of the direct path."""
     direct, written, saved = saving.direct, saving.written, saving.direct - saving.written
-    if saving.part < 1.0:
-        share = max(100.0 * saving.part, 0.01)
-        source = f"estimated from {share:.{1 if share >= 1.0 else 2}f} % of the path"
-        if abs(saved) < _ALIKE * direct:
-            return f"takes about {direct:.0f} s as the direct path does ({source})"
-        if saved > 0.0:
-            return f"saves about {saved:.0f} s of {direct:.0f} s ({source})"
-        return f"takes about {-saved:.0f} s more than {direct:.0f} s ({source})"
     if abs(saved) < 0.05:
         return f"takes {written:.1f} s as the direct path does"
     return f"saves {saved:.1f} s of {direct:.1f} s" if saved > 0.0 else f"takes {-saved:.1f} s more than {direct:.1f} s"
