@@ -97,7 +97,20 @@ def test_braces_are_filled_by_name_only(block: str, tmp_path: Path) -> None:
     assert b"unknown braces" in found.stderr
 
 
-@pytest.mark.parametrize("pattern", ["(a+)+$", "(a|a)*b", "(?:a*)*", "a*a*a*a*a*b", "(", "x" * 201, "([)]){3}"])
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "(a+)+$",
+        "(a|aa)" * 28 + "b",
+        "a?" * 24 + "a" * 24,
+        "(a|a)*b",
+        "(?:a*)*",
+        "a*a*a*a*a*b",
+        "(",
+        "x" * 201,
+        "([)]){3}",
+    ],
+)
 def test_patterns_of_tables_cannot_run_without_end(pattern: str, tmp_path: Path) -> None:
     table = tmp_path / "own.toml"
     table.write_text(f"like = 'fanuc'\n[program]\nname_pattern = '{pattern}'\n")
@@ -138,3 +151,16 @@ def test_settings_that_loosen_or_that_anybody_may_write_are_named(quiet: tuple[s
     settings.chmod(0o666)
     assert "these settings are obeyed, and anybody may change them" in run(*command).stderr.decode()
     assert "larger than the default" not in run(*command, "-e", "5").stderr.decode()
+
+
+@unix
+def test_tables_and_programs_without_end_are_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "part.cls").write_bytes(SMALL)
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
+    found = run("smooth", tmp_path / "part.cls", "--control", tmp_path / "zero.toml", "-o", tmp_path / "o.nc")
+    assert found.returncode == 2
+    assert b"longer than a table" in found.stderr
+    monkeypatch.setattr("cornersmooth.nc_reader.source._LARGEST", 1 << 16)
+    found = run("verify", tmp_path / "part.cls", "/dev/zero", "--control", "fanuc")
+    assert found.returncode == 3
+    assert b"more than 2 GB" in found.stderr

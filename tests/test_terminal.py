@@ -50,3 +50,21 @@ def test_a_name_forges_no_line(tmp_path: Path) -> None:
     assert not [line for line in lines if line.startswith(("9 files", "error"))]
     assert b"\x1b" not in found.stderr
     assert lines[-1].startswith("2 files: 1 ")
+
+
+def test_names_and_tables_of_strangers_are_shown_only(tmp_path: Path) -> None:
+    program = tmp_path / f"a\nPASSED{ESCAPE}.nc"
+    program.write_bytes(b"%\nO1\nG21 G90 G94 G17\nG0 X0 Y0 Z0\nG1 X1 F100.\nX2 Y1\nM30\n%\n")
+    table = tmp_path / "own.toml"
+    table.write_text('like = "table-ac"\ndescription = "a\\u001b[2Jb"\n')
+    control = tmp_path / "control.toml"
+    control.write_text('like = "fanuc"\ndescription = "a\\u001b[2Jb"\n')
+    for command in (
+        ("info", program),
+        ("filter", program, "--no-tcp", "-o", tmp_path / "out.nc"),
+        ("machines", table),
+        ("controls", control),
+    ):
+        found = run(*command)
+        assert b"\x1b" not in found.stdout + found.stderr, command
+        assert not [line for line in (found.stdout + found.stderr).splitlines() if line.startswith(b"PASSED\\x1b")]

@@ -338,12 +338,13 @@ def _remove_abandoned(folder: str, name: str) -> None:
     """Remove what killed runs on this computer have left of an output; those of others may still be at work."""
     for left in glob.glob(os.path.join(glob.escape(folder), glob.escape(f".{name}.") + f"*-{_machine()}.part")):
         process = os.path.basename(left).removeprefix(f".{name}.").partition("-")[0]
-        if process.isdigit() and not _is_running(int(process)):
+        if process.isdigit() and not is_running(int(process)):
             with contextlib.suppress(OSError):
                 os.unlink(left)
 
 
-def _is_running(process: int) -> bool:
+def is_running(process: int) -> bool:
+    """Whether a process of this number runs on this computer, as far as that can be told."""
     if os.name == "nt":  # there, signal 0 is Ctrl-C
         return True
     try:

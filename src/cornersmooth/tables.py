@@ -15,6 +15,7 @@ from copy import deepcopy
 from dataclasses import MISSING, dataclass, fields
 from functools import lru_cache, partial
 from importlib import resources
+from itertools import accumulate
 from pathlib import Path
 from string import Formatter
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
@@ -28,6 +29,9 @@ Record = TypeVar("Record")
 Check = Callable[[Any, str], Any]
 
 _MOST = 1_000_000
+
+#: characters of a table at most
+_LARGEST = 1_000_000
 
 #: repeats in a pattern, whose number is the power with which the time of a search grows, and its characters
 _MOST_REPEATS, _LONGEST_PATTERN = 4, 200
@@ -108,11 +112,16 @@ class Shelf:
         if not is_file(name_or_path):
             return TableText(self.built_in(given), f"{given}.toml", given)
         try:
-            text = Path(name_or_path).read_text(encoding="utf-8-sig")  # some editors put a mark before it
+            with Path(name_or_path).open(encoding="utf-8-sig") as file:  # some editors put a mark before it
+                text = file.read(_LARGEST + 1)
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) and error.strerror else "not UTF-8 text"
             what = f"{self.kind} file cannot be read: {reason}"
             raise SettingsError(self.unreadable, what, "check the name", file=given) from error
+        if len(text) > _LARGEST:
+            raise SettingsError(
+                self.unreadable, f"{self.kind} file is longer than a table", "check the name", file=given
+            )
         return TableText(text, given, Path(name_or_path).stem)
 
     def built_in(self, name: str) -> str:
@@ -245,9 +254,9 @@ class Shelf:
         return tuple(self.number(each, where) for each in value)
 
     def text(self, value: object, where: str) -> str:
-        """Refuse what is no text."""
-        if not isinstance(value, str):
-            raise self.wrong(f"{where} is {value!r}", "write it as text in quotes")
+        """Refuse what is no text, or none that a terminal only shows."""
+        if not isinstance(value, str) or not value.isprintable():
+            raise self.wrong(f"{where} is {value!r}", "write it as one line of text in quotes")
         return value
 
     def texts(self, value: object, where: str, count: int | None = None, hint: str = "") -> tuple[str, ...]:
@@ -308,7 +317,7 @@ def check_pattern(pattern: str) -> None:
     Raises
     ------
     ValueError
-        It says why. Groups must not be repeated, and only `_MOST_REPEATS` things may be.
+        It says why. Groups hold no choice and are not repeated, and only `_MOST_REPEATS` things may be.
     """
     try:
         with warnings.catch_warnings():
@@ -318,13 +327,18 @@ def check_pattern(pattern: str) -> None:
         raise ValueError(f"{error}") from error
     bare = re.sub(r"\\.", "x", pattern)
     bare = re.sub(r"\[\^?\]?[^\]]*\]", "x", bare)
+    bare = bare.replace("(?", "(")  # what kind of group it is
+    depths = accumulate((letter == "(") - (letter == ")") for letter in bare)
+    choices = any(letter == "|" and depth > 0 for letter, depth in zip(bare, depths, strict=True))
     if (
         len(pattern) > _LONGEST_PATTERN
+        or choices
         or re.search(r"\)[*+{]", bare)
-        or len(re.findall(r"[*+{]", bare)) > _MOST_REPEATS
+        or len(re.findall(r"[*+{?]", bare)) > _MOST_REPEATS
     ):
         raise ValueError(
-            f"a group that is repeated, more than {_MOST_REPEATS} repeats, or more than {_LONGEST_PATTERN} characters"
+            "a choice in a group, a group that is repeated, "
+            f"more than {_MOST_REPEATS} repeats, or more than {_LONGEST_PATTERN} characters"
         )
 
 

@@ -20,7 +20,7 @@ from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.errors import SettingsError
 from cornersmooth.optional_packages import install_hint
-from cornersmooth.output import make_folder, processes_of_leftovers, remove_leftovers, temporary_name
+from cornersmooth.output import is_running, make_folder, processes_of_leftovers, remove_leftovers, temporary_name
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -124,22 +124,12 @@ def _proof_of_sharing(jobs: list[Job]) -> Iterator[str]:
     make_folder(folder)
     name = f"cluster-{socket.gethostname()}"
     for process in processes_of_leftovers(folder, name):
-        if not _alive(process):  # a run of this machine that was killed
+        if not is_running(process):  # a run of this machine that was killed
             remove_leftovers(os.path.join(folder, name), process)
     with temporary_name(folder, name) as path:
         with open(path, "xb"):
             pass
         yield path
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # somebody else's
-        pass
-    return True
 
 
 def _outcome(job: Job, task: Any) -> Outcome:

@@ -13,7 +13,7 @@ from cornersmooth.cli.inputs import Input, find_inputs, named_input
 from cornersmooth.cli.options import nc_text, outputs, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import console, more, print_line
+from cornersmooth.cli.show import console, more, print_line, printable, say_line
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.output import make_folder, open_output
 from cornersmooth.verdict import Verdict
@@ -173,12 +173,12 @@ def verify_with_program(old: bytes, path: str, given: dict[str, Any]) -> int:
     verdict = Verdict.of(problems=len(found.wrong))
     _show_wrong(name, found.wrong)
     if not given["quiet"]:
-        click.echo(f"{verdict}: {_problems(found.wrong) or _measured(found, settings.tolerance)}")
+        say_line(f"{verdict}: {_problems(found.wrong) or _measured(found, settings.tolerance)}")
     return int(verdict is not Verdict.PASSED)
 
 
-def describe_program(data: bytes, name: str) -> str:
-    """Say what an NC program holds, as far as words tell that need no machine."""
+def describe_program(data: bytes, name: str) -> tuple[str, ...]:
+    """Say in lines what an NC program holds, as far as words tell that need no machine."""
     from cornersmooth.filter.runs import ProgramReader
     from cornersmooth.filter.vocabulary import VOCABULARIES
     from cornersmooth.nc_reader.recognition import recognise_control
@@ -188,9 +188,9 @@ def describe_program(data: bytes, name: str) -> str:
     reading = ProgramReader(control if control in VOCABULARIES else "fanuc", None).read(data)
     looks = f", looks like {control}" if control else ""
     return (
-        f"file   {name}: an NC program{looks}, {len(reading.why)} lines\n"
-        f"cuts   {reading.cuts}\n"
-        "       'cornersmooth filter' smooths them, and says which cannot be; name the control and the machine there"
+        f"file   {name}: an NC program{looks}, {len(reading.why)} lines",
+        f"cuts   {reading.cuts}",
+        "       'cornersmooth filter' smooths them, and says which cannot be; name the control and the machine there",
     )
 
 
@@ -213,8 +213,8 @@ def _show_wrong(name: str, wrong: Sequence[Wrong]) -> None:
 def _show(name: str, found: Filtered, tolerance: float, verbose: int, given_units: str | None) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
     out = console()
-    out.print(first_line(found, tolerance), style="bold")
-    out.print(f"{name}: {found.lines} lines, {found.new_lines} after; all outside of runs is the same byte for byte")
+    out.print(printable(first_line(found, tolerance)), style="bold")
+    print_line(f"{name}: {found.lines} lines, {found.new_lines} after; all outside of runs is the same byte for byte")
     if found.checked is not None:
         _show_wrong(name, found.checked.wrong)
     if not found.units_said and given_units is None:
@@ -223,7 +223,7 @@ def _show(name: str, found: Filtered, tolerance: float, verbose: int, given_unit
     if left:
         out.print(f"{'left as it is':>13}  first line  reason")
     for cuts in left:
-        out.print(f"{cuts.count:>13}  {cuts.line:>10}  {cuts.reason}")
+        out.print(f"{cuts.count:>13}  {cuts.line:>10}  {printable(cuts.reason)}")
     if len(left) < len(found.left):
         out.print(f"... {len(found.left) - len(left)} more reasons; -v shows them")
     if found.cuts and not found.smoothed and any("tool tip control is off" in one.reason for one in found.left):

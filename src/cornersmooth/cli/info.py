@@ -49,7 +49,8 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
 
     data, name = read_input(source, size_limit=not given["no_size_limit"])
     if looks_like_program(data[:HEAD]):
-        click.echo(describe_program(data, name))
+        for line in describe_program(data, name):
+            say_line(line)
         return 0
     info = describe(read(data, name=name, **reading.reading_of(given)), tolerance, axis_length)
     if as_json:

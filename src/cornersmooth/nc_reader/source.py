@@ -11,6 +11,9 @@ from typing import BinaryIO, Final
 
 from cornersmooth.errors import InputError
 
+#: bytes that are taken of a pipe or device
+_LARGEST: Final = 2 << 30
+
 #: seconds between two looks at a file that grows
 _PAUSE: Final = 0.003
 
@@ -21,14 +24,26 @@ def unreadable(error: OSError, name: str | None) -> InputError:
 
 
 def readable_twice(text: bytes | str | os.PathLike[str]) -> bytes | str | os.PathLike[str]:
-    """Return the path of a file as it is, and all that comes out of a pipe or device."""
+    """Return the path of a file as it is, and all that comes out of a pipe or device.
+
+    Raises
+    ------
+    InputError
+        CS500: more comes out than any program holds.
+    """
     if isinstance(text, bytes):
         return text
     try:
         mode = os.stat(text).st_mode
-        return text if stat.S_ISREG(mode) or stat.S_ISDIR(mode) else Path(text).read_bytes()
+        if stat.S_ISREG(mode) or stat.S_ISDIR(mode):
+            return text
+        with Path(text).open("rb") as stream:
+            data = stream.read(_LARGEST + 1)
     except OSError:  # who opens it says why
         return text
+    if len(data) > _LARGEST:
+        raise InputError("CS500", "a pipe or device gives more than 2 GB", "name a file", file=os.fspath(text))
+    return data
 
 
 class Source:
