@@ -9,16 +9,15 @@ import numpy as np
 from cornersmooth.model import Arcs, Bools, Program, Runs
 
 
-def some_poses(program: Program, first: int, stop: int, *, earlier: bool) -> Program:
+def some_poses(program: Program, first: int, stop: int) -> Program:
     """Poses from `first` to before `stop`, with the arcs and statements between them.
 
     Parameters
     ----------
     program : Program
     first, stop : int
-        An arc that ends at the first pose is left out: it begins outside.
-    earlier : bool
-        Whether statements before the first pose stay before it; else they are left out.
+        An arc that ends at the first pose is left out: it begins outside. Earlier statements come
+        before the first pose.
     """
     rows, arcs = slice(first, stop), program.arcs
     own = (arcs.pose > first) & (arcs.pose < stop)
@@ -35,7 +34,7 @@ def some_poses(program: Program, first: int, stop: int, *, earlier: bool) -> Pro
         statements=tuple(
             replace(statement, pose=max(statement.pose - first, 0))
             for statement in program.statements
-            if statement.pose < stop and (earlier or statement.pose > first)
+            if statement.pose < stop
         ),
     )
 

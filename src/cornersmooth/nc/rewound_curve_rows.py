@@ -97,7 +97,7 @@ def _part(smoothed: SmoothProgram, first: int, stop: int) -> SmoothProgram:
     extra = {name: column[own] for name, column in corners.extra.items()}
     return replace(
         smoothed,
-        program=some_poses(program, first, stop, earlier=True),
+        program=some_poses(program, first, stop),
         corners=Corners(**columns, extra=extra),
         runs=None if runs is None else _runs(runs, first, stop),
     )
