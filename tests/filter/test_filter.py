@@ -252,9 +252,11 @@ def test_commands_know_programs(tmp_path: Path) -> None:
     assert found.returncode == 1
     assert b"the lines after line 15 of the old program are not there" in found.stderr
     assert b"an NC program, looks like linuxcnc" in run("info", "part.ngc", cwd=tmp_path).stdout
-    refused = run("smooth", "part.ngc", cwd=tmp_path)
-    assert refused.returncode == BAD_INPUT
-    assert b"cornersmooth filter" in refused.stderr
+    (tmp_path / "part.h").write_text(PROGRAMS["heidenhain words"][2])
+    for name in ("part.ngc", "part.h"):
+        refused = run("smooth", name, cwd=tmp_path)
+        assert refused.returncode == BAD_INPUT
+        assert b"cornersmooth filter" in refused.stderr
 
 
 def test_without_words_for_tip_control_it_has_to_be_said() -> None:

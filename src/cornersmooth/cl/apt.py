@@ -19,6 +19,8 @@ from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.reader_state import ReaderState
 from cornersmooth.errors import Finding
 from cornersmooth.model import MM_PER_UNIT, Arcs, Floats, Ints, Keep, Move, Program, Source, Units
+from cornersmooth.nc_reader.recognition import first_block
+from cornersmooth.provenance import HEAD
 
 #: what stands between plain GOTO lines is often the same (RAPID; PAINT/COLOR,31): gaps of up to so many lines are
 #: taken apart once, and no more than so many different ones remembered
@@ -69,6 +71,9 @@ def read_apt(
     Memory while reading: 5 bytes for a byte of a tool path of plain GOTO lines, at most 130 for any statements; the
     lines of a NURBS record may be `nurbs.MOST_LINES` poses for each control point.
     """
+    block = first_block(data[:HEAD])
+    if block is not None:
+        raise error("CS198", name, data.count(b"\n", 0, block.start()) + 1, word=block[0].decode("latin-1").strip())
     data, cut = without_card_columns(data, name)
     known = by_name(dialect) if dialect else recognise(data)
     decode = _decoder(data)

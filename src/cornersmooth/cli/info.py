@@ -43,12 +43,12 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     """
     from cornersmooth.cl import read
     from cornersmooth.cli.filter import describe_program
-    from cornersmooth.nc_reader.recognition import looks_like_program
+    from cornersmooth.nc_reader.recognition import first_block
     from cornersmooth.provenance import HEAD
     from cornersmooth.report.info import describe, info_json
 
     data, name = read_input(source, size_limit=not given["no_size_limit"])
-    if looks_like_program(data[:HEAD]):
+    if first_block(data[:HEAD]):
         for line in describe_program(data, name):
             say_line(line)
         return 0

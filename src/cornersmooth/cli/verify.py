@@ -84,7 +84,7 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.cl import read
     from cornersmooth.cli.filter import verify_with_program
     from cornersmooth.nc import own_words
-    from cornersmooth.nc_reader.recognition import looks_like_program
+    from cornersmooth.nc_reader.recognition import first_block
     from cornersmooth.nc_reader.source import readable_twice
     from cornersmooth.provenance import HEAD
     from cornersmooth.report import findings_table
@@ -98,7 +98,7 @@ def command(source: str, text: str, **given: Any) -> int:
     check_inputs(source, text)
     _check_outputs(source, text, given)
     data, name = read_input(source, size_limit=not given["no_size_limit"])
-    if looks_like_program(data[:HEAD]):
+    if first_block(data[:HEAD]):
         return verify_with_program(data, text, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)

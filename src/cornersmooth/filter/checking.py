@@ -17,6 +17,7 @@ from cornersmooth.filter.state import State
 from cornersmooth.filter.writing import Job
 from cornersmooth.model import Floats
 from cornersmooth.nc_reader import NcProgram
+from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.nc_reader.rotary import LINE_SHARE
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
@@ -119,16 +120,17 @@ def _first_other(old: Reading, new: Reading, line: int, at: int) -> Wrong:
     return Wrong(mine + 1, "there is more than in the old program")
 
 
-def check(job: Job, old: Reading, new: Reading, where: Sequence[Place], states: Sequence[State]) -> Checked:
+def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Checked:
     """Measure the runs that have changed, and compare what holds after each."""
     wrong: list[Wrong] = []
     largest = [0.0, 0.0]
-    for place, state in zip(where, states, strict=True):
-        text = _left_otherwise(place.run, state)
+    for place in where:
+        text = _left_otherwise(place.run, new.at[place.stop])
         if text:
             wrong.append(Wrong(place.stop, text))
-    for unit in sorted({place.run.state.unit for place in where}):
-        own = [place for place in where if place.run.state.unit == unit]
+    share = _share(old, new, where)
+    for key in sorted(set(share)):
+        own = [place for place, other in zip(where, share, strict=True) if other == key]
         try:
             found, others = _measure(job, old, new, own)
         except CornersmoothError as error:
@@ -139,6 +141,15 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place], states: 
         ]
         largest = np.maximum(largest, (found.tip.value, found.axis_point.value)).tolist()  # NaN stays
     return Checked(tuple(sorted(wrong, key=lambda one: one.line)), *largest)
+
+
+def _share(old: Reading, new: Reading, where: Sequence[Place]) -> list[tuple[int, float]]:
+    """Share out places by the bytes that they have, so that memory is bounded, and by their units."""
+    size = [
+        new.start[place.stop] - new.start[place.first] + old.start[place.run.stop] - old.start[place.run.first]
+        for place in where
+    ]
+    return [(int(end) // CHUNK, place.run.state.unit) for end, place in zip(np.cumsum(size), where, strict=True)]
 
 
 def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[Verification, list[Wrong]]:

@@ -11,7 +11,7 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.filter.checking import Checked, Place, check, places
 from cornersmooth.filter.runs import ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
-from cornersmooth.filter.writing import Job, blocks, smoothed
+from cornersmooth.filter.writing import Job, smoothed
 from cornersmooth.memory import return_free_memory
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc.form import Form
@@ -112,8 +112,7 @@ def filter_program(
     """
     settings = Settings() if settings is None else settings
     job, old = _read(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
-    made, why = smoothed(job, old)
-    texts = {run.first: blocks(job, old, run, made.pop(run.first)) for run in old.runs if run.first in made}
+    texts, why = smoothed(job, old)
     return_free_memory()  # verification takes as much again
     for run in old.runs:
         if texts.get(run.first) == old.lines(run.first, run.stop):
@@ -121,16 +120,16 @@ def filter_program(
             why[run.first] = "nothing in it is to be rounded"
     while True:
         new, where = _spliced(old, texts)
+        texts.clear()  # as long as the new program
         if not verify or not where:
-            return _result(old, new, texts, why, Checked(()) if verify else None)
-        checked = _checked(job, old, new, where)
-        lines = [(one.line, one.text) for one in checked.wrong]
-        bad = {p.run.first: text for p in where for line, text in lines if p.first < line <= p.stop}
+            return _result(old, new, where, why, Checked(()) if verify else None)
+        after = job.reader.read(new, [place.stop for place in where])
+        checked = check(job, old, after, where)
+        bad = {p.run.first: one.text for p in where for one in checked.wrong if p.first < one.line <= p.stop}
         if not bad:
-            return _result(old, new, texts, why, checked)
-        for first, text in bad.items():
-            del texts[first]
-            why[first] = f"verification found: {text}"
+            return _result(old, new, where, why, checked)
+        texts = {p.run.first: after.lines(p.first, p.stop) for p in where if p.run.first not in bad}
+        why |= {first: f"verification found: {text}" for first, text in bad.items()}
 
 
 def verify_programs(
@@ -146,11 +145,10 @@ def verify_programs(
     """Compare a program with the one that it was made from, whoever made it; parameters as of `filter_program`."""
     settings = Settings() if settings is None else settings
     job, before = _read(old, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
-    after = job.reader.read(new)
-    where, wrong = places(before, after)
+    where, wrong = places(before, job.reader.read(new))
     if wrong:
         return Checked(tuple(wrong))
-    return _checked(job, before, new, where)
+    return check(job, before, job.reader.read(new, [place.stop for place in where]), where)
 
 
 def _read(
@@ -216,15 +214,7 @@ def _spliced(old: Reading, texts: dict[int, bytes]) -> tuple[bytes, list[Place]]
     return b"".join(parts), where
 
 
-def _checked(job: Job, old: Reading, new: bytes, where: list[Place]) -> Checked:
-    after = job.reader.read(new, [place.stop for place in where])
-    return check(job, old, after, where, [after.at[place.stop] for place in where])
-
-
-def _result(
-    old: Reading, new: bytes, texts: dict[int, bytes], why: dict[int, str], checked: Checked | None
-) -> Filtered:
-    replaced = [run for run in old.runs if run.first in texts]
+def _result(old: Reading, new: bytes, where: list[Place], why: dict[int, str], checked: Checked | None) -> Filtered:
     for run in old.runs:
         if run.first in why:
             old.why[run.first : run.stop] = old.number(why[run.first])
@@ -233,8 +223,8 @@ def _result(
         lines=len(old.why),
         new_lines=new.count(b"\n") + (not new.endswith(b"\n")),
         cuts=old.cuts,
-        smoothed=sum(map(len, replaced)),
-        runs=len(replaced),
+        smoothed=sum(len(place.run) for place in where),
+        runs=len(where),
         left=tuple(Left(*one) for one in old.left()),
         checked=checked,
         units_said=_UNITS.search(old.data) is not None,

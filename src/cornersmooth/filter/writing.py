@@ -20,6 +20,7 @@ from cornersmooth.kinematics import Machine, solutions, tool_axis
 from cornersmooth.model import Floats
 from cornersmooth.nc import Frame, write
 from cornersmooth.nc.form import Form
+from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.pipeline import smooth
 from cornersmooth.settings import Settings
 
@@ -66,21 +67,21 @@ class Job:
         return b"".join(block + b" " + (feed[0] if feed else b"") + b"\n" for block, feed in pairs)
 
 
-def smoothed(job: Job, reading: Reading) -> tuple[dict[int, list[bytes]], dict[int, str]]:
+def smoothed(job: Job, reading: Reading) -> tuple[dict[int, bytes], dict[int, str]]:
     """Blocks for runs, and why others are left, by the first line of each."""
-    made: dict[int, list[bytes]] = {}
+    made: dict[int, bytes] = {}
     why: dict[int, str] = {}
-    for group in _groups(job, reading.runs):
+    for group in _groups(job, reading):
         _attempt(job, reading, group, made, why)
     return made, why
 
 
-def _groups(job: Job, runs: Sequence[Run]) -> list[list[Run]]:
-    """Runs that can be written together: with the same units, solution and turn."""
+def _groups(job: Job, reading: Reading) -> list[list[Run]]:
+    """Runs that can be written together: near each other, so that memory is bounded, with the same units and turn."""
     found: dict[tuple[object, ...], list[Run]] = {}
     machine = job.form.machine
-    for run in runs:
-        key: tuple[object, ...] = (run.state.unit, bool(run.state.rounding))
+    for run in reading.runs:
+        key: tuple[object, ...] = (int(reading.start[run.first]) // CHUNK, run.state.unit, bool(run.state.rounding))
         if machine is not None and len(machine.names) == 2:
             angles = run.start[3:]
             both = solutions(machine, tool_axis(machine, angles[None])).angles[0]
@@ -91,9 +92,7 @@ def _groups(job: Job, runs: Sequence[Run]) -> list[list[Run]]:
     return list(found.values())
 
 
-def _attempt(
-    job: Job, reading: Reading, runs: Sequence[Run], made: dict[int, list[bytes]], why: dict[int, str]
-) -> None:
+def _attempt(job: Job, reading: Reading, runs: Sequence[Run], made: dict[int, bytes], why: dict[int, str]) -> None:
     """Smooth runs together; those that this is not good for on their own."""
     try:
         texts = _write(job, reading, runs)
@@ -107,7 +106,7 @@ def _attempt(
         return
     for run, text in zip(runs, texts, strict=True):
         if text is not None:
-            made[run.first] = text
+            made[run.first] = blocks(job, reading, run, text)
         elif len(runs) == 1:
             why[run.first] = "the rotary axes would come out in another turn or solution"
         else:

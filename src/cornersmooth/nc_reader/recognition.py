@@ -19,12 +19,12 @@ _COMMENT: Final = re.compile(r"\([^)]*\)|;.*")
 
 #: what begins a line of a CL file or of a table, and a block of an NC program
 _OTHER: Final = re.compile(rb"(?im)^\s*(GOTO|FEDRAT|LOADTL|PARTNO|TOOL PATH|RAPID|MULTAX|FINI)\b")
-_BLOCK: Final = re.compile(rb"(?im)^[ \t/]*(N\d+[ \t]*)?(G\d{1,3}(\.\d)?(?![\d/,=])|L [XYZ][+-]|\d+ BEGIN PGM)")
+_BLOCK: Final = re.compile(rb"(?im)^[ \t/]*(N\d+[ \t]*)?(G\d{1,3}(\.\d)?(?![\d/,=])|L [XYZ][+-]|\d+ BEGIN PGM).*")
 
 
-def looks_like_program(head: bytes) -> bool:
-    """Whether the beginning of a file is that of an NC program, not of a CL file or a table of points."""
-    return _BLOCK.search(head) is not None and not _OTHER.search(head)
+def first_block(head: bytes) -> re.Match[bytes] | None:
+    """Motion in the beginning of an NC program; None where that is of a CL file or a table of points."""
+    return None if _OTHER.search(head) else _BLOCK.search(head)
 
 
 def recognise_control(head: bytes) -> str:
