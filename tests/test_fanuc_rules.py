@@ -21,7 +21,7 @@ STEP = 1e-4
 
 
 def smooth(data: bytes, *options: str) -> tuple[str, Written]:
-    result = run("smooth", "-", "-f", "g6.2", "-q", *options, data=data)
+    result = run("smooth", "-", "-f", "g6.2", "--method", "proportional", "-q", *options, data=data)
     assert result.returncode == 0, result.stderr.decode()
     return result.stdout.decode("ascii"), parse(result.stdout, "g6.2")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import json
 from pathlib import Path
 from typing import BinaryIO
 
@@ -13,6 +14,7 @@ from scipy.interpolate import BSpline
 
 import cornersmooth
 from cornersmooth import Program
+from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Form, choose_form
 from cornersmooth.pipeline import Result
 from nc import run_chains
@@ -196,3 +198,67 @@ def test_runs_with_steep_turns_are_named_where_curves_are_written() -> None:
         assert (smoothed.runs is not None) == lines
         assert [finding.count for finding in told] == ([] if lines else [3])
         assert smoothed.corners.rounded.all()
+
+
+@pytest.mark.parametrize(
+    ("control", "form", "machine", "settings", "used"),
+    [
+        ("fanuc", "g1", "", {}, "proportional"),
+        ("linuxcnc", "g1", "xyzac-trt", {}, "proportional"),
+        ("fanuc", "g6.2", "", {}, "global"),
+        ("siemens", "bspline", "table-ac", {}, "global"),
+        ("siemens", "poly", "", {}, "global"),
+        ("heidenhain", "spl", "table-ac", {}, "global"),
+        ("fanuc", "g6.2", "", {"weights": (1.0, 0.5)}, "proportional"),
+        ("fanuc", "g6.2", "", {"method": "proportional"}, "proportional"),
+        ("fanuc", "g1", "", {"method": "global"}, "global"),
+    ],
+)
+def test_the_method_is_that_of_the_form(
+    control: str, form: str, machine: str, settings: dict[str, object], used: str
+) -> None:
+    chain = random_chains(7, 1, corners=6)[0]
+    chosen = choose_form(control, form, machine=load_machine(machine) if machine else None)
+    program = cornersmooth.read(cl_text([chain])[0])
+    smoothed = cornersmooth.smooth(program, cornersmooth.Settings(**settings), form=chosen)  # type: ignore[arg-type]
+    assert smoothed.settings.method == used
+
+
+def test_without_a_form_corners_are_rounded_one_by_one() -> None:
+    program = Program.from_poses(np.eye(3), np.tile([0.0, 0.0, 1.0], (3, 1)))
+    assert cornersmooth.smooth(program).settings.method == "proportional"
+
+
+def told(tmp_path: Path, data: bytes, *options: str) -> tuple[list[str], dict[str, object]]:
+    """Lines of the terminal that begin with the method, and the summary of the report."""
+    report = tmp_path / "r.json"
+    result = run("smooth", "-", "-o", tmp_path / "o.nc", "--report", report, "--force", *options, data=data)
+    assert result.returncode == 0, result.stderr.decode()
+    lines = [line for line in result.stderr.decode().splitlines() if line.startswith("method")]
+    return lines, json.loads(report.read_text())["summary"]
+
+
+def test_the_method_and_what_it_could_not_do_are_said_in_one_line(tmp_path: Path) -> None:
+    """A turn of 65 degrees in one move: curves take its run corner by corner, lines as a whole."""
+    poses = [(0, 0, 0), (5, 1, 5), (10, 0, 70), (15, 1, 75), (20, 0, 80)]
+    goto = "".join(
+        f"GOTO/{x},{y},0,{np.sin(np.radians(tilt)):.6f},0,{np.cos(np.radians(tilt)):.6f}\n" for x, y, tilt in poses
+    )
+    data = f"UNITS/MM\nLOADTL/1\nSPINDL/900,CLW\nFEDRAT/300,MMPM\n{goto}FINI\n".encode()
+    why = "corner rounded by itself: the tool axis turns by more than 30 deg in one move of its run (3 times)"
+    lines, summary = told(tmp_path, data, "-f", "g6.2")
+    assert lines == [f"method        global; {why}"]
+    assert summary["instead"] == [{"count": 3, "text": why.removesuffix(" (3 times)")}]
+    lines, summary = told(tmp_path, data, "--method", "global")
+    assert lines == ["method        global, 1 run with 3 corners"]
+    assert (summary["method"], summary["runs"], summary["corners_in_runs"], summary["instead"]) == ("global", 1, 3, [])
+    assert told(tmp_path, data)[0] == ["method        proportional"]
+
+
+@pytest.mark.parametrize(("options", "said"), [((), False), (("--lines", "dense"), False), (("--lines", "long"), True)])
+def test_long_lines_of_runs_are_warned_of_where_the_control_blends(options: tuple[str, ...], said: bool) -> None:
+    """Measured on LinuxCNC's controller: docs/linuxcnc.md."""
+    data = cl_text(random_chains(7, 1, corners=6))[0]
+    words = ("--control", "linuxcnc", "--machine", "xyzac-trt", "--method", "global" if said or options else "auto")
+    result = run("smooth", "-", *words, *options, data=data)
+    assert ("use --method proportional" in result.stderr.decode()) == said

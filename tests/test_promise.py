@@ -61,7 +61,7 @@ def smooth(
     source.write_bytes(data)
     # the oracle is to judge, not the built-in verification
     options = ["-e", str(tolerance), "-H", str(axis_length), "-f", form, "--force", "-q", "--no-verify"]
-    result = run("smooth", source, "-o", out, "--report", report, *options)
+    result = run("smooth", source, "-o", out, "--report", report, "--method", "proportional", *options)
     assert result.returncode == 0, result.stderr.decode()
     with report.open(newline="") as stream:
         status = {int(row["line"]): row["status"] for row in csv.DictReader(stream)}

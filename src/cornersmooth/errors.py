@@ -18,6 +18,9 @@ _BESIDE_THE_METAL = frozenset((133, 134, 139, 174, 184, 325, 371, 509))
 #: numbers of warnings of what an option leaves out of the program
 _LEFT_OUT = frozenset((315,))
 
+#: numbers of notes of what the method asked for could not do, and another way did
+_INSTEAD = frozenset((226, 229, 378))
+
 
 class CornersmoothError(Exception):
     """Work stopped; the text says what happened and what to do.
@@ -143,6 +146,11 @@ class Finding:
     def leaves_out(self) -> bool:
         """Whether it says that an option left something out of the program."""
         return int(self.code[2:]) in _LEFT_OUT
+
+    @property
+    def instead(self) -> bool:
+        """Whether it says that something was done in another way than the method has it."""
+        return int(self.code[2:]) in _INSTEAD
 
     @property
     def to_check(self) -> bool:

@@ -63,4 +63,8 @@ METHODS: Mapping[str, Method] = MappingProxyType(
     }
 )
 
-DEFAULT_METHOD = "proportional"
+#: what suits the form: see `Settings.with_method`
+AUTO = "auto"
+
+#: of lines, and of curves
+DEFAULT_METHOD, CURVES_METHOD = "proportional", "global"

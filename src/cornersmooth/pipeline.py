@@ -114,7 +114,7 @@ def smooth(
     ----------
     program : Program
     settings : Settings, optional
-        Defaults: ε 0.01 mm, H 10 mm, the proportional method.
+        Defaults: ε 0.01 mm, H 10 mm; the global method in curves, the proportional one in lines and without a form.
     form : Form, optional
         What the path will be written in, as `choose_form` gives it: the rounding of its digits is taken off ε. Without
         it ε holds for the path itself, as for plans and plots, and `write` refuses it.
@@ -177,7 +177,7 @@ def postprocess(
     source : Program, path or bytes
     target : path or binary stream
     settings : Settings, optional
-        ε 0.01 mm, H 10 mm, the proportional method; fitted here to the digits of the form.
+        ε 0.01 mm, H 10 mm, the method that suits the form; fitted here to its digits.
     form : Form, optional
         What `choose_form` gives; fanuc g1 by default.
     frame : Frame, optional

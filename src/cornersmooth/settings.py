@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.methods import DEFAULT_METHOD, METHODS
+from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD, METHODS
 
 Lines = Literal["dense", "long"]
 
@@ -26,7 +26,8 @@ class Settings:
     axis_tolerance : float or None, degrees
         τ: in place of ε at the axis point, what the tool axis may be off where the tip is within ε.
     method : str
-        A name in `cornersmooth.methods.METHODS`.
+        A name in `cornersmooth.methods.METHODS`, or "auto" for what suits the form: global in curves, if nothing that
+        is given is against it, else proportional.
     weights : (float, float)
         w1 and w2 of the five-point curve, in (0, 3]; rounded to the three decimals that controls accept.
     ratio : float
@@ -62,7 +63,7 @@ class Settings:
     tolerance: float = 0.01
     axis_length: float = 10.0
     axis_tolerance: float | None = None
-    method: str = DEFAULT_METHOD
+    method: str = AUTO
     weights: tuple[float, float] = (1.0, 1.0)
     ratio: float = 2.0 / 3.0
     reversal_angle: float = 170.0
@@ -80,13 +81,12 @@ class Settings:
     shortest_line: float = 1e-3
 
     def __post_init__(self) -> None:
-        if self.method not in METHODS:
-            raise SettingsError("CS201", f"unknown method {self.method!r}", f"use {' or '.join(METHODS)}")
+        if self.method not in (AUTO, *METHODS):
+            raise SettingsError("CS201", f"unknown method {self.method!r}", f"use {' or '.join((AUTO, *METHODS))}")
         if self.lines not in (None, "dense", "long"):
             raise SettingsError("CS201", f"unknown lines {self.lines!r}", "use dense or long")
-        prescribed = METHODS[self.method].prescribed
-        if any(getattr(self, name) != value for name, value in prescribed.items()):
-            names = " and ".join(prescribed)
+        if self.method != AUTO and not self._allows(self.method):
+            names = " and ".join(METHODS[self.method].prescribed)
             raise SettingsError("CS207", f"the method {self.method} has its own {names}", f"leave out {names}")
         object.__setattr__(self, "weights", tuple(round(float(w), WEIGHT_DECIMALS) for w in self.weights))
         for name, (low, high) in BOUNDS.items():
@@ -102,6 +102,16 @@ class Settings:
                 f"tolerance {self.tolerance:g} mm is finer than the written digits can hold",
                 self._coarser,
             )
+
+    def _allows(self, method: str) -> bool:
+        """Whether these are the settings that the method does not leave open."""
+        return all(getattr(self, name) == value for name, value in METHODS[method].prescribed.items())
+
+    def with_method(self, *, curves: bool = False) -> Settings:
+        """Put a method in the place of "auto": what suits lines, or curves."""
+        if self.method != AUTO:
+            return self
+        return self.but(method=CURVES_METHOD if curves and self._allows(CURVES_METHOD) else DEFAULT_METHOD)
 
     def _check_axis_tolerance(self, degrees: float) -> float:
         """H that goes with an axis tolerance, mm."""

@@ -28,7 +28,7 @@ LIMITS = Limits()
 def text_of(program: Program, form: str = "g1", control: str = "fanuc", **settings: object) -> bytes:
     chosen = choose_form(control, form)
     stream = io.BytesIO()
-    fitted = fit_settings(Settings(**settings), chosen, program.units)
+    fitted = fit_settings(Settings(**{"method": "proportional", **settings}), chosen, program.units)
     write(smooth(program, fitted), stream, form=chosen)
     return stream.getvalue()
 
@@ -129,7 +129,7 @@ def curves_of(
     machine = load_machine(name) if name else None
     chosen = choose_form(control, form, machine=machine, digits=digits)
     stream = io.BytesIO()
-    smoothed = smooth(program, fit_settings(Settings(tolerance=0.02), chosen, program.units))
+    smoothed = smooth(program, fit_settings(Settings(tolerance=0.02, method="proportional"), chosen, program.units))
     write(smoothed, stream, form=chosen)
     return smoothed, read_nc(stream.getvalue(), control=control, machine=machine), stream.getvalue()
 
@@ -196,7 +196,9 @@ def test_rounded_digits_cost_time_on_a_machine_and_a_far_second_point_saves_it()
         control = replace(control, digits=replace(control.digits, lever=lever))
         form = choose_form(control, "g6.2")
         stream = io.BytesIO()
-        write(smooth(dense, fit_settings(Settings(tolerance=0.02), form, "mm")), stream, form=form)
+        write(
+            smooth(dense, fit_settings(Settings(tolerance=0.02, method="proportional"), form, "mm")), stream, form=form
+        )
         taken.append(plan_text(read_nc(stream.getvalue(), control="generic"), LIMITS, machine=machine).total)
     fine, coarse, near = taken
     assert fine < coarse < near

@@ -12,10 +12,9 @@ import pytest
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
-from cornersmooth.nc import Form, choose_form, fit_settings, load_control, parse_control, write
+from cornersmooth.nc import Form, choose_form, load_control, parse_control
 from cornersmooth.pipeline import postprocess
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import smooth
 from cornersmooth.verify import verify
 from nc.grammars import reader
 
@@ -49,7 +48,9 @@ def program(units: str = "mm") -> Program:
 
 def written(form: Form, units: str = "mm", tolerance: float = 0.02) -> str:
     stream = io.BytesIO()
-    result = postprocess(program(units), stream, Settings(tolerance=tolerance), form=form, processes=1)
+    result = postprocess(
+        program(units), stream, Settings(tolerance=tolerance, method="proportional"), form=form, processes=1
+    )
     assert result.verification is not None
     assert result.verification.passed
     assert not result.unverified
@@ -99,7 +100,7 @@ def test_digits_too_coarse_for_the_tolerance_are_refused() -> None:
 def test_a_second_point_stands_a_hundred_millimetres_up_the_axis_or_farther() -> None:
     for length, lever in ((10.0, 100.0), (150.0, 150.0)):
         stream = io.BytesIO()
-        settings = Settings(tolerance=0.02, axis_length=length)
+        settings = Settings(tolerance=0.02, axis_length=length, method="proportional")
         form = choose_form("fanuc", "g6.2")
         assert form.stretch(length) * length == pytest.approx(lever)
         postprocess(program(), stream, settings, form=form, processes=1)
@@ -175,15 +176,3 @@ def test_systems_are_those_of_the_table() -> None:
     fanuc = load_control("fanuc")
     assert replace(fanuc.systems["IS-C"], vector=7, vector_length=1) == fanuc.digits
     assert not load_control("siemens").systems
-
-
-@pytest.mark.parametrize(("digits", "said"), [("IS-B", True), ("", False), ("IS-E", False)])
-def test_digits_that_bend_short_curves_are_named(digits: str, said: bool) -> None:
-    """Segments of 0.3 mm: control points of transitions are 0.05 mm apart, 50 steps of IS-B and 500 of IS-C."""
-    count = 40
-    tip = np.cumsum(np.column_stack((np.full(count, 0.3), 0.1 * (np.arange(count) % 2), np.zeros(count))), axis=0)
-    program = Program.from_poses(tip, np.tile([0.0, 0.0, 1.0], (count, 1)), feed=500.0)
-    form = choose_form("fanuc", "g6.2", digits=digits)
-    stream = io.BytesIO()
-    found = write(smooth(program, fit_settings(Settings(), form, "mm")), stream, form=form).findings
-    assert ("CS349" in {finding.code for finding in found}) == said

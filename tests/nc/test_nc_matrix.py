@@ -42,7 +42,7 @@ def read_back(case: Case, feed: str, units: str = "mm") -> Reading:
     """Write a program for the case and read it strictly."""
     form = case.choose()
     program = read(cl(feed, upright=form.orientation == "fixed", units=units), name="part.cls")
-    text, _ = written(program, form, Settings(tolerance=0.05))
+    text, _ = written(program, form, Settings(tolerance=0.05, method="proportional"))
     return reader(case.control, case.form, case.machine, case.tcp, units).read(text, 10.0, 0.05)
 
 

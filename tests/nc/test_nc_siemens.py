@@ -45,7 +45,8 @@ def circle(count: int, step: float) -> bytes:
 
 
 def text_of(data: bytes, form: str, **settings: object) -> tuple[str, SmoothProgram]:
-    wanted = Settings(tolerance=TOLERANCE, axis_length=AXIS_LENGTH, **settings)  # type: ignore[arg-type]
+    chosen = {"tolerance": TOLERANCE, "axis_length": AXIS_LENGTH, "method": "proportional", **settings}
+    wanted = Settings(**chosen)  # type: ignore[arg-type]
     return written(read(data, name="part.cls"), choose_form("siemens", form), wanted)
 
 
@@ -110,7 +111,7 @@ def test_isolated_corners_are_splines_of_their_own() -> None:
 def test_single_splines_are_warned_of(count: int, said: int) -> None:
     """At least 6 blocks out of every 10 must be spline blocks (programming manual)."""
     form = choose_form("siemens", "bspline")
-    settings = fit_settings(Settings(tolerance=TOLERANCE), form, "mm")
+    settings = fit_settings(Settings(tolerance=TOLERANCE, method="proportional"), form, "mm")
     smoothed = smooth(read(circle(count, 0.3), name="part.cls"), settings)
     found = write(smoothed, io.BytesIO(), form=form).findings
     assert sum(finding.count for finding in found if finding.code == "CS325") == said
@@ -183,7 +184,7 @@ def test_polynomials_are_the_curve_in_two_blocks() -> None:
 def test_cycle832_is_asked_for_by_name() -> None:
     program = read(circle(4, 0.3), name="part.cls")
     form = choose_form("siemens", "g1", extras=("cycle832",))
-    text, _ = written(program, form, Settings(tolerance=0.02, axis_length=25.0))
+    text, _ = written(program, form, Settings(tolerance=0.02, axis_length=25.0, method="proportional"))
     lines = text.splitlines()
     assert lines[lines.index("TRAORI") - 1] == "CYCLE832(0.00200,_ORI_FINISH,0.00458)"
     assert lines[lines.index("TRAFOOF", 2) + 1] == "CYCLE832(0,_OFF,1)"

@@ -28,7 +28,7 @@ def write(
     with np.errstate(all="raise", under="ignore"):
         if isinstance(program, bytes):
             program = cornersmooth.read(program)
-        wanted = cornersmooth.Settings(tolerance=tolerance, axis_length=axis_length)
+        wanted = cornersmooth.Settings(tolerance=tolerance, axis_length=axis_length, method="proportional")
         fitted = cornersmooth.fit_settings(wanted, choose_form("fanuc", form), program.units)
         smoothed = cornersmooth.smooth(program, fitted)
         # some real files have cycles that are refused

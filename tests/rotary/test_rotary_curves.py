@@ -47,7 +47,7 @@ def endless(name: str) -> Machine:
 
 def reserved(**changes: object) -> Settings:
     """Settings that leave a tenth of ε to the orientation of every corner."""
-    return Settings(tolerance=TOLERANCE, axis_point_resolution=0.1 * TOLERANCE).but(**changes)
+    return Settings(tolerance=TOLERANCE, method="proportional", axis_point_resolution=0.1 * TOLERANCE).but(**changes)
 
 
 def rotary(smoothed: SmoothProgram, machine: Machine) -> RotaryCurves:

@@ -31,7 +31,7 @@ CASES = [
 def text_of(case: Case, program: Program) -> list[str]:
     """Lines of a program."""
     form = case.choose()
-    settings = fit_settings(Settings(tolerance=EPS, axis_length=H), form, "mm")
+    settings = fit_settings(Settings(tolerance=EPS, axis_length=H, method="proportional"), form, "mm")
     stream = io.BytesIO()
     write(smooth(program, settings), stream, form=form)
     return stream.getvalue().decode("ascii").splitlines()

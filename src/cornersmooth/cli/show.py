@@ -96,7 +96,7 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
     """Print the small table of one file, and its sharp corners."""
     from rich.text import Text
 
-    from cornersmooth.report.verdict import sharp_text
+    from cornersmooth.report.verdict import method_text, sharp_text
     from cornersmooth.smoothing.construction import construction_of
 
     summary, settings = contents["summary"], contents["settings"]
@@ -124,6 +124,7 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
             f"(H {settings['axis_length']:g} mm), {allowed}",
         )
     say("tool axis", f"turned by up to {summary['max_orientation_error_deg']:.4f}° from the original")
+    say("method", method_text(summary))
     if text := construction_of(settings["method"]).summary_text(summary):
         say(settings["method"], text)
     if "verification" in contents:

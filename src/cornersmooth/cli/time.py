@@ -13,7 +13,7 @@ from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothin
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import print_line, progress_bar, say_line
-from cornersmooth.methods import METHODS
+from cornersmooth.methods import DEFAULT_METHOD, METHODS
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
@@ -194,7 +194,7 @@ def _tables(compared: Comparison) -> Iterator[str]:
     if compared.machine is not None:
         yield ""
         yield from _axis_table(compared)
-    for name in ("direct_velocity_jump", settings.method):
+    for name in ("direct_velocity_jump", DEFAULT_METHOD):
         yield ""
         yield f"where the time goes ({_TITLES[name]})"
         yield f"{'line':>8}{'x':>12}{'y':>12}{'z':>12}{'time s':>10}{'lost s':>10}{'least mm/s':>12}"

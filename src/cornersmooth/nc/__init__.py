@@ -116,7 +116,7 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
                 "leave out --lines; lines with the tip under tool tip control can be",
             )
         settings = settings.but(curve_share=long.curve_share, line_share=long.line_share, blend_share=long.blend_share)
-    return settings.but(
+    return settings.with_method(curves=form.curves).but(
         lines=lines,
         tip_resolution=form.tip_resolution(units, tolerance),
         axis_point_resolution=form.axis_point_resolution(units, settings),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import FeedMode, Program, SmoothProgram
 from cornersmooth.nc.circles import Circles
 from cornersmooth.nc.findings import Findings
@@ -11,10 +12,6 @@ from cornersmooth.nc.form import Form
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.settings import FLIP_ANGLE
 from cornersmooth.smoothing.axis_steps import axis_steps
-from cornersmooth.vectors import norm
-
-#: distance of control points in steps of the last digit from which on rounding costs no time (docs/feedrate.md)
-_FEW_STEPS = 250.0
 
 
 def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings: Findings) -> None:
@@ -25,36 +22,21 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
     _large_feeds(form, smoothed.program, findings)
     if form.orientation == "machine":
         _feeds(smoothed.program, findings)
-    if form.curves:
-        _coarse_digits(form, smoothed, findings)
     if "{kinematics_on}" in form.mode.within_on and form.machine is not None and form.machine.tip_control is None:
         text = (
             "the machine file names no blocks that switch tip control on and off: the kinematics must keep the tip "
             'from the start; write tip_control = ["M428", "M429"], or [] if they do'
         )
         findings.add("CS393", "warning", 0, text)
+    if form.table.lines.lag and smoothed.settings.lines == "long" and smoothed.settings.method == CURVES_METHOD:
+        text = (
+            f"{form.control} rounds the corners of lines by itself; lines of the method {CURVES_METHOD} took it 10 to "
+            f"50 % longer, and once it left the tolerance there: use --method {DEFAULT_METHOD}"
+        )
+        findings.add("CS394", "warning", 0, text)
     for extra in form.extras:
         if extra.warning:
             findings.add("CS339", "warning", 0, f"{extra.name} was asked for: {extra.warning}")
-
-
-def _coarse_digits(form: Form, smoothed: SmoothProgram, findings: Findings) -> None:
-    """Transitions so short that the rounding of their control points bends them: the axes must follow every digit."""
-    program, corners = smoothed.program, smoothed.corners
-    at, rounded = program.tip[corners.pose], corners.smoothed
-    legs = (
-        norm(at - program.tip[corners.before]) * corners.trim_in,
-        norm(program.tip[corners.after] - at) * corners.trim_out,
-    )
-    apart = ((1.0 - corners.ratio) * np.minimum(*legs))[rounded] / form.rounding(program.units)
-    apart = apart[apart > 0.0]
-    if not len(apart) or (typical := float(np.median(apart))) >= _FEW_STEPS:
-        return
-    text = (
-        f"control points of transitions are {typical:.0f} steps of the last digit apart, typically: rounding bends the "
-        "curves, and the axes follow; --method global or more digits cost less time"
-    )
-    findings.add("CS349", "note", 0, text)
 
 
 def _arcs(circles: Circles, program: Program, findings: Findings) -> None:

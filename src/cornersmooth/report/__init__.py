@@ -64,7 +64,10 @@ def report(
     sharp, listed = sharp_corners(smoothed)
     own = smoothed.settings.axis_tolerance is not None  # bounds of runs hold at another distance from the tip then
     summary: dict[str, Any] = {
+        "method": smoothed.settings.method,
         "corners": len(corners),
+        "corners_in_runs": int((corners.status == Status.IN_RUN).sum()),
+        "instead": [{"count": one.count, "text": one.text} for one in told if one.instead],
         "smoothed": int(done.sum()),
         "limited_by_tolerance": int((corners.limited_by == LimitedBy.TOLERANCE).sum()),
         "limited_by_segment": int((corners.limited_by == LimitedBy.SEGMENT).sum()),

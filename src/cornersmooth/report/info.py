@@ -281,6 +281,7 @@ def _arcs(program: Program) -> ArcSummary:
 
 def _corners(program: Program, settings: Settings) -> CornerSummary:
     # a program with a move that smoothing refuses is described all the same
+    settings = settings.with_method()
     corners = construction_of(settings.method).smooth(program, settings).corners
     turn = _tip_turn(program, corners)
     done = corners.rounded

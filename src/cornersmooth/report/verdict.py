@@ -179,6 +179,20 @@ def first_line(contents: Mapping[str, Any], saving: Saving | None = None) -> str
     return "; ".join(parts)
 
 
+def method_text(summary: Mapping[str, Any]) -> str:
+    """Say which method made the curves, for how many runs, and what was done in another way, and why.
+
+    Parameters
+    ----------
+    summary : mapping
+        Of the report.
+    """
+    text = summary["method"]
+    if runs := summary.get("runs"):
+        text += f", {runs:,} {'run' if runs == 1 else 'runs'} with {summary['corners_in_runs']:,} corners"
+    return "; ".join((text, *(f"{one['text']} ({one['count']:,} times)" for one in summary["instead"])))
+
+
 def saving_text(saving: Saving) -> str:
     """Say what smoothing saves of the time of the direct path."""
     direct, written, saved = saving.direct, saving.written, saving.direct - saving.written

@@ -28,7 +28,7 @@ def smooth(
     ----------
     program : Program
     settings : Settings, optional
-        Defaults: ε 0.01 mm, H 10 mm, the proportional method.
+        Defaults: ε 0.01 mm, H 10 mm; without a form the method "auto" is the proportional one.
     progress : callable, optional
         Called now and then with (corners done, corners in all).
     processes : int
@@ -44,7 +44,7 @@ def smooth(
     InputError
         CS183: the tool axis turns by nearly half a turn in one feed move.
     """
-    settings = Settings() if settings is None else settings
+    settings = (Settings() if settings is None else settings).with_method()
     refuse_flips(program)
     smoothed = construction_of(settings.method).smooth(program, settings, progress, processes)
     if settings.axis_tolerance is not None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any, ClassVar
 
-from cornersmooth.methods import METHODS
+from cornersmooth.methods import AUTO, DEFAULT_METHOD, METHODS
 from cornersmooth.model import Corners, Floats, Ints, Program, SmoothProgram
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
@@ -93,6 +93,7 @@ class Construction(ABC):
 
 
 def construction_of(method: str) -> Construction:
-    """The construction of a method, by its name."""
-    construction: Construction = import_module(METHODS[method].module).CONSTRUCTION
+    """The construction of a method, by its name; that of lines for "auto", which paths have that are not smoothed."""
+    name = DEFAULT_METHOD if method == AUTO else method
+    construction: Construction = import_module(METHODS[name].module).CONSTRUCTION
     return construction

@@ -140,14 +140,14 @@ def _with_runs(corners: Corners, runs: Runs, curves: RunCurves, found: AtPoses) 
 
 
 def _steep(program: Program, pose: Ints) -> Finding:
-    text = f"the tool axis turns by more than {STEEPEST:g} deg in one move; curves round such runs corner by corner"
+    text = f"corner rounded by itself: the tool axis turns by more than {STEEPEST:g} deg in one move of its run"
     return Finding("CS229", "note", int(program.line[pose[0]]), text, len(pose))
 
 
 def _one_by_one(program: Program, pose: int, curves: RunCurves, count: Ints) -> Finding:
     kept: Bools = curves.kept
     corners = int((count[~kept] - 2).sum())
-    text = "the curves of a run were not proved to keep the tolerance; its corners are rounded one by one"
+    text = "corner rounded by itself: the curves of its run were not proved to keep the tolerance"
     return Finding("CS226", "note", int(program.line[pose]), text, corners)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli.options.parameters import LENGTH, Weights, all_of
-from cornersmooth.methods import DEFAULT_METHOD, METHODS
+from cornersmooth.methods import AUTO, METHODS
 
 if TYPE_CHECKING:
     from cornersmooth.settings import Settings
@@ -33,13 +33,12 @@ axis_tolerance = click.option(
 )
 method = click.option(
     "--method",
-    type=click.Choice(list(METHODS)),
-    default=DEFAULT_METHOD,
+    type=click.Choice([AUTO, *METHODS]),
+    default=AUTO,
     show_default=True,
-    help="How the curves are made. "
+    help="How the curves are made. auto: global in curves (g6.2, bspline, poly, spl), proportional in lines; "
     + "; ".join(f"{item.name}: {item.summary}" for item in METHODS.values())
-    + ". Global pays on dense five-axis paths: less time on the machine, and a block a pose in bspline and g6.2."
-    + " Proportional suits every form of every control, and is the quickest.",
+    + ". Global takes less time on the machine and about a block a pose in curves; on LinuxCNC it takes more time.",
 )
 weights = click.option(
     "--weights", type=Weights(), default=(1.0, 1.0), help="Weights w1,w2 of the curves, up to 3. [default: 1,1]"
