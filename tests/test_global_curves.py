@@ -263,3 +263,22 @@ def test_long_lines_of_runs_are_warned_of_where_the_control_blends(options: tupl
     words = ("--control", "linuxcnc", "--machine", "xyzac-trt", "--method", "global" if said or options else "auto")
     result = run("smooth", "-", *words, *options, data=data)
     assert ("use --method proportional" in result.stderr.decode()) == said
+
+
+@pytest.mark.parametrize(("form", "top"), [("g1", 120.0), ("g6.2", 120.0), ("g6.2", 119.999), ("g6.2", 119.0)])
+def test_runs_at_the_limit_of_an_axis_are_rounded_corner_by_corner(form: str, top: float) -> None:
+    """A of the machine goes to 120 degrees, and the poses with it: the curve of the run would go on."""
+    t = np.linspace(0.0, 1.0, 40)
+    tilt = np.radians(np.minimum(top, top - 30.0 + 50.0 * t))
+    aside = np.where(t < 0.55, 0.5 * np.sin(t / 0.55 * np.pi), 0.0)
+    tip = np.stack((60.0 * t, 2.0 * np.sin(9.0 * t), 0.0 * t), axis=1)
+    axis = np.stack((np.sin(tilt) * np.sin(aside), -np.sin(tilt) * np.cos(aside), np.cos(tilt)), axis=1)
+    program = Program.from_poses(tip, axis, feed=1000.0)
+    chosen = choose_form("fanuc", form, machine=load_machine("table-ac"))
+    result = cornersmooth.postprocess(program, io.BytesIO(), cornersmooth.Settings(method="global"), form=chosen)
+    assert result.verification is not None
+    assert result.verification.passed
+    assert (result.smoothed.runs is None) == (top > 119.5)
+    assert result.smoothed.corners.rounded.all()
+    counts = [finding.count for finding in result.findings if finding.instead]
+    assert counts == ([38] if top > 119.5 else [])

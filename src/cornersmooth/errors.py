@@ -19,7 +19,7 @@ _BESIDE_THE_METAL = frozenset((133, 134, 139, 174, 184, 325, 371, 509))
 _LEFT_OUT = frozenset((315,))
 
 #: numbers of notes of what the method asked for could not do, and another way did
-_INSTEAD = frozenset((226, 229, 378))
+_INSTEAD = frozenset((226, 229, 239, 378))
 
 
 class CornersmoothError(Exception):

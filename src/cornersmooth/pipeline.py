@@ -131,7 +131,8 @@ def smooth(
     settings = Settings() if settings is None else settings
     if form is not None:
         settings = nc.fit_settings(settings, form, program.units)
-    return smoothing.smooth(program, settings, progress=progress, processes=processes)
+    smoothed = smoothing.smooth(program, settings, progress=progress, processes=processes)
+    return smoothed if form is None else nc.within_reach(smoothed, form)
 
 
 def reading_back(form: Form) -> dict[str, Any]:

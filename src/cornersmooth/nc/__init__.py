@@ -33,6 +33,7 @@ from cornersmooth.nc.planes import Planes, plan_planes
 from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
 from cornersmooth.nc.rewound_curve_rows import curve_rows_of, rewound_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
+from cornersmooth.nc.run_reach import within_reach
 from cornersmooth.nc.run_writer import RunWriter
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
@@ -54,6 +55,7 @@ __all__ = [
     "load_control",
     "own_words",
     "parse_control",
+    "within_reach",
     "write",
 ]
 

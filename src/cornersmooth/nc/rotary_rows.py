@@ -227,7 +227,7 @@ def _way(
     """Choose the angles of all rows, given as tip, axis and move."""
     tip, axis, move = poses
     rapid, file = rapid_moves(program.kind)[move], program.source.name
-    _check_reach(machine, program, axis, move, tolerance)
+    check_reach(machine, program, axis, move, tolerance)
     how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": program.line[move], "file": file}
     how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
     left = np.zeros(len(move), np.bool_)
@@ -345,7 +345,7 @@ def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> B
     return beside
 
 
-def _check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, tolerance: float) -> None:
+def check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, tolerance: float) -> None:
     """Refuse the first pose that an axis is missing for, or a method that turns the tool to where one is."""
     if len(machine.names) > 1:
         return

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.errors import Finding
 from cornersmooth.model import Bools, Corners, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
 from cornersmooth.settings import Settings
+from cornersmooth.slices import some_runs
 from cornersmooth.smoothing.construction import RUN_CURVATURE
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
@@ -50,6 +53,32 @@ class GlobalRuns(Proportional):
             first = int(pose[lines.first[:-1][~curves.kept][0]])
             findings = (*findings, _one_by_one(program, first, curves, count))
         return SmoothProgram(program, _with_runs(corners, runs, curves, found), settings, findings, runs)
+
+
+def corner_by_corner(smoothed: SmoothProgram, runs: Bools) -> SmoothProgram:
+    """Take back the curves of some runs, which a machine cannot follow: (r,) of `SmoothProgram.runs`."""
+    program, whole, corners = smoothed.program, smoothed.runs, smoothed.corners
+    assert whole is not None
+    own = place_corners(program, smoothed.settings, CONSTRUCTION)
+    run, place = spread(whole.count)
+    rows = np.searchsorted(corners.pose, whole.pose[runs[run] & (place > 0) & (place < whole.count[run] - 1)])
+
+    def taken_back(values: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
+        values = values.copy()
+        values[rows] = others[rows]
+        return values
+
+    extra = {**corners.extra, RUN_CURVATURE: taken_back(corners.extra[RUN_CURVATURE], np.full(len(corners), np.nan))}
+    values = {field.name: getattr(own, field.name) for field in fields(own) if field.name != "extra"}
+    values = {name: taken_back(getattr(corners, name), value) for name, value in values.items()}
+    text = "corner rounded by itself: the curves of its run would leave the limits of a rotary axis"
+    finding = Finding("CS239", "note", int(program.line[corners.pose[rows[0]]]), text, len(rows))
+    return replace(
+        smoothed,
+        corners=Corners(**values, extra=extra),
+        findings=(*smoothed.findings, finding),
+        runs=None if runs.all() else some_runs(whole, ~runs),
+    )
 
 
 def _turning(settings: Settings) -> float:
