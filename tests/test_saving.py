@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import cornersmooth
 from cornersmooth.feedrate import Limits, direct
 from cornersmooth.kinematics import load_machine
+from cornersmooth.kinematics.dynamics import Dynamics
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.saving import planned_saving
+from cornersmooth.vectors import unit
 
 
 def winding(count: int) -> Program:
@@ -72,11 +76,36 @@ def test_what_nobody_runs_gets_no_time(program):
     empty = Program.from_poses(np.zeros((0, 3)), np.zeros((0, 3)))
     assert planned_saving(rapids, fitted(form), form, Limits()) is None
     assert planned_saving(empty, fitted(form), form, Limits()) is None
-    for other in (
-        choose_form(),
-        choose_form("linuxcnc", machine=load_machine("xyzac-trt")),
-    ):  # no axes; a law of its own
-        assert planned_saving(program, fitted(other), other, Limits()) is None
+    without_axes = choose_form()
+    assert planned_saving(program, fitted(without_axes), without_axes, Limits()) is None
+
+
+def test_limits_of_axes_leave_the_words_as_they_are(program):
+    """A program in tool vectors under limits of axes: the direct path takes what it takes in rotary words."""
+    vectors, words = choose_form(), choose_form(machine=MACHINE)
+    found = planned_saving(program, fitted(vectors), vectors, Limits(), MACHINE)
+    other = planned_saving(program, fitted(words), words, Limits())
+    assert found.direct == pytest.approx(other.direct, rel=1e-9)
+    assert found.written != pytest.approx(other.written, rel=1e-6)
+    assert found.limits
+    assert found.limits[0][1] <= 1.0
+
+
+def test_linuxcnc_takes_the_time_of_its_own_planner():
+    """Of two lines of 10 mm, each from rest to rest, the second begins below the blend speed."""
+    limits = replace(MACHINE, dynamics=tuple(Dynamics(name, 6e5, 1000.0, 1e6) for name in "XYZAC"))
+    trunnion = replace(load_machine("xyzac-trt"), dynamics=limits.dynamics)
+    form = choose_form("linuxcnc", machine=trunnion)
+    tip = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 10.0, 0.0]])
+    axis = unit(np.array([[0.0, 0.1, 1.0], [0.0, 0.2, 1.0], [0.0, 0.3, 1.0]]))
+    program = Program.from_poses(tip, axis, feed=3000.0)
+    settings = fitted(form)
+    found = planned_saving(program, settings, form, Limits())
+    first = 10.0 / 50.0 + 50.0 / 500.0  # at 50 mm/s, 500 mm/s2
+    last = 10.0 / 50.0 + 50.0 / 1000.0  # nothing follows that it would blend with
+    overlap = 2.0 * np.sqrt(500.0 * 0.02 / np.cos(np.pi / 4.0)) / 500.0  # 2θ is the angle between the lines, 90 degrees
+    assert found.direct == pytest.approx(first + last - overlap, rel=1e-3)
+    assert "G64 P0.02" in found.against
 
 
 def test_holes_count_on_neither_side(program, whole):

@@ -1,31 +1,153 @@
-"""What smoothing saves of the time: both programs planned as they are written."""
+"""The time of a program as it is written, that of the unsmoothed lines, and what smoothing saves."""
 
 from __future__ import annotations
 
 import io
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cornersmooth import nc, smoothing
 from cornersmooth.errors import CornersmoothError
-from cornersmooth.feedrate import Limits, direct, plan_text
+from cornersmooth.feedrate import BlockLimits, Limits, direct, limiting, plan_text
+from cornersmooth.feedrate.linuxcnc import line_times
+from cornersmooth.feedrate.linuxcnc_program import axis_limits, program_lines
 from cornersmooth.feedrate.written import written_motion
-from cornersmooth.kinematics import Machine, endless, with_dynamics
-from cornersmooth.model import Ints, Move, Program
+from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
+from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
-from cornersmooth.pipeline import read_back
+from cornersmooth.pipeline import Progress, read_back
 from cornersmooth.report.verdict import Saving
-from cornersmooth.settings import Settings
+from cornersmooth.settings import BOUNDS, Settings
 
-#: of the digits of a text, mm and radians: a pose of it is the same as one of the CL file
+#: of the digits of a program, mm and radians: a pose of it is the same as one of the CL file
 _SAME = 1e-3
 
 
-def planned_saving(program: Program, settings: Settings, form: Form, limits: Limits) -> Saving | None:
-    """Plan a program as it was and as it is written, under the limits of the axes of its machine.
+@dataclass(frozen=True)
+class Timing:
+    """Under which limits programs of a form are planned.
 
-    Holes are only gone over in both: what a cycle takes is in the text, and nowhere in the CL file.
+    Parameters
+    ----------
+    form : Form
+    settings : Settings
+        Those the program is smoothed with.
+    limits : Limits
+        Of the tip.
+    machine : Machine
+        Limits of the axes.
+    blocks : BlockLimits
+        What the control makes of blocks.
+    """
+
+    form: Form
+    settings: Settings
+    limits: Limits
+    machine: Machine
+    blocks: BlockLimits
+
+    @classmethod
+    def of(
+        cls,
+        form: Form,
+        settings: Settings,
+        limits: Limits | None = None,
+        axes: Machine | None = None,
+        blocks: BlockLimits | None = None,
+    ) -> Timing | None:
+        """Give the limits of the axes of `axes`, else of the machine of the form; None where no axis has any."""
+        machine = with_dynamics(form.machine if axes is None else axes)
+        if machine is None or (_linuxcnc(form) and form.machine is None):
+            return None
+        machine = endless(machine) if form.rewind else machine
+        return cls(form, settings, limits or Limits(), machine, blocks or BlockLimits())
+
+    def written(
+        self, text: bytes, program: Program, progress: Progress | None = None
+    ) -> tuple[float, tuple[tuple[str, float], ...]]:
+        """Time of a program from the first to the last pose it goes to, s, and the limits that are reached the longest.
+
+        Its way from and to the retract is not counted: the CL file does not have it.
+
+        Parameters
+        ----------
+        text : bytes
+        program : Program
+            What it was made of.
+        """
+        if _linuxcnc(self.form):
+            return self._on_linuxcnc(text, program), ()
+        read = read_back(text, self.form, self.settings)
+        law = plan_text(
+            read,
+            self.limits,
+            settings=self.settings,
+            machine=self.machine,
+            blocks=self.blocks,
+            progress=_stage(progress, "planning as written"),
+        )
+        moves = written_motion(read, program.source.name, self.settings.axis_length).program
+        begin, end = _from_to(program, moves.tip, moves.axis)
+        told = tuple(limiting(law))
+        if begin < 0:
+            return law.total, told
+        seconds = law.times_at(law.edge[np.searchsorted(law.path.move, [begin, end], side="right")])
+        return float(seconds[1] - seconds[0]), told
+
+    def unsmoothed(self, program: Program, progress: Progress | None = None) -> tuple[float, str]:
+        """Time of the lines of the CL file, s, and what is to be said of them.
+
+        On LinuxCNC they are written as lines of rotary words under G64 with P = ε.
+        """
+        if not _linuxcnc(self.form):
+            law = direct(
+                program,
+                self.limits,
+                "velocity_jump",
+                settings=self.settings,
+                machine=self.machine,
+                progress=_stage(progress, "planning unsmoothed"),
+            )
+            return law.total, ""
+        blend, loosest = self.settings.tolerance, BOUNDS["tolerance"][1]
+        settings = replace(
+            Settings(tolerance=loosest, axis_length=self.settings.axis_length, lines="dense"),
+            blend_share=blend / loosest,  # no points between the poses, as a tolerance would ask for
+        )
+        kept = replace(program, keep=np.ones(len(program), np.uint8))
+        text = written_text(kept, nc.fit_settings(settings, self.form, program.units), self.form)
+        return self._on_linuxcnc(text, program), f"unsmoothed lines under G64 P{blend:g}, which holds the tip alone"
+
+    def _on_linuxcnc(self, text: bytes, program: Program) -> float:
+        """Time by the law of LinuxCNC's planner, s."""
+        lines = program_lines(text.decode("utf-8", "replace"), program.source.name)
+        if not len(lines) or self.form.machine is None:
+            return 0.0
+        start, end = line_times(lines, axis_limits(self.machine))
+        place = np.vstack((lines.start[:1], lines.end))
+        time = np.concatenate((start[:1], end))
+        columns = ["XYZABC".index(axis.name) for axis in self.form.machine.axes]
+        first, last = _from_to(program, place[:, :3], tool_axis(self.form.machine, place[:, columns]))
+        return float(time[last] - time[first])
+
+
+def _linuxcnc(form: Form) -> bool:
+    return form.table.lines.planner == "linuxcnc-2.9"
+
+
+def planned_saving(
+    program: Program,
+    settings: Settings,
+    form: Form,
+    limits: Limits | None = None,
+    axes: Machine | None = None,
+    progress: Progress | None = None,
+) -> Saving | None:
+    """Plan a program as it was and as it is written, under the limits of the axes of a machine.
+
+    Holes are only gone over in both: what a cycle takes is in the program, and nowhere in the CL file.
 
     Parameters
     ----------
@@ -33,33 +155,37 @@ def planned_saving(program: Program, settings: Settings, form: Form, limits: Lim
     settings : Settings
         Those the program is smoothed with.
     form : Form
-    limits : Limits
+    limits : Limits, optional
+    axes : Machine, optional
+        Whose limits, in place of those of the machine of the form.
+    progress : callable, optional
+        Called with (stage, work done, work in all).
 
     Returns
     -------
     Saving or None
-        None where a time would be of something that nobody runs: without limits of the axes, without any feed, out of
-        reach of the machine, and on LinuxCNC, whose planner has a law of its own (`feedrate.linuxcnc`).
+        None where a time would be of something that nobody runs: without limits of the axes, without any feed, or
+        out of reach of the machine.
     """
-    machine = timed_machine(form)
-    if machine is None:
+    timing = Timing.of(form, settings, limits, axes)
+    if timing is None:
         return None
     program = without_holes(program)
     if not np.isin(program.kind[1:], (Move.LINEAR, Move.ARC)).any():
         return None
     try:
-        before = direct(program, limits, "velocity_jump", settings=settings, machine=machine).total
-        return Saving(before, _written_time(program, settings, form, limits, machine))
+        before, against = timing.unsmoothed(program, progress)
+        written, limited = timing.written(written_text(program, settings, form), program, progress)
+        return Saving(before, written, limited, against)
     except CornersmoothError:
         return None
 
 
-def timed_machine(form: Form) -> Machine | None:
-    """Give the machine whose limits a time of a program would be under; None where a time would say nothing."""
-    machine = with_dynamics(form.machine)
-    if machine is None or form.table.lines.lag:  # a control that blends lines by itself plans them by itself
-        return None
-    return endless(machine) if form.rewind else machine
+def written_text(program: Program, settings: Settings, form: Form) -> bytes:
+    """Write the smoothed program."""
+    stream = io.BytesIO()
+    nc.write(smoothing.smooth(program, settings), stream, form=form)
+    return stream.getvalue()
 
 
 def without_holes(program: Program) -> Program:
@@ -71,22 +197,20 @@ def without_holes(program: Program) -> Program:
     return replace(program, kind=np.where(holes, np.uint8(Move.RAPID), program.kind), statements=kept)
 
 
-def _written_time(program: Program, settings: Settings, form: Form, limits: Limits, machine: Machine | None) -> float:
-    """Time of the text from the first to the last pose it goes to: without its way there and back."""
-    stream = io.BytesIO()
-    nc.write(smoothing.smooth(program, settings), stream, form=form)
-    text = read_back(stream.getvalue(), form, settings)
-    law = plan_text(text, limits, settings=settings, machine=machine)
-    moves = written_motion(text, program.source.name, settings.axis_length).program
+def _stage(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:
+    return None if progress is None else lambda done, total: progress(stage, done, total)
+
+
+def _from_to(program: Program, tip: Floats, axis: Floats) -> tuple[int, int]:
+    """Rows of written poses that are the first and the last pose a program goes to; −1 where it goes another way."""
     gone_to = np.flatnonzero(program.kind != Move.FROM)[[0, -1]]  # no text goes to a FROM
-    begin, end = (_poses_at(moves, program, pose) for pose in gone_to.tolist())
-    if not len(begin) or not len(end) or begin[0] >= end[-1]:  # approached in another way than from the pose
-        return law.total
-    from_second, to_second = law.times_at(law.edge[np.searchsorted(law.path.move, [begin[0], end[-1]], side="right")])
-    return float(to_second - from_second)
+    begin, end = (_poses_at(tip, axis, program, pose) for pose in gone_to.tolist())
+    if not len(begin) or not len(end) or begin[0] >= end[-1]:
+        return -1, -1
+    return int(begin[0]), int(end[-1])
 
 
-def _poses_at(text: Program, program: Program, pose: int) -> Ints:
-    """Poses of a text that are a pose of the program."""
-    near = np.abs(text.tip - program.tip[pose]).max(axis=1) < _SAME
-    return np.flatnonzero(near & (np.abs(text.axis - program.axis[pose]).max(axis=1) < _SAME))
+def _poses_at(tip: Floats, axis: Floats, program: Program, pose: int) -> Ints:
+    """Rows that are a pose of the program."""
+    near = np.abs(tip - program.tip[pose]).max(axis=1) < _SAME
+    return np.flatnonzero(near & (np.abs(axis - program.axis[pose]).max(axis=1) < _SAME))

@@ -229,8 +229,8 @@ WEIGHT_DECIMALS = 3
 #: Half a unit of the fourth decimal, which some CL files have, is a tenth of a degree there at 175, and 6 at 179.9.
 FLIP_ANGLE = 175.0
 
-#: Poses up to which `smooth` plans what it saves for its verdict: some seconds of work; and with -v, and for pages.
-TIMED_POSES, TIMED_POSES_VERBOSE = 1000, 20_000
+#: Poses up to which the time is planned without being asked for: a minute of work.
+TIMED_POSES = 20_000
 
 #: closed bounds of the numeric settings
 BOUNDS: dict[str, tuple[float, float]] = {

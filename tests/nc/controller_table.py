@@ -21,7 +21,8 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from linuxcnc_controller import MACHINE, SERVO_SECONDS, STATED, Floats, deviations, original, run_controller, tool
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cornersmooth.cl import read
 from cornersmooth.kinematics import load_machine
@@ -30,6 +31,7 @@ from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.nc.form import ROTARY_SHARE
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
+from nc.linuxcnc_controller import MACHINE, SERVO_SECONDS, STATED, Floats, deviations, original, run_controller, tool
 
 SAMPLE = Path(__file__).parents[2] / "samples" / "impeller.cls"
 #: files of the folder, and how many of their poses are run

@@ -18,6 +18,7 @@ from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
+    from cornersmooth.kinematics import Machine
     from cornersmooth.nc import Form, Frame
     from cornersmooth.pipeline import Progress, Result
     from cornersmooth.report.verdict import Saving
@@ -67,9 +68,12 @@ class Job:
         Whether an output that exists is left as it is, whatever it was made of.
     tool : Tool or None
         For pages, instead of that of the file.
-    plan : (int, int)
-        Poses up to which the time that is saved is planned as a whole, and the stretches of longer programs from which
-        it is estimated; none for not at all.
+    plan : int
+        Poses up to which the time that is saved is planned.
+    timed : bool
+        Whether it is planned without a page, too.
+    axes : Machine or None
+        Whose limits, in place of those of the machine of the form.
     plan_feeds : Limits or None
         Within which the feeds of the blocks are planned; None for the programmed ones.
     beginning : bool
@@ -94,6 +98,8 @@ class Job:
     skip_existing: bool = False
     tool: Tool | None = None
     plan: int = 0
+    timed: bool = False
+    axes: Machine | None = None
     plan_feeds: Limits | None = None
     beginning: bool = False
     run: str = ""
@@ -268,21 +274,15 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         saving = _write_report(path, job, bool(may_replace[path]), source, result, contents)
         outcome.saving = saving or outcome.saving
     good = result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE)
-    if good and not outcome.saving and len(result.program) <= job.plan:
-        outcome.saving = _planned(job, result)
+    if good and job.timed and not outcome.saving and len(result.program) <= job.plan:
+        outcome.saving = _planned(job, result, progress)
     return contents
 
 
-def _limits(job: Job) -> Limits:
-    from cornersmooth.feedrate import Limits
-
-    return Limits() if job.feed is None else Limits(feed=job.feed)
-
-
-def _planned(job: Job, result: Result) -> Saving | None:
+def _planned(job: Job, result: Result, progress: Progress | None) -> Saving | None:
     from cornersmooth.saving import planned_saving
 
-    return planned_saving(result.program, result.smoothed.settings, result.form, _limits(job))
+    return planned_saving(result.program, result.smoothed.settings, result.form, axes=job.axes, progress=progress)
 
 
 def _write_report(
@@ -299,7 +299,10 @@ def _write_report(
     else:
         from cornersmooth.page.pages import page_and_saving
 
-        page, saving = page_and_saving(result, source=source, frame=result.frame, limits=_limits(job), tool=job.tool)
+        timed = len(result.program) <= job.plan
+        page, saving = page_and_saving(
+            result, source=source, frame=result.frame, axes=job.axes, timed=timed, tool=job.tool
+        )
         texts = iter([page])
     with open_output(target_of(path), replace=may_replace) as output:
         for text in texts:

@@ -40,7 +40,8 @@ FILE = "cornersmooth.toml"
 PREFIX = "CORNERSMOOTH_"
 #: tables with options; the first holds for all commands
 COMMAND_TABLES = ("smooth", "filter", "verify", "time", "info", "surface")
-_OWN_TABLES = {"controls": "control", "machines": "machine"}
+#: tables of controls and machines of one's own, and the options that name them
+_OWN_TABLES = {"controls": ("control",), "machines": ("machine", "limits")}
 
 #: options that belong to one run
 _ONE_RUN = frozenset("output directory force reports csv summary scheduler as_json law no_verify help".split())
@@ -99,9 +100,10 @@ class ShopCommand(click.Command):
         ctx.meta[__name__] = shop
         ctx.default_map = defaults(self, shop, control)
         rest = super().parse_args(ctx, args)
-        for kind, name in _OWN_TABLES.items():
-            if isinstance(ctx.params.get(name), str):
-                ctx.params[name] = _own(shop, kind, ctx.params[name])
+        for kind, options in _OWN_TABLES.items():
+            for name in options:
+                if isinstance(ctx.params.get(name), str):
+                    ctx.params[name] = _own(shop, kind, ctx.params[name])
         _name_what_is_loose(ctx)
         return rest
 

@@ -56,6 +56,8 @@ _NAMED = 3
 @smoothing.line_options
 @reading.feed
 @motion.planned_feed_options
+@motion.limits
+@motion.planned_time
 @reading.reading_options
 @reading.tool_options
 @nc_text.no_verify
@@ -128,6 +130,7 @@ def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> No
 def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     """One job for every input, all of them checked for names that clash."""
     from cornersmooth.nc import fit_settings
+    from cornersmooth.settings import TIMED_POSES
 
     folder, output = given["directory"], given["output"]
     _check_usage(inputs, given)
@@ -157,7 +160,9 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 skip_existing=given["skip_existing"],
                 tool=given["tool"],
                 beginning=not folder and not output and _to_terminal(),
-                plan=_planned_poses(given),
+                plan=sys.maxsize if given["time"] else TIMED_POSES,
+                timed=not (given["quiet"] or folder),
+                axes=nc_text.machine_of(given, "limits"),
             )
         )
     _check_targets(jobs)
@@ -167,15 +172,6 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
     if folder:
         make_folder(folder)
     return jobs
-
-
-def _planned_poses(given: dict[str, Any]) -> int:
-    """Poses up to which a program is planned for the verdict."""
-    from cornersmooth.settings import TIMED_POSES, TIMED_POSES_VERBOSE
-
-    if given["quiet"] or given["directory"]:
-        return 0
-    return TIMED_POSES_VERBOSE if given["verbose"] else TIMED_POSES
 
 
 def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:

@@ -131,8 +131,10 @@ def command(source: str, text: str, **given: Any) -> int:
     if pages:
         from cornersmooth.page import verified_page
 
-        text_read = _read_for_page(nc, given, reader)
-        page = verified_page(program, text_read, found, source=data, machine=how["machine"], tool=given["tool"])
+        text_read, planner = _read_for_page(nc, given, reader), nc_text.control_of(given).lines.planner
+        page = verified_page(
+            program, text_read, found, source=data, machine=how["machine"], planner=planner, tool=given["tool"]
+        )
         for path in pages:
             _write(path, [page])
     for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):

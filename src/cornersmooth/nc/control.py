@@ -17,6 +17,9 @@ Orientation = Literal["vector", "point", "angles", "machine", "fixed"]
 #: what lines may end with
 LINE_ENDS: Mapping[str, bytes] = {"lf": b"\n", "crlf": b"\r\n"}
 
+#: laws by which a control plans lines, that of `cornersmooth.feedrate` first
+PLANNERS = ("", "linuxcnc-2.9")
+
 #: how curves are written; empty for lines
 CurveStyle = Literal["", "g6.2", "bspline", "poly", "spl"]
 
@@ -358,6 +361,8 @@ class LineStyle:
         `cornersmooth.smoothing.blending.largest_blends` finds, up to ε.
     executed_share : float
         Part of ε that is left to what the control executes at those corners, by that estimate.
+    planner : str
+        Law by which the control plans lines, where it is not that of `cornersmooth.feedrate`: "linuxcnc-2.9".
     """
 
     lines: str = "dense"
@@ -367,6 +372,7 @@ class LineStyle:
     lag: float = 0.0
     rounding: str = ""
     executed_share: float = 0.85
+    planner: str = ""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from cornersmooth.model import FeedMode
 from cornersmooth.nc.control import (
     INVERSE_TIME,
     LINE_ENDS,
+    PLANNERS,
     Control,
     CurveStyle,
     Cycles,
@@ -299,6 +300,8 @@ def _lines(table: Any, where: str) -> LineStyle:
     for name in ("curve_share", "line_share", "blend_share", "executed_share"):
         if not 0.0 < getattr(lines, name) <= 1.0:
             raise _SHELF.wrong(f"lines.{name} is {getattr(lines, name)}", "give a part of 1")
+    if lines.planner not in PLANNERS:
+        raise _SHELF.wrong(f"lines.planner is {lines.planner!r}", f"use {PLANNERS[1]}, or leave it out")
     if not 0.0 <= lines.lag <= _MOST_LAG:
         raise _SHELF.wrong(f"lines.lag is {lines.lag}", f"give a number up to {_MOST_LAG:g}")
     return lines

@@ -18,8 +18,8 @@ from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.page.document import document
 from cornersmooth.page.scene import Story, Subject, scene
 from cornersmooth.report.verdict import Saving, first_line, judge, saving_text, times_text, trusted_blocks
-from cornersmooth.saving import planned_saving, timed_machine
-from cornersmooth.settings import TIMED_POSES_VERBOSE, Settings
+from cornersmooth.saving import planned_saving
+from cornersmooth.settings import Settings
 from cornersmooth.surface.tool import Tool
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, verify
@@ -38,6 +38,8 @@ def page_and_saving(
     source: bytes = b"",
     frame: Frame | None = None,
     limits: Limits | None = None,
+    axes: Machine | None = None,
+    timed: bool = True,
     tool: Tool | None = None,
 ) -> tuple[str, Saving | None]:
     """Page of a file that was smoothed, written and verified, and the times that its verdict tells.
@@ -51,12 +53,16 @@ def page_and_saving(
         As in `postprocess`: a text that went to a stream is written once more for the page.
     limits : Limits, optional
         Of the planned speeds.
+    axes : Machine, optional
+        Whose limits the speeds are planned under, in place of those of the machine of the form.
+    timed : bool
+        Whether a time is said.
     tool : Tool, optional
         Instead of that of the file.
     """
     smoothed, form, settings = result.smoothed, result.form, result.smoothed.settings
     nc = read_written(result, frame)
-    limits = Limits() if limits is None else limits
+    limits, axes = limits or Limits(), form.machine if axes is None else axes
     subject = Subject(
         program=result.program,
         nc=nc,
@@ -65,7 +71,8 @@ def page_and_saving(
         smoothed=smoothed,
         dense=not form.curve,
         limits=limits,
-        machine=form.machine,
+        machine=axes,
+        planner=form.table.lines.planner,
         tool=tool,
     )
     contents = result.report()
@@ -73,16 +80,15 @@ def page_and_saving(
         *_input_facts(result.program, source),
         ("control and form", f"{form.table.name}, {form.name}" + (f", {form.machine.name}" if form.machine else "")),
         *_settings_facts(settings),
-        *_limit_facts(limits, form.machine),
+        *_limit_facts(limits, axes),
     ]
     badge = result.verdict
     notes = [f"{finding.severity}, line {finding.line}: {finding.text}" for finding in result.findings[:_MOST_NOTES]]
 
     meta, pack = scene(subject, Story(result.program.source.name, "", badge, facts, notes))
-    saving = None if timed_machine(form) is None else _saving(meta["totals"], result.program)
-    short = len(result.program) <= TIMED_POSES_VERBOSE
-    if short and saving is None and badge not in (Verdict.FAILED, Verdict.NOT_VERIFIED):
-        saving = planned_saving(result.program, settings, form, limits)
+    saving = None
+    if timed and badge not in (Verdict.FAILED, Verdict.NOT_VERIFIED):
+        saving = planned_saving(result.program, settings, form, limits, axes)
     meta["verdict"] = first_line(contents, saving)
     return document(meta, pack), saving
 
@@ -109,6 +115,7 @@ def verified_page(
     source: bytes = b"",
     limits: Limits | None = None,
     machine: Machine | None = None,
+    planner: str = "",
     tool: Tool | None = None,
     surface: SurfaceMap | None = None,
 ) -> str:
@@ -122,6 +129,7 @@ def verified_page(
         verification=found,
         limits=limits,
         machine=machine,
+        planner=planner,
         tool=tool if surface is None else surface.tool,
         surface=surface,
     )

@@ -20,6 +20,9 @@ from cornersmooth.settings import Settings
 #: moves up to which a motion is planned: some 10 s of work
 MOST_MOVES = 100_000
 
+#: of a control with another law
+NOT_PLANNED = "The control plans its speeds by a law of its own: none are drawn."
+
 #: looks at a law in each step of a chart
 _LOOKS = 6
 

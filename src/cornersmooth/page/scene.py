@@ -14,7 +14,15 @@ from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.page.corners import KINDS, CornerList, measured_corners, smoothed_corners
 from cornersmooth.page.packing import Pack
-from cornersmooth.page.planned_speeds import Planned, axis_loads, feed_seconds, plan_all, speeds_along, speeds_over
+from cornersmooth.page.planned_speeds import (
+    NOT_PLANNED,
+    Planned,
+    axis_loads,
+    feed_seconds,
+    plan_all,
+    speeds_along,
+    speeds_over,
+)
 from cornersmooth.report.paths import OriginalPath, WrittenPath, original_path, written_path
 from cornersmooth.report.thinning import thinned
 from cornersmooth.settings import Settings
@@ -84,6 +92,8 @@ class Subject:
         Laws that are planned already: ``"direct"``, ``"local"``.
     limits : Limits
     machine : Machine or None
+    planner : str
+        Of the control's table: with a law of its own no speeds are planned.
     tool : Tool or None
         Instead of those in the file.
     surface : SurfaceMap or None
@@ -98,6 +108,7 @@ class Subject:
     laws: Mapping[str, TimeLaw] = field(default_factory=dict)
     limits: Limits = field(default_factory=Limits)
     machine: Machine | None = None
+    planner: str = ""
     tool: Tool | None = None
     surface: SurfaceMap | None = None
 
@@ -114,16 +125,20 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         axis_length=settings.axis_length,
         axis_tolerance=settings.axis_tolerance,
     )
-    planned = plan_all(
-        program,
-        original,
-        smoothed=subject.smoothed,
-        written=written,
-        nc=subject.nc,
-        limits=subject.limits,
-        machine=subject.machine,
-        settings=settings,
-        known=subject.laws,
+    planned = (
+        Planned({}, {}, None, (NOT_PLANNED,))
+        if subject.planner
+        else plan_all(
+            program,
+            original,
+            smoothed=subject.smoothed,
+            written=written,
+            nc=subject.nc,
+            limits=subject.limits,
+            machine=subject.machine,
+            settings=settings,
+            known=subject.laws,
+        )
     )
     corners = _corners(subject)
     centre = 0.5 * (program.tip.min(axis=0) + program.tip.max(axis=0)) if len(program) else np.zeros(3)

@@ -55,10 +55,16 @@ class Saving:
     Parameters
     ----------
     direct, written : float, s
+    limits : tuple of (str, float)
+        What the written program reaches, and the part of the cutting time, as `feedrate.limiting` gives them.
+    against : str
+        What the program as it was is, where that is not the path of the CL file.
     """
 
     direct: float
     written: float
+    limits: tuple[tuple[str, float], ...] = ()
+    against: str = ""
 
 
 @dataclass(frozen=True)
@@ -197,8 +203,16 @@ def saving_text(saving: Saving) -> str:
     """Say what smoothing saves of the time of the direct path."""
     direct, written, saved = saving.direct, saving.written, saving.direct - saving.written
     if abs(saved) < 0.05:
-        return f"takes {written:.1f} s as the direct path does"
-    return f"saves {saved:.1f} s of {direct:.1f} s" if saved > 0.0 else f"takes {-saved:.1f} s more than {direct:.1f} s"
+        text = f"takes {written:.1f} s as {saving.against or 'the direct path'} would"
+    else:
+        text = f"saves {saved:.1f} s of" if saved > 0.0 else f"takes {-saved:.1f} s more than"
+        text += f" {direct:.1f} s" + (f" of {saving.against}" if saving.against else "")
+    return text + _limits_text(saving.limits)
+
+
+def _limits_text(limits: Sequence[tuple[str, float]]) -> str:
+    parts = [f"{name} {100.0 * part:.0f} %" for name, part in limits[:_LIMITS_TOLD] if part >= _LEAST_TOLD]
+    return f"; limited by {', '.join(parts)} of the cutting time" if parts else ""
 
 
 def times_text(seconds: Mapping[str, float], names: Sequence[str], limits: Sequence[tuple[str, float]] = ()) -> str:
@@ -219,5 +233,4 @@ def times_text(seconds: Mapping[str, float], names: Sequence[str], limits: Seque
     share = f" ({100.0 * abs(saved) / jumps:.0f} %)" if jumps else ""
     told = f"saves {saved:.1f} s of" if saved >= 0.0 else f"takes {-saved:.1f} s more than"
     text = f"{best} {told} the {jumps:.1f} s of the direct path{share}, which takes {stops:.1f} s with stops at corners"
-    parts = [f"{name} {100.0 * part:.0f} %" for name, part in limits[:_LIMITS_TOLD] if part >= _LEAST_TOLD]
-    return text + (f"; limited by {', '.join(parts)} of the cutting time" if parts else "")
+    return text + _limits_text(limits)

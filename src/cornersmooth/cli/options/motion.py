@@ -125,6 +125,15 @@ limits_machine = click.option(
     help="Keep the limits of this machine's five axes, too: a name that 'cornersmooth machines' lists (its numbers are "
     "examples), or a TOML file with [dynamics.X] and so on.",
 )
+limits = click.option(
+    "--limits",
+    type=str,
+    metavar="NAME|FILE",
+    shell_complete=completing.machines,
+    help="Say the time under the limits of this machine's axes; the words of the program stay as they are. A name that "
+    "'cornersmooth machines' lists, or a TOML file with [dynamics.X] and so on. [default: those of --machine]",
+)
+planned_time = click.option("--time", is_flag=True, help="Say the time of programs of more than 20,000 poses, too.")
 text = click.option(
     "--text",
     type=PATH,

@@ -185,11 +185,11 @@ def control_of(given: Mapping[str, Any]) -> Control:
     return load_control(control) if isinstance(control, str) else control
 
 
-def machine_of(given: Mapping[str, Any]) -> Machine | None:
+def machine_of(given: Mapping[str, Any], option: str = "machine") -> Machine | None:
     """Machine of that name, of that file, or of the shop settings; None where none is named."""
     from cornersmooth.kinematics import load_machine
 
-    machine: str | Machine | None = given["machine"]
+    machine: str | Machine | None = given[option]
     return load_machine(machine) if isinstance(machine, str) and machine else machine or None
 
 
