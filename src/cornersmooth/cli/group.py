@@ -20,6 +20,7 @@ COMMANDS = {
     "filter": ("cornersmooth.cli.filter", "Smooth the cutting runs of a finished NC program."),
     "verify": ("cornersmooth.cli.verify", "Measure NC text against the CL file it was made from."),
     "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
+    "setup": ("cornersmooth.cli.setup", "Find how to clamp a part so that its program runs fastest."),
     "surface": ("cornersmooth.cli.surface", "Measure what the NC text leaves of the surface of the CL file."),
     "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
     "controls": ("cornersmooth.cli.controls", "List the controls that NC text can be written for, and their forms."),
