@@ -14,7 +14,6 @@ from cornersmooth.model import Bools, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_rows import check_reach, whole_rows
 from cornersmooth.rotary import rapid_moves, rotary_angles, still_poses
-from cornersmooth.smoothing.global_runs import corner_by_corner
 from cornersmooth.smoothing.runs.splines import starts
 from cornersmooth.smoothing.sampling import dense_rows
 
@@ -50,6 +49,8 @@ def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:
             still_tolerance=form.angle_rounding,
         )
     except InputError:
+        from cornersmooth.smoothing.global_runs import corner_by_corner  # which takes long to load
+
         return corner_by_corner(smoothed, near)
     return smoothed
 
