@@ -42,7 +42,7 @@ def test_what_cannot_be_understood_says_nothing(text: bytes) -> None:
 
 def test_the_head_of_a_text(part: Path) -> None:
     text = run("smooth", part, "-e", "0.0005in", "-H", "25", "-f", "g6.2").stdout.decode("ascii")
-    first = f"(CORNERSMOOTH {__version__}: E=0.0127 H=25 METHOD=proportional CONTROL=fanuc FORM=g6.2)"
+    first = f"(CORNERSMOOTH {__version__}: E=0.0127 H=25 METHOD=global CONTROL=fanuc FORM=g6.2)"
     second = f"(SHA256={hashlib.sha256(SMALL).hexdigest()} CL=part one [A].cls)"
     assert f"\n{first}\n{second}\n" in text
     assert "CORNERSMOOTH " not in run("smooth", part, "--no-comments").stdout.decode("ascii")

@@ -12,6 +12,7 @@ from cornersmooth.model import Floats
 from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.vectors import unit
+from oracle.chains import random_chains
 
 #: passes, poses of each, and distance of passes, mm
 PASSES, POSES, PITCH = 10, 94, 0.09
@@ -72,3 +73,23 @@ def test_neighbouring_passes_differ_by_little(path: Program, tolerance: float, m
     off = deviations(smooth(path, Settings(tolerance=tolerance, method="global")))
     assert np.sqrt(np.mean(np.diff(off, axis=0) ** 2)) < most
     assert np.abs(off).max() < tolerance / 2.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("tolerance", [0.01, 0.15])
+def test_a_pass_there_and_back_is_the_same_curve(seed: int, tolerance: float) -> None:
+    """To far below the digits that any control takes, whatever the chain: also on rings."""
+    chain = random_chains(seed, 1, corners=12)[0]
+    tip, axis = chain.tip, chain.original.axis
+    if seed % 2:
+        tip, axis = np.vstack((tip, tip[:1])), np.vstack((axis, axis[:1]))
+    settings = Settings(method="global", tolerance=tolerance)
+    there, back = (
+        smooth(Program.from_poses(tip[way], axis[way], feed=900.0), settings).runs
+        for way in (slice(None), slice(None, None, -1))
+    )
+    assert there is not None
+    assert back is not None
+    np.testing.assert_allclose(back.control[::-1], there.control, rtol=0.0, atol=1e-9)
+    length = np.repeat(back.knot[np.cumsum(back.knot_count) - 1], back.knot_count)
+    np.testing.assert_array_equal((length - back.knot)[::-1], there.knot)

@@ -32,7 +32,10 @@ def differences(program: Program, form: str, tolerance: float, axis_length: floa
     """Measured less calculated at tip and axis point, and the printed digit, mm."""
     chosen = choose_form("fanuc", form)
     smoothed = smooth(
-        program, fit_settings(Settings(tolerance=tolerance, axis_length=axis_length), chosen, program.units)
+        program,
+        fit_settings(
+            Settings(tolerance=tolerance, axis_length=axis_length, method="proportional"), chosen, program.units
+        ),
     )
     stream = io.BytesIO()
     write(smoothed, stream, form=chosen)

@@ -74,7 +74,8 @@ def part(count=600, every=45, units="mm", seed=0, fixed=False):
 def text_of(program, control="fanuc", form="g1", frame=None, **settings):
     stream = io.BytesIO()
     chosen = choose_form(control, form)
-    smoothed = smooth(program, fit_settings(Settings(tolerance=TOLERANCE, **settings), chosen, program.units))
+    wanted = Settings(tolerance=TOLERANCE, **{"method": "proportional", **settings})
+    smoothed = smooth(program, fit_settings(wanted, chosen, program.units))
     write(smoothed, stream, form=chosen, frame=frame or Frame())
     return stream.getvalue()
 

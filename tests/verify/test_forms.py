@@ -50,7 +50,7 @@ def readings(case: Case, machine: Machine | None, settings: Settings) -> dict[st
 def test_no_false_alarm_on_random_chains(case: Case, units: str) -> None:
     form, place = case.choose(), CHOSEN.index(case)
     tolerance, axis_length = LIMITS[(place + (units == "inch")) % len(LIMITS)]
-    settings = Settings(tolerance=tolerance, axis_length=axis_length)
+    settings = Settings(tolerance=tolerance, axis_length=axis_length, method="proportional")
     program = chains_for(case, form, place, units=units)
     text, _ = written(program, form, settings)
     nc = read_nc(text.encode(), **readings(case, form.machine, settings))
@@ -69,7 +69,7 @@ def _is_block(line: str) -> bool:
 @pytest.mark.parametrize("case", covering_share(CHOSEN, 2), ids=str)
 def test_motion_is_that_of_the_independent_readers(case: Case) -> None:
     form = case.choose()
-    settings = Settings(tolerance=0.02, axis_length=10.0)
+    settings = Settings(tolerance=0.02, axis_length=10.0, method="proportional")
     text, _ = written(chains_for(case, form, 3, count=how_many(1, 8)), form, settings)
     nc = read_nc(text.encode(), **readings(case, form.machine, settings))
     pieces = reader(case.control, case.form, case.machine, case.tcp, "mm").read(text, 10.0, 0.02).pieces

@@ -149,7 +149,7 @@ class Score:
 def text_of(case: Case) -> list[str]:
     """Lines of the right text."""
     form = case.choose()
-    settings = fit_settings(Settings(tolerance=EPS, axis_length=H), form, "mm")
+    settings = fit_settings(Settings(tolerance=EPS, axis_length=H, method="proportional"), form, "mm")
     stream = io.BytesIO()
     write(smooth(program_of(case), settings), stream, form=form)
     return stream.getvalue().decode("ascii").splitlines()

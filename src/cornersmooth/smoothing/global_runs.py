@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.errors import Finding
-from cornersmooth.model import Bools, Corners, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
+from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
 from cornersmooth.settings import Settings
 from cornersmooth.slices import some_runs
 from cornersmooth.smoothing.construction import RUN_CURVATURE
@@ -19,7 +19,7 @@ from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.rows import TURNING
 from cornersmooth.smoothing.runs.solving import STEP, AtPoses, RunCurves, solve_groups
-from cornersmooth.smoothing.runs.splines import ranges, spread
+from cornersmooth.smoothing.runs.splines import Splines, ranges, spread, starts
 from cornersmooth.smoothing.transition import place_corners
 from cornersmooth.vectors import angle_between
 
@@ -46,8 +46,12 @@ class GlobalRuns(Proportional):
             return SmoothProgram(program, corners, settings, findings)
         point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
         tolerances = settings.tip_tolerance, settings.axis_point_tolerance - TURNING * _turning(settings)
-        lines = Polylines.through(point, count, STEP * min(tolerances))
+        back = _backwards(point, count)
+        order = _turned(count, back)
+        lines = Polylines.through(point[order], count, STEP * min(tolerances))
         curves, found = solve_groups(lines, tolerances, settings.axis_length, progress, processes=processes)
+        curves = _turned_curves(curves, back)
+        found = AtPoses(found.tip[order], found.axis[order], found.turn[order], found.curvature[order])
         runs = _kept(curves, pose)
         if not curves.kept.all():
             first = int(pose[lines.first[:-1][~curves.kept][0]])
@@ -78,6 +82,45 @@ def corner_by_corner(smoothed: SmoothProgram, runs: Bools) -> SmoothProgram:
         corners=Corners(**values, extra=extra),
         findings=(*smoothed.findings, finding),
         runs=None if runs.all() else some_runs(whole, ~runs),
+    )
+
+
+def _backwards(point: Floats, count: Ints) -> Bools:
+    """(r,) bool: runs that are solved from their end, so that there and back the curve is the same.
+
+    The longest way in any coordinate from the first to the last pose leads upwards; on a ring, that between their
+    neighbours.
+    """
+    first, last = starts(count)[:-1], starts(count)[1:] - 1
+    way, inner = point[last] - point[first], point[last - 1] - point[first + 1]
+    way = np.where(way.any(axis=1, keepdims=True), way, inner)
+    back: Bools = way[np.arange(len(way)), np.abs(way).argmax(axis=1)] < 0.0
+    return back
+
+
+def _turned(count: Ints, back: Bools) -> Ints:
+    """Rows of runs with those of some of them in reverse: its own inverse."""
+    run, place = spread(count)
+    order: Ints = starts(count)[run] + np.where(back[run], count[run] - 1 - place, place)
+    return order
+
+
+def _turned_curves(curves: RunCurves, back: Bools) -> RunCurves:
+    """The same curves, some of them from their other end."""
+    lines, splines = curves.lines, curves.splines
+    whole = lines.s[lines.first[1:] - 1]
+
+    def turned(s: Floats, count: Ints) -> Floats:
+        run, order = spread(count)[0], _turned(count, back)
+        places: Floats = np.where(back[run], whole[run] - s[order], s[order])
+        return places
+
+    poses = _turned(lines.count, back)
+    return replace(
+        curves,
+        lines=Polylines(lines.point[poses], lines.count, turned(lines.s, lines.count), lines.step),
+        splines=Splines(turned(splines.knot, splines.count), splines.count),
+        control=curves.control[_turned(splines.count + 2, back)],
     )
 
 
