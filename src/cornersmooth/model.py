@@ -254,6 +254,10 @@ class Program:
             **rest,
         )
 
+    def feed_at(self, pose: Ints) -> Floats:
+        """Feeds of the moves into some poses, mm/min; NaN for none, and per revolution."""
+        return np.where(self.feed_mode[pose] == FeedMode.PER_MINUTE, self.feed[pose], np.nan)
+
     @property
     def mm_per_unit(self) -> float:
         """Millimetres per unit of the file and of its NC text."""

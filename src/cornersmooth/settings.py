@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD, METHODS
+
+if TYPE_CHECKING:
+    from cornersmooth.model import Floats
 
 Lines = Literal["dense", "long"]
 
@@ -37,7 +42,12 @@ class Settings:
     max_axis_step : float, degrees
         A corner next to a segment whose axis turns by more stays sharp: the ruled motion is not a motion any more.
     chord_tolerance : float or None, mm
-        Distance between the written lines and the curve in dense output; None for a tenth of ε, at most 0.0005 mm.
+        Largest distance between the written lines and the curve in dense output; None for a tenth of ε, at most
+        0.0005 mm.
+    block_time : float or None, s
+        Shortest time in which the control takes a block: dense lines follow the curves as closely as 0.00005 mm where
+        none is passed sooner at the programmed feed. 0 for lines by the chord tolerance alone; None for what the
+        control's table says, and without a control 0.
     axis_step : float or None, degrees
         Largest change of axis in one written line next to a rounded corner; None for what ε and H ask for.
     lines : {"dense", "long"} or None
@@ -69,6 +79,7 @@ class Settings:
     reversal_angle: float = 170.0
     max_axis_step: float = 90.0
     chord_tolerance: float | None = None
+    block_time: float | None = None
     axis_step: float | None = None
     lines: Lines | None = None
     curve_share: float = 1.0
@@ -188,6 +199,25 @@ class Settings:
         """Effective chord tolerance of dense output, mm."""
         return min(self.tolerance / 10, LARGEST_CHORD) if self.chord_tolerance is None else self.chord_tolerance
 
+    def lines_for_feed(self, by_chord: Floats, length: Floats, feed: Floats) -> Floats:
+        """Lines that a stretch of a curve is written in, so that the axes jump little in speed where they meet.
+
+        Parameters
+        ----------
+        by_chord : (n,) float64
+            Lines that the chord tolerance asks for; their chord error goes with the square of their number.
+        length : (n,) float64, mm
+            Way of the tip.
+        feed : (n,) float64, mm/min
+            NaN for none: then the chord tolerance alone counts.
+        """
+        if not self.block_time or self.lines == "long" or self.chord <= FINEST_CHORD:
+            return by_chord
+        finest = by_chord * math.sqrt(self.chord / FINEST_CHORD)
+        most = np.nan_to_num(60.0 * length / (feed * self.block_time), nan=0.0, posinf=0.0)
+        found: Floats = np.maximum(by_chord, np.minimum(finest, most))
+        return found
+
     @property
     def interpolation_tolerance(self) -> float:
         """Distance, at `axis_scale` from the tip, that turning the axis inside one written line may add, mm.
@@ -220,6 +250,10 @@ def chord_of(degrees: float) -> float:
 #: it: a larger tolerance must not mean coarser lines. docs/feedrate.md has the times that led to this.
 LARGEST_CHORD = 5e-4
 
+#: Chord error below which lines are not divided for their feed, mm: half of a step of 0.0001 mm, the last digit of most
+#: controls. Finer lines follow the digits.
+FINEST_CHORD = 5e-5
+
 #: decimals of a weight that every control keeps (FANUC IS-B, reference manual B-63324EN/03 4.17)
 WEIGHT_DECIMALS = 3
 
@@ -242,6 +276,7 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "reversal_angle": (1.0, 180.0),
     "max_axis_step": (1.0, 90.0),
     "chord_tolerance": (1e-7, 1.0),
+    "block_time": (0.0, 1.0),
     "axis_step": (1e-3, 90.0),
     "curve_share": (0.01, 1.0),
     "line_share": (0.01, 1.0),

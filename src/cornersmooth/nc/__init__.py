@@ -118,8 +118,14 @@ def fit_settings(settings: Settings, form: Form, units: Units) -> Settings:
                 "leave out --lines; lines with the tip under tool tip control can be",
             )
         settings = settings.but(curve_share=long.curve_share, line_share=long.line_share, blend_share=long.blend_share)
+    block_time = long.block_time if settings.block_time is None else settings.block_time
+    if (
+        form.orientation == "machine" and form.mode.motion.fastest
+    ):  # no block is passed sooner than inverse time can say
+        block_time = max(block_time, 60.0 / form.mode.motion.fastest)
     return settings.with_method(curves=form.curves).but(
         lines=lines,
+        block_time=block_time,
         tip_resolution=form.tip_resolution(units, tolerance),
         axis_point_resolution=form.axis_point_resolution(units, settings),
         round_feed_changes=settings.round_feed_changes and not form.curves,

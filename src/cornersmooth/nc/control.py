@@ -363,6 +363,8 @@ class LineStyle:
         Part of ε that is left to what the control executes at those corners, by that estimate.
     planner : str
         Law by which the control plans lines, where it is not that of `cornersmooth.feedrate`: "linuxcnc-2.9".
+    block_time : float, s
+        `Settings.block_time`. By default that of Haas, whose makers state it.
     """
 
     lines: str = "dense"
@@ -373,6 +375,7 @@ class LineStyle:
     rounding: str = ""
     executed_share: float = 0.85
     planner: str = ""
+    block_time: float = 0.001
 
 
 @dataclass(frozen=True)

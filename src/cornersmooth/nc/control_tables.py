@@ -33,7 +33,7 @@ from cornersmooth.nc.control import (
     Words,
 )
 from cornersmooth.nc.program_table import STEPS, ProgramTable
-from cornersmooth.settings import Lines
+from cornersmooth.settings import BOUNDS, Lines
 from cornersmooth.tables import Shelf, Table, check_pattern, filled, is_file
 
 _FORM_KEYS = ("description", "curve", "upright", "plane", *get_args(Orientation))
@@ -300,6 +300,8 @@ def _lines(table: Any, where: str) -> LineStyle:
     for name in ("curve_share", "line_share", "blend_share", "executed_share"):
         if not 0.0 < getattr(lines, name) <= 1.0:
             raise _SHELF.wrong(f"lines.{name} is {getattr(lines, name)}", "give a part of 1")
+    if not 0.0 <= lines.block_time <= BOUNDS["block_time"][1]:
+        raise _SHELF.wrong(f"lines.block_time is {lines.block_time}", "give seconds, up to 1")
     if lines.planner not in PLANNERS:
         raise _SHELF.wrong(f"lines.planner is {lines.planner!r}", f"use {PLANNERS[1]}, or leave it out")
     if not 0.0 <= lines.lag <= _MOST_LAG:

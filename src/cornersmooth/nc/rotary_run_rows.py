@@ -150,7 +150,7 @@ def _followed(smoothed: SmoothProgram, runs: Runs, path: _Path) -> tuple[Runs, _
     """The runs that begin where a row ends and in which no solution may change, with their rows."""
     program = smoothed.program
     lines = polylines_of(runs, program.tip, program.tip + smoothed.settings.axis_length * program.axis)
-    places = line_places(runs, lines, smoothed.settings)
+    places = line_places(runs, lines, program, smoothed.settings)
     inside = np.zeros(len(program), np.bool_)
     inside[places.pose] = True
     row = np.flatnonzero(inside[path.move])

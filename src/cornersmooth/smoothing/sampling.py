@@ -99,7 +99,7 @@ class _RunLines:
             return cls(np.zeros(0, np.int64), nothing, nothing, np.zeros(n, np.int64), np.zeros(n, np.bool_))
         height = smoothed.settings.axis_length
         pose, tip, axis = run_lines(
-            runs, polylines_of(runs, program.tip, program.tip + height * program.axis), smoothed.settings
+            runs, polylines_of(runs, program.tip, program.tip + height * program.axis), program, smoothed.settings
         )
         count = np.bincount(pose, minlength=n)
         return cls(pose, tip, axis, count, count > 0)

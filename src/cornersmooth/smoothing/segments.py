@@ -181,6 +181,8 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     more_bend, more_turn = shape_factors(corners.weights[rows], corners.ratio[rows])
     bend = np.sqrt(np.maximum(square(bends[0]), square(bends[1]))) * more_bend
     by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
+    way = np.minimum(norm(tip_in) * corners.trim_in[rows], norm(tip_out) * corners.trim_out[rows])
+    by_chord = settings.lines_for_feed(by_chord, way, program.feed_at(after))
     number = np.ceil(by_chord - 1e-9)
 
     by_turn = np.zeros(len(rows))

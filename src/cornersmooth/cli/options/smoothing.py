@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cornersmooth.cli.options.parameters import LENGTH, Weights, all_of
+from cornersmooth.cli.options.parameters import LENGTH, Duration, Weights, all_of
 from cornersmooth.methods import AUTO, METHODS
 
 if TYPE_CHECKING:
@@ -60,7 +60,13 @@ chord_tolerance = click.option(
     "--chord",
     "chord_tolerance",
     type=LENGTH,
-    help="Distance between the written lines and the curve. [default: a tenth of -e, at most 0.0005]",
+    help="Largest distance between the written lines and the curve. [default: a tenth of -e, at most 0.0005]",
+)
+block_time = click.option(
+    "--block-time",
+    type=Duration(),
+    help="Shortest time in which the control takes a block, as in 1ms: no line along a curve is passed sooner at the "
+    "programmed feed for the sake of speed. [default: that of the control's table]",
 )
 axis_step = click.option(
     "--axis-step",
@@ -78,6 +84,7 @@ _SETTINGS = {
     "reversal_angle": reversal_angle,
     "lines": lines,
     "chord_tolerance": chord_tolerance,
+    "block_time": block_time,
     "axis_step": axis_step,
 }
 
@@ -89,7 +96,7 @@ def curve_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def line_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every command that writes lines along the curves."""
-    return all_of(function, (lines, chord_tolerance, axis_step))
+    return all_of(function, (lines, chord_tolerance, block_time, axis_step))
 
 
 def settings_of(given: dict[str, Any]) -> Settings:

@@ -101,7 +101,7 @@ class LinePlaces:
     end: Ints
 
 
-def run_lines(runs: Runs, lines: Polylines, settings: Settings) -> tuple[Ints, Floats, Floats]:
+def run_lines(runs: Runs, lines: Polylines, program: Program, settings: Settings) -> tuple[Ints, Floats, Floats]:
     """Ends of the lines that runs are written as.
 
     Returns
@@ -111,7 +111,7 @@ def run_lines(runs: Runs, lines: Polylines, settings: Settings) -> tuple[Ints, F
     tip, axis : (m, 3) float64
         mm, and unit vectors. The last of a run are its last pose.
     """
-    found = line_places(runs, lines, settings)
+    found = line_places(runs, lines, program, settings)
     tip, axis = points_at(runs.control, Splines(runs.knot, runs.knot_count), found.span, found.s)
     at = np.flatnonzero(found.end >= 0)
     ends = lines.point[found.end[at]]  # which are passed exactly
@@ -119,7 +119,7 @@ def run_lines(runs: Runs, lines: Polylines, settings: Settings) -> tuple[Ints, F
     return found.pose, tip, axis
 
 
-def line_places(runs: Runs, lines: Polylines, settings: Settings) -> LinePlaces:
+def line_places(runs: Runs, lines: Polylines, program: Program, settings: Settings) -> LinePlaces:
     """Places on the curves where the lines end that runs are written as."""
     splines = Splines(runs.knot, runs.knot_count)
     pieces = Pieces.of(splines, lines)
@@ -127,7 +127,7 @@ def line_places(runs: Runs, lines: Polylines, settings: Settings) -> LinePlaces:
         none = np.zeros(0, np.int64)
         return LinePlaces(none, none, np.zeros(0), none)
     segment, first = np.unique(pieces.segment, return_index=True)  # one piece or more for every segment
-    effort = _effort(runs, splines, lines, pieces, settings)
+    effort = _effort(runs, splines, lines, pieces, program, settings)
     number = np.clip(np.ceil(np.add.reduceat(effort, first) - 1e-9), 1, _MOST_LINES).astype(np.int64)
     row, place = spread(number)
     last = place == number[row] - 1
@@ -151,13 +151,18 @@ def line_places(runs: Runs, lines: Polylines, settings: Settings) -> LinePlaces:
     return LinePlaces(runs.pose[pose_row], pieces.span[piece], s, end)
 
 
-def _effort(runs: Runs, splines: Splines, lines: Polylines, pieces: Pieces, settings: Settings) -> Floats:
+def _effort(
+    runs: Runs, splines: Splines, lines: Polylines, pieces: Pieces, program: Program, settings: Settings
+) -> Floats:
     """(p,) lines that each piece asks for: by its bend and the chord tolerance, and by the turn of the axis."""
     controls = runs.control[splines.span_control[pieces.span][:, None] + np.arange(4)]
     hull = splines.bernstein(pieces.span, pieces.low, pieces.high) @ controls
     bends = 6.0 * np.diff(hull, 2, axis=1)  # second derivatives at both ends, over the whole piece
     size = np.maximum(norm(bends[..., :3]), norm(bends[..., 3:])).max(axis=1)
-    by_chord = np.sqrt(size / (8.0 * settings.chord))
+    feed = program.feed_at(runs.pose[pieces.segment + 1])
+    by_chord = settings.lines_for_feed(
+        np.sqrt(size / (8.0 * settings.chord)), norm(hull[:, 3, :3] - hull[:, 0, :3]), feed
+    )
     levers = lines.point[:, 3:] - lines.point[:, :3]
     turn = np.concatenate((angle_between(levers[:-1], levers[1:]), [0.0]))[pieces.segment]
     turned = angle_between(hull[:, 0, 3:] - hull[:, 0, :3], hull[:, 3, 3:] - hull[:, 3, :3])

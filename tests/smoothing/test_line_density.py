@@ -1,0 +1,52 @@
+"""How many lines follow a curve: by the chord tolerance, and by the time that the control takes for a block."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cornersmooth
+from cornersmooth.kinematics import load_machine
+from cornersmooth.model import Program
+from cornersmooth.nc import choose_form, fit_settings
+from cornersmooth.saving import Timing, written_text
+from cornersmooth.settings import FINEST_CHORD, Settings
+from cornersmooth.smoothing.segments import lines_per_half
+
+SAMPLE = Path(__file__).parents[2] / "samples" / "impeller.cls"
+
+
+def halves(feed: float, **more: float) -> tuple[int, float]:
+    """Lines per half of a corner of 90 degrees, and the way of the tip in a half, mm."""
+    tip, axis = np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 10.0, 0.0]]), np.array([[0.0, 0.0, 1.0]] * 3)
+    program = Program.from_poses(tip, axis, feed=feed)
+    smoothed = cornersmooth.smooth(program, Settings(tolerance=0.01, lines="dense", **more))
+    return abs(int(lines_per_half(smoothed)[0])), 10.0 * float(smoothed.corners.trim_in[0])
+
+
+def test_no_line_is_passed_sooner_than_the_control_takes_a_block() -> None:
+    by_chord, way = halves(1000.0)
+    finest, _ = halves(1e-3, block_time=0.001)
+    assert finest == pytest.approx(by_chord * np.sqrt(5e-4 / FINEST_CHORD), abs=1 + np.sqrt(5e-4 / FINEST_CHORD))
+    feed = 60.0 * way / (1.7 * by_chord * 0.001)  # 1.7 times as many lines take a block time each
+    between, _ = halves(feed, block_time=0.001)
+    assert between == np.ceil(1.7 * by_chord - 1e-9)
+    assert (
+        halves(60.0 * way / 0.001, block_time=0.001)[0] == by_chord
+    )  # too fast for more: the chord holds all the same
+    assert halves(np.nan, block_time=0.001)[0] == by_chord
+    assert halves(1e-3, block_time=0.001, chord_tolerance=0.004)[0] == pytest.approx(finest, abs=1)
+
+
+def test_the_sample_gains_as_documented() -> None:
+    """On table-ac, where lines by the chord alone took 103 s."""
+    machine, program = load_machine("table-ac"), cornersmooth.read(SAMPLE)
+    form = choose_form(machine=machine)
+    settings = fit_settings(Settings(tolerance=0.01), form, program.units)
+    text = written_text(program, settings, form)
+    timing = Timing.of(form, settings)
+    assert timing is not None
+    assert timing.written(text, program)[0] <= 88.0
+    assert text.count(b"\n") < 7500
