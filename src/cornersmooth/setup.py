@@ -41,6 +41,8 @@ COARSE, FINE = 15.0, 5.0
 _STARTS: Final = 4
 #: setups that differ by less are as good as the same, degrees
 _APART: Final = 15.0
+#: of a second that count
+_DIGITS: Final = 2
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,12 @@ class Rating:
     estimate: float
     seconds: float = math.nan
     why: str = ""
+
+    @property
+    def rank(self) -> tuple[bool, float, float]:
+        """Sorts setups: the fastest first, of those as fast the one with the least tilts; then those out of reach."""
+        seconds = self.estimate if math.isnan(self.seconds) else self.seconds
+        return bool(self.why), round(seconds, _DIGITS), abs(self.setup.tilt_x) + abs(self.setup.tilt_y)
 
 
 @dataclass(frozen=True)
@@ -246,7 +254,7 @@ def find_setups(
         planned.append(rating)
         if progress is not None:
             progress("planning", len(planned), len(chosen))
-    best = sorted((one for one in planned[1:] if not one.why), key=lambda one: one.seconds)
+    best = sorted((one for one in planned[1:] if not one.why), key=lambda one: one.rank)
     rated |= {one.setup: one for one in planned}
     gone = sum(bool(one.why) for one in rated.values())
     if gone == len(rated):
@@ -274,7 +282,7 @@ def _rounds(rated: dict[Setup, Rating], tilt: float, turns: bool) -> Iterable[li
 def _chosen(ratings: Iterable[Rating], count: int) -> list[Rating]:
     """Take the best that are within reach and apart from one another, and not today's."""
     found = [Rating(Setup(), 0.0)]
-    for one in sorted(ratings, key=lambda one: one.estimate):
+    for one in sorted(ratings, key=lambda one: one.rank):
         if len(found) > count or math.isinf(one.estimate):
             break
         if all(one.setup.angle_to(other.setup) >= _APART - 1e-6 for other in found):

@@ -17,6 +17,9 @@ from cornersmooth.cli.show import progress_bar, say_line
 if TYPE_CHECKING:
     from cornersmooth.setup import Rating, Setups
 
+#: savings of less are none, %
+_WORTH = 0.1
+
 limits = click.option(
     "--limits",
     required=True,
@@ -114,14 +117,13 @@ def _lines(found: Setups, machine: str) -> Iterator[str]:
     elif today.why:
         yield f"fastest setup of {found.tried}: {found.best[0].seconds:.3f} s; today's is out of reach: {today.why}"
     else:
-        best = max(found.saving(one) for one in found.best)
-        yield (
-            f"fastest setup of {found.tried}: saves {best:.1f} % of {today.seconds:.3f} s"
-            if best > 0.0
-            else (f"today's setup is the fastest of {found.tried}: {today.seconds:.3f} s")
-        )
+        best, times = max(found.saving(one) for one in found.best), f"{today.seconds:.3f} s"
+        if best < _WORTH:
+            yield f"no setup of {found.tried} is faster than today's: {times}"
+        else:
+            yield f"fastest setup of {found.tried}: saves {best:.1f} % of {times}"
     yield f"{'turn Z':>8}{'tilt X':>8}{'tilt Y':>8}{'time s':>11}{'saves %':>9}    zero of the part moves by X Y Z, mm"
-    rows = sorted([today, *found.best], key=lambda one: (bool(one.why), one.seconds))
+    rows = sorted([today, *found.best], key=lambda one: one.rank)
     for one in rows:
         yield _row(found, one) + ("    today" if one is today else "")
     yield "Degrees: the part is turned about Z, then tilted about X, then about Y, the axes of the machine, all about"
@@ -134,6 +136,6 @@ def _lines(found: Setups, machine: str) -> Iterator[str]:
 def _row(found: Setups, one: Rating) -> str:
     setup, zero = one.setup, found.zero(one.setup) + 0.0
     angles = f"{setup.turn:>8g}{setup.tilt_x:>8g}{setup.tilt_y:>8g}"
-    saves = "" if found.today.why else f"{found.saving(one):.1f}"
+    saves = "" if found.today.why else f"{round(found.saving(one), 1) + 0.0:.1f}"
     times = f"{'out of reach':>20}" if one.why else f"{one.seconds:>11.3f}{saves:>9}"
     return angles + times + "    X{:.3f} Y{:.3f} Z{:.3f}".format(*zero)
