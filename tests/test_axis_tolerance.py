@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 import cornersmooth
-from cornersmooth import Settings
+from cornersmooth import Program, Settings
 from cornersmooth.errors import SettingsError
+from cornersmooth.feedrate import Limits, plan
+from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import choose_form
 from oracle.axis_place import shares
 from oracle.chains import Chain, cl_text, random_chains
@@ -203,3 +205,17 @@ def test_the_command_line_says_it_everywhere(tmp_path: Path) -> None:
     both = run("smooth", SAMPLE, "-o", tmp_path / "p.nc", "--axis-tolerance", "0.4", "-H", "20")
     assert both.returncode == USAGE
     assert "takes the place of -H" in both.stderr.decode()
+
+
+def test_more_freedom_of_the_axis_is_not_slower() -> None:
+    """One pass of the sample: turns between straight moves, on which the axis would swing for nothing."""
+    program = cornersmooth.read(SAMPLE)
+    part = Program.from_poses(program.tip[4:79], program.axis[4:79], feed=1800.0)
+    machine, limits = load_machine("table-ac"), Limits(feed=1800.0)
+    least, *more = (
+        plan(
+            cornersmooth.smooth(part, Settings(method="global", axis_tolerance=degrees)), limits, machine=machine
+        ).total
+        for degrees in (None, 0.5, 5.0)
+    )
+    assert max(more) <= least

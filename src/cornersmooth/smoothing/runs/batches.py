@@ -112,6 +112,17 @@ class Problem:
         return self.lines.point[:, 3:] - self.lines.point[:, :3]
 
     @cached_property
+    def room(self) -> Floats:
+        """(poses,) share of its tolerance that the axis point may use in the segment from each pose.
+
+        The axis may have a larger tolerance than the tip. Then it may be off by what it turns in the segment, or by
+        what the tip may be: where it does not turn, a swing only takes time.
+        """
+        turned = np.sqrt(_squares(np.diff(self.lever, axis=0, append=self.lever[-1:])))
+        room: Floats = np.minimum(np.maximum(turned, self.tolerances[0]) / self.tolerances[1], 1.0)
+        return room
+
+    @cached_property
     def first_lever(self) -> Floats:
         """(runs, 3) mm: that at the start of each run."""
         return self.lever[self.lines.first[:-1]]
@@ -206,6 +217,7 @@ class _Places:
         span = np.repeat(np.arange(len(windows.span)), number)[samples.piece]
         begins = np.concatenate(([True], samples.piece[1:] != samples.piece[:-1]))
         before = np.where(begins, np.maximum(rows - 1, 0)[samples.piece], rows[samples.piece])
+        tight = tight * np.stack((np.ones(len(pieces.span)), problem.room[pieces.segment]), axis=1)
         limit = SHARE * np.minimum(tight[rows][samples.piece], tight[before])  # a piece ends where the next begins
         near = Gather(windows.local[span], samples.basis, len(windows.control))
         smooth = Gather(windows.local, splines.third[windows.span], len(windows.control))
