@@ -1,74 +1,52 @@
-"""Writes the table of numbers in README.md: what one sample gains at three tolerances.
+"""Writes the table of numbers in README.md: what one sample gains in each program of a control.
 
 python docs/make_numbers.py
 
-Times are planned for the path as the CL file has it and for the written text, with the feeds of the file: under limits
-of the tip alone (the defaults of ``cornersmooth time``), and under those of a machine's axes besides.
+The rows are those of ``cornersmooth compare samples/impeller.cls --control fanuc --limits table-ac`` with tool vectors.
 """
 
 from __future__ import annotations
 
-import io
 import re
 from pathlib import Path
 
 import cornersmooth
-from cornersmooth import Limits, Settings
-from cornersmooth.feedrate import plan_text
-from cornersmooth.kinematics import Machine
-from cornersmooth.nc_reader import NcProgram, read_nc
+from cornersmooth import Settings
+from cornersmooth.comparing import Row, Table, candidates, compare_programs
+from cornersmooth.nc import load_control
 
 ROOT = Path(__file__).resolve().parent.parent
 PART = ROOT / "samples" / "impeller.cls"
-TOLERANCES = (0.01, 0.04, 0.16)
-MACHINE = "table-ac"
+CONTROL, MACHINE = "fanuc", "table-ac"
 HEAD = """\
-| ε mm | blocks written | most at the tip, mm | at the axis point, mm | planned time | on `table-ac` | its curves |
-|---|---|---|---|---|---|---|
+| form | method | lines | blocks | kB | most at the tip, mm | at the axis point, mm | planned time |
+|---|---|---|---|---|---|---|---|
 """
 PLACE = re.compile(r"(?<=<!-- numbers -->\n).*?(?=<!-- end of numbers -->)", re.DOTALL)
 
 
-def seconds_before(machine: Machine | None) -> float:
-    """Planned time of the path as the CL file has it."""
-    return cornersmooth.direct(cornersmooth.read(PART), Limits(), "velocity_jump", machine=machine).total
+def compared(*forms: str) -> Table:
+    """The rows in tool vectors, of all forms or of some."""
+    tried = candidates(load_control(CONTROL), Settings(), None)
+    tried = [one for one in tried if not forms or one.form.name in forms]
+    return compare_programs(cornersmooth.read(PART), tried, cornersmooth.load_machine(MACHINE))
 
 
-def smoothed(tolerance: float) -> tuple[cornersmooth.Result, NcProgram]:
-    """What is made with a tolerance, and the text as it is read back."""
-    text = io.BytesIO()
-    result = cornersmooth.postprocess(PART, text, Settings(tolerance=tolerance))
-    return result, read_nc(text.getvalue(), tolerance=tolerance)
-
-
-def seconds_after(tolerance: float, nc: NcProgram, machine: Machine | None) -> float:
-    """Planned time of a text."""
-    return plan_text(nc, Limits(), settings=Settings(tolerance=tolerance), machine=machine).total
-
-
-def seconds_of_curves(tolerance: float) -> float:
-    """Planned time of the curves that the lines of the text follow, with the machine."""
-    program = cornersmooth.smooth(cornersmooth.read(PART), Settings(tolerance=tolerance))
-    return cornersmooth.plan(program, Limits(), machine=cornersmooth.load_machine(MACHINE)).total
+def line_of(row: Row, before: float) -> str:
+    """One row, in Markdown."""
+    assert row.usable
+    assert row.seconds is not None
+    saved = f"{row.seconds:.1f} s ({100 * (row.seconds / before - 1):+.0f} %)"
+    size = f"{row.blocks:,} | {row.bytes / 1000:.0f}"
+    return f"| {row.form} | {row.method} | {row.lines} | {size} | {row.tip:.4f} | {row.axis_point:.4f} | {saved} |\n"
 
 
 def table() -> str:
     """The table, in Markdown."""
-    machines = (None, cornersmooth.load_machine(MACHINE))
-    before = [seconds_before(machine) for machine in machines]
+    found = compared()
     poses = len(cornersmooth.read(PART))
-    rows = [f"| as it was | {poses:,} | | | {before[0]:.1f} s | {before[1]:.1f} s | |\n"]
-    for tolerance in TOLERANCES:
-        result, nc = smoothed(tolerance)
-        found = result.verification
-        assert found is not None
-        after = [seconds_after(tolerance, nc, machine) for machine in machines]
-        times = (f"{new:.1f} s ({100 * (new / old - 1):+.0f} %)" for old, new in zip(before, after, strict=True))
-        rows.append(
-            f"| {tolerance:g} | {result.written.blocks:,} | {found.max_tip_deviation_mm:.4f} | "
-            f"{found.max_axis_point_deviation_mm:.4f} | {' | '.join(times)} | {seconds_of_curves(tolerance):.1f} s |\n"
-        )
-    return HEAD + "".join(rows)
+    first = f"| unsmoothed | | | {poses:,} poses | | | | {found.unsmoothed:.1f} s |\n"
+    return HEAD + first + "".join(line_of(row, found.unsmoothed) for row in found.rows)
 
 
 def main() -> None:

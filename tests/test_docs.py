@@ -186,20 +186,19 @@ def test_the_job_of_an_array_does_its_share(shop: Path) -> None:
 
 
 def test_the_numbers_of_the_readme_are_those_that_come_out() -> None:
-    """One row of the table, and a twentieth for what changes: `python docs/make_numbers.py` makes all of it."""
+    """Rows of one form, and a twentieth for what changes: `python docs/make_numbers.py` makes all of it."""
     numbers = load("make_numbers")
-    rows = {
-        row.split("|")[1].strip(): row
-        for row in numbers.PLACE.search((ROOT / "README.md").read_text())[0].split("\n")[2:-1]
-    }
-    assert list(rows) == ["as it was", *(f"{tolerance:g}" for tolerance in numbers.TOLERANCES)]
-    told = [float(word.replace(",", "")) for word in re.findall(r"[\d.,]*\d", rows["0.01"])]
-    result, nc = numbers.smoothed(0.01)
-    found = result.verification
-    made = [0.01, result.written.blocks, found.max_tip_deviation_mm, found.max_axis_point_deviation_mm]
-    made.append(numbers.seconds_after(0.01, nc, None))
-    assert told[:5] == pytest.approx(made, rel=0.05)
-    assert f"| {numbers.seconds_before(None):.0f}." in re.sub(r"\.\d s", ". s", rows["as it was"])
+    told = numbers.PLACE.search((ROOT / "README.md").read_text())[0]
+    found = numbers.compared("g6.2")
+    before = re.search(r"([\d.]+) s", told.split("\n")[2])
+    assert before
+    assert float(before[1]) == pytest.approx(found.unsmoothed, rel=0.01)
+    assert len(found.rows) == 2
+    for row in found.rows:
+        made = numbers.line_of(row, found.unsmoothed)
+        (line,) = (one for one in told.split("\n") if one.startswith(made[: made.index("|", 10)]))
+        pairs = zip(*(re.findall(r"[\d.,]*\d", text.replace(",", "")) for text in (line, made)), strict=True)
+        assert all(float(old) == pytest.approx(float(new), rel=0.05) for old, new in pairs)
 
 
 def parts_of(source: Path) -> set[str]:

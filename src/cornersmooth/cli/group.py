@@ -19,6 +19,10 @@ COMMANDS = {
     "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC text."),
     "filter": ("cornersmooth.cli.filter", "Smooth the cutting runs of a finished NC program."),
     "verify": ("cornersmooth.cli.verify", "Measure NC text against the CL file it was made from."),
+    "compare": (
+        "cornersmooth.cli.compare",
+        "Compare the programs of all forms, methods and line densities of a control.",
+    ),
     "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
     "setup": ("cornersmooth.cli.setup", "Find how to clamp a part so that its program runs fastest."),
     "surface": ("cornersmooth.cli.surface", "Measure what the NC text leaves of the surface of the CL file."),

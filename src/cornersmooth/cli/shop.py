@@ -16,8 +16,8 @@ A project's file stands in the folder of the input or above it, a user's in ``~/
     like = "table-ac"
 
 What counts is the option, then the environment (``CORNERSMOOTH_TOLERANCE``), the project, the user, the default. What
-[smooth] says holds for all commands that have the option; [filter], [verify], [time], [setup], [info] and [surface] may
-say otherwise.
+[smooth] says holds for all commands that have the option; [filter], [verify], [compare], [time], [setup], [info] and
+[surface] may say otherwise.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from cornersmooth.output import reason
 FILE = "cornersmooth.toml"
 PREFIX = "CORNERSMOOTH_"
 #: tables with options; the first holds for all commands
-COMMAND_TABLES = ("smooth", "filter", "verify", "time", "setup", "info", "surface")
+COMMAND_TABLES = ("smooth", "filter", "verify", "compare", "time", "setup", "info", "surface")
 #: tables of controls and machines of one's own, and the options that name them
 _OWN_TABLES = {"controls": ("control",), "machines": ("machine", "limits")}
 

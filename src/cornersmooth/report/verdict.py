@@ -207,10 +207,11 @@ def saving_text(saving: Saving) -> str:
     else:
         text = f"saves {saved:.1f} s of" if saved > 0.0 else f"takes {-saved:.1f} s more than"
         text += f" {direct:.1f} s" + (f" of {saving.against}" if saving.against else "")
-    return text + _limits_text(saving.limits)
+    return text + limits_text(saving.limits)
 
 
-def _limits_text(limits: Sequence[tuple[str, float]]) -> str:
+def limits_text(limits: Sequence[tuple[str, float]]) -> str:
+    """Say which limits are reached the longest, after a semicolon; empty where none is."""
     parts = [f"{name} {100.0 * part:.0f} %" for name, part in limits[:_LIMITS_TOLD] if part >= _LEAST_TOLD]
     return f"; limited by {', '.join(parts)} of the cutting time" if parts else ""
 
@@ -233,4 +234,4 @@ def times_text(seconds: Mapping[str, float], names: Sequence[str], limits: Seque
     share = f" ({100.0 * abs(saved) / jumps:.0f} %)" if jumps else ""
     told = f"saves {saved:.1f} s of" if saved >= 0.0 else f"takes {-saved:.1f} s more than"
     text = f"{best} {told} the {jumps:.1f} s of the direct path{share}, which takes {stops:.1f} s with stops at corners"
-    return text + _limits_text(limits)
+    return text + limits_text(limits)

@@ -163,4 +163,5 @@ law = click.option(
     show_default=True,
     help="Motion that --csv writes.",
 )
+rows_csv = click.option("--csv", type=PATH, help="Write the rows.")
 motion_csv = click.option("--csv", type=PATH, help="Write the motion, a row every period.")

@@ -1,0 +1,180 @@
+"""``cornersmooth compare``: which form, method and line density suit a part, as written."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import shlex
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from cornersmooth.cli.files import check_inputs, check_path, read_input, target_of
+from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
+from cornersmooth.cli.options.parameters import PATH
+from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.show import progress_bar, say_line
+from cornersmooth.output import open_output
+
+if TYPE_CHECKING:
+    from cornersmooth.comparing import Row, Table
+
+#: options of this command that `smooth` has not, or that would write
+_OWN = frozenset(("as_json", "csv", "verbose", "quiet", "force", "machine", "limits", "source", "look_ahead"))
+
+
+@click.command(
+    "compare",
+    cls=ShopCommand,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid; "
+    "4 output cannot be written.",
+)
+@click.argument("source", type=PATH, metavar="IN")
+@smoothing.tolerance
+@smoothing.axis_length
+@smoothing.axis_tolerance
+@nc_text.control
+@nc_text.machine
+@motion.limits
+@motion.look_ahead
+@smoothing.curve_options
+@reading.feed
+@reading.reading_options
+@outputs.as_json
+@motion.rows_csv
+@outputs.force
+@outputs.quiet
+@outputs.verbose
+def command(source: str, **given: Any) -> int:
+    """Write the CL file IN in every form, method and line density that the control can run, and compare the times.
+
+    Every program is verified and planned as it is written, under the limits of the axes of --limits, or of --machine.
+    The best row is the fastest that keeps the tolerance; the command that writes it follows. Of parts of more than
+    2,000 poses whole runs from the middle are compared. -v states by which law lines are planned. The method zhang2016
+    is left out: it is there as published.
+
+    \b
+    Examples:
+      cornersmooth compare part.cls --control siemens --limits table-ac
+      cornersmooth compare part.cls -e 0.04 --control fanuc --limits mill.toml --csv part.csv
+      cornersmooth compare part.cls --control linuxcnc --machine xyzac-trt -v
+    """
+    from cornersmooth.cl import read
+    from cornersmooth.comparing import candidates, compare_programs, limits_machine
+    from cornersmooth.feedrate import BlockLimits
+
+    check_inputs(source)
+    if given["csv"]:
+        check_path(given["csv"], [source], force=given["force"])
+    machine, limits = nc_text.machine_of(given), nc_text.machine_of(given, "limits")
+    axes = limits_machine(limits, machine)
+    if axes is None:
+        raise click.UsageError("compare plans within limits of axes: name a machine that has [dynamics] with --limits")
+    control, settings = nc_text.control_of(given), smoothing.settings_of(given)
+    data, name = read_input(source, size_limit=not given["no_size_limit"])
+    program = read(data, name=name, **reading.reading_of(given))
+    if given["feed"] is not None:
+        import numpy as np
+
+        program = replace(program, feed=np.where(np.isnan(program.feed), given["feed"], program.feed))
+    tried = candidates(control, settings, limits if machine is None else machine)
+    blocks = BlockLimits(look_ahead=given["look_ahead"])
+    with progress_bar(given["quiet"]) as progress:
+        step = None if progress is None else lambda done, total: progress("programs", done, total)
+        table = compare_programs(program, tried, axes, blocks, progress=step)
+    machine_named = given["limits"] if machine is None else given["machine"]
+    commands = [_command(source, given, row, machine_named, control.layout.suffix) for row in table.rows]
+    if given["csv"]:
+        with open_output(target_of(given["csv"])) as output:
+            output.stream.write(_csv(table, commands).encode("utf-8"))
+    if given["as_json"]:
+        contents = table.as_dict()
+        for row, text in zip(contents["rows"], commands, strict=True):
+            row["command"] = text
+        click.echo(json.dumps(contents, indent=1))
+    elif not given["quiet"]:
+        for line in _lines(table, commands, bool(given["verbose"])):
+            say_line(line)
+    return 0
+
+
+def _lines(table: Table, commands: list[str], verbose: bool) -> Iterator[str]:
+    from cornersmooth.report.verdict import limits_text
+
+    if table.share < 1.0:
+        yield f"from {100.0 * table.share:.2g} % of the poses: whole runs from the middle of the part"
+    if verbose:
+        yield f"law of lines: {table.law}"
+    yield f"unsmoothed: {table.unsmoothed:.1f} s" + (f", {table.against}" if table.against else "")
+    widths = [max(len(str(cell)) for cell in column) for column in zip(*map(_cells, table.rows), strict=True)]
+    head = ("form", "words", "method", "lines", "blocks", "kB", "s", "saves %", "tip mm", "axis point mm")
+    widths = [max(width, len(title)) for width, title in zip(widths, head, strict=True)]
+    yield "  " + "  ".join(f"{title:<{width}}" for title, width in zip(head, widths, strict=True)).rstrip()
+    best = table.best
+    for number, row in enumerate(table.rows):
+        cells = "  ".join(f"{cell:<{width}}" for cell, width in zip(_cells(row), widths, strict=True))
+        verdict = "" if row.usable else f"  {row.verdict}"
+        yield f"{'* ' if number == best else '  '}{cells.rstrip()}{verdict}"
+    if best is not None:
+        yield f"* {commands[best]}"
+        if told := limits_text(table.rows[best].limits):
+            yield f"  {told.removeprefix('; ')}"
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    if row.seconds is None or row.saved is None or row.tip is None:
+        return (row.form, row.words, row.method, row.lines, *[""] * 6)
+    share = 100.0 * row.saved / (row.seconds + row.saved) if row.seconds + row.saved else 0.0
+    return (
+        row.form,
+        row.words,
+        row.method,
+        row.lines,
+        f"{row.blocks:,}",
+        f"{row.bytes / 1000.0:.0f}",
+        f"{row.seconds:.1f}",
+        f"{share:.0f}",
+        f"{row.tip:.4f}",
+        "" if row.axis_point is None else f"{row.axis_point:.4f}",
+    )
+
+
+def _command(source: str, given: dict[str, Any], row: Row, machine: Any, suffix: str) -> str:
+    """Options that were typed, and those of the row; a machine is called as the user has called it."""
+    context, typed = click.get_current_context(), []
+    for option in context.command.params:
+        name = str(option.name)
+        from_user = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
+        if not isinstance(option, click.Option) or name in _OWN or not from_user:
+            continue
+        spelled = option.opts[-1]
+        value = given[name]
+        for one in value if option.multiple else (value,):
+            if option.is_flag:
+                typed.append(spelled)
+            else:
+                number = ",".join(f"{part:g}" for part in one) if isinstance(one, tuple) else one
+                typed += [spelled, f"{number:g}" if isinstance(number, float) else str(number)]
+    called = machine if isinstance(machine, str) else getattr(machine, "name", "")
+    options = list(row.options)
+    if "--machine" in options:
+        options[options.index("--machine") + 1] = called
+    target = os.path.splitext(os.path.basename(source))[0] + suffix
+    return shlex.join(["cornersmooth", "smooth", source, *typed, *options, "-o", target])
+
+
+def _csv(table: Table, commands: list[str]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(
+        "form,words,method,lines,verdict,blocks,bytes,seconds,saved,tip_mm,axis_point_mm,best,command".split(",")
+    )
+    for number, (row, text) in enumerate(zip(table.rows, commands, strict=True)):
+        numbers = (row.blocks, row.bytes, row.seconds, row.saved, row.tip, row.axis_point)
+        writer.writerow([row.form, row.words, row.method, row.lines, row.verdict, *numbers, number == table.best, text])
+    return stream.getvalue()

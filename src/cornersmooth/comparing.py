@@ -1,0 +1,290 @@
+"""Every program that a control can run of a part, each written, measured and planned as it is written."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cornersmooth import nc
+from cornersmooth.errors import CornersmoothError, SettingsError
+from cornersmooth.feedrate import BlockLimits
+from cornersmooth.kinematics import Machine, with_dynamics
+from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
+from cornersmooth.model import Move, Program
+from cornersmooth.nc import Control, Form, choose_form
+from cornersmooth.pipeline import postprocess
+from cornersmooth.processes import can_fork, map_in_processes, useful_processes
+from cornersmooth.saving import Timing, without_holes
+from cornersmooth.settings import Settings
+from cornersmooth.slices import some_poses
+from cornersmooth.verdict import Verdict
+
+#: poses of a part that are looked at; of longer ones whole runs from the middle
+MOST_POSES = 2000
+
+#: Times over the least that count as that: plans are 0.6 to 3 % above linear programmes (docs/feedrate.md).
+EQUAL = 1.03
+
+#: block time that leaves the number of lines to the chord tolerance, s
+_BY_CHORD = 1.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A way to write a part.
+
+    Parameters
+    ----------
+    form : Form
+    settings : Settings
+    options : tuple of str
+        What asks `cornersmooth smooth` for it, besides the control and the tolerance.
+    """
+
+    form: Form
+    settings: Settings
+    options: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of a candidate.
+
+    Parameters
+    ----------
+    form, words, method, lines : str
+        Form of the control; "vectors" or "rotary words of MACHINE"; method; "fine", "chord" or "long", empty in curves.
+    options : tuple of str
+        As in `Candidate`.
+    verdict : str
+        Of verification; what was wrong where it was not written.
+    blocks, bytes : int
+    seconds, saved : float or None
+        As written, and less than the unsmoothed lines; None where nothing was written.
+    tip, axis_point : float or None, mm
+        Largest measured deviation; of the axis point None under an axis tolerance.
+    limits : tuple of (str, float)
+        What the program reaches the longest.
+    """
+
+    form: str
+    words: str
+    method: str
+    lines: str
+    options: tuple[str, ...]
+    verdict: str
+    blocks: int = 0
+    bytes: int = 0
+    seconds: float | None = None
+    saved: float | None = None
+    tip: float | None = None
+    axis_point: float | None = None
+    limits: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def usable(self) -> bool:
+        """Whether the program keeps the tolerance, and has a time."""
+        return self.seconds is not None and self.verdict in (Verdict.PASSED, Verdict.INCOMPLETE)
+
+
+@dataclass(frozen=True)
+class Table:
+    """All rows, and what they are measured against.
+
+    Parameters
+    ----------
+    unsmoothed : float, s
+        Time of the lines of the CL file.
+    against : str
+        What these lines are, where that is not the path of the CL file.
+    share : float
+        Part of the poses that was looked at.
+    law : str
+        By which lines are planned.
+    rows : tuple of Row
+    """
+
+    unsmoothed: float
+    against: str
+    share: float
+    law: str
+    rows: tuple[Row, ...]
+
+    @property
+    def best(self) -> int | None:
+        """Number of the fastest row that keeps the tolerance; of those that no plan can tell apart the smallest."""
+        usable = [number for number, row in enumerate(self.rows) if row.usable]
+        if not usable:
+            return None
+        least = min(self.rows[number].seconds or 0.0 for number in usable)
+        equal = (number for number in usable if (self.rows[number].seconds or 0.0) <= EQUAL * least)
+        return min(equal, key=lambda number: self.rows[number].bytes)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        rows = [asdict(row) | {"best": number == self.best} for number, row in enumerate(self.rows)]
+        return {
+            "schema": "cornersmooth-compare/1",
+            "unsmoothed_seconds": self.unsmoothed,
+            "unsmoothed": self.against or "lines of the CL file",
+            "share_of_poses": self.share,
+            "law": self.law,
+            "rows": rows,
+        }
+
+
+def candidates(control: Control, settings: Settings, machine: Machine | None) -> list[Candidate]:
+    """Forms, methods and line densities that a control can run, with tool vectors and with words of the machine."""
+    found: list[Candidate] = []
+    for name in control.forms:
+        for words in dict.fromkeys((None, machine)):
+            try:
+                form = choose_form(control, name, machine=words)
+            except SettingsError:
+                continue
+            rotary = ("--machine", words.name) if words is not None and form.rotary else ()
+            if words is not None and not rotary:
+                continue
+            for method in (DEFAULT_METHOD, CURVES_METHOD):
+                for density in _densities(form):
+                    chosen = settings.but(method=method, **density)
+                    options = ("-f", name, *rotary, "--method", method, *_density_options(density))
+                    found.append(Candidate(form, chosen, options))
+    return found
+
+
+def _densities(form: Form) -> Iterator[dict[str, Any]]:
+    if form.curves:
+        yield {}
+        return
+    yield {"lines": "dense"}
+    if form.table.lines.block_time:
+        yield {"lines": "dense", "block_time": _BY_CHORD}
+    if form.long_lines:
+        yield {"lines": "long"}
+
+
+def _density_options(density: dict[str, Any]) -> tuple[str, ...]:
+    lines = ("--lines", density["lines"]) if density else ()
+    return (*lines, "--block-time", f"{density['block_time']:g}s") if "block_time" in density else lines
+
+
+def compare_programs(
+    program: Program,
+    tried: list[Candidate],
+    axes: Machine | None = None,
+    blocks: BlockLimits | None = None,
+    *,
+    processes: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Table:
+    """Write, measure and plan every candidate.
+
+    Parameters
+    ----------
+    program : Program
+        With a feed for every move.
+    tried : list of Candidate
+        At least one.
+    axes : Machine, optional
+        Whose limits, in place of those of the machines of the forms.
+    blocks : BlockLimits, optional
+    processes : int, optional
+        As many as are useful by default; the rows do not depend on it.
+    progress : callable, optional
+        Called with (rows done, rows in all).
+
+    Raises
+    ------
+    SettingsError
+        CS265: no axis of the machine has limits.
+    CornersmoothError
+        The unsmoothed lines cannot be planned.
+    """
+    part = without_holes(_middle(program))
+    first = next((one for one in tried if Timing.of(one.form, one.settings, axes=axes) is not None), None)
+    timing = None if first is None else Timing.of(first.form, first.settings, axes=axes, blocks=blocks)
+    if timing is None:
+        raise SettingsError("CS265", "no limits of axes are known", "name a machine that has [dynamics] with --limits")
+    unsmoothed, against = timing.unsmoothed(part)
+    count = (useful_processes() if processes is None else processes) if can_fork() else 1
+
+    def work(candidate: Candidate) -> Row:
+        return _row(part, candidate, unsmoothed, axes, blocks)
+
+    rows: list[Row] = []
+    for row in map_in_processes(work, tried, count):
+        rows.append(row)
+        if progress is not None:
+            progress(len(rows), len(tried))
+    return Table(unsmoothed, against, len(part) / max(len(program), 1), law_of_lines(timing), tuple(rows))
+
+
+def law_of_lines(timing: Timing) -> str:
+    """State the law by which a control is taken to run lines, in one sentence or two."""
+    if timing.form.table.lines.planner:
+        return f"planner {timing.form.table.lines.planner}: see docs/feedrate.md"
+    blocks = timing.blocks
+    known = "all blocks" if blocks.look_ahead is None else f"{blocks.look_ahead} blocks"
+    return (
+        f"where lines meet, no axis of {timing.machine.name} changes its speed by more than its acceleration allows in "
+        f"{1000.0 * timing.limits.period:g} ms; block time {1000.0 * blocks.block_time:g} ms; look-ahead {known}"
+    )
+
+
+def _middle(program: Program) -> Program:
+    """Whole runs from the middle of a long program, from rapid to rapid as far as these are near enough."""
+    if len(program) <= MOST_POSES:
+        return program
+    rapids = np.flatnonzero(program.kind == Move.RAPID)
+    wanted = (len(program) - MOST_POSES) // 2
+    before = rapids[(rapids <= wanted) & (rapids > wanted - MOST_POSES)]
+    first = int(before[-1]) if len(before) else wanted
+    ends = rapids[(rapids > first) & (rapids <= first + MOST_POSES)]
+    return some_poses(program, first, int(ends[-1]) if len(ends) else first + MOST_POSES)
+
+
+def _row(
+    program: Program, candidate: Candidate, unsmoothed: float, axes: Machine | None, blocks: BlockLimits | None
+) -> Row:
+    form, settings = candidate.form, candidate.settings
+    density = "" if form.curves else "long" if settings.lines == "long" else "fine"
+    row = Row(
+        form=form.name,
+        words=f"rotary words of {form.machine.name}" if form.rotary and form.machine is not None else "vectors",
+        method=settings.method,
+        lines="chord" if settings.block_time == _BY_CHORD else density,
+        options=candidate.options,
+        verdict="",
+    )
+    try:
+        stream = io.BytesIO()
+        result = postprocess(program, stream, settings, form=form, processes=1)
+        fitted = nc.fit_settings(settings, form, program.units)
+        timing = Timing.of(form, fitted, axes=axes, blocks=blocks)
+        found = result.verification
+        if timing is None or found is None:
+            return replace(row, verdict="no limits of axes are known")
+        seconds, limits = timing.written(stream.getvalue(), program)
+    except CornersmoothError as failure:
+        return replace(row, verdict=getattr(failure, "what", str(failure)))
+    return replace(
+        row,
+        verdict=str(result.verdict),
+        blocks=result.written.blocks,
+        bytes=len(stream.getvalue()),
+        seconds=seconds,
+        saved=unsmoothed - seconds,
+        tip=found.max_tip_deviation_mm,
+        axis_point=None if settings.axis_tolerance is not None else found.max_axis_point_deviation_mm,
+        limits=limits,
+    )
+
+
+def limits_machine(limits: Machine | None, machine: Machine | None) -> Machine | None:
+    """Give the machine whose limits count: those that are named, else those of the machine of the words."""
+    return with_dynamics(limits if limits is not None else machine)

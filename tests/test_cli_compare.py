@@ -1,0 +1,86 @@
+"""``cornersmooth compare``: every program of a control, as written, and the command of the best."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from oracle.command import run
+
+#: a winding cut of a tool that turns, from a rapid
+CUT = "".join(
+    f"GOTO/{2.0 * k},{(k % 2) * 1.5},{0.1 * k},0.0,{0.02 * (k % 3):.6f},{(1.0 - (0.02 * (k % 3)) ** 2) ** 0.5:.9f}\n"
+    for k in range(12)
+)
+PART = f"TOOL PATH/PART,TOOL,T\nFEDRAT/MMPM,1500.0\nRAPID\nGOTO/0.0,0.0,20.0,0.0,0.0,1.0\n{CUT}END-OF-PATH\n"
+
+
+@pytest.fixture
+def part(tmp_path: Path) -> Path:
+    path = tmp_path / "part.cls"
+    path.write_text(PART)
+    return path
+
+
+def test_every_row_is_a_program_and_the_best_is_marked_with_its_command(part: Path, tmp_path: Path) -> None:
+    table = tmp_path / "rows.csv"
+    given = ("compare", part, "-e", "0.02", "--control", "siemens", "--limits", "table-ac")
+    done = run(*given, "--json", "--csv", table)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    rows = found["rows"]
+    # g1: vectors and rotary words, two methods, three densities; bspline: both words and methods; poly: vectors
+    assert len(rows) == 2 * 2 * 3 + 2 * 2 + 2
+    assert {row["verdict"] for row in rows} == {"PASSED"}
+    assert all(row["tip"] <= 0.02 and row["axis_point"] <= 0.02 for row in rows)
+    assert all(row["seconds"] + row["saved"] == pytest.approx(found["unsmoothed_seconds"]) for row in rows)
+    (best,) = (row for row in rows if row["best"])
+    least = min(row["seconds"] for row in rows)
+    equal = [row for row in rows if row["seconds"] <= 1.03 * least]
+    assert best["bytes"] == min(row["bytes"] for row in equal)
+    assert [row["best"] for row in csv.DictReader(table.read_text().splitlines())] == [str(row["best"]) for row in rows]
+
+    name, *words = shlex.split(best["command"])
+    assert name == "cornersmooth"
+    target = tmp_path / words[-1]
+    said = run(*words[:-1], target, "--limits", "table-ac")
+    assert said.returncode == 0, said.stderr
+    assert target.suffix == ".mpf"
+    verdict = said.stderr.decode().splitlines()[0]
+    assert f"saves {best['saved']:.1f} s of {found['unsmoothed_seconds']:.1f} s" in verdict
+    blocks = re.search(r"blocks\s+\d+ in, ([\d,]+) out", said.stderr.decode())
+    assert blocks
+    assert int(blocks[1].replace(",", "")) == best["blocks"]
+
+
+def test_linuxcnc_by_its_own_law(part: Path) -> None:
+    done = run("compare", part, "--control", "linuxcnc", "--machine", "xyzac-trt", "-v")
+    assert done.returncode == 0, done.stderr
+    said = done.stdout.decode()
+    assert "law of lines: planner linuxcnc-2.9" in said
+    assert "unsmoothed lines under G64 P0.01" in said
+    (marked,) = (line for line in said.splitlines() if line.startswith("* cornersmooth "))
+    assert "--lines long" in marked
+    assert "--machine xyzac-trt" in marked
+
+
+def test_a_share_of_a_long_part_is_stated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cornersmooth.comparing.MOST_POSES", 20)
+    part = tmp_path / "long.cls"
+    runs = "".join(f"RAPID\nGOTO/0.0,0.0,{20 + k}.0,0.0,0.0,1.0\n{CUT}" for k in range(5))
+    part.write_text(PART.replace(CUT, runs))
+    done = run("compare", part, "--control", "fanuc", "--limits", "table-ac", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["share_of_poses"] == pytest.approx(13 / 66)  # a rapid and its cut
+    assert "from 20 % of the poses" in run("compare", part, "--limits", "table-ac").stdout.decode()
+
+
+def test_limits_of_axes_are_asked_for(part: Path) -> None:
+    done = run("compare", part)
+    assert done.returncode == 2
+    assert b"--limits" in done.stderr
