@@ -21,6 +21,9 @@ from cornersmooth.pipeline import Progress, read_back
 from cornersmooth.report.verdict import Saving
 from cornersmooth.settings import BOUNDS, Settings
 
+#: name of the law of LinuxCNC's planner in the tables of controls
+LINUXCNC = "linuxcnc-2.9"
+
 #: of the digits of a program, mm and radians: a pose of it is the same as one of the CL file
 _SAME = 1e-3
 
@@ -134,7 +137,7 @@ class Timing:
 
 
 def _linuxcnc(form: Form) -> bool:
-    return form.table.lines.planner == "linuxcnc-2.9"
+    return form.table.lines.planner == LINUXCNC
 
 
 def planned_saving(

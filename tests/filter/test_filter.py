@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import cornersmooth as cs
 from cornersmooth.filter import Filtered, filter_program, verify_programs
 from cornersmooth.filter.vocabulary import VOCABULARIES
 from cornersmooth.verdict import Verdict
-from filter.programs import ISO, PROGRAMS, WORDS, cuts
+from filter.programs import ISO, PROGRAMS, WORDS, N, X, Y, Z, cuts
 from oracle.command import BAD_INPUT, DONE, run
 
 EPS = 0.02
@@ -286,3 +287,23 @@ def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
         found = verify_programs(old, b"".join(wrong), form, settings).wrong
         assert found
         assert line is None or any(one.line == line for one in found), (line, found)
+
+
+def test_says_the_time_of_what_has_changed(tmp_path: Path) -> None:
+    control, machine, text = PROGRAMS["fanuc words"]
+    form, settings, axes = form_of(control, machine), cs.Settings(tolerance=EPS), cs.load_machine(machine)
+    # so slow that no axis has to brake: the length over the feed, of all but the first cut, to which it is a rapid
+    length = np.linalg.norm(np.diff(np.column_stack((X, Y, Z)), axis=0), axis=1).sum()
+    slow = filter_program(text.replace("F1000.", "F6.").encode(), form, settings, axes=axes)
+    assert slow.seconds is not None
+    first = 19.0 if "Z20." in text else 0.0  # from Z20 down to the first place
+    assert slow.seconds[0] == pytest.approx((length + first) / 0.1, rel=1e-3)
+    # each corner is cut by less than ε
+    assert slow.seconds[0] - 2 * N * EPS / 0.1 < slow.seconds[1] < slow.seconds[0]
+    fast = filter_program(text.encode(), form, settings, axes=axes)
+    assert fast.seconds is not None
+    assert fast.seconds[1] < fast.seconds[0]
+    (tmp_path / "part.nc").write_text(text)
+    on = ("--control", control, "--machine", machine, "--limits", machine, "-e", EPS)
+    told = run("filter", "part.nc", *on, "-o", "new.nc", cwd=tmp_path).stderr.decode()
+    assert f"planned time {fast.seconds[0]:.1f} s, {fast.seconds[1]:.1f} s after (" in told

@@ -10,7 +10,7 @@ import click
 
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
 from cornersmooth.cli.inputs import Input, find_inputs, named_input
-from cornersmooth.cli.options import nc_text, outputs, smoothing
+from cornersmooth.cli.options import motion, nc_text, outputs, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import console, more, print_line, printable, say_line
@@ -59,6 +59,7 @@ units = click.option("--units", type=click.Choice(["mm", "inch"]), help="Units o
 @outputs.glob
 @smoothing.method
 @smoothing.line_options
+@motion.limits
 @nc_text.no_verify
 @nc_text.strict
 @outputs.force
@@ -151,6 +152,7 @@ def _filter(source: str, target: str, form: Form, settings: Any, given: dict[str
         tip_from_start=given["tip_control"],
         inch=given["units"] == "inch",
         verify=not given["no_verify"],
+        axes=nc_text.machine_of(given, "limits"),
         processes=useful_processes(),
     )
     bad = found.verdict is Verdict.FAILED or (given["strict"] and found.verdict is not Verdict.PASSED)
@@ -217,6 +219,11 @@ def _show(name: str, found: Filtered, tolerance: float, verbose: int, given_unit
     print_line(f"{name}: {found.lines} lines, {found.new_lines} after; all outside of runs is the same byte for byte")
     if found.checked is not None:
         _show_wrong(name, found.checked.wrong)
+    if found.seconds is not None:
+        before, after = found.seconds
+        print_line(
+            f"{name}: planned time {before:.1f} s, {after:.1f} s after ({100.0 * (after / before - 1.0):+.1f} %)"
+        )
     if not found.units_said and given_units is None:
         print_line(f"{name}: warning: the program does not say its units: millimetres are taken; --units says others")
     left = found.left if verbose else found.left[:_SHOWN]

@@ -81,13 +81,13 @@ def command(source: str, **given: Any) -> int:
       cornersmooth setup part.cls --limits table-ac --tilt 0 --json
     """
     from cornersmooth.cl import read
-    from cornersmooth.kinematics import load_machine
     from cornersmooth.nc import choose_form
     from cornersmooth.processes import useful_processes
     from cornersmooth.report.timelaw import comparison_json
     from cornersmooth.setup import find_setups
 
-    form = choose_form(nc_text.control_of(given), given["form"], machine=load_machine(given["limits"]))
+    machine = nc_text.machine_of(given, "limits")
+    form = choose_form(nc_text.control_of(given), given["form"], machine=machine)
     data, name = read_input(source, size_limit=not given["no_size_limit"])
     with progress_bar(given["quiet"]) as progress:
         found = find_setups(
@@ -104,7 +104,7 @@ def command(source: str, **given: Any) -> int:
     if given["as_json"]:
         click.echo(comparison_json(found.as_dict()), nl=False)
     elif not given["quiet"]:
-        for line in _lines(found, given["limits"]):
+        for line in _lines(found, "the machine" if machine is None else machine.name):
             say_line(line)
     return 0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -128,11 +128,9 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
         text = _left_otherwise(place.run, new.at[place.stop])
         if text:
             wrong.append(Wrong(place.stop, text))
-    share = _share(old, new, where)
-    for key in sorted(set(share)):
-        own = [place for place, other in zip(where, share, strict=True) if other == key]
+    for own in _shared(old, new, where):
         try:
-            found, others = _measure(job, old, new, own)
+            found, others = _measure(job, *_motions(job, old, new, own))
         except CornersmoothError as error:
             wrong.append(Wrong(own[0].first + 1, error.what))
             continue
@@ -143,25 +141,35 @@ def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Check
     return Checked(tuple(sorted(wrong, key=lambda one: one.line)), *largest)
 
 
-def _share(old: Reading, new: Reading, where: Sequence[Place]) -> list[tuple[int, float]]:
+def _shared(old: Reading, new: Reading, where: Sequence[Place]) -> list[list[Place]]:
     """Share out places by the bytes that they have, so that memory is bounded, and by their units."""
     size = [
         new.start[place.stop] - new.start[place.first] + old.start[place.run.stop] - old.start[place.run.first]
         for place in where
     ]
-    return [(int(end) // CHUNK, place.run.state.unit) for end, place in zip(np.cumsum(size), where, strict=True)]
+    found: dict[tuple[int, float], list[Place]] = {}
+    for end, place in zip(np.cumsum(size), where, strict=True):
+        found.setdefault((int(end) // CHUNK, place.run.state.unit), []).append(place)
+    return list(found.values())
 
 
-def _measure(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[Verification, list[Wrong]]:
+def motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Iterator[tuple[NcProgram, NcProgram]]:
+    """Give the motion of runs before and after, some of them at a time."""
+    return (_motions(job, old, new, own) for own in _shared(old, new, where))
+
+
+def _motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tuple[NcProgram, NcProgram]:
+    """Motion of runs with the same units, before and after."""
+    after = [Stretch(place.run, _absolute(new.lines(place.first, place.stop)), place.first + 1) for place in where]
+    return (
+        motion([job.stretch(old, place.run) for place in where], job.own, job.spelling, job.settings),
+        motion(after, job.form, job.spelling, job.settings),
+    )
+
+
+def _measure(job: Job, before: NcProgram, after: NcProgram) -> tuple[Verification, list[Wrong]]:
     """Measure runs with the same units, and decide whether both motions can be run beside each other."""
     settings = job.settings
-    before = motion([job.stretch(old, place.run) for place in where], job.own, job.spelling, settings)
-    after = motion(
-        [Stretch(place.run, _absolute(new.lines(place.first, place.stop)), place.first + 1) for place in where],
-        job.form,
-        job.spelling,
-        settings,
-    )
     found = verify(
         program_of(before),
         after,

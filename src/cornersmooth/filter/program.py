@@ -11,7 +11,9 @@ from cornersmooth.errors import SettingsError
 from cornersmooth.filter.checking import Checked, Place, check, places
 from cornersmooth.filter.runs import ProgramReader, Reading
 from cornersmooth.filter.spelling import SAMPLE, Spelling
+from cornersmooth.filter.times import planned_times
 from cornersmooth.filter.writing import Job, smoothed
+from cornersmooth.kinematics import Machine
 from cornersmooth.memory import return_free_memory
 from cornersmooth.nc import choose_form, fit_settings
 from cornersmooth.nc.form import Form
@@ -57,6 +59,8 @@ class Filtered:
         None where it was not asked for.
     units_said : bool
         Whether the program says its units.
+    seconds : (float, float) or None
+        Planned time before and after; see `planned_times`.
     """
 
     data: bytes
@@ -68,6 +72,7 @@ class Filtered:
     left: tuple[Left, ...]
     checked: Checked | None
     units_said: bool = True
+    seconds: tuple[float, float] | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -85,6 +90,7 @@ def filter_program(
     tip_from_start: bool = False,
     inch: bool = False,
     verify: bool = True,
+    axes: Machine | None = None,
     processes: int = 1,
 ) -> Filtered:
     """Smooth the cutting runs of a finished NC program.
@@ -103,12 +109,16 @@ def filter_program(
         Whether the program is in inches where it does not say so itself.
     verify : bool
         Whether both programs are read and compared. Runs that do not pass stay as they are.
+    axes : Machine, optional
+        Say the time under the limits of the axes of this machine.
     processes : int
 
     Raises
     ------
     SettingsError
-        The form cannot hold what the settings ask for.
+        The form cannot hold what the settings ask for, or `axes` does not say how fast its axes may go.
+    InputError
+        `axes` does not reach a pose, or CS264: on LinuxCNC a program with arcs has no time.
     """
     settings = Settings() if settings is None else settings
     job, old = _read(data, form, settings, tip_from_start=tip_from_start, inch=inch, processes=processes)
@@ -121,13 +131,12 @@ def filter_program(
     while True:
         new, where = _spliced(old, texts)
         texts.clear()  # as long as the new program
-        if not verify or not where:
-            return _result(old, new, where, why, Checked(()) if verify else None)
         after = job.reader.read(new, [place.stop for place in where])
-        checked = check(job, old, after, where)
+        checked = check(job, old, after, where) if verify else Checked(())
         bad = {p.run.first: one.text for p in where for one in checked.wrong if p.first < one.line <= p.stop}
         if not bad:
-            return _result(old, new, where, why, checked)
+            seconds = planned_times(job, old, after, where, axes) if axes is not None and where else None
+            return _result(old, after, where, why, checked if verify else None, seconds)
         texts = {p.run.first: after.lines(p.first, p.stop) for p in where if p.run.first not in bad}
         why |= {first: f"verification found: {text}" for first, text in bad.items()}
 
@@ -214,18 +223,26 @@ def _spliced(old: Reading, texts: dict[int, bytes]) -> tuple[bytes, list[Place]]
     return b"".join(parts), where
 
 
-def _result(old: Reading, new: bytes, where: list[Place], why: dict[int, str], checked: Checked | None) -> Filtered:
+def _result(
+    old: Reading,
+    new: Reading,
+    where: list[Place],
+    why: dict[int, str],
+    checked: Checked | None,
+    seconds: tuple[float, float] | None,
+) -> Filtered:
     for run in old.runs:
         if run.first in why:
             old.why[run.first : run.stop] = old.number(why[run.first])
     return Filtered(
-        data=new,
+        data=new.data,
         lines=len(old.why),
-        new_lines=new.count(b"\n") + (not new.endswith(b"\n")),
+        new_lines=len(new.why),
         cuts=old.cuts,
         smoothed=sum(len(place.run) for place in where),
         runs=len(where),
         left=tuple(Left(*one) for one in old.left()),
         checked=checked,
         units_said=_UNITS.search(old.data) is not None,
+        seconds=seconds,
     )
