@@ -29,10 +29,10 @@ FILES = ("hecc_point_zigzag.csv", "hust_5x_impeller_yelun.cls")
 #: control, form, digits and other settings of the texts
 TEXTS: tuple[tuple[str, str, str, dict[str, str]], ...] = (
     ("fanuc", "g1", "", {}),
-    ("siemens", "bspline", "", {}),
-    ("fanuc", "g6.2", "IS-D", {}),
-    ("fanuc", "g6.2", "", {}),
-    ("fanuc", "g6.2", "IS-B", {}),
+    ("siemens", "bspline", "", {"method": "proportional"}),
+    ("fanuc", "g6.2", "IS-D", {"method": "proportional"}),
+    ("fanuc", "g6.2", "", {"method": "proportional"}),
+    ("fanuc", "g6.2", "IS-B", {"method": "proportional"}),
     ("fanuc", "g6.2", "IS-B", {"method": "global"}),
     ("fanuc", "g1", "IS-B", {}),
 )

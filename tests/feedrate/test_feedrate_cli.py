@@ -33,7 +33,12 @@ def test_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     part.write_bytes(beginning(IMPELLER, 205))
     assert run(["time", str(part), "-e", "0.02"]) == 0
     text = capsys.readouterr().out
-    for words in ("direct, exact stop", "smoothed, proportional", "where the time goes", "at constant feed"):
+    for words in ("direct, exact stop", "as written", "at constant feed"):
+        assert words in text
+    assert "curves" not in text
+    assert run(["time", str(part), "-e", "0.02", "-v"]) == 0
+    text = capsys.readouterr().out
+    for words in ("curves, proportional", "where the time goes"):
         assert words in text
     assert run(["time", TABLE_1, *PAPER, "--quiet"]) == 0
     assert capsys.readouterr().out == ""
@@ -73,7 +78,7 @@ def test_refusals(arguments: list[str], code: int, words: str, capsys: pytest.Ca
 def test_weights_are_for_both_methods(capsys: pytest.CaptureFixture[str]) -> None:
     seconds = []
     for more in ([], ["--weights", "1,0.65"]):
-        assert run(["time", TABLE_1, *PAPER, "--json", *more]) == 0
+        assert run(["time", TABLE_1, *PAPER, "--json", "-v", *more]) == 0
         seconds.append(json.loads(capsys.readouterr().out)["seconds"])
     assert seconds[0]["zhang2016"] != seconds[1]["zhang2016"]
     assert seconds[0]["proportional"] != seconds[1]["proportional"]
@@ -84,10 +89,10 @@ def test_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from cornersmooth.kinematics import load_machine, machine_position, tool_axis
 
     path = tmp_path / "motion.csv"
-    common = ["time", TABLE_1, *PAPER, "-e", "0.15", "--json"]
+    common = ["time", TABLE_1, *PAPER, "-e", "0.15", "--json", "-v", "--law", "proportional"]
     assert run(common) == 0
     free = json.loads(capsys.readouterr().out)
-    assert run([*common, "--machine", "table-ac", "--csv", str(path)]) == 0
+    assert run([*common, "--limits", "table-ac", "--csv", str(path)]) == 0
     bound = json.loads(capsys.readouterr().out)
     assert "axis_peaks" not in free
     assert bound["machine"] == "table-ac"
@@ -106,7 +111,7 @@ def test_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     linear = np.column_stack([table[f"machine_{name}_mm"] for name in "xyz"])
     assert tool_axis(machine, angles) == pytest.approx(np.column_stack((table["i"], table["j"], table["k"])), abs=1e-9)
     assert machine_position(machine, tip, angles) == pytest.approx(linear, abs=1e-9)
-    assert run(["time", TABLE_1, *PAPER, "--machine", "table-ac"]) == 0
+    assert run(["time", TABLE_1, *PAPER, "--limits", "table-ac", "-v"]) == 0
     text = capsys.readouterr().out
     assert "reached of the limits of table-ac, %" in text
     assert "500 deg/s2" in text
@@ -142,3 +147,31 @@ def test_a_text_is_read_before_anything_is_planned(
     text.write_text("%\nO1\nG21 G90\nG1 X1 NONSENSE\nM30\n%\n")
     assert run(["time", TABLE_1, "--units", "mm", "--feed", "1800", "--text", str(text)]) == 3
     assert capsys.readouterr().err.startswith(f"{text}:4: error: ")
+
+
+def test_the_program_of_the_options_is_planned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What smooth writes with the same options takes the time that is said without it."""
+    part, nc = tmp_path / "part.cls", tmp_path / "part.mpf"
+    part.write_bytes(beginning(IMPELLER, 205))
+    options = ["--control", "siemens", "-f", "bspline", "--method", "proportional"]
+    assert run(["smooth", str(part), *options, "-o", str(nc), "-q"]) == 0
+    told = []
+    for more in ([*options, "--limits", "table-ac"], [*options, "--limits", "table-ac", "--text", str(nc)]):
+        assert run(["time", str(part), "--json", *more]) == 0
+        told.append(json.loads(capsys.readouterr().out)["seconds"])
+    assert list(told[0]) == ["direct_exact_stop", "direct_velocity_jump", "as_written"]
+    assert told[0]["as_written"] == pytest.approx(told[1]["as_written"], rel=1e-3)
+
+
+def test_linuxcnc_is_timed_by_its_own_law(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    part, nc = tmp_path / "part.cls", tmp_path / "part.ngc"
+    part.write_bytes(beginning(IMPELLER, 60))
+    options = ["--control", "linuxcnc", "--machine", "xyzac-trt"]
+    assert run(["smooth", str(part), *options, "-o", str(nc)]) == 0
+    verdict = capsys.readouterr().err.splitlines()[0]
+    assert run(["time", str(part), *options, "--json"]) == 0
+    seconds = json.loads(capsys.readouterr().out)["seconds"]
+    assert f"{abs(seconds['unsmoothed'] - seconds['as_written']):.1f} s" in verdict
+    assert run(["time", str(part), *options, "--text", str(nc), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["seconds"] == pytest.approx(seconds, rel=1e-3)
+    assert run(["time", str(part), *options, "--csv", str(tmp_path / "a.csv")]) == 2

@@ -8,7 +8,6 @@ import json
 import os
 import shlex
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -67,6 +66,7 @@ def command(source: str, **given: Any) -> int:
     from cornersmooth.cl import read
     from cornersmooth.comparing import candidates, compare_programs, limits_machine
     from cornersmooth.feedrate import BlockLimits
+    from cornersmooth.saving import with_feed
 
     check_inputs(source)
     if given["csv"]:
@@ -77,11 +77,7 @@ def command(source: str, **given: Any) -> int:
         raise click.UsageError("compare plans within limits of axes: name a machine that has [dynamics] with --limits")
     control, settings = nc_text.control_of(given), smoothing.settings_of(given)
     data, name = read_input(source, size_limit=not given["no_size_limit"])
-    program = read(data, name=name, **reading.reading_of(given))
-    if given["feed"] is not None:
-        import numpy as np
-
-        program = replace(program, feed=np.where(np.isnan(program.feed), given["feed"], program.feed))
+    program = with_feed(read(data, name=name, **reading.reading_of(given)), given["feed"])
     tried = candidates(control, settings, limits if machine is None else machine)
     blocks = BlockLimits(look_ahead=given["look_ahead"])
     with progress_bar(given["quiet"]) as progress:

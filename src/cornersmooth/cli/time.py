@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -13,17 +14,19 @@ from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothin
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import print_line, progress_bar, say_line
-from cornersmooth.methods import DEFAULT_METHOD, METHODS
+from cornersmooth.methods import METHODS
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Comparison
-    from cornersmooth.model import Program
+    from cornersmooth.model import Program, Units
+    from cornersmooth.nc import Form
+    from cornersmooth.settings import Settings
 
 _TITLES = {
     "direct_exact_stop": "direct, exact stop",
     "direct_velocity_jump": "direct, velocity jump",
-    **{name: f"smoothed, {name}" for name in METHODS},
+    **{name: f"curves, {name}" for name in METHODS},
     "as_written": "as written",
 }
 LAWS = tuple(_TITLES)
@@ -41,9 +44,12 @@ LAWS = tuple(_TITLES)
 @smoothing.axis_length
 @smoothing.axis_tolerance
 @motion.limit_options
-@motion.limits_machine
-@motion.text
 @nc_text.control
+@nc_text.form
+@nc_text.machine
+@smoothing.method
+@motion.limits
+@motion.text
 @motion.text_machine
 @motion.block_time
 @motion.look_ahead
@@ -56,25 +62,24 @@ LAWS = tuple(_TITLES)
 @surface.tool
 @outputs.force
 @outputs.quiet
+@outputs.verbose
 def command(source: str, **given: Any) -> int:
-    """Plan the motion of the CL file IN directly and smoothed, under the same limits, and compare the times.
+    """Plan the CL file IN as it is and the program that the options write, under the same limits.
 
-    The direct path is driven twice: with a stop at the end of every move, and with jumps of velocity at corners as far
-    as the acceleration allows in one period. The smoothed path is that of each method. Delays, tool changes and the
-    strokes of hole cycles are not counted. Limits are those of the tip; where it stands still while the axis turns the
-    angular ones count (some methods have such places where transitions use up a short tip segment).
+    The path of the CL file is driven twice: with a stop at the end of every move, and with jumps of velocity at corners
+    as far as the acceleration allows in one period. The program is that of smooth with the same options, or --text. -v
+    adds the ideal curves of each method, which no control runs. Delays, tool changes and the strokes of hole cycles are
+    not counted. Limits are those of the tip, and of the axes of --limits or --machine.
 
     \b
     Examples:
-      cornersmooth time part.cls -e 0.04
+      cornersmooth time part.cls -e 0.04 --limits table-ac
       cornersmooth time part.cls -e 0.04 --feed 1800 --accel 1000 --jerk 5000 --period 2ms --json
       cornersmooth time part.cls -e 0.04 --csv motion.csv
       cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
       cornersmooth time part.cls -e 0.04 --report times.html
       cornersmooth time part.cls --text part.nc --block-time 1ms --look-ahead 200
     """
-    if given["law"] == "as_written" and not given["text"]:
-        raise click.UsageError("--law as_written: name the text with --text")
     for path in given["reports"]:
         if not path.lower().endswith(".html"):
             raise click.UsageError(f"--report {path}: let the name end in .html")
@@ -84,6 +89,13 @@ def command(source: str, **given: Any) -> int:
         if path:
             check_path(path, inputs, force=given["force"])
     data, name = read_input(source, size_limit=not given["no_size_limit"])
+    control = nc_text.control_of(given)
+    if control.lines.planner:
+        if given["csv"] or given["reports"]:
+            raise click.UsageError(
+                f"--csv and --report: {control.name} plans by a law of its own, which gives times only"
+            )
+        return _by_own_law(data, name, given)
     compared = _compare(data, name, given)
     if given["reports"]:
         from cornersmooth.page import times_page
@@ -103,31 +115,78 @@ def command(source: str, **given: Any) -> int:
 
         click.echo(comparison_json(compared.as_dict()), nl=False)
     elif not given["quiet"]:
-        for line in _tables(compared):
+        for line in _tables(compared, bool(given["verbose"])):
             say_line(line)
     return 0
 
 
 def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
-    from cornersmooth.cl import read
     from cornersmooth.feedrate import BlockLimits, compare, plan_text
+    from cornersmooth.methods import METHODS
     from cornersmooth.nc_reader import read_nc
+    from cornersmooth.pipeline import read_back
+    from cornersmooth.saving import without_holes, written_text
 
-    machine = nc_text.machine_of(given)
+    machine, axes = nc_text.machine_of(given), nc_text.machine_of(given, "limits")
+    axes = machine if axes is None else axes
     limits, settings = motion.limits_of(given), smoothing.settings_of(given)
-    program = read(data, name=name, **reading.reading_of(given))
+    program = _read(data, name, given)
     if given["text"]:  # before anything that takes long
         how = nc_text.reading_back_of(given | _how_text_was_made(given))
         nc = read_nc(given["text"], **how, tolerance=settings.tolerance, axis_length=settings.axis_scale)
+    else:
+        form, fitted = _form(given, program.units)
+        nc = read_back(written_text(without_holes(program), fitted, form), form, fitted)
     if not given["quiet"]:
         _tell_feeds(program, given["feed"])
+    everything = given["verbose"] or given["reports"]
+    methods = tuple(METHODS) if everything else tuple(name for name in METHODS if name == given["law"])
     with progress_bar(given["quiet"]) as progress:
-        compared = compare(program, settings, limits, machine=machine, progress=progress)
-        if not given["text"]:
-            return compared
-        blocks = BlockLimits(given["block_time"], given["look_ahead"])
-        law = plan_text(nc, limits, name=given["text"], blocks=blocks, settings=settings, machine=machine)
+        compared = compare(program, settings, limits, methods=methods, machine=axes, progress=progress)
+        blocks = BlockLimits(given["block_time"] or 0.0, given["look_ahead"])
+        law = plan_text(nc, limits, name=given["text"] or name, blocks=blocks, settings=settings, machine=axes)
         return compared.with_text(law)
+
+
+def _read(data: bytes, name: str, given: dict[str, Any]) -> Program:
+    from cornersmooth.cl import read
+
+    return read(data, name=name, **reading.reading_of(given))
+
+
+def _form(given: dict[str, Any], units: Units) -> tuple[Form, Settings]:
+    """Form that the options ask for, and the settings that fit it."""
+    from cornersmooth.nc import choose_form, fit_settings
+
+    form = choose_form(nc_text.control_of(given), given["form"], machine=nc_text.machine_of(given))
+    return form, fit_settings(smoothing.settings_of(given), form, units)
+
+
+def _by_own_law(data: bytes, name: str, given: dict[str, Any]) -> int:
+    """Times of a control that plans lines by a law of its own."""
+    from cornersmooth.comparing import law_of_lines
+    from cornersmooth.saving import Timing, with_feed, without_holes, written_text
+
+    program = without_holes(with_feed(_read(data, name, given), given["feed"]))
+    form, settings = _form(given, program.units)
+    timing = Timing.of(form, settings, axes=nc_text.machine_of(given, "limits"))
+    if timing is None:
+        raise click.UsageError("name the machine with --machine; its table has to have [dynamics]")
+    if given["text"]:
+        with open(given["text"], "rb") as file:
+            text = file.read()
+    else:
+        text = written_text(program, settings, form)
+    before, against = timing.unsmoothed(program)
+    seconds = timing.written(text, program)[0]
+    if given["as_json"]:
+        contents = {"seconds": {"unsmoothed": before, "as_written": seconds}, "unsmoothed": against}
+        click.echo(json.dumps({"schema": "cornersmooth-time/1", **contents, "law": law_of_lines(timing)}, indent=1))
+    elif not given["quiet"]:
+        say_line(f"{before:>12.3f} s  {against}")
+        say_line(f"{seconds:>12.3f} s  as written")
+        say_line(law_of_lines(timing))
+    return 0
 
 
 def _how_text_was_made(given: dict[str, Any]) -> dict[str, Any]:
@@ -161,15 +220,14 @@ def _tell_feeds(program: Program, feed: float | None) -> None:
     print_line(f"{place}: warning: feed move without a feed in the CL file; planned with --feed {feed:g} mm/min{times}")
 
 
-def _tables(compared: Comparison) -> Iterator[str]:
-    """Times and savings, then what was reached, then the places that lose most."""
+def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
+    """Times and savings; with `verbose` what was reached, and the places that lose most."""
     from cornersmooth.feedrate import limiting
     from cornersmooth.feedrate.compare import peaks, slowest, stops, turning_seconds
     from cornersmooth.report.verdict import times_text
 
     settings, saving = compared.settings, compared.saving_percent
-    names = [name for name in compared.laws if name not in LAWS[:2]]
-    yield times_text(compared.seconds, names, limiting(compared.laws[min(names, key=compared.seconds.__getitem__)]))
+    yield times_text(compared.seconds, ["as_written"], limiting(compared.laws["as_written"]))
     own = settings.axis_tolerance
     second = f"axis point at {settings.axis_length:g} mm" if own is None else f"tool axis {own:g} deg"
     yield f"tolerance {settings.tolerance:g} mm, {second}"
@@ -183,6 +241,8 @@ def _tables(compared: Comparison) -> Iterator[str]:
             f"{law.length:>14.3f}"
         )
     yield f"{'at constant feed':<24}{compared.constant_feed_seconds:>12.3f}"
+    if not verbose:
+        return
     yield ""
     yield f"{'reached':<24}{'mm/s':>12}{'mm/s2':>12}{'across':>12}{'mm/s3':>14}"
     for name, law in compared.laws.items():
@@ -194,7 +254,7 @@ def _tables(compared: Comparison) -> Iterator[str]:
     if compared.machine is not None:
         yield ""
         yield from _axis_table(compared)
-    for name in ("direct_velocity_jump", DEFAULT_METHOD):
+    for name in ("direct_velocity_jump", "as_written"):
         yield ""
         yield f"where the time goes ({_TITLES[name]})"
         yield f"{'line':>8}{'x':>12}{'y':>12}{'z':>12}{'time s':>10}{'lost s':>10}{'least mm/s':>12}"

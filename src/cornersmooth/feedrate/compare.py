@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -149,16 +149,19 @@ def compare(
     settings: Settings | None = None,
     limits: Limits | None = None,
     *,
+    methods: Sequence[str] = tuple(METHODS),
     machine: Machine | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Plan a program directly, with stops and with jumps of velocity, and smoothed by every method.
+    """Plan a program directly, with stops and with jumps of velocity, and the ideal curves of methods.
 
     Parameters
     ----------
     program : Program
     settings : Settings, optional
     limits : Limits, optional
+    methods : sequence of str
+        Whose curves are planned.
     machine : Machine, optional
         Keep the limits of its five axes, too.
     progress : callable, optional
@@ -188,8 +191,8 @@ def compare(
             progress=step("direct_velocity_jump"),
         ),
     }
-    for name, method in METHODS.items():
-        chosen = settings.but(method=name, **method.prescribed)
+    for name in methods:
+        chosen = settings.but(method=name, **METHODS[name].prescribed)
         laws[name] = plan(smooth(program, chosen), limits, machine=machine, progress=step(name))
     return Comparison(program, settings, limits, laws, machine)
 

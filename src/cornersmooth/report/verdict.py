@@ -233,5 +233,6 @@ def times_text(seconds: Mapping[str, float], names: Sequence[str], limits: Seque
     saved = jumps - seconds[best]
     share = f" ({100.0 * abs(saved) / jumps:.0f} %)" if jumps else ""
     told = f"saves {saved:.1f} s of" if saved >= 0.0 else f"takes {-saved:.1f} s more than"
+    best = best.replace("_", " ")
     text = f"{best} {told} the {jumps:.1f} s of the direct path{share}, which takes {stops:.1f} s with stops at corners"
     return text + limits_text(limits)

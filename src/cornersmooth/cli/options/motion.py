@@ -9,7 +9,7 @@ import click
 
 from cornersmooth.cli import completing
 from cornersmooth.cli.options.parameters import PATH, Duration, all_of
-from cornersmooth.methods import DEFAULT_METHOD, METHODS
+from cornersmooth.methods import METHODS
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
@@ -117,14 +117,6 @@ def planned_limits_of(given: dict[str, Any]) -> Limits | None:
     return None
 
 
-limits_machine = click.option(
-    "--machine",
-    type=str,
-    metavar="NAME|FILE",
-    shell_complete=completing.machines,
-    help="Keep the limits of this machine's five axes, too: a name that 'cornersmooth machines' lists (its numbers are "
-    "examples), or a TOML file with [dynamics.X] and so on.",
-)
 limits = click.option(
     "--limits",
     type=str,
@@ -138,7 +130,7 @@ text = click.option(
     "--text",
     type=PATH,
     metavar="NC",
-    help="Plan this NC text, too, as its control would run it: its lines, digits and feeds.",
+    help="Plan this NC text in place of the program that these options write: its lines, digits and feeds.",
 )
 text_machine = click.option(
     "--text-machine",
@@ -148,20 +140,23 @@ text_machine = click.option(
     help="Machine whose rotary words --text has. [default: that of its head, else --machine]",
 )
 block_time = click.option(
-    "--block-time", type=Duration(), default=0.0, help="Shortest time that the control takes for one block of --text."
+    "--block-time",
+    type=Duration(),
+    help="Shortest time that the control takes for one block, of lines to write and in the plan. [default: that of the "
+    "control's table for lines, none in the plan]",
 )
 look_ahead = click.option(
     "--look-ahead",
     type=click.IntRange(min=1),
     metavar="BLOCKS",
-    help="Blocks within which the control must be able to stop. [default: all of --text]",
+    help="Blocks within which the control must be able to stop. [default: all]",
 )
 law = click.option(
     "--law",
     type=click.Choice(["direct_exact_stop", "direct_velocity_jump", *METHODS, "as_written"]),
-    default=DEFAULT_METHOD,
+    default="as_written",
     show_default=True,
-    help="Motion that --csv writes.",
+    help="Motion that --csv writes: of a method the ideal curves.",
 )
 rows_csv = click.option("--csv", type=PATH, help="Write the rows.")
 motion_csv = click.option("--csv", type=PATH, help="Write the motion, a row every period.")
