@@ -70,6 +70,14 @@ def test_heads_may_be_helped_by_a_turn_and_no_tilt_is_beyond_what_is_asked_for()
     assert all((one.setup.tilt_x, one.setup.tilt_y) == (0.0, 0.0) and one.setup.turn for one in found.best)
 
 
+@pytest.mark.parametrize(("tilt", "tried"), [(0.0, 1), (10.0, 15)])
+def test_small_tilts_are_tried_too(tilt: float, tried: int) -> None:
+    found = find_setups(cone(3.0), form_for(load_machine("table-ac")), tilt=tilt, plans=2)
+    assert found.tried >= tried
+    assert len(found.best) == (2 if tilt else 0)
+    assert all(0.0 < max(abs(one.setup.tilt_x), abs(one.setup.tilt_y)) <= tilt for one in found.best)
+
+
 def test_setups_beyond_the_travel_are_left_out() -> None:
     """C turns the part by half today, to X-50. Leaning to Y it stays at X50, leaning to X it is turned to Y."""
     table = 'like = "table-ac"\n[travel]\nX = [{0}, {1}]\n'

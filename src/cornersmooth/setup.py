@@ -125,7 +125,7 @@ class Setups:
 
     def saving(self, rating: Rating) -> float:
         """Time saved against today's setup, %; NaN where one of them has none."""
-        return 100.0 * (1.0 - rating.seconds / self.today.seconds)
+        return 100.0 * (1.0 - rating.seconds / self.today.seconds) if self.today.seconds else 0.0
 
     def zero(self, setup: Setup) -> Floats:
         """(3,) where the zero of the part goes to, counted from where it is, mm."""
@@ -248,7 +248,7 @@ def find_setups(
     for setups in _rounds(rated, tilt, turns):
         new = [setup for setup in dict.fromkeys(setups) if setup not in rated]
         rated |= {one.setup: one for one in map_in_processes(estimate, new, processes)}
-    chosen = [rated[Setup()], *_chosen(rated.values(), plans)]
+    chosen = [rated[Setup()], *_chosen(rated.values(), plans, tilt)]
     planned = []
     for rating in map_in_processes(plan, chosen, min(processes, len(chosen))):
         planned.append(rating)
@@ -264,14 +264,15 @@ def find_setups(
 
 def _rounds(rated: dict[Setup, Rating], tilt: float, turns: bool) -> Iterable[list[Setup]]:
     """Setups to estimate: far apart, then around the best of what has been rated, twice."""
-    steps = COARSE * np.arange(-(tilt // COARSE), tilt // COARSE + 1)
+    step = min(COARSE, tilt) or COARSE
+    steps = step * np.arange(-int(tilt / step), int(tilt / step) + 1)
     about_z = COARSE * np.arange(0, 24, 3) if turns else np.zeros(1)
     yield [Setup(*map(float, one)) for one in itertools.product(about_z, steps, steps)]
     near = np.array((-FINE, 0.0, FINE))
     for _ in range(2):
         yield [
             Setup(*map(float, ((c % 360.0), a, b)))
-            for one in _chosen(rated.values(), _STARTS)
+            for one in _chosen(rated.values(), _STARTS, tilt)
             for c in (one.setup.turn + near if turns else np.zeros(1))
             for a in one.setup.tilt_x + near
             for b in one.setup.tilt_y + near
@@ -279,13 +280,13 @@ def _rounds(rated: dict[Setup, Rating], tilt: float, turns: bool) -> Iterable[li
         ]
 
 
-def _chosen(ratings: Iterable[Rating], count: int) -> list[Rating]:
+def _chosen(ratings: Iterable[Rating], count: int, tilt: float) -> list[Rating]:
     """Take the best that are within reach and apart from one another, and not today's."""
-    found = [Rating(Setup(), 0.0)]
+    found, apart = [Rating(Setup(), 0.0)], min(_APART, tilt) or _APART
     for one in sorted(ratings, key=lambda one: one.rank):
         if len(found) > count or math.isinf(one.estimate):
             break
-        if all(one.setup.angle_to(other.setup) >= _APART - 1e-6 for other in found):
+        if all(one.setup.angle_to(other.setup) >= apart - 1e-6 for other in found):
             found.append(one)
     return found[1:]
 

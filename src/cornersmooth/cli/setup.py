@@ -78,7 +78,7 @@ def command(source: str, **given: Any) -> int:
     Examples:
       cornersmooth setup part.cls --limits mill.toml
       cornersmooth setup part.cls --limits mill.toml --control siemens -f bspline -e 0.01 --tilt 30
-      cornersmooth setup part.cls --limits table-ac --tilt 0 --json
+      cornersmooth setup part.cls --limits table-ac --tilt 20 --json
     """
     from cornersmooth.cl import read
     from cornersmooth.nc import choose_form
@@ -112,7 +112,9 @@ def command(source: str, **given: Any) -> int:
 def _lines(found: Setups, machine: str) -> Iterator[str]:
     """Setups as a table, then what their numbers mean."""
     today = found.today
-    if not found.best:
+    if found.tried == 1:
+        yield "no other setup was tried: the table turns the part about Z by itself, and --tilt allows no tilt"
+    elif not found.best:
         yield f"no other setup is within reach of {machine}, of {found.tried} that were tried"
     elif today.why:
         yield f"fastest setup of {found.tried}: {found.best[0].seconds:.3f} s; today's is out of reach: {today.why}"
