@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
-from cornersmooth.cli.inputs import Input, find_inputs, named_input
+from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
 from cornersmooth.cli.options import motion, nc_text, outputs, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
@@ -81,7 +81,7 @@ def command(inputs: tuple[str, ...], **given: Any) -> int:
       cat part.nc | cornersmooth filter - > smooth.nc
     """
     folder, output = given["directory"], given["output"]
-    _check_usage(inputs, given)
+    check_together(inputs, given)
     form, settings = form_of(given), smoothing.settings_of(given)
     files = find_inputs(inputs, given["glob"] or PATTERNS) if folder else [named_input(inputs[0])]
     targets = [_target(one, folder) if folder else output or STANDARD for one in files]
@@ -120,17 +120,6 @@ def form_of(given: dict[str, Any]) -> Form:
         known = ", ".join(sorted(VOCABULARIES))
         raise SettingsError("CS240", f"programs for {control.name} are not read as a filter", f"use one of {known}")
     return choose_form(control, given.get("form"), machine=nc_text.machine_of(given), tcp=not given["no_tcp"])
-
-
-def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:
-    if given["directory"] and given["output"]:
-        raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
-    if given["glob"] and not given["directory"]:
-        raise click.UsageError("--glob is for folders, which need -d FOLDER")
-    if len(inputs) > 1 and (not given["directory"] or STANDARD in inputs):
-        raise click.UsageError("several inputs need -d FOLDER, and standard input goes with no other input")
-    if given["no_verify"] and given["strict"]:
-        raise click.UsageError("--no-verify and --strict exclude each other")
 
 
 def _target(one: Input, folder: str) -> str:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatch
+from typing import Any
+
+import click
 
 from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.show import print_line
@@ -28,6 +32,23 @@ class Input:
 
     path: str
     stem: str
+
+
+def check_together(inputs: tuple[str, ...], given: Mapping[str, Any]) -> None:
+    """Refuse options that do not go together, or not with so many inputs."""
+    folder = given["directory"]
+    if given["quiet"] and given["verbose"]:
+        raise click.UsageError("-q and -v exclude each other")
+    if given["no_verify"] and given["strict"]:
+        raise click.UsageError("--no-verify and --strict exclude each other")
+    if folder and given["output"]:
+        raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
+    if given["glob"] and not folder:
+        raise click.UsageError("--glob is for folders, which need -d FOLDER")
+    if len(inputs) > 1 and not folder:
+        raise click.UsageError("several inputs need -d FOLDER; -o goes with a single input")
+    if len(inputs) > 1 and STANDARD in inputs:
+        raise click.UsageError("standard input goes with no other input")
 
 
 def find_inputs(named: tuple[str, ...], patterns: tuple[str, ...]) -> list[Input]:

@@ -11,7 +11,7 @@ import click
 
 from cornersmooth.cli.batch import Batch
 from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_lines
-from cornersmooth.cli.inputs import Input, find_inputs, named_input
+from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
 from cornersmooth.cli.job import Job, Outcome, check, run_job
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
@@ -177,20 +177,9 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
 def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:
     """Refuse options that do not go together, or not with so many inputs."""
     folder = given["directory"]
-    if given["quiet"] and given["verbose"]:
-        raise click.UsageError("-q and -v exclude each other")
-    if given["no_verify"] and given["strict"]:
-        raise click.UsageError("--no-verify and --strict exclude each other")
-    if folder and given["output"]:
-        raise click.UsageError("-o and -d exclude each other; -d is for several inputs")
-    if given["glob"] and not folder:
-        raise click.UsageError("--glob is for folders, which need -d FOLDER")
+    check_together(inputs, given)
     if given["summary"] and not folder:
         raise click.UsageError("--summary is for batches, which need -d FOLDER; --report tells of a single file")
-    if len(inputs) > 1 and not folder:
-        raise click.UsageError("several inputs need -d FOLDER; -o goes with a single input")
-    if len(inputs) > 1 and STANDARD in inputs:
-        raise click.UsageError("standard input goes with no other input")
     if given["scheduler"] and (not folder or given["jobs"] != 1):
         raise click.UsageError("--scheduler is for batches, which need -d FOLDER and take no -j")
     if given["feed"] is not None and not 0.0 < given["feed"] < 1e6:
