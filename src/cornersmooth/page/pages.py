@@ -17,6 +17,7 @@ from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.page.document import document
 from cornersmooth.page.scene import Story, Subject, scene
+from cornersmooth.report.surface import passes_text
 from cornersmooth.report.verdict import Saving, first_line, judge, saving_text, times_text, trusted_blocks
 from cornersmooth.saving import planned_saving
 from cornersmooth.settings import Settings
@@ -201,7 +202,8 @@ def surface_text(surface: SurfaceMap) -> str:
     over, under = told["overcut"]["max_mm"], told["undercut"]["max_mm"]
     within = told["within_tolerance_percent"]
     share = "" if within is None else f"; {within:.4g} % of {told['points']:,} points within {surface.tolerance:g} mm"
-    return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}"
+    rows = "" if surface.passes is None else f"; passes: {passes_text(surface.passes)}"
+    return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}{rows}"
 
 
 def _saving(seconds: Mapping[str, float], program: Program) -> Saving | None:

@@ -12,7 +12,7 @@ import numpy as np
 from cornersmooth.errors import SettingsError
 from cornersmooth.optional_packages import install_hint
 from cornersmooth.report.thinning import thinned
-from cornersmooth.surface import SurfaceMap
+from cornersmooth.surface import PassDifference, SurfaceMap
 
 CSV_COLUMNS = ("cl_line", "station", "level", "side", "x", "y", "z", "nx", "ny", "nz", "off_mm")
 
@@ -69,11 +69,22 @@ def surface_lines(surface: SurfaceMap) -> Iterator[str]:
             f"{name:<18}largest {own['max_mm']:.6f} mm{where}, 95 % within {own['percentile_95_mm']:.6f} mm, "
             f"mean {own['mean_mm']:.6f} mm, {own['points']:,} points"
         )
+    yield f"{'passes':<18}{passes_text(surface.passes)}"
     if told["rms_mm"] is not None:
         yield f"{'all':<18}mean {told['mean_mm']:.6f} mm, root mean square {told['rms_mm']:.6f} mm"
         yield f"{'within':<18}{told['within_tolerance_percent']:.4g} % within the tolerance of {surface.tolerance:g} mm"
         yield ""
         yield from _histogram(surface)
+
+
+def passes_text(passes: PassDifference | None) -> str:
+    """Say how differently neighbouring passes are off: where they are, rows show."""
+    if passes is None:
+        return "no pass has a neighbour"
+    return (
+        f"neighbours, {passes.apart:.3g} mm apart, differ by {passes.rms:.6f} mm (root mean square), 95 % by at most "
+        f"{passes.percentile_95:.6f} mm, the most {passes.largest:.6f} mm at CL line {passes.line}"
+    )
 
 
 def _histogram(surface: SurfaceMap) -> Iterator[str]:

@@ -14,6 +14,7 @@ from cornersmooth.nc_reader import NcProgram, read_nc
 from cornersmooth.surface.distance import distance_to_motion
 from cornersmooth.surface.envelope import EnvelopePoints, envelope_points
 from cornersmooth.surface.motion import original_cuts, written_cuts
+from cornersmooth.surface.passes import PassDifference, neighbouring_passes
 from cornersmooth.surface.tool import Tool
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ class SurfaceMap:
     edge, tolerance, reach : float, mm
     buried : int
         Points of the envelope that another part of the original path cuts away; they are not among the rows.
+    passes : PassDifference or None
+        How differently neighbouring passes are off; None where no pass has a neighbour within the tool.
     """
 
     points: EnvelopePoints
@@ -51,6 +54,7 @@ class SurfaceMap:
     tolerance: float
     reach: float
     buried: int
+    passes: PassDifference | None = None
 
     def __len__(self) -> int:
         return len(self.off)
@@ -94,6 +98,16 @@ class SurfaceMap:
             "rms_mm": float(np.sqrt((off * off).mean())) if len(off) else None,
             "within_tolerance_percent": float(100.0 * (np.abs(off) <= self.tolerance).mean()) if len(off) else None,
             "histogram": {"edges_mm": edges.tolist(), "counts": counts.astype(int).tolist()},
+        }
+        passes = self.passes
+        contents["neighbouring_passes"] = passes and {
+            "places": passes.places,
+            "apart_mm": passes.apart,
+            "rms_mm": passes.rms,
+            "percentile_95_mm": passes.percentile_95,
+            "max_mm": passes.largest,
+            "cl_line": passes.line,
+            "at_mm": list(passes.point),
         }
         for name, sign in (("overcut", -1), ("undercut", 1)):
             own = np.abs(off[sign * off > 0.0])
@@ -158,4 +172,5 @@ def measure_surface(
     rows = np.flatnonzero(on)
     points, own = points.chosen(rows), own[rows]
     off = distance_to_motion(points.point, written, tool, edge, reach=reach) - own
-    return SurfaceMap(points, off, tool, edge, tolerance, reach, int(np.count_nonzero(~on)))
+    passes = neighbouring_passes(original, written, tool.corner_radius, tool.diameter, stations=stations)
+    return SurfaceMap(points, off, tool, edge, tolerance, reach, int(np.count_nonzero(~on)), passes)

@@ -1,0 +1,162 @@
+"""How much neighbouring passes differ: rows show on a surface where they are smoothed differently.
+
+It looks at the point as high as the centre of the tool's corner arc, tip + r·O: of a ball it is the centre, which makes
+the surface. Across it lies the direction normal to the pass and to the way to its neighbour.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.surface.motion import RuledMotion
+from cornersmooth.vectors import dot, norm
+
+#: ends of segments near a place that are looked at
+_NEAREST = 48
+
+#: way along the path to a neighbouring pass over the distance to it: on a half circle it is less
+_WAY_BACK = 2.0
+
+#: cosine of the angle up to which passes are parallel
+_PARALLEL = 0.9
+
+#: places worked on together
+_TOGETHER = 2048
+
+
+@dataclass(frozen=True)
+class PassDifference:
+    """By how much the written motion is off differently on neighbouring passes.
+
+    Parameters
+    ----------
+    places : int
+        Places with a neighbour.
+    apart : float, mm
+        Middle distance of neighbours.
+    rms, percentile_95, largest : float, mm
+        Of the difference of both deviations, across the surface.
+    line : int
+        CL line of the largest.
+    point : (float, float, float), mm
+        Tip there.
+    """
+
+    places: int
+    apart: float
+    rms: float
+    percentile_95: float
+    largest: float
+    line: int
+    point: tuple[float, float, float]
+
+
+def neighbouring_passes(
+    original: RuledMotion, written: RuledMotion, radius: float, within: float, *, stations: int = 2000
+) -> PassDifference | None:
+    """Compare what neighbouring passes are off.
+
+    Parameters
+    ----------
+    original, written : RuledMotion
+    radius : float, mm
+        Of the tool's corner.
+    within : float, mm
+        Passes farther apart are no neighbours.
+    stations : int
+        Places along the path, about so many.
+
+    Returns
+    -------
+    PassDifference or None
+        None where no pass has a neighbour.
+    """
+    path, own = _Path.of(original, radius), _Path.of(written, radius)
+    segment = np.unique(np.linspace(0, len(original) - 1, min(stations, len(original))).astype(np.int64))
+    here = (path.start[segment] + path.end[segment]) / 2.0
+    along = (path.length[segment] + path.length[segment + 1]) / 2.0
+    beside = [
+        path.nearest(here[part], path.way[segment[part]], along[part], within)
+        for part in np.array_split(np.arange(len(segment)), -(-len(segment) // _TOGETHER))
+    ]
+    place, other = (np.concatenate(parts) for parts in zip(*beside, strict=True))
+    found = np.flatnonzero(other >= 0)
+    here, way, place, other = here[found], path.way[segment[found]], place[found], other[found]
+    across = np.cross(way, place - here)
+    size = norm(across)
+    off = [own.off(points, ways) for points, ways in ((here, way), (place, path.way[other]))]
+    known = (size > 0.0) & np.isfinite(off[0]).all(axis=1) & np.isfinite(off[1]).all(axis=1)
+    if not known.any():
+        return None
+    rows = np.flatnonzero(known)
+    difference = np.abs(dot(off[0][rows] - off[1][rows], across[rows] / size[rows, None]))
+    worst = rows[np.argmax(difference)]
+    row = segment[found[worst]]
+    return PassDifference(
+        places=len(rows),
+        apart=float(np.median(norm(place - here)[rows])),
+        rms=float(np.sqrt(np.square(difference).mean())),
+        percentile_95=float(np.percentile(difference, 95.0)),
+        largest=float(difference.max()),
+        line=int(original.line[row]),
+        point=tuple(original.tip[row].mean(axis=0).tolist()),
+    )
+
+
+@dataclass(frozen=True)
+class _Path:
+    """Chords of the looked-at point, m of them, their directions, and the length of the path up to each (m + 1,)."""
+
+    start: Floats
+    end: Floats
+    way: Floats
+    length: Floats
+    tree: cKDTree
+
+    @classmethod
+    def of(cls, motion: RuledMotion, radius: float) -> _Path:
+        start, end = (motion.tip[:, k] + radius * motion.axis[:, k] for k in (0, 1))
+        step = end - start
+        size = norm(step)
+        way = step / np.where(size > 0.0, size, 1.0)[:, None]
+        length = np.concatenate(([0.0], np.cumsum(size)))
+        return cls(start, end, way, length, cKDTree(np.concatenate((start, end))))
+
+    def _feet(self, points: Floats) -> tuple[Ints, Floats, Floats, Floats, Bools]:
+        """Chords (q, c) near points (q, 3), feet on them, distances, lengths up to feet, and which are inside."""
+        count = min(_NEAREST, self.tree.n)
+        chord = self.tree.query(points, k=count)[1].reshape(len(points), count) % len(self.start)
+        step = self.end[chord] - self.start[chord]
+        gone = points[:, None] - self.start[chord]
+        square = np.maximum((step * step).sum(axis=-1), 1e-300)
+        share = (gone * step).sum(axis=-1) / square
+        inside = (share >= -1e-9) & (share <= 1.0 + 1e-9)
+        share = np.clip(share, 0.0, 1.0)
+        foot = self.start[chord] + share[..., None] * step
+        distance = np.sqrt(((foot - points[:, None]) ** 2).sum(axis=-1))
+        return chord, foot, distance, self.length[chord] + share * np.sqrt(square), inside
+
+    def nearest(self, points: Floats, ways: Floats, along: Floats, within: float) -> tuple[Floats, Ints]:
+        """Feet (q, 3) on the nearest parallel pass and their chords, -1 for none."""
+        chord, foot, distance, length, inside = self._feet(points)
+        parallel = np.abs(np.einsum("qcd,qd->qc", self.way[chord], ways)) > _PARALLEL
+        other = np.abs(length - along[:, None]) > _WAY_BACK * distance
+        good = inside & parallel & other & (distance > 0.0) & (distance <= within)
+        best = np.where(good, distance, np.inf).argmin(axis=1)
+        row = np.arange(len(points))
+        return foot[row, best], np.where(good[row, best], chord[row, best], -1)
+
+    def off(self, points: Floats, ways: Floats) -> Floats:
+        """(q, 3) from points to this path where it runs the same way; NaN where it does not come by."""
+        found = np.full((len(points), 3), np.nan)
+        for begin in range(0, len(points), _TOGETHER):
+            here = slice(begin, begin + _TOGETHER)
+            chord, foot, distance, _, _ = self._feet(points[here])
+            good = np.einsum("qcd,qd->qc", self.way[chord], ways[here]) > _PARALLEL
+            row, best = np.arange(len(foot)), np.where(good, distance, np.inf).argmin(axis=1)
+            found[here] = np.where(good[row, best][:, None], foot[row, best] - points[here], np.nan)
+        return found
