@@ -46,6 +46,7 @@ RUN_BY = {
     "python docs/make_codes.py": "tests/test_codes.py",
     "python docs/run_examples.py docs/gallery.md docs": "tests/test_docs.py",
     "python docs/make_savings.py FOLDER": "test_savings_are_printed_as_a_table",
+    "python tests/nc/planned_column.py FOLDER": "tests/nc/test_nc_planned_column.py",
     "python tests/batch_runs.py": "test_batch_runs_times_a_batch",
     "python -m nc.test_nc_golden": "tests/nc/test_nc_golden.py",
     "python -m nc.sweep": "test_sweeps_find_nothing",

@@ -41,12 +41,15 @@ class Candidate:
     ----------
     form : Form
     settings : Settings
+    lines : str
+        "fine" as short as the control can take them, "chord" by the chord tolerance alone, or "long"; empty in curves.
     options : tuple of str
         What asks `cornersmooth smooth` for it, besides the control and the tolerance.
     """
 
     form: Form
     settings: Settings
+    lines: str
     options: tuple[str, ...]
 
 
@@ -57,7 +60,7 @@ class Row:
     Parameters
     ----------
     form, words, method, lines : str
-        Form of the control; "vectors" or "rotary words of MACHINE"; method; "fine", "chord" or "long", empty in curves.
+        Form of the control; "vectors" or "rotary words of MACHINE"; method; lines as in `Candidate`.
     options : tuple of str
         As in `Candidate`.
     verdict : str
@@ -150,27 +153,25 @@ def candidates(control: Control, settings: Settings, machine: Machine | None) ->
             if words is not None and not rotary:
                 continue
             for method in (DEFAULT_METHOD, CURVES_METHOD):
-                for density in _densities(form):
-                    chosen = settings.but(method=method, **density)
-                    options = ("-f", name, *rotary, "--method", method, *_density_options(density))
-                    found.append(Candidate(form, chosen, options))
+                for lines, changes, more in _densities(form):
+                    options = ("-f", name, *rotary, "--method", method, *more)
+                    found.append(Candidate(form, settings.but(method=method, **changes), lines, options))
     return found
 
 
-def _densities(form: Form) -> Iterator[dict[str, Any]]:
+def _densities(form: Form) -> Iterator[tuple[str, dict[str, Any], tuple[str, ...]]]:
+    """Names of line densities of a form, what they change of the settings, and their options."""
     if form.curves:
-        yield {}
+        yield "", {}, ()
         return
-    yield {"lines": "dense"}
+    dense = ("--lines", "dense")
     if form.table.lines.block_time:
-        yield {"lines": "dense", "block_time": _BY_CHORD}
+        yield "fine", {"lines": "dense"}, dense
+        yield "chord", {"lines": "dense", "block_time": _BY_CHORD}, (*dense, "--block-time", f"{_BY_CHORD:g}s")
+    else:
+        yield "chord", {"lines": "dense"}, dense
     if form.long_lines:
-        yield {"lines": "long"}
-
-
-def _density_options(density: dict[str, Any]) -> tuple[str, ...]:
-    lines = ("--lines", density["lines"]) if density else ()
-    return (*lines, "--block-time", f"{density['block_time']:g}s") if "block_time" in density else lines
+        yield "long", {"lines": "long"}, ("--lines", "long")
 
 
 def compare_programs(
@@ -252,12 +253,11 @@ def _row(
     program: Program, candidate: Candidate, unsmoothed: float, axes: Machine | None, blocks: BlockLimits | None
 ) -> Row:
     form, settings = candidate.form, candidate.settings
-    density = "" if form.curves else "long" if settings.lines == "long" else "fine"
     row = Row(
         form=form.name,
         words=f"rotary words of {form.machine.name}" if form.rotary and form.machine is not None else "vectors",
         method=settings.method,
-        lines="chord" if settings.block_time == _BY_CHORD else density,
+        lines=candidate.lines,
         options=candidate.options,
         verdict="",
     )

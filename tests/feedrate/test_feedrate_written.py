@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.feedrate import BlockLimits, Limits, TimeLaw, direct, plan, plan_text
+from cornersmooth.feedrate import BlockLimits, Limits, TimeLaw, direct, limiting, plan, plan_text
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program, SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, load_control, write
@@ -226,6 +226,15 @@ def test_blocks_of_a_curve_are_counted() -> None:
     motion = [line for line in text.splitlines() if line[:2] in (b"G1", b"G6", b"K0", b"K1")]
     assert law.total >= 0.01 * (len(motion) - 1)
     assert law.total < 0.01 * (len(motion) + 60)
+
+
+def test_blocks_that_limit_the_motion_are_named() -> None:
+    """Lines of 10 mm at 100 mm/s that take a block time of 1 s each."""
+    text = b"G21 G90 G94\nG1 X0. Y0. Z0. I0. J0. K1. F6000.\nX10.\nX20.\nX30.\nM30\n"
+    shares = dict(limiting(planned(text, BlockLimits(block_time=1.0))))
+    assert shares["block time or look-ahead"] > 0.9
+    assert "the programmed feed" not in shares
+    assert "block time or look-ahead" not in dict(limiting(planned(text)))
 
 
 def test_command_shows_the_text_beside_the_paths(tmp_path: Path) -> None:

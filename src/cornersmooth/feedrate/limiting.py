@@ -37,8 +37,12 @@ def limiting(law: TimeLaw) -> list[tuple[str, float]]:
     if not cutting.any():
         return []
     limits = law.limits
+    fastest = states.v >= _REACHED * path.speed[element]
+    feed = path.program.feed_at(path.move) if limits.feed is None else np.full(len(path), limits.feed)
+    slower = (60.0 * path.speed < _REACHED * feed)[element]  # what the control makes of its blocks
     reached: dict[str, Bools] = {
-        "the programmed feed": states.v >= _REACHED * path.speed[element],
+        "the programmed feed": fastest & ~slower,
+        "block time or look-ahead": fastest & slower,
         "acceleration along the path": _at(states.a, limits.accel),
         "jerk along the path": _at(states.j, limits.jerk),
         "acceleration across the path": _at(states.centripetal, limits.centripetal_accel),
