@@ -3,7 +3,7 @@
 The same path asks other things of the axes where the part is clamped in another way. Two steps find a good one:
 
 1. estimate: many setups, by the motion of the axes between the poses. With τ the time of each move at its feed, an axis
-   that would go at ``q'`` and speed up by ``q''`` slows the path by ``max(1, |q'|/V, sqrt(|q''|/A))``.
+   that would go at ``q'`` and speed up by ``q''`` slows the path by ``hypot(1, max(|q'|/V, sqrt(|q''|/A)))``.
 2. plan: the best of them are smoothed, written, read back and planned, as for the verdict of ``smooth``.
 
 Wei, Lee: Adv. Mech. Eng. 12(12), 2020, doi 10.1177/1687814020975544, tell of such gains on a machine with two tables.
@@ -315,9 +315,9 @@ def _estimate(program: Program, machine: Machine, path: Path, settings: Settings
     time = path.length / path.speed
     rate = (place[path.move] - place[path.start]) / time[:, None]
     bend = 2.0 * np.diff(rate, axis=0) / (time[1:] + time[:-1])[:, None]
-    slow = np.maximum((np.abs(rate) / speed).max(axis=1), 1.0)
+    slow = (np.abs(rate) / speed).max(axis=1)
     inside = np.maximum(np.maximum(slow[1:], slow[:-1]), np.sqrt((np.abs(bend) / accel).max(axis=1)))
-    ends = np.concatenate((slow[:1], inside, slow[-1:]))
+    ends = np.hypot(1.0, np.concatenate((slow[:1], inside, slow[-1:])))
     return float((time * (ends[1:] + ends[:-1])).sum() / 2.0)
 
 

@@ -15,6 +15,7 @@ from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import progress_bar, say_line
 
 if TYPE_CHECKING:
+    from cornersmooth.model import Floats
     from cornersmooth.setup import Rating, Setups
 
 #: savings of less are none, %
@@ -129,15 +130,19 @@ def _lines(found: Setups, machine: str) -> Iterator[str]:
     for one in rows:
         yield _row(found, one) + ("    today" if one is today else "")
     yield "Degrees: the part is turned about Z, then tilted about X, then about Y, the axes of the machine, all about"
-    yield "X{:.3f} Y{:.3f} Z{:.3f} of the part, the middle of the cuts.".format(*found.pivot)
+    yield f"{_point(found.pivot)} of the part, the middle of the cuts."
     if found.out_of_reach:
         yield f"{found.out_of_reach} setups are beyond the travel or the rotary limits of {machine}."
     yield "Fixture, reach of the tool and collisions are not looked at: they are yours."
 
 
 def _row(found: Setups, one: Rating) -> str:
-    setup, zero = one.setup, found.zero(one.setup) + 0.0
+    setup, zero = one.setup, found.zero(one.setup)
     angles = f"{setup.turn:>8g}{setup.tilt_x:>8g}{setup.tilt_y:>8g}"
     saves = "" if found.today.why else f"{round(found.saving(one), 1) + 0.0:.1f}"
     times = f"{'out of reach':>20}" if one.why else f"{one.seconds:>11.3f}{saves:>9}"
-    return angles + times + "    X{:.3f} Y{:.3f} Z{:.3f}".format(*zero)
+    return f"{angles}{times}    {_point(zero)}"
+
+
+def _point(place: Floats) -> str:
+    return "X{:.3f} Y{:.3f} Z{:.3f}".format(*(place.round(3) + 0.0))
