@@ -82,7 +82,7 @@ class Rating:
     ----------
     setup : Setup
     estimate : float, s
-        Infinite where the machine does not reach a pose.
+        Only to compare with others; infinite where the machine does not reach a pose.
     seconds : float, s
         Of the program as it is written; NaN where it was not planned, or is out of reach.
     why : str
@@ -144,11 +144,7 @@ class Setups:
         }
 
     def _row(self, rating: Rating) -> dict[str, Any]:
-        numbers = {
-            "estimate_seconds": rating.estimate,
-            "seconds": rating.seconds,
-            "saving_percent": self.saving(rating),
-        }
+        numbers = {"seconds": rating.seconds, "saving_percent": self.saving(rating)}
         return {
             "turn_deg": rating.setup.turn,
             "tilt_x_deg": rating.setup.tilt_x,
