@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import signal
 import socket
 import subprocess
@@ -35,24 +36,29 @@ def shown(start: str) -> list[str]:
     return shlex.split(line.replace(" &", ""), comments=True)
 
 
-@pytest.fixture(scope="module")
-def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+@contextlib.contextmanager
+def cluster(shared: Path, **settings: str) -> Iterator[Path]:
     """The scheduler file of a cluster of two processes, started by the lines of the page but for ports and number."""
     pytest.importorskip("distributed")
-    shared = tmp_path_factory.mktemp("shared")
     changed = {"/shared/scheduler.json": str(shared / "scheduler.json"), "16": "2"}
     with contextlib.ExitStack() as stack:
         for words, ports in ((shown("dask scheduler"), ["--port", "0"]), (shown("dask worker"), [])):
             process = subprocess.Popen(
                 [SCRIPT.parent / words[0], *(changed.get(word, word) for word in words[1:]), *ports, "--no-dashboard"],
                 cwd=shared,
-                env=environment(),
+                env=environment(**settings),
                 stderr=subprocess.DEVNULL,
             )
             stack.enter_context(process)
             stack.callback(process.terminate)
         wait_for(lambda: (shared / "scheduler.json").exists())
         yield shared / "scheduler.json"
+
+
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    with cluster(tmp_path_factory.mktemp("shared")) as file:
+        yield file
 
 
 @pytest.fixture
@@ -102,6 +108,38 @@ def test_the_commands_of_the_page_work(scheduler: Path, folder: Path, tmp_path: 
     assert result.stderr.decode().splitlines()[-1] == f"{FILES} files: {FILES} skipped"
     assert len(files_in(tmp_path / "nc")) == FILES
     assert len((tmp_path / "made.csv").read_text().splitlines()) == FILES + 1
+
+
+def certificate(folder: Path) -> dict[str, str]:
+    """Make a certificate that is its own authority; return the settings of Dask that take it."""
+    if not (openssl := shutil.which("openssl")):
+        pytest.skip("openssl, which makes the certificate, is not installed")
+    folder.mkdir()
+    key, signed = str(folder / "key.pem"), str(folder / "certificate.pem")
+    words = "req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=cluster -keyout".split()
+    subprocess.run([openssl, *words, key, "-out", signed], check=True, capture_output=True)
+    found = {"DASK_DISTRIBUTED__COMM__REQUIRE_ENCRYPTION": "True", "DASK_DISTRIBUTED__COMM__TLS__CA_FILE": signed}
+    for who in ("SCHEDULER", "WORKER", "CLIENT"):
+        found |= {f"DASK_DISTRIBUTED__COMM__TLS__{who}__{one}": file for one, file in (("KEY", key), ("CERT", signed))}
+    return found
+
+
+def test_a_scheduler_with_tls_takes_those_with_its_certificate(folder: Path, tmp_path: Path) -> None:
+    ours, strange = certificate(tmp_path / "ours"), certificate(tmp_path / "strange")
+    (tmp_path / "shared").mkdir()
+    with cluster(tmp_path / "shared", **ours) as file:
+        address = json.loads(file.read_text())["address"]
+        assert address.startswith("tls://")
+        for settings, code in ((strange, USAGE), ({}, USAGE), (ours, DONE)):
+            words = command("smooth", folder, "-d", tmp_path / "nc", "--scheduler", address)
+            found = subprocess.run(words, env=environment(**settings), cwd=tmp_path, capture_output=True, check=False)
+            said = found.stderr.decode().splitlines()
+            assert found.returncode == code, said
+            if code == USAGE:
+                assert f"no scheduler answers at {address}" in said[-1]
+                assert not list(tmp_path.rglob("*.nc"))
+    assert said[-1].startswith(f"{FILES} files: {FILES} PASSED")
+    assert len(files_in(tmp_path / "nc")) == FILES
 
 
 def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path) -> None:
