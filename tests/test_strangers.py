@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -139,18 +140,31 @@ def test_nesting_without_end_is_no_toml(where: str, tmp_path: Path) -> None:
 
 @unix
 @pytest.mark.parametrize("quiet", [(), ("-q",)])
-def test_settings_that_loosen_or_that_anybody_may_write_are_named(quiet: tuple[str, ...], tmp_path: Path) -> None:
+@pytest.mark.parametrize("words", ["smooth part.cls -o o.nc", "smooth part.cls -d out", "verify part.cls o.nc"])
+def test_settings_that_loosen_or_that_anybody_may_write_are_named(
+    words: str, quiet: tuple[str, ...], tmp_path: Path
+) -> None:
     (tmp_path / "part.cls").write_bytes(SMALL)
+    assert run("smooth", "part.cls", "-e", "5", "-o", "o.nc", cwd=tmp_path).returncode == 0
     settings = tmp_path / "cornersmooth.toml"
-    settings.write_text("[smooth]\ntolerance = 5\n")
+    settings.write_text("".join(f"[{name}]\ntolerance = 5\n" for name in ("smooth", "verify")))
     settings.chmod(0o644)
-    command = ("smooth", tmp_path / "part.cls", "-o", tmp_path / "o.nc", "--force", *quiet)
-    said = run(*command).stderr.decode()
-    assert said.startswith("warning: the tolerance is 5 mm, larger than the default 0.01 mm: ")
-    assert "anybody" not in said
+    command = (*words.split(), *(("--force",) if words.startswith("smooth") else ()), *quiet)
+
+    def said(*more: str) -> str:
+        found = run(*command, *more, cwd=tmp_path)
+        assert found.returncode == 0
+        return " ".join((found.stderr + found.stdout).decode().split())  # lines that were folded
+
+    text = said()
+    assert text.count("the tolerance 5 mm is larger than the default 0.01 mm: ") == 1
+    verdict, _, where = text.partition("; the tolerance 5 mm is larger")
+    assert re.search(r"PASSED\W[^;]*within 5 mm everywhere$", verdict)
+    assert "cornersmooth.toml" in where
+    assert "anybody" not in text
     settings.chmod(0o666)
-    assert "these settings are obeyed, and anybody may change them" in run(*command).stderr.decode()
-    assert "larger than the default" not in run(*command, "-e", "5").stderr.decode()
+    assert "these settings are obeyed, and anybody may change them" in said()
+    assert "larger than the default" not in said("-e", "5")
 
 
 @unix

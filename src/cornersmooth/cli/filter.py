@@ -12,7 +12,7 @@ from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
 from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
 from cornersmooth.cli.options import motion, nc_text, outputs, smoothing
 from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.shop import ShopCommand, loosened
 from cornersmooth.cli.show import console, more, print_line, printable, say_line
 from cornersmooth.errors import CornersmoothError
 from cornersmooth.output import make_folder, open_output
@@ -150,6 +150,8 @@ def _filter(source: str, target: str, form: Form, settings: Any, given: dict[str
         output.stream.write(found.data)
     if not given["quiet"]:
         _show(name, found, settings.tolerance, given["verbose"], given["units"])
+    elif loosened(settings.tolerance):
+        print_line(f"{name}: {first_line(found, settings.tolerance)}")
     return int(bad)
 
 
@@ -163,8 +165,10 @@ def verify_with_program(old: bytes, path: str, given: dict[str, Any]) -> int:
     found = verify_programs(old, new, form_of(given), settings, processes=useful_processes())
     verdict = Verdict.of(problems=len(found.wrong))
     _show_wrong(name, found.wrong)
-    if not given["quiet"]:
-        say_line(f"{verdict}: {_problems(found.wrong) or _measured(found, settings.tolerance)}")
+    loose = loosened(settings.tolerance)
+    if loose or not given["quiet"]:
+        what = (_problems(found.wrong) or _measured(found, settings.tolerance), loose)
+        say_line(f"{verdict}: {'; '.join(filter(None, what))}")
     return int(verdict is not Verdict.PASSED)
 
 
@@ -227,7 +231,11 @@ def _show(name: str, found: Filtered, tolerance: float, verbose: int, given_unit
 
 
 def first_line(found: Filtered, tolerance: float) -> str:
-    """Give the verdict in one line."""
+    """Give the verdict in one line, and what settings loosen."""
+    return "; ".join(filter(None, (_verdict_text(found, tolerance), loosened(tolerance))))
+
+
+def _verdict_text(found: Filtered, tolerance: float) -> str:
     what = f"{found.smoothed} of {found.cuts} cuts smoothed in {found.runs} runs"
     if found.checked is None:
         return f"{found.verdict}: {what}; it was not asked for"

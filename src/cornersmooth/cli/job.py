@@ -80,6 +80,8 @@ class Job:
         Whether standard output gets the first lines only.
     run : str
         Name of a run that does a file again where a worker was lost, although that may have written it; empty for none.
+    loosened : str
+        What settings made looser than the default; the line of the verdict says it.
     """
 
     source: str
@@ -103,6 +105,7 @@ class Job:
     plan_feeds: Limits | None = None
     beginning: bool = False
     run: str = ""
+    loosened: str = ""
 
 
 @dataclass
@@ -269,6 +272,7 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
     if beginning is not None:
         outcome.held_back = beginning.held_back
     contents = result.report()
+    contents["verdict_text"] = "; ".join(filter(None, (contents["verdict_text"], job.loosened)))
     outcome.verdict_text = contents["verdict_text"]
     for path in job.reports:
         saving = _write_report(path, job, bool(may_replace[path]), source, result, contents)

@@ -47,6 +47,10 @@ _OWN_TABLES = {"controls": ("control",), "machines": ("machine", "limits")}
 _ONE_RUN = frozenset("output directory force reports csv summary scheduler as_json law no_verify help".split())
 
 
+#: commands with a verdict, whose line says what settings loosen
+_WITH_VERDICT = frozenset(("smooth", "verify", "filter"))
+
+
 @dataclass(frozen=True)
 class ShopFile:
     """One file of shop settings."""
@@ -104,7 +108,8 @@ class ShopCommand(click.Command):
             for name in options:
                 if isinstance(ctx.params.get(name), str):
                     ctx.params[name] = _own(shop, kind, ctx.params[name])
-        _name_what_is_loose(ctx)
+        if self.name not in _WITH_VERDICT and (loose := loosened(ctx.params.get("tolerance"))):
+            print_line(f"warning: {loose}")
         return rest
 
 
@@ -119,16 +124,17 @@ def _name_strangers(path: str) -> None:
         print_line(f"{path}: warning: these settings are obeyed, and anybody may change them")
 
 
-def _name_what_is_loose(ctx: click.Context) -> None:
-    """Say where a tolerance is from that is larger than the default, and was not typed."""
-    option = next((one for one in settable(ctx.command) if one.name == "tolerance"), None)
-    if option is None or (where := origin(ctx, "tolerance")) in ("command line", "default"):
-        return
+def loosened(tolerance: float | None) -> str:
+    """Say where a tolerance is from that is larger than the default, and was not typed; empty for any other."""
+    ctx = click.get_current_context()
+    if tolerance is None or (where := origin(ctx, "tolerance")) in ("command line", "default"):
+        return ""
     from cornersmooth.settings import Settings
 
     least = Settings.tolerance
-    if (value := ctx.params["tolerance"]) is not None and value > least:
-        print_line(f"warning: the tolerance is {value:g} mm, larger than the default {least:g} mm: {where}")
+    if tolerance <= least:
+        return ""
+    return f"the tolerance {tolerance:g} mm is larger than the default {least:g} mm: {where}"
 
 
 def origin(ctx: click.Context, name: str) -> str:

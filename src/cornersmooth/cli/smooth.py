@@ -15,7 +15,7 @@ from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_in
 from cornersmooth.cli.job import Job, Outcome, check, run_job
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.shop import ShopCommand, loosened
 from cornersmooth.cli.show import more, print_line, progress_bar, show_findings, show_summary, show_verdict
 from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.cli.summary import check_summary, counts_line, line_of, row_of, write_summary
@@ -118,10 +118,14 @@ def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
 
 
 def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> None:
-    """Print what went wrong and what was noticed, and any verdict but PASSED where no line has told it."""
+    """Print what went wrong and what was noticed; where no line has told the verdict, any but a plain PASSED."""
     if outcome.message:
         print_line(outcome.message)
-    elif not told and (quiet or outcome.job.batch) and outcome.verdict not in ("", Verdict.PASSED):
+    elif (
+        not told
+        and (quiet or outcome.job.batch)
+        and (outcome.verdict not in ("", Verdict.PASSED) or (outcome.contents and outcome.job.loosened))
+    ):
         print_line(f"{outcome.job.source}: {outcome.verdict_text}")
     if outcome.contents and not quiet:
         show_findings(outcome.job.source, outcome.contents["findings"], verbose)
@@ -163,6 +167,7 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 plan=sys.maxsize if given["time"] else TIMED_POSES,
                 timed=not (given["quiet"] or folder),
                 axes=nc_text.machine_of(given, "limits"),
+                loosened=loosened(settings.tolerance),
             )
         )
     _check_targets(jobs)

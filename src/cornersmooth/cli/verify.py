@@ -15,7 +15,7 @@ import click
 from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_input, read_lines, target_of
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand
+from cornersmooth.cli.shop import ShopCommand, loosened
 from cornersmooth.cli.show import more, print_line, say_line, show_findings
 from cornersmooth.errors import SettingsError
 from cornersmooth.memory import return_large_arrays
@@ -140,12 +140,14 @@ def command(source: str, text: str, **given: Any) -> int:
     for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
         print_line(line)
     findings = (*program.findings, *trusted_blocks(found))
+    loose = loosened(given["tolerance"])
+    verdict = "; ".join(filter(None, (judge(found, findings).text, loose)))
     if given["quiet"]:
-        if found.verdict not in (Verdict.PASSED, Verdict.FAILED):
-            print_line(f"{text}: {judge(found, findings).text}")
+        if loose or found.verdict not in (Verdict.PASSED, Verdict.FAILED):
+            print_line(f"{text}: {verdict}")
     else:
         show_findings(name, findings_table(findings), given["verbose"])
-        say_line(judge(found, findings).text)
+        say_line(verdict)
         for line in _summary(found):
             say_line(line)
         if given["verbose"]:
