@@ -199,7 +199,7 @@ class Settings:
         """Effective chord tolerance of dense output, mm."""
         return min(self.tolerance / 10, LARGEST_CHORD) if self.chord_tolerance is None else self.chord_tolerance
 
-    def lines_for_feed(self, by_chord: Floats, length: Floats, feed: Floats) -> Floats:
+    def lines_for_feed(self, by_chord: Floats, length: Floats, feed: Floats, kinks: tuple[Floats, Floats]) -> Floats:
         """Lines that a stretch of a curve is written in, so that the axes jump little in speed where they meet.
 
         Parameters
@@ -210,12 +210,16 @@ class Settings:
             Way of the tip.
         feed : (n,) float64, mm/min
             NaN for none: then the chord tolerance alone counts.
+        kinks : ((n,) float64, (n,) float64), rad, rad/mm
+            By how much the direction of the tip, and the turning of the tool axis on its way, change in the stretch.
         """
         if not self.block_time or self.lines == "long" or self.chord <= FINEST_CHORD:
             return by_chord
         finest = by_chord * math.sqrt(self.chord / FINEST_CHORD)
-        most = np.nan_to_num(60.0 * length / (feed * self.block_time), nan=0.0, posinf=0.0)
-        found: Floats = np.maximum(by_chord, np.minimum(finest, most))
+        speed = feed / 60.0
+        jump = np.maximum(speed * kinks[0] / SMALL_JUMPS[0], np.degrees(speed * kinks[1]) / SMALL_JUMPS[1])
+        most = np.minimum(length / (speed * self.block_time), jump)
+        found: Floats = np.maximum(by_chord, np.minimum(finest, np.nan_to_num(most, nan=0.0, posinf=0.0)))
         return found
 
     @property
@@ -253,6 +257,13 @@ LARGEST_CHORD = 5e-4
 #: Chord error below which lines are not divided for their feed, mm: half of a step of 0.0001 mm, the last digit of most
 #: controls. Finer lines follow the digits.
 FINEST_CHORD = 5e-5
+
+#: Jumps in speed between two lines for which no line is divided, of the tip in mm/s and of the tool axis in deg/s: what
+#: 1000 mm/s² and 150 deg/s² make in 2 ms, the limits of ``cornersmooth time``.
+SMALL_JUMPS = (2.0, 0.3)
+
+#: mm: on a shorter way the tip stands still, and no feed divides lines
+STANDING = 1e-9
 
 #: decimals of a weight that every control keeps (FANUC IS-B, reference manual B-63324EN/03 4.17)
 WEIGHT_DECIMALS = 3

@@ -26,18 +26,20 @@ def halves(feed: float, **more: float) -> tuple[int, float]:
     return abs(int(lines_per_half(smoothed)[0])), 10.0 * float(smoothed.corners.trim_in[0])
 
 
-def test_no_line_is_passed_sooner_than_the_control_takes_a_block() -> None:
+def test_lines_are_divided_for_jumps_and_none_is_passed_sooner_than_the_control_takes_a_block() -> None:
+    """In each half the direction turns by half of the chord of 90 degrees; a jump of 2 mm/s needs no division."""
     by_chord, way = halves(1000.0)
-    finest, _ = halves(1e-3, block_time=0.001)
-    assert finest == pytest.approx(by_chord * np.sqrt(5e-4 / FINEST_CHORD), abs=1 + np.sqrt(5e-4 / FINEST_CHORD))
-    feed = 60.0 * way / (1.7 * by_chord * 0.001)  # 1.7 times as many lines take a block time each
-    between, _ = halves(feed, block_time=0.001)
-    assert between == np.ceil(1.7 * by_chord - 1e-9)
-    assert (
-        halves(60.0 * way / 0.001, block_time=0.001)[0] == by_chord
-    )  # too fast for more: the chord holds all the same
-    assert halves(np.nan, block_time=0.001)[0] == by_chord
-    assert halves(1e-3, block_time=0.001, chord_tolerance=0.004)[0] == pytest.approx(finest, abs=1)
+    jump = np.sqrt(2.0) / 2.0 / 2.0  # lines per mm/s
+    finer = np.sqrt(5e-4 / FINEST_CHORD)
+    finest, _ = halves(60.0 * 1000.0, block_time=1e-7)
+    assert finest == pytest.approx(by_chord * finer, abs=1 + finer)
+    for_jumps, _ = halves(60.0 * 1.7 * by_chord / jump, block_time=1e-7)
+    assert for_jumps == pytest.approx(1.7 * by_chord, abs=1)
+    for_blocks, _ = halves(60.0 * 1000.0, block_time=way / (1000.0 * 1.7 * by_chord))
+    assert for_blocks == np.ceil(1.7 * by_chord - 1e-9)
+    for feed, block_time in ((60.0, 1e-7), (60.0 * 1000.0, 1.0), (np.nan, 1e-7)):
+        assert halves(feed, block_time=block_time)[0] == by_chord
+    assert halves(60.0 * 1000.0, block_time=1e-7, chord_tolerance=0.004)[0] == pytest.approx(finest, abs=1)
 
 
 def test_the_sample_gains_as_documented() -> None:
@@ -49,4 +51,4 @@ def test_the_sample_gains_as_documented() -> None:
     timing = Timing.of(form, settings)
     assert timing is not None
     assert timing.written(text, program)[0] <= 88.0
-    assert text.count(b"\n") < 7500
+    assert text.count(b"\n") < 5500

@@ -15,7 +15,7 @@ import numpy as np
 
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
-from cornersmooth.settings import FLIP_ANGLE, Settings
+from cornersmooth.settings import FLIP_ANGLE, STANDING, Settings
 from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
 from cornersmooth.vectors import norm, square
 
@@ -182,7 +182,10 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     bend = np.sqrt(np.maximum(square(bends[0]), square(bends[1]))) * more_bend
     by_chord = np.sqrt(bend / (_BEND_PER_CHORD * settings.chord))
     way = np.minimum(norm(tip_in) * corners.trim_in[rows], norm(tip_out) * corners.trim_out[rows])
-    by_chord = settings.lines_for_feed(by_chord, way, program.feed_at(after))
+    # in each half the directions change by half of what they do at the corner
+    halved = np.maximum(2.0 * way, STANDING)
+    kinks = norm(bends[0]) / halved, norm(bends[1] - bends[0]) / (settings.axis_length * halved)
+    by_chord = settings.lines_for_feed(by_chord, way, program.feed_at(after), kinks)
     number = np.ceil(by_chord - 1e-9)
 
     by_turn = np.zeros(len(rows))

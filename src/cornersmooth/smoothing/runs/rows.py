@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.model import Floats, Ints, Program, Runs
-from cornersmooth.settings import Settings
+from cornersmooth.settings import STANDING, Settings
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
 from cornersmooth.smoothing.runs.splines import Splines, spread, starts
 from cornersmooth.smoothing.segments import turn_limit
@@ -159,10 +159,12 @@ def _effort(
     hull = splines.bernstein(pieces.span, pieces.low, pieces.high) @ controls
     bends = 6.0 * np.diff(hull, 2, axis=1)  # second derivatives at both ends, over the whole piece
     size = np.maximum(norm(bends[..., :3]), norm(bends[..., 3:])).max(axis=1)
+    way = norm(hull[:, 3, :3] - hull[:, 0, :3])
+    change = 3.0 * ((hull[:, 3] - hull[:, 2]) - (hull[:, 1] - hull[:, 0]))
+    along = np.maximum(way, STANDING)
+    kinks = norm(change[:, :3]) / along, norm(change[:, 3:] - change[:, :3]) / (settings.axis_length * along)
     feed = program.feed_at(runs.pose[pieces.segment + 1])
-    by_chord = settings.lines_for_feed(
-        np.sqrt(size / (8.0 * settings.chord)), norm(hull[:, 3, :3] - hull[:, 0, :3]), feed
-    )
+    by_chord = settings.lines_for_feed(np.sqrt(size / (8.0 * settings.chord)), way, feed, kinks)
     levers = lines.point[:, 3:] - lines.point[:, :3]
     turn = np.concatenate((angle_between(levers[:-1], levers[1:]), [0.0]))[pieces.segment]
     turned = angle_between(hull[:, 0, 3:] - hull[:, 0, :3], hull[:, 3, 3:] - hull[:, 3, :3])
