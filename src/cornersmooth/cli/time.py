@@ -125,7 +125,7 @@ def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
     from cornersmooth.methods import METHODS
     from cornersmooth.nc_reader import read_nc
     from cornersmooth.pipeline import read_back
-    from cornersmooth.saving import without_holes, written_text
+    from cornersmooth.saving import with_feed, without_holes, written_text
 
     machine, axes = nc_text.machine_of(given), nc_text.machine_of(given, "limits")
     axes = machine if axes is None else axes
@@ -136,7 +136,7 @@ def _compare(data: bytes, name: str, given: dict[str, Any]) -> Comparison:
         nc = read_nc(given["text"], **how, tolerance=settings.tolerance, axis_length=settings.axis_scale)
     else:
         form, fitted = _form(given, program.units)
-        nc = read_back(written_text(without_holes(program), fitted, form), form, fitted)
+        nc = read_back(written_text(without_holes(with_feed(program, given["feed"])), fitted, form), form, fitted)
     if not given["quiet"]:
         _tell_feeds(program, given["feed"])
     everything = given["verbose"] or given["reports"]
