@@ -1,6 +1,6 @@
 """Mutate CL and point files and read them: each is a valid program or an error with its place, and nothing else.
 
-    python fuzz/fuzz_cl.py --runs 1000000 --seed 1
+    python fuzz/fuzz_cl.py --seconds 300 --seed 1
 
 Seeds are the hand-written files of the tests, the heads of the samples, and the files of any folder given by --corpus.
 A failure prints the input as a Python literal, and how to repeat it.
@@ -9,6 +9,7 @@ A failure prints the input as a Python literal, and how to repeat it.
 from __future__ import annotations
 
 import argparse
+import math
 import random
 import sys
 import time
@@ -215,11 +216,15 @@ def inputs(runs: int, seed: int, corpus: list[Path]) -> Iterator[tuple[int, byte
         yield run, data, options, rng.random() < 0.2
 
 
-def fuzz(runs: int, seed: int, corpus: list[Path] | None = None, *, progress: bool = False) -> Counter[str]:
-    """Read so many mutated inputs; return how often each outcome came."""
+def fuzz(
+    runs: int, seed: int, corpus: list[Path] | None = None, *, seconds: float = math.inf, progress: bool = False
+) -> Counter[str]:
+    """Read so many mutated inputs, for so many seconds at most; return how often each outcome came."""
     outcomes: Counter[str] = Counter()
     begin = time.perf_counter()
     for run, data, options, compare in inputs(runs, seed, corpus or []):
+        if time.perf_counter() - begin >= seconds:
+            break
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
@@ -235,11 +240,12 @@ def fuzz(runs: int, seed: int, corpus: list[Path] | None = None, *, progress: bo
 def main() -> None:
     """Parse the command line and run."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=100_000)
+    parser.add_argument("--runs", type=int, default=sys.maxsize)
+    parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--corpus", type=Path, action="append", default=[], help="folder of more seeds")
     arguments = parser.parse_args()
-    outcomes = fuzz(arguments.runs, arguments.seed, arguments.corpus, progress=True)
+    outcomes = fuzz(arguments.runs, arguments.seed, arguments.corpus, seconds=arguments.seconds, progress=True)
     for outcome, count in outcomes.most_common():
         print(f"{count:9d} {outcome}")
 

@@ -1,4 +1,4 @@
-"""A short run of the fuzzer, always the same; the long ones are run by hand (``python fuzz/fuzz_cl.py --runs N``)."""
+"""A short run of the fuzzer, always the same; long ones are run by hand (``python fuzz/fuzz_cl.py --seconds N``)."""
 
 from __future__ import annotations
 
@@ -25,6 +25,10 @@ def test_mutated_files(fuzzer: ModuleType) -> None:
     assert sum(outcomes.values()) == 1500
     assert outcomes["apt"] > 100
     assert len(outcomes) > 25
+
+
+def test_the_time_ends_a_run(fuzzer: ModuleType) -> None:
+    assert 0 < sum(fuzzer.fuzz(10**9, seed=4, seconds=0.2).values()) < 10**5
 
 
 def test_same_seed_same_inputs(fuzzer: ModuleType) -> None:
