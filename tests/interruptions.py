@@ -128,7 +128,7 @@ class Bench:
     def _look(self, found: Found, one: Try, session: int, out: Path, scratch: Path) -> None:
         found.early = "<frozen" in found.said or "site.py" in found.said or found.code in (-2, -15)
         deadline = time.monotonic() + LEFT
-        while (left := _members(session)) and time.monotonic() < deadline:
+        while (left := members(session)) and time.monotonic() < deadline:
             time.sleep(0.02)
         if left:
             found.wrong.append(f"processes left: {left}")
@@ -157,7 +157,7 @@ class Bench:
 
 def _send(process: subprocess.Popen[bytes], how: str) -> None:
     if how == "kill":
-        if children := [pid for pid in _members(process.pid) if pid != process.pid]:
+        if children := [pid for pid in members(process.pid) if pid != process.pid]:
             os.kill(random.choice(children), signal.SIGKILL)
     elif how == "parent":
         process.kill()
@@ -167,7 +167,7 @@ def _send(process: subprocess.Popen[bytes], how: str) -> None:
         process.send_signal(signal.SIGTERM if how == "term" else signal.SIGINT)
 
 
-def _members(session: int) -> list[int]:
+def members(session: int) -> list[int]:
     """Processes of a session that are not yet dead."""
     found = []
     for entry in Path("/proc").iterdir():

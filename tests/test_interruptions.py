@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pickle
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,8 @@ from cornersmooth import Settings, choose_form
 from cornersmooth.cli import worker
 from cornersmooth.cli.job import Job
 from cornersmooth.nc import Frame
-from interruptions import HOW, Bench, Try, tries
+from interruptions import HOW, LEFT, OLD, Bench, Try, cl_text, members, tries
+from oracle.command import PATIENCE, command, environment, run, wait_for
 from oracle.share import THOROUGH
 
 
@@ -56,3 +59,52 @@ def test_a_worker_that_nobody_listens_to_ends_in_silence(tmp_path: Path) -> None
         pickle.dump(job, process.stdin)
         process.stdin.flush()
         assert (process.wait(60), process.stderr.read()) == (0, b"")
+
+
+@pytest.fixture(scope="module")
+def long_work(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with inputs that every command is busy with for longer than the test waits."""
+    folder = tmp_path_factory.mktemp("long")
+    wavy = cl_text(20_000, 0)
+    (folder / "a.cls").write_text(wavy)
+    for words in ((), ("--control", "linuxcnc", "--machine", "xyzac-trt")):
+        run("smooth", "a.cls", "-q", "-o", f"a.{'ngc' if words else 'nc'}", *words, "--no-verify", cwd=folder)
+    poses = wavy.splitlines(keepends=True)[3:-1]
+    (folder / "large.cls").write_text("UNITS/MM\n" + "".join(poses) * 25 + "FINI\n")
+    (folder / "line.cls").write_text("UNITS/MM\nPPRINT " + "A" * 100_000_000 + "\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
+    (folder / "in").mkdir()
+    for number in range(4):
+        (folder / "in" / f"p{number}.cls").write_text(cl_text(15_000, number))
+    return folder
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "verify large.cls a.nc --report out.json",
+        "filter a.ngc --control linuxcnc --machine xyzac-trt -o out.nc --force",
+        "smooth in -d out -j 2",
+        "smooth large.cls -o out.nc --force",
+        "smooth line.cls -o out.nc --force",
+        "info large.cls",
+    ],
+)
+def test_every_command_ends_within_two_seconds(words: str, number: signal.Signals, long_work: Path) -> None:
+    old = long_work / "out.nc"
+    old.write_bytes(OLD)
+    before = set(long_work.glob("*"))
+    with subprocess.Popen(
+        command(*words.split()), cwd=long_work, stderr=subprocess.PIPE, env=environment(), start_new_session=True
+    ) as process:
+        time.sleep(1.0)
+        begin = time.monotonic()
+        process.send_signal(number)
+        _, complaint = process.communicate(timeout=PATIENCE)
+        assert time.monotonic() - begin < LEFT
+    assert process.returncode == 128 + number, complaint.decode()
+    assert old.read_bytes() == OLD
+    assert set(long_work.glob("*")) - before <= {long_work / "out"}
+    assert not list(long_work.rglob(".*.part"))
+    wait_for(lambda: not members(process.pid))
+    assert time.monotonic() - begin < LEFT
