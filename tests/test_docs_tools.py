@@ -51,7 +51,7 @@ RUN_BY = {
     "python -m nc.test_nc_golden": "tests/nc/test_nc_golden.py",
     "python -m nc.sweep": "test_sweeps_find_nothing",
     "python -m nc.run_chains": "test_sweeps_find_nothing",
-    "python -m nc.run_chains 200 450": "test_sweeps_find_nothing",
+    "python -m nc.run_chains 3000 3252": "test_sweeps_find_nothing",
     "python -m verify.sweep": "test_sweeps_find_nothing",
     "python -m verify.hole_programs 1400000 1402000": "test_sweeps_find_nothing",
     "python -m verify.slices": "tests/verify/test_slices.py",

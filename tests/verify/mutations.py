@@ -68,9 +68,8 @@ def distance_to_chord(a, p, b):
 
 
 def goes_back(tip, path):
-    """Whether four tips are farther from the CL path in order with the inner two swapped, by more than a digit."""
-    part = piece(path, tip[0], tip[3])
-    return frechet_distance(tip[[0, 2, 1, 3]], part) > frechet_distance(tip, part) + 1e-4
+    """Whether four tips with the inner two swapped cannot be run beside the CL path within ε: what can is harmless."""
+    return frechet_distance(tip[[0, 2, 1, 3]], piece(path, tip[0], tip[3])) > EPS + 1e-4
 
 
 def piece(path, start, end):
@@ -169,9 +168,8 @@ def motion_mutants(form, lines, path, rng):
         if lines[i + 1][:2] != "G1" or not is_motion(lines[i - 1]) or " F" in lines[i] + lines[i + 1]:
             continue
         tip = np.array([place(line, form)[0] for line in lines[i - 1 : i + 3]])
-        if np.linalg.norm(tip[2] - tip[1]) > 5e-3:
-            seen = goes_back(tip, path)
-            yield Mutant("swapped", [*lines[:i], lines[i + 1], lines[i], *lines[i + 2 :]], (i, i + 4) if seen else None)
+        if goes_back(tip, path):
+            yield Mutant("swapped", [*lines[:i], lines[i + 1], lines[i], *lines[i + 2 :]], (i, i + 4))
     # a piece run twice, or left out
     for _ in range(40):
         i = int(rng.choice(straight[:-14]))

@@ -225,9 +225,9 @@ def test_pass_longer_than_batches_is_cut(used, control, form, processes):
 
 def test_pass_that_runs_to_and_fro_is_cut(used):
     """Where a path runs to and fro on the same line only its length tells where a place is."""
-    steps = np.tile([0.0, 4.0], 450)
+    steps = np.tile([0.0, 4.0], 900)
     tip = np.stack((steps, 0 * steps, 0 * steps), axis=1)
-    program = Program.from_poses(tip, np.tile([0.0, 0.0, 1.0], (900, 1)), feed=np.full(900, 250.0))
+    program = Program.from_poses(tip, np.tile([0.0, 0.0, 1.0], (1800, 1)), feed=np.full(1800, 250.0))
     assert check(program, text_of(program), used).passed
 
 

@@ -5,7 +5,7 @@
 | rows whose tip and axis point are measured alone | all are, some at a time |
 | digits: first 64 kB, I and J, a step of 1 without decimals | all of the text, K too, never more than a share of ε |
 | motion after the last stop, said once | each piece is compared with where the tool stood |
-| pieces of a batch that are out of order | NOT VERIFIED with the line |
+| places where the motions part | after 100 of them nothing more, NOT VERIFIED with the line |
 | comments about holes | FAILED, or INCOMPLETE with --skip-cycles |
 | words of the head | NOT VERIFIED where they loosen the check, FAILED for another CL file |
 """
@@ -20,7 +20,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, Steps
 from cornersmooth.verdict import Verdict
-from cornersmooth.verify import in_order, verify
+from cornersmooth.verify import verify
 from oracle.command import run
 
 HEAD = ["%", "O0001", "G21 G90 G94 G17 G40 G49 G80", "G91 G28 Z0.", "G90"]
@@ -109,13 +109,25 @@ def test_motion_after_long_standing_still_is_compared(behind: list[str], verdict
     )
 
 
-def test_order_that_is_not_looked_at_is_not_verified(monkeypatch: pytest.MonkeyPatch) -> None:
-    match = type("Match", (), {"on": np.ones(9, np.bool_), "path": None, "segment": None, "fraction": None})()
-    match.path = type("Path", (), {"length_at": staticmethod(lambda *_: np.zeros(9))})()
-    monkeypatch.setattr(in_order, "_MOST_FAILED", 0)
-    windows = in_order.Windows(match)
-    assert windows.disordered(4) is None
-    assert windows.unlooked == [4]
+def test_after_many_places_nothing_more_is_looked_at() -> None:
+    source = cl("RAPID", "GOTO/0,0,50,0,0,1", "FEDRAT/1000,MMPM", *(f"GOTO/{x},0,50,0,0,1" for x in range(1, 1000)))
+    cut = [f"G1 X{x}. Y{0.1 * (x % 2):.1f}" + " F1000." * (x == 1) for x in range(1, 1000)]
+    found = verify(read(source), program(START, *cut), tolerance=0.02)
+    assert found.verdict == Verdict.FAILED
+    assert "after 100 places where the motions part" in found.unverified
+    assert found.max_tip_deviation_mm == pytest.approx(0.1, abs=1e-9)
+
+
+def test_tips_and_axis_points_on_their_own_are_said_to_be() -> None:
+    """The axis point is 0.03 mm behind, along its own path: within ε of that, but not at a common pose."""
+    poses = [f"GOTO/{x},0,50,0,0,1" for x in range(1, 50)]
+    source = cl("RAPID", "GOTO/0,0,50,0,0,1", "FEDRAT/1000,MMPM", *poses)
+    lines = [f"G1 X{x}. I-0.0060000 J0. K0.9999820" + " F1000." * (x == 1) for x in range(1, 49)]
+    text = program(START, *lines, "G1 X49. I0. J0. K1.")
+    found = verify(read(source), text, tolerance=0.02)
+    assert (found.verdict, found.apart) == (Verdict.PASSED, True)
+    assert not verify(read(source), text, tolerance=0.031).apart
+    assert judged(source, text, tolerance=0.0149) == Verdict.FAILED
 
 
 HOLES = cl(

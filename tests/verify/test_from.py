@@ -42,4 +42,4 @@ def test_arc_behind_from_is_read_back(form: str, kinds: list[Move]) -> None:
     start = next(i for i, line in enumerate(lines) if "G1 X10.0000 Y0.0000" in line)
     moved = [*lines[:start], lines[start].replace("Y0.0000", "Y1.0000"), *lines[start + 1 :]]
     problems = verify(program, ("\n".join(moved) + "\n").encode(), tolerance=0.01).problems
-    assert start + 1 in [problem.nc_line for problem in problems]
+    assert any(0 <= problem.nc_line - start - 1 <= 1 for problem in problems)

@@ -20,7 +20,7 @@ from cornersmooth.report.verification import (
     verification_json,
 )
 from cornersmooth.verify import verify
-from cornersmooth.verify.polyline import original_motion
+from cornersmooth.verify.cl_motion import original_motion
 
 from .writing import encode, job
 
@@ -69,7 +69,7 @@ def test_command(files, tmp_path, capsys):
     # corner to chamfer: 0.05/sqrt(2)
     assert told.out.startswith("PASSED")
     assert "tip               0.0353553 mm (limit 0.04) at CL line 6, NC line 11" in told.out
-    assert "common pose       tip 0.0353553 mm (limit 0.08) at CL line 6, NC line 11" in told.out
+    assert "common pose       tip 0.0353553 mm (limit 0.04) at CL line 6, NC line 11" in told.out
     assert run(["verify", source, text, "-e", "0.03", "-q"]) == 1
     told = capsys.readouterr()
     assert told.out == ""

@@ -322,14 +322,14 @@ def _problems(found: Verification, name: str, text: str, verbose: int) -> Iterat
 
 def _summary(found: Verification) -> Iterator[str]:
     """Label and text of everything measured."""
-    from cornersmooth.verify.deviation import TOGETHER
+    from cornersmooth.verify.task import APART
 
     if found.taken_from_head:
         yield f"{'from the head':<18}{' '.join(found.taken_from_head)}"
     own_axis = found.axis_tolerance is not None
     second = f"tool axis {found.axis_tolerance:g} deg" if own_axis else f"axis point at {found.axis_length:g} mm"
     yield f"{'tolerance':<18}{found.tolerance:g} mm, {second}"
-    one, both = found.tolerance, TOGETHER * found.tolerance
+    one, both = found.tolerance, (APART if found.apart else 1.0) * found.tolerance
     yield f"{'tip':<18}{_place(found.tip, 'mm', one)}"
     if not own_axis:
         yield f"{'axis point':<18}{_place(found.axis_point, 'mm', one)}"
@@ -337,8 +337,8 @@ def _summary(found: Verification) -> Iterator[str]:
     if not own_axis:
         yield f"{'common pose':<18}tip {_place(found.together_tip, 'mm', both)}"
         yield f"{'':<18}axis point {_place(found.together_axis_point, 'mm', both)}"
-        text = f"(tip and axis point measured from one pose of the other motion may be {TOGETHER:g} times as far)"
-        yield f"{'':<18}{text}"
+        if found.apart:
+            yield f"{'':<18}tip and axis point each keep the tolerance, but not at common poses"
     yield f"{'tangent jump':<18}{_place(found.tangent_jump, 'deg')}"
     if found.curves:
         yield f"{'curvature jump':<18}{_place(found.curvature_jump, '1/mm')}"

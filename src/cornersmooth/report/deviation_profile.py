@@ -13,8 +13,8 @@ from cornersmooth.nc_reader.elements import NcProgram
 from cornersmooth.nc_reader.reading import read_nc
 from cornersmooth.nc_reader.tool import written_at
 from cornersmooth.verify.batches import Batches
-from cornersmooth.verify.distances import from_original, owner_fraction
-from cornersmooth.verify.match import Match, match
+from cornersmooth.verify.distances import of_original
+from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import nearest_places
 from cornersmooth.verify.task import Task
 
@@ -98,7 +98,7 @@ def deviation_along(
         text = read_nc(text, control=control, machine=machine, tcp=tcp, tolerance=tolerance, axis_length=length)
     parts = [np.zeros((0, _COLUMNS))]
     for batch in Batches(task, text.events).of([text]):
-        matched = match(task, batch)
+        matched = Match(task, batch)
         parts += [_of_elements(matched, batch.offset, samples), _of_poses(matched)]
     rows = np.concatenate(parts)
     parts.clear()
@@ -109,10 +109,10 @@ def deviation_along(
 
 def _of_poses(match: Match) -> Floats:
     """Columns (k, 10) of the distribution at the original poses of one match."""
-    reached = from_original(match)
-    original, trail = match.original, match.written.trail
+    reached = of_original(match)
+    original = match.original
     pose = original.pose[original.trail.owner[reached.vertex]]
-    nc_line = match.nc.line[trail.owner[np.minimum(reached.place.astype(np.int64) + 1, len(trail) - 1)]]
+    nc_line = match.nc_lines(np.minimum(reached.place.astype(np.int64) + 1, len(match.six) - 1))
     gap, way = reached.gap, match.path.length[reached.vertex]
     share, none = original.trail.fraction[reached.vertex], np.zeros(len(pose))
     places = (share, none, pose, none - 1.0, original.program.line[pose], nc_line)
@@ -122,25 +122,27 @@ def _of_poses(match: Match) -> Floats:
 
 def _of_elements(match: Match, offset: int, samples: int) -> Floats:
     """Columns (k, 10) of the distribution at written poses of one match."""
-    trail, first = match.written.trail, match.written.first
-    end = trail.last[1:]
-    start = trail.last[:-1]
-    feeding = np.flatnonzero(match.on[start] & match.on[end] & (match.stretch[start] == match.stretch[end]))
-    element = np.repeat(feeding + first + 1, samples)
+    last = match.motion.last
+    start, end = last[:-1], last[1:]
+    feeding = np.flatnonzero((match.section[start] == match.section[end]) & (match.section[end] >= 0))
+    # where the motions part places are those between the next that are known
+    known, count = np.flatnonzero(match.on), len(match.place)
+    filled = np.interp(np.arange(count), known, match.place[known]) if len(known) else 1.0 * match.low
+    element = np.repeat(feeding + match.first + 1, samples)
     share = np.tile(np.arange(1, samples + 1) / samples, len(feeding))
     tip, axis = written_at(match.nc, element, share)
     # somewhere between the places of the element's ends
-    low, high = match.place[start[feeding]], match.place[end[feeding]]
+    low, high = filled[start[feeding]], filled[end[feeding]]
     place = np.repeat(low, samples) + share * np.repeat(high - low, samples)
     vertex = np.repeat(end[feeding], samples)
     limits = match.low[vertex], match.high[vertex]
     middle = np.clip(place.astype(np.int64), *limits)
     six = match.task.six(tip, axis)
-    segment, at, _ = nearest_places(six, match.path.six, middle, _REACH, *limits)
-    original, length = match.original, match.path.length
-    owner, fraction = owner_fraction(original.trail.owner, original.trail.fraction, segment, at)
+    place = nearest_places(six, match.path.points, middle, _REACH, *limits)
+    original = match.original
+    owner, fraction = original.move_at(place)
     gap = match.task.gap(tip, axis, *original.at(owner, fraction))
-    way = length[segment] + at * (length[segment + 1] - length[segment])
+    way = match.path.lengths_at(place)
     pose = original.pose[owner]
     places = (fraction, share, pose, element + offset, original.program.line[pose], match.nc.line[element])
     columns = (way, gap.tip, gap.axis_point, np.degrees(gap.angle), *places)

@@ -1,37 +1,30 @@
-"""Verification: measures NC text, as a control would run it, against the CL program.
+"""Verification: whether an NC program runs the motion of the CL file, as a control would run it.
 
 Shares no code with `smoothing` and `nc`::
 
     found = verify(program, "part.nc", tolerance=0.04, axis_length=10.0)
     found.passed, found.max_tip_deviation_mm, found.problems
 
-One way for every text::
+A program is verified when the written motion can be run beside the motion of the CL file, both forward only, so that at
+every moment the tips are within the tolerance and the axis points are within the tolerance. One way for every program::
 
-    elements (from `nc_reader`) -> batches -> matches -> checks -> result
+    elements (from `nc_reader`) -> stretches -> decision -> checks -> result
 
-================= =====================================================================================================
-word              meaning
-================= =====================================================================================================
-trail, vertex     a motion as a polyline, and a point of it: inner points only where it is curved
-place             segment and fraction of the CL path; its *length* is the path length up to there
-stop              end of a rapid, or the first pose: named exactly by the text, it divides the motion
-stretch           feed moves between two stops
-batch             elements that are matched and measured at once; both ends of its stretches are known places
-match             a batch with the place of every vertex
-margin            what printed digits account for, mm; *slack* is that and what polylines cut short
-================= =====================================================================================================
+=================== ===================================================================================================
+what is decided     where
+=================== ===================================================================================================
+both as polylines   `cl_motion`, `motions`; how far they leave their chords, proved: `bending`
+run beside another  `passage`: by a `chain` of nearest places, where that fails exactly (`around`, `free_space`)
+stretch by stretch  `rapids` pairs the ends of rapids, `batches` cuts long stretches, `decision` goes on between them
+holes               `drilling` (`hole_lines`, `hole_search`, `hole_check`); tool changes: package `statements`
+what parts          `deviation`: the lines and the distances, which `distances` measures; poses that must be exact
+feeds               `feeds`; where a vertex may be besides its place: `reachable`
+words               `word_check` against `nc_reader.word_list`; `word_places`: where they are, for `statements`
+what is said        `findings`, `result`; all of it: `verifier`
+=================== ===================================================================================================
 
-Where is what:
-
-- what is measured against: `task`, `polyline`
-- elements to batches: `batches`, with `rapids`, `drilling` (`hole_lines`, `hole_search`, `hole_check`, tool changes of
-  `statements`), and `guide` for long stretches
-- where everything is: `match`, found by `search` with `nearest` and `assignment`
-- checks (`checks` lists them): `deviation`, `backtracking`, `feeds`, `continuity`; they share `distances`, with
-  `wide_search`, `hull_bounds`; what they find is in `findings`
-- words: `word_check` against `nc_reader.word_list`; `word_places`: where those beside the motion stand, for the package
-  `statements`, which compares what they say
-- all of it: `verifier`, `result`
+A *place* is a segment of the CL path and a fraction of it. A *stop* is the end of a rapid, or the first pose.
+A *stretch* is the run of feed moves between two stops. The *bend* of a step is how far the motion may leave its chord.
 """
 
 from cornersmooth.processes import useful_processes

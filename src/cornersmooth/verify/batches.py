@@ -1,7 +1,7 @@
-"""The written motion in batches, each with its stretches and where both of their ends are on the CL path.
+"""The written motion in batches, each with its stretches and the place of every vertex on the CL path.
 
 A *stretch* is the run of feed moves between two stops (see `rapids`). Many short stretches make a batch; a long one is
-cut where there is no doubt about the place of a vertex (see `guide`).
+cut anywhere, as the decision (`passage`) goes on from where the motion has been reached.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Floats, Ints, Move
+from cornersmooth.model import Floats, Move
 from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem
 from cornersmooth.nc_reader.tool import directions, moving_rapids
 from cornersmooth.statements.tool_changes import ToolChanges
+from cornersmooth.verify.decision import Decision, Way
 from cornersmooth.verify.drilling import Holes
-from cornersmooth.verify.guide import STRIDE, cut, guide, places_on_each
-from cornersmooth.verify.polyline import Polyline
+from cornersmooth.verify.motions import Motion, written_motion
+from cornersmooth.verify.nearest import places_on_each
 from cornersmooth.verify.rapids import Rapids
 from cornersmooth.verify.task import Task
 
@@ -30,11 +31,6 @@ BATCH: Final = 1 << 14
 
 #: batches that are held back while stops of the text fit nothing
 _HELD: Final = 4
-
-#: vertices of the original in a stretch that is looked at: whether the text can have run all of it, which is not much
-#: longer than what it has run
-_MANY: Final = 1024
-_LONGER: Final = 2.5
 
 #: a stretch in a batch: it begins at the end of one element and ends with another; where it begins on the CL path
 #: (segment and fraction), and its last segment plus one
@@ -45,7 +41,7 @@ STRETCH: Final = np.dtype(
 
 @dataclass(frozen=True)
 class Batch:
-    """Elements that are matched and measured at once.
+    """Elements that are decided at once, and then measured.
 
     Parameters
     ----------
@@ -54,17 +50,23 @@ class Batch:
         Number of the first of them in the whole text.
     stretches : (k,) STRETCH
         Elements are counted in this batch.
-    until : float
-        Place on the CL path where the last stretch goes on in the next batch; inf where it ends in this one.
+    motion : Motion
+        The polyline of the elements from the end of the first stretch's `first` on.
+    way : Way
+        The place of each of its vertices, and where the motions part.
     continued : bool
         Whether the first stretch begins in the batch before: one more element stands in front of it.
+    goes_on : bool
+        Whether the last stretch goes on in the next batch.
     """
 
     elements: Elements
     offset: int
     stretches: NDArray[Any]
-    until: float = np.inf
+    motion: Motion
+    way: Way
     continued: bool = False
+    goes_on: bool = False
 
     @property
     def first(self) -> int:
@@ -98,6 +100,7 @@ class Batches:
 
     def __init__(self, task: Task, events: Sequence[Event]) -> None:
         self.task, self._events = task, events
+        self.decision = Decision(task)
         self.problems: list[Problem] = []
         self.stops = Stops()
         #: elements of holes, as of `Holes`
@@ -221,14 +224,7 @@ class _Part:
             yield from self._close(self.move_last, stop - 1)
             yield from self._flush()
         elif not len(self.waiting) and stop - 1 - self.element > BATCH + BATCH // 2:
-            yield from self._flush()
-            if self.move < self.move_last:
-                yield from self._cut_long(stop - 1, int(self.task.original.trail.last[self.move_last]), open_end=True)
-            else:  # nothing of the CL path is left for what is held: it may only stay where it is
-                yield from self._close(self.move, stop - 1)
-                at = self.element - base
-                self.origin = self.origin or (held.tip[at].copy(), held.second[at].copy())
-                self.element, self.continued = stop - 1, True
+            yield from self._cut_open(stop - 1)
         first = min(self.pending[0][0] if self.pending else self.element, self.element) - 1
         if first > self.base:
             self.held, self.base = self.held.part(first - self.base, len(self.held)), first
@@ -248,9 +244,9 @@ class _Part:
                 line = int(original.program.line[original.pose[move]])
                 self.batches.problems.append(Problem("CS532", line, int(self.held.line[at]), text))
             if kind == Move.HOLE:  # out of it the way begins anywhere
-                places, squares = places_on_each(
-                    self._six(slice(at, at + 1))[0], path, start, int(last_vertex[move + 1]) - 1
-                )
+                tip = self.held.tip[at : at + 1]
+                six = task.six(tip, directions(self.held, tip, self.held.second[at : at + 1]))[0]
+                places, squares = places_on_each(six, path, start, int(last_vertex[move + 1]) - 1)
                 there = float(places[np.argmin(squares)])
         self.move, self.element, self.continued, self.told, self.origin = move, element, False, False, None
         self.start, self.fraction, self.share = start, 0.0, 0.0
@@ -272,104 +268,58 @@ class _Part:
         if not (theirs and ours):
             return
         stop = int(self.task.original.trail.last[move_last])
-        if element_last - self.element > BATCH + BATCH // 2:
-            yield from self._flush()
-            while element_last - self.element > BATCH + BATCH // 2:
-                yield from self._cut_long(element_last, stop, open_end=False)
+        while element_last - self.element > BATCH + BATCH // 2:
+            yield from self._cut(self.element + BATCH, stop)
         start, fraction = self.start, self.fraction
-        if stop - start > _MANY:
-            stop = self._within_reach(start, stop, element_last)
         if start >= stop:
             start, fraction = stop - 1, 1.0
         if self.pending and (element_last - self.pending[0][0] > BATCH or stop - self.pending[0][2] > 2 * BATCH):
             yield from self._flush()
         self.pending.append((self.element, element_last, start, stop, fraction))
 
-    def _within_reach(self, start: int, stop: int, element_last: int) -> int:
-        """Vertex of the original where a stretch ends at the latest: what it cannot have run is missing."""
-        task = self.task
-        length = task.path.length
-        six = self._six(slice(self.element - self.base, element_last + 1 - self.base))
-        run = _LONGER * float(Polyline.of(six).length[-1]) + 2.0 * task.tolerance + task.margin(self.held)
-        if length[stop] - length[start] <= run:
-            return stop
-        reached = max(int(np.searchsorted(length, length[start] + run)), start + 1)
-        original = task.original
-        line = int(original.program.line[original.pose[original.trail.owner[reached]]])
-        extent = float(length[stop] - length[reached])
-        text = "feed moves of the CL file are missing"
-        nc_line = int(self.held.line[element_last - self.base])
-        self.batches.problems.append(Problem("CS535", line, nc_line, text, extent))
-        return reached
+    def _cut_open(self, last: int) -> Iterator[Batch]:
+        """Give out what is held of a stretch whose end is not known yet, but its last element."""
+        rapids = self.rapids
+        move_last = int(rapids.stops[rapids.next]) - 1 if rapids.next < len(rapids.stops) else self.move_last
+        if self.move < move_last:
+            while last - self.element > BATCH + BATCH // 2:
+                yield from self._cut(self.element + BATCH, int(self.task.original.trail.last[move_last]))
+            return
+        # nothing of the CL path is left for what is held: it may only stay where it is
+        yield from self._flush()
+        yield from self._close(self.move, last)
+        at = self.element - self.base
+        self.origin = self.origin or (self.held.tip[at].copy(), self.held.second[at].copy())
+        self.element, self.continued = last, True
 
-    def _six(self, part: slice) -> Floats:
-        """(k, 6) tips and axis points at the ends of elements of what is held."""
-        tip = self.held.tip[part]
-        axis = directions(self.held, tip, self.held.second[part])
-        return self.task.six(tip, axis)
+    def _cut(self, element: int, stop: int) -> Iterator[Batch]:
+        """Give out a long stretch up to an element."""
+        yield from self._flush()
+        start, fraction = (self.start, self.fraction) if self.start < stop else (stop - 1, 1.0)
+        yield self._batch([(self.element, element, start, stop, fraction)], goes_on=True)
+        place = self.batches.decision.reached
+        self.start = min(int(place), stop - 1)
+        self.element, self.fraction, self.continued = element, place - self.start, True
 
     def _flush(self) -> Iterator[Batch]:
         """Give out what waits."""
         if self.pending:
-            yield self._batch(self.pending, np.inf)
+            yield self._batch(self.pending)
             self.pending = []
 
-    def _batch(self, rows: list[tuple[int, int, int, int, float]], until: float) -> Batch:
-        lead = int(self.continued and rows[0][0] == self.element)
+    def _batch(self, rows: list[tuple[int, int, int, int, float]], *, goes_on: bool = False) -> Batch:
+        task, lead = self.task, int(self.continued and rows[0][0] == self.element)
         begin = rows[0][0] - lead
         table = np.array(rows, STRETCH)
         table["first"] -= begin
         table["last"] -= begin
         elements = self.held.part(begin - self.base, rows[-1][1] + 1 - self.base)
-        return Batch(elements, begin, table, until, bool(lead))
-
-    def _cut_long(self, element_last: int, stop: int, *, open_end: bool) -> Iterator[Batch]:
-        """Cut off the beginning of a long stretch; nothing where it is better to wait for more of it."""
-        task, path = self.task, self.task.path
-        nc, begin = self.held, self.element - self.base
-        margin = task.margin(nc)
-        far = float(np.sqrt(2) * task.tolerance + margin)
-        origin = float(path.length_at(np.array([self.start]), np.array([self.fraction]))[0])
-        limits = self.start, max(stop - 1, self.start)
-        for wanted in (BATCH, _HELD * BATCH):
-            size = min(element_last - self.element, wanted + BATCH // 2)
-            part = slice(begin, begin + size + 1)
-            six = self._six(part)
-            length = Polyline.of(six).length
-            found = guide(six, length, path, origin, limits, far)
-            ends = np.append(np.diff(nc.line[part]) != 0, True)
-            latest = min(wanted, size - STRIDE)
-            chosen = cut(six, length, found, path, limits, ends, latest, (margin, 2.0 * task.tolerance + margin))
-            if chosen is not None:
-                break
-            if open_end and size < wanted + BATCH // 2:
-                return
-        if chosen is None:  # the text is off its way: as far as the last vertex that was on it tells
-            vertex = size - BATCH // 2
-            known = int(np.searchsorted(found[0], vertex, side="right")) - 1
-            away = length[vertex] - length[found[0][known]]
-            chosen = vertex, min(float(found[1][known] + away), float(path.length[limits[1] + 1]))
-        vertex, place = chosen
-        segment, fraction = path.place_at(place)
-        element = self.element + vertex
-        yield self._batch([(self.element, element, self.start, segment + 1, self.fraction)], segment + fraction)
-        self.element, self.start, self.fraction, self.continued = element, segment, fraction, True
-        if open_end:
-            self._pass_by(place, begin + found[0], found[1])
-
-    def _pass_by(self, place: float, elements: Ints, places: Floats) -> None:
-        """Say which stops of the CL file the text has passed without stopping; elements are of what is held."""
-        rapids, task = self.rapids, self.task
-        last_vertex = task.original.trail.last
-        near = 2.0 * task.tolerance + task.margin(self.held)
-        while rapids.next < len(rapids.stops):
-            vertex = int(last_vertex[rapids.stops[rapids.next]])
-            if task.path.length[vertex] > place - near:
-                return
-            about = int(np.interp(task.path.length[vertex], places, elements))
-            last = len(self.held) - 1
-            rapids.missing(self.held, rapids.next, max(about - STRIDE, 0), min(about + STRIDE, last))
-            rapids.next += 1
+        first = int(table["first"][0])
+        part = elements.part(first, len(elements))
+        motion = written_motion(part, task.tolerance, task.axis_length, own_axis=task.own_axis)
+        ends = motion.last[table["first"] - first], motion.last[table["last"] - first]
+        way = self.batches.decision.take(part, motion, ends, table, goes_on=goes_on)
+        return Batch(elements, begin, table, motion, way, bool(lead), goes_on)
 
     def _lost(self, move_last: int, element_last: int, *, theirs: bool) -> None:
         """Say that only one of the two motions moves between two stops."""

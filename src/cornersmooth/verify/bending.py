@@ -70,12 +70,12 @@ def curve_bend(group: CurveGroup, second: Second, axis_length: float) -> Floats:
 
 def _point_bend(points: Floats, weight: Floats) -> Floats:
     """(k,) bend of rational Bézier curves with control points (k, d + 1, 3)."""
-    away = points - points.mean(axis=1, keepdims=True)
-    reach = np.sqrt((away**2).sum(axis=2)).max(axis=1)
-    first, second = _derivatives(away * weight[..., None])
     if not np.ptp(weight):
-        one: Floats = second / weight[:, 0] / 8.0
+        one: Floats = _derivatives(points)[1] / 8.0
         return one
+    away = points - points.mean(axis=1, keepdims=True)
+    reach = np.sqrt(_squares(away).max(axis=1))
+    first, second = _derivatives(away * weight[..., None])
     least = weight.min(axis=1)
     fall, curl = _derivatives(weight[..., None])
     slope = (first + fall * reach) / least
@@ -86,7 +86,7 @@ def _point_bend(points: Floats, weight: Floats) -> Floats:
 def _direction_bend(vector: Floats) -> Floats:
     """(k,) bend of the directions of Bézier curves with control points (k, d + 1, 3)."""
     middle = vector.mean(axis=1)
-    middle /= np.maximum(np.sqrt((middle**2).sum(axis=1)), np.finfo(np.float64).tiny)[:, None]
+    middle /= np.maximum(np.sqrt(np.einsum("ij,ij->i", middle, middle)), np.finfo(np.float64).tiny)[:, None]
     least = np.einsum("ijk,ik->ij", vector, middle).min(axis=1)  # the curve is in the hull of its control points
     first, second = _derivatives(vector)
     safe = np.where(least > 0.0, least, 1.0)
@@ -95,7 +95,12 @@ def _direction_bend(vector: Floats) -> Floats:
 
 def _derivatives(points: Floats) -> tuple[Floats, Floats]:
     """(k,) bounds of the first and of the second derivative of Bézier curves with control points (k, d + 1, 3)."""
-    degree = points.shape[1] - 1
-    first, second = np.diff(points, axis=1), np.diff(points, 2, axis=1)
-    bounds = [np.sqrt((values**2).sum(axis=2)).max(axis=1, initial=0.0) for values in (first, second)]
+    degree, step = points.shape[1] - 1, np.diff(points, axis=1)
+    bounds = [np.sqrt(_squares(values).max(axis=1, initial=0.0)) for values in (step, np.diff(step, axis=1))]
     return degree * bounds[0], degree * max(degree - 1, 0) * bounds[1]
+
+
+def _squares(vectors: Floats) -> Floats:
+    """(k, d) squares of vectors (k, d, n)."""
+    squares: Floats = np.einsum("ijk,ijk->ij", vectors, vectors)
+    return squares

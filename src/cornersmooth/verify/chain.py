@@ -18,6 +18,7 @@ the smallest value of α / t + β / (1 - t) is (√α + √β)². Where neighbou
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,8 +27,8 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.free_space import largest_square
 
-#: looks at a row that is not near where it was expected (speed only)
-_LOOKS = 3
+#: rows that are looked for together: at least, at first, at most (speed only)
+_BLOCKS = 64, 512, 8192
 
 #: how far a row may be from where it is expected, as a share of the way and in radii (speed only)
 _SLACK, _RADII = 0.05, 100.0
@@ -46,21 +47,32 @@ class Path:
         How far the motion may leave each segment.
     gate : (m + 1,) float64, mm
         Radius at each vertex.
+    exact : callable or None
+        Gives points (k, 3h) of the motion at places (k,); None where it is straight.
     """
 
     points: Floats
     length: Floats
     bend: Floats
     gate: Floats
+    exact: Callable[[Floats], Floats] | None = None
 
     @classmethod
-    def of(cls, points: Floats, radius: float, *, gate: Floats | None = None, bend: Floats | None = None) -> Path:
+    def of(
+        cls,
+        points: Floats,
+        radius: float,
+        *,
+        gate: Floats | None = None,
+        bend: Floats | None = None,
+        exact: Callable[[Floats], Floats] | None = None,
+    ) -> Path:
         """Make it of vertices."""
         step = points[1:] - points[:-1]
         length = np.zeros(len(points))
         np.cumsum(np.sqrt(np.einsum("ij,ij->i", step, step)), out=length[1:])
         limit = np.full(len(points), radius) if gate is None else np.minimum(gate, radius)
-        return cls(points, length, np.zeros(len(step)) if bend is None else bend, limit)
+        return cls(points, length, np.zeros(len(step)) if bend is None else bend, limit, exact)
 
     @property
     def segments(self) -> int:
@@ -72,17 +84,51 @@ class Path:
         """Whether any of the segments is."""
         return bool(self.bend.any())
 
+    def at(self, place: Floats) -> Floats:
+        """(k, 3h) points of the motion at places."""
+        return points_at(self.points, place).T if self.exact is None else self.exact(place)
+
     def length_at(self, place: float) -> float:
         """Path length up to a place, mm."""
         k = min(int(place), self.segments - 1)
         return float(self.length[k] + (place - k) * (self.length[k + 1] - self.length[k]))
 
+    def lengths_at(self, place: Floats) -> Floats:
+        """(k,) path lengths up to places, mm."""
+        k = np.minimum(place.astype(np.int64), self.segments - 1)
+        start = self.length.take(k)
+        length: Floats = start + (place - k) * (self.length.take(k + 1) - start)
+        return length
+
+    def place_at(self, length: float) -> tuple[int, float]:
+        """Return segment and fraction at a path length."""
+        last = max(len(self.length) - 2, 0)
+        segment = min(max(int(np.searchsorted(self.length, length, side="right")) - 1, 0), last)
+        start, end = self.length[segment : segment + 2]
+        return segment, float(np.clip((length - start) / (end - start), 0.0, 1.0)) if end > start else 0.0
+
+    def way_apart(self, here: float, there: float) -> float:
+        """How far the path goes away from one place on its way to another, mm; places are path lengths.
+
+        Less than the length of the way where it goes to and fro.
+        """
+        length = self.length
+        low, high = np.searchsorted(length, sorted((here, there)))
+        if min(here, there) < 0 or high == len(length):
+            return abs(there - here)
+        ends = []
+        for place in (here, there):
+            k = min(int(np.searchsorted(length, place, side="right")), len(length) - 1)
+            share = (place - length[k - 1]) / max(length[k] - length[k - 1], np.finfo(np.float64).tiny)
+            ends.append(self.points[k - 1] + share * (self.points[k] - self.points[k - 1]))
+        return float(np.linalg.norm(np.vstack((self.points[low:high], ends[1])) - ends[0], axis=1).max())
+
 
 @dataclass(frozen=True)
 class Window:
-    """Segments of a path from `first` on, as columns."""
+    """Segments of a path that lead somewhere, as columns."""
 
-    first: int
+    number: Ints  #: (w,) of the segments
     start: Floats  #: (3h, w)
     way: Floats
     inverse: Floats  #: 1 / |way|²
@@ -97,22 +143,31 @@ class Window:
         points = np.ascontiguousarray(path.points[first : stop + 1].T)
         way = points[:, 1:] - points[:, :-1]
         size = np.einsum("ij,ij->j", way, way)
+        number, start, length = np.arange(first, stop), points[:, :-1], path.length[first : stop + 1]
+        if not size.all():
+            kept = np.flatnonzero(size > 0.0)
+            kept = kept if len(kept) else np.zeros(1, np.int64)
+            number, start, way, size = number[kept], start[:, kept], way[:, kept], size[kept]
+            length = np.append(length[kept], length[-1])
         inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
-        return cls(first, points[:, :-1], way, inverse, path.length[first : stop + 1])
+        return cls(number, start, way, inverse, length)
 
     def segment_at(self, length: Floats) -> Ints:
         """Segment, counted in the window, at path lengths."""
         k: Ints = np.clip(np.searchsorted(self.length, length, side="right") - 1, 0, self.way.shape[1] - 1)
         return k
 
-    def nearest(self, points: Floats, length: Floats) -> Floats:
-        """Places near points (3h, k), from path lengths on: a step along the tangent, then the neighbours."""
+    def nearest(self, points: Floats, length: Floats) -> tuple[Floats, Floats]:
+        """Places near points (3h, k), from path lengths on: a step along the tangent, then the neighbours.
+
+        With the squares of the distances of the farthest of their triples.
+        """
         k = self.segment_at(length)
         away = points - self.start.take(k, axis=1)
         ahead = np.einsum("ij,ij->j", away, self.way.take(k, axis=1)) * self.inverse[k]
         k = self.segment_at(self.length[k] + ahead * (self.length[k + 1] - self.length[k]))
         best: Floats | None = None
-        place: Floats = np.zeros(0)
+        place = farthest = np.zeros(0)
         for step in (0, -1, 1):
             j = np.clip(k + step, 0, self.way.shape[1] - 1)
             way = self.way.take(j, axis=1)
@@ -120,16 +175,18 @@ class Window:
             at = np.einsum("ij,ij->j", away, way) * self.inverse.take(j)
             np.clip(at, 0.0, 1.0, out=at)
             away -= at * way
-            square = np.einsum("ij,ij->j", away, away)
-            at += j
+            squares = [np.einsum("ij,ij->j", away[c : c + 3], away[c : c + 3]) for c in range(0, len(away), 3)]
+            square = squares[0] if len(squares) == 1 else squares[0] + squares[1]
+            larger = squares[0] if len(squares) == 1 else np.maximum(*squares)
+            at += self.number.take(j)
             if best is None:
-                best, place = square, at
+                best, place, farthest = square, at, larger
             else:
                 nearer = square < best
                 np.copyto(best, square, where=nearer)
                 np.copyto(place, at, where=nearer)
-        place += self.first
-        return place
+                np.copyto(farthest, larger, where=nearer)
+        return place, farthest
 
 
 @dataclass(frozen=True)
@@ -181,10 +238,13 @@ class Chain:
         Ascending.
     bad : (n,) bool
         Whether the row, or the step from the row before it, is not proved.
+    far : (n,) bool
+        Whether it is not because vertices are farther apart: dividing the step proves nothing.
     """
 
     place: Floats
     bad: Bools
+    far: Bools
 
 
 def points_at(path: Floats, place: Floats, first: int = 0) -> Floats:
@@ -222,46 +282,57 @@ def chain(own: Floats, bend: Floats, path: Path, radius: float, sections: Sectio
     ends = slice(None, -1 if sections.open else None)
     place[sections.last[ends]] = sections.stop[ends]
     away = own - points_at(path.points, place)
-    bad = largest_square(away) > radius * radius
+    away_square = largest_square(away)
+    bad = away_square > radius * radius
     rows, vertices, share = passed(own, step, path.points, place)
     beside = path.points[vertices].T - own[:, rows] - share * step[:, rows]
     beside_square = largest_square(beside)
     limit = np.minimum(radius, path.gate[vertices] - 4.0 * bend[rows] * share * (1.0 - share))
     bad[rows[(beside_square > limit * limit) | (limit < 0.0)] + 1] = True
+    far = bad
     if path.bent or bend.any():
+        far = away_square > radius * radius
+        least = np.sqrt(beside_square) - 4.0 * bend[rows] * share * (1.0 - share)
+        far[rows[least > np.minimum(radius, path.gate[vertices])] + 1] = True
         bad |= _bent(bend, path, radius, place, (rows, vertices, share), (away, -beside))
     bad[~inside] = False
     firsts = sections.first[1:]
     bad[firsts] = largest_square(away[:, firsts]) > radius * radius  # the step to it is none of its section
     bad[0] = False
-    return Chain(place, bad)
+    return Chain(place, bad, far)
 
 
 def _places(own: Floats, gone: Floats, path: Path, radius: float, where: tuple[Sections, Ints]) -> tuple[Floats, Bools]:
-    """Nearest places of all rows, and which of them are near; the number of the section of each row is known."""
+    """Nearest places of all rows, and which of them are near; the number of the section of each row is known.
+
+    Block by block, as one motion may be longer than the other: each is looked for from where the last one was found.
+    """
     sections, number = where
-    begin = np.array([path.length_at(place) for place in sections.start.tolist()])
-    expected = (begin - gone[sections.first])[number] + gone
-    place, near = sections.start[number], np.zeros(len(gone), np.bool_)
-    rows = np.arange(len(gone))
-    for _ in range(_LOOKS):
-        low, high = float(expected[rows].min()), float(expected[rows].max())
+    begin, left = path.lengths_at(sections.start), gone[sections.first]
+    place, near = np.empty(len(gone)), np.empty(len(gone), np.bool_)
+    row, size, ratio = 0, _BLOCKS[1], 1.0
+    while row < len(gone):
+        rows = slice(row, row + size)
+        k = number[rows]
+        expected = begin[k] + ratio * (gone[rows] - left[k])
+        low, high = float(expected.min()), float(expected.max())
         slack = _SLACK * (high - low) + _RADII * radius
-        window = Window.of(path, low - slack, high + slack)
-        found = window.nearest(own[:, rows] if len(rows) < len(gone) else own, expected[rows])
-        place[rows] = found
-        square = largest_square(own[:, rows] - points_at(path.points, found))
-        near[rows] = square <= radius * radius
-        rows = rows[~near[rows]]
-        if not len(rows) or len(rows) == len(gone):
-            break
-        # from the last row of the section before that is near
-        last = np.where(near, np.arange(len(gone)), 0)
-        np.maximum.accumulate(last, out=last)
-        last = np.maximum(last, sections.first[number])[rows]
-        k = np.minimum(place[last].astype(np.int64), path.segments - 1)
-        there = path.length[k] + (place[last] - k) * (path.length[k + 1] - path.length[k])
-        expected[rows] = there + gone[rows] - gone[last]
+        place[rows], square = Window.of(path, low - slack, high + slack).nearest(own[:, rows], expected)
+        close = square <= radius * radius
+        count = len(close)
+        if size > _BLOCKS[0] and not close.all():
+            count, size = int(np.argmin(close)), max(size // 4, _BLOCKS[0])
+        else:
+            size = min(2 * size, _BLOCKS[2])
+        near[row : row + count] = close[:count]
+        known = row + np.flatnonzero(close[:count])[-1:]
+        row += count
+        if len(known):
+            section, last = int(number[known[0]]), int(known[0])
+            there = path.length_at(float(place[last]))
+            if gone[last] - left[section] > _RADII * radius:
+                ratio = min(max((there - begin[section]) / (gone[last] - left[section]), 0.5), 2.0)
+            begin[section], left[section] = there, gone[last]
     return place, near
 
 

@@ -7,15 +7,13 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import CurveGroup, groups
 from cornersmooth.nc_reader.elements import Element, Elements
-from cornersmooth.verify.distances import Distances
 from cornersmooth.verify.findings import Findings
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import larger_square
 
 
-def measure_continuity(distances: Distances, found: Findings) -> None:
+def measure_continuity(match: Match, found: Findings) -> None:
     """Take down the largest jumps and the shortest element."""
-    match = distances.match
     element, cosine, curved, jump = _jumps(match)
     worst = found.continuity
     for largest, values, where in ((worst.tangent, -cosine, element), (worst.curvature, jump, curved)):
@@ -23,14 +21,14 @@ def measure_continuity(distances: Distances, found: Findings) -> None:
             k = int(np.argmax(values))
             largest.update(values[k : k + 1], _cl_lines(match, where[k : k + 1]), match.nc.line[where[k : k + 1]])
     # a block in rotary words may have become several elements: its length is from its start to its end
-    trail, first = match.written.trail, match.written.first
-    lines = match.nc.line[first : first + len(trail.last)]
+    last, first = match.motion.last, match.first
+    lines = match.nc.line[first : first + len(last)]
     chosen = np.flatnonzero(np.append(lines[1:] != lines[:-1], True))
-    ends = trail.last[chosen]
+    ends = last[chosen]
     six = match.six[ends] if len(ends) < len(match.six) else match.six
     square = larger_square(six[1:] - six[:-1])
     square[(square == 0) | ~match.on[ends[1:]] | ~match.on[ends[:-1]]] = np.inf
-    square[match.stretch[ends[1:]] != match.stretch[ends[:-1]]] = np.inf
+    square[match.section[ends[1:]] != match.section[ends[:-1]]] = np.inf
     if len(square):
         k = int(np.argmin(square))
         own = chosen[k + 1 : k + 2] + first
@@ -38,10 +36,7 @@ def measure_continuity(distances: Distances, found: Findings) -> None:
 
 
 def _cl_lines(match: Match, elements: Ints) -> Ints:
-    original = match.original
-    vertex = match.written.trail.last[elements - match.written.first]
-    lines: Ints = original.program.line[original.pose[original.trail.owner[match.segment[vertex] + 1]]]
-    return lines
+    return match.cl_lines(np.floor(match.place[match.motion.last[elements - match.first]]) + 1.0)
 
 
 def _jumps(match: Match) -> tuple[Ints, Floats, Ints, Floats]:
@@ -50,9 +45,9 @@ def _jumps(match: Match) -> tuple[Ints, Floats, Ints, Floats]:
     Returns the elements (k,) behind the joints and the cosines of the angles between the tangents; those (c,) behind
     joints of which at least one side is a curve or an arc, and the differences of the curvatures there, 1/mm.
     """
-    nc, lead = match.nc, int(match.continued)  # an element in front, if the batch begins in a stretch
-    first = match.written.first - lead
-    last = match.written.first + len(match.written.trail.last) - 1
+    nc, lead = match.nc, int(match.batch.continued)  # an element in front, if the batch begins in a stretch
+    first = match.first - lead
+    last = match.first + len(match.motion.last) - 1
     part = slice(first, last + 1)
     tip, kind = nc.tip[part], nc.kind[part]
     count = len(tip)
@@ -63,16 +58,14 @@ def _jumps(match: Match) -> tuple[Ints, Floats, Ints, Floats]:
     bent: Bools = (kind == Element.ARC) | (kind == Element.CURVE)
     if bent.any():
         arrive, bend_in, bend_out = leave.copy(), np.zeros(count), np.zeros(count)
-        curves = match.written.curves
-        if lead and kind[lead] == Element.CURVE:
-            curves = (*curves, *groups(nc.curves, np.flatnonzero(nc.curves.element == first + lead)))
-        for group in curves:
+        inside = (nc.curves.element >= first + lead) & (nc.curves.element <= last)
+        for group in groups(nc.curves, np.flatnonzero(inside)):
             _add_curves(nc, group, first, (leave, bend_out), (arrive, bend_in))
         _add_arcs(nc, first, last, leave, arrive, bend_in, bend_out)
-    end = match.written.trail.last
+    end = match.motion.last
     feeding = np.zeros(count, np.bool_)
-    on, stretch = match.on[end], match.stretch[end]
-    feeding[lead + 1 :] = on[1:] & on[:-1] & (stretch[1:] == stretch[:-1])
+    stretch = match.section[end]
+    feeding[lead + 1 :] = match.feeding
     stretch = np.concatenate((stretch[:lead], stretch))
     if lead:
         feeding[lead] = True

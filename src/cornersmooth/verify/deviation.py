@@ -1,199 +1,258 @@
-"""Deviation: how far the two motions are apart at most, and which poses are missed that must be passed exactly."""
+"""Deviation: where the motions part, how far they are apart at most, and which poses are missed that must be exact."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.common_place import axis_off_of_original, axis_off_of_written
 from cornersmooth.verify.distances import (
-    Distances,
     Reached,
-    common_gaps_of_original,
-    own_gaps_of_original,
-    own_gaps_of_written,
+    gap_of_written,
+    of_original,
+    of_written,
+    original_alone,
+    written_alone,
+    written_together,
 )
-from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses
-from cornersmooth.verify.hull_bounds import hull_gaps
+from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Worst
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import distance_between
+from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
+from cornersmooth.verify.passage import AROUND, LONGER, MOST_BREAKS, Break
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 
-#: rows of a batch for which tip and axis point are looked at each on its own: at a time at first, and those that are
-#: farther than the tolerance from a common pose at a time
-_OWN_ROWS, _SOME_OWN_ROWS = 16, 256
+#: rows for which tip and axis point are looked at each on its own at a time: only the largest are wanted
+_SOME: Final = 16
 
-#: rows farther than the tolerance from which on the worst of them tell enough, if most of these are off by themselves
-_MANY_OVER = 1024
-
-#: poses of a batch that are missed where they are looked for, and looked for at other places, at most
-_MOST_MISSED: Final = 1024
-
-#: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
-TOGETHER: Final = 2.0
+#: vertices and segments around a break that are looked at for what is said of it
+_MOST_ROWS, _MOST_SEGMENTS = 256, 4096
 
 
-def check_written(distances: Distances, found: Findings) -> None:
-    """Written vertices must be near the original: CS521, CS522, CS525, CS527."""
-    match, written = distances.match, distances.written
-    cl_line = _cl_lines_near(distances, written.place)
-    nc_line = match.nc.line[match.written.trail.owner[written.vertex]]
-    _take(distances, found, written, (cl_line, nc_line), written.place, mine=True)
+def check_breaks(match: Match, found: Findings) -> None:
+    """Both motions must be run beside each other within the tolerance: CS521, CS522, CS523, CS525, CS527."""
+    for metric, one in match.batch.way.breaks:
+        _say(match, found, metric, one)
+    if not match.batch.way.whole and match.batch.way.breaks:
+        line = int(match.nc_lines(np.array([match.batch.way.breaks[-1][1].row]))[0])
+        found.unlooked.append((line, f"what comes after {MOST_BREAKS} places where the motions part"))
 
 
-def check_original(distances: Distances, found: Findings) -> None:
-    """The written motion must come near the vertices of the original: CS521, CS522, CS525, CS527."""
-    match, theirs = distances.match, distances.original
+def _say(match: Match, found: Findings, metric: Metric, one: Break) -> None:
+    """Take down one break: what is off around it, or else that the order is wrong."""
+    limit, around = match.tolerance + ARITHMETIC, _Around.of(match, one)
+    off: dict[str, float] = {}
+    cl_line, nc_line = match.cl_lines(np.array([one.place])), match.nc_lines(around.rows[:1])
+    for name in COLUMNS:
+        off[name], place, row = around.farthest(match, name)
+        where = match.cl_lines(place), match.nc_lines(row)
+        if name == "both":
+            gap = gap_of_written(match, *around.worst(match))
+            for values, worst in ((gap.tip, found.largest.together_tip), (gap.angle, found.largest.orientation)):
+                worst.update(values, *where)
+            found.largest.together_axis_point.update(gap.axis_point, *where)
+            found.poses.append(around.poses(match))
+            cl_line, nc_line = where if off[name] > limit else (cl_line, nc_line)
+        elif off[name] > limit and metric in (name, "both") and not (name == "axis point" and match.task.own_axis):
+            worst = found.largest.tip if name == "tip" else found.largest.axis_point
+            worst.update(np.array([off[name]]), *where)
+            found.violations.add(521 if name == "tip" else 522, place, *where, np.array([off[name]]))
+    if max(off["tip"], 0.0 if match.task.own_axis else off["axis point"]) > limit:
+        return
+    if off["both"] <= limit and not one.proved:
+        found.unlooked.append((int(nc_line[0]), "the order of the motion"))
+        return
+    code, amount = 523 if off["both"] <= limit else 525, off["both"]
+    if code == 525 and match.task.own_axis:
+        code, amount = AXIS_OFF, float(np.degrees(gap.angle[0]))
+    found.violations.add(code, np.array([one.place]), cl_line, nc_line, np.array([amount]))
+
+
+@dataclass(frozen=True)
+class _Around:
+    """What is around a break.
+
+    Parameters
+    ----------
+    rows, segments : (r,), (m,) int64
+        Written vertices from the break to where the motions are together again, and segments of the CL path near them.
+    vertices, steps : (k,), (s,) int64
+        Vertices of the CL path between the two places, and steps of the written motion near them.
+    """
+
+    rows: Ints
+    segments: Ints
+    vertices: Ints
+    steps: Ints
+
+    @classmethod
+    def of(cls, match: Match, one: Break) -> _Around:
+        """Find it."""
+        path, row = match.path, max(one.row, 0)
+        end = int(np.flatnonzero(match.section == match.section[row])[-1])
+        whole = min(int(match.motion.last[match.motion.owner[row]]), end)  # what is off at its end begins before it
+        again = whole + 1 + np.flatnonzero(match.on[whole + 1 : end + 1])
+        resumed = int(again[0]) if len(again) else end + 1
+        last = min(max(resumed - 1, row), end, row + _MOST_ROWS)
+        here, stop = path.length_at(one.place), float(match.high[row] + 1)
+        vertices = np.arange(int(one.place) + 1, int(stop) + 1)
+        if len(again):
+            stop = float(match.place[resumed])
+            vertices = vertices[: int(np.ceil(stop)) - int(one.place) - 1]
+        elif last < end or match.batch.goes_on:  # no farther than the rows that are looked at
+            way = np.diff(match.six[max(row - 1, 0) : last + 1], axis=0)
+            longest = LONGER * float(np.sqrt(np.einsum("ij,ij->i", way, way)).sum()) + AROUND * match.tolerance
+            length = here + longest
+            stop, vertices = min(stop, float(np.searchsorted(path.length, length))), vertices[:0]
+        radius = AROUND * match.tolerance
+        low, high = np.searchsorted(path.length, (here - radius, path.length_at(stop) + radius)).tolist()
+        low = min(max(low - 1, int(match.low[row])), int(match.high[row]))
+        high = max(min(high, int(match.high[row]) + 1, low + _MOST_SEGMENTS), low + 1)
+        vertices = vertices[:_MOST_SEGMENTS]
+        steps = np.arange(max(row - 1, 0), max(min(resumed, end, last + 1), row))
+        vertices = vertices if len(steps) else vertices[:0]
+        return cls(np.arange(row, last + 1), np.arange(low, high), vertices, steps)
+
+    def farthest(self, match: Match, metric: Metric) -> tuple[float, Floats, Ints]:
+        """The largest distance of the vertices of both motions, mm; place and written vertex, (1,) each.
+
+        The latter are those of the first that is beyond the tolerance: there it begins.
+        """
+        columns, path, limit = COLUMNS[metric], match.path.points, match.tolerance + ARITHMETIC
+        share, off, nearest = _distances(match.six[self.rows], path, self.segments, columns)
+        k = _first_or_worst(off, limit)
+        found = float(off.max()), float(self.segments[nearest[k]] + share[k]), int(self.rows[k])
+        if len(self.vertices):
+            _, off, nearest = _distances(path[self.vertices], match.six, self.steps, columns)
+            k = _first_or_worst(off, limit)
+            if off.max() > found[0]:  # else the written vertices tell more
+                place, row = float(self.vertices[k]), int(self.steps[nearest[k]]) + 1
+                found = (float(off.max()), place, row) if found[0] <= limit else (float(off.max()), *found[1:])
+        return found[0], np.array([found[1]]), np.array([found[2]])
+
+    def worst(self, match: Match) -> tuple[Ints, Floats]:
+        """The written vertex that is farthest off both paths at common places, and where it is, (1,) each."""
+        share, off, nearest = _distances(match.six[self.rows], match.path.points, self.segments, COLUMNS["both"])
+        k = int(off.argmax())
+        return self.rows[k : k + 1], self.segments[nearest[k : k + 1]] + share[k : k + 1]
+
+    def poses(self, match: Match) -> Poses:
+        """How far the original poses are from the written motion."""
+        trail, vertices = match.original.trail, self.vertices
+        vertices = vertices[trail.fraction[vertices] == 1]
+        point, pose = match.path.points[vertices], match.original.pose[trail.owner[vertices]]
+        if not len(vertices):
+            nothing = np.zeros(0)
+            return Poses(pose, nothing, nothing, nothing, np.zeros(0, np.int64))
+        share, _, nearest = _distances(point, match.six, self.steps, COLUMNS["both"])
+        step, at = self.steps[nearest], share[:, None]
+        six = match.six[step] + at * (match.six[step + 1] - match.six[step])
+        gap = match.task.gap(six[:, :3], match.task.axis_of(six), point[:, :3], trail.axis[vertices])
+        return Poses(pose, gap.tip, gap.axis_point, gap.angle, match.nc_lines(step + 1))
+
+
+def _first_or_worst(off: Floats, limit: float) -> int:
+    """The first that is beyond a limit, or the largest."""
+    return int(np.argmax(off > limit)) if off.max() > limit else int(off.argmax())
+
+
+def _distances(point: Floats, vertices: Floats, segments: Ints, columns: slice) -> tuple[Floats, Floats, Ints]:
+    """Of points (k, 6): fraction, distance (k,) and which of segments (m,) is nearest.
+
+    Of both, tip and axis point, the larger distance at the nearest common place.
+    """
+    segments = np.broadcast_to(segments, (len(point), len(segments)))
+    share, square = on_segments(point[:, None, columns], vertices, segments, columns)
+    if columns == slice(0, 6):
+        start = vertices[segments]
+        away = point[:, None] - start - share[..., None] * (vertices[segments + 1] - start)
+        square = np.maximum((away[..., :3] ** 2).sum(axis=2), (away[..., 3:] ** 2).sum(axis=2))
+    nearest, each = square.argmin(axis=1), np.arange(len(point))
+    return share[each, nearest], np.sqrt(square[each, nearest]), nearest
+
+
+def measure_written(match: Match, found: Findings) -> None:
+    """Take down how far written vertices are from the original."""
+    reached = of_written(match)
+    lines = match.cl_lines(reached.place), match.nc_lines(reached.vertex)
+    _largest(match, found, reached, lines, mine=True)
+
+
+def measure_original(match: Match, found: Findings) -> None:
+    """Take down how far vertices of the original are from the written motion, and poses that must be passed: CS524."""
+    reached = of_original(match)
     original = match.original
-    pose = original.pose[original.trail.owner[theirs.vertex]]
-    cl_line = original.program.line[pose]
-    segment = np.minimum(theirs.place.astype(np.int64) + 1, len(match.six) - 1)
-    nc_line = match.nc.line[match.written.trail.owner[segment]]
-    _take(distances, found, theirs, (cl_line, nc_line), theirs.vertex.astype(np.float64), mine=False)
-    gap, whole = theirs.gap, original.trail.fraction[theirs.vertex] == 1
+    pose = original.pose[original.trail.owner[reached.vertex]]
+    row = np.minimum(reached.place.astype(np.int64) + 1, len(match.six) - 1)
+    nc_line = match.nc_lines(row)
+    _largest(match, found, reached, (original.program.line[pose], nc_line), mine=False)
+    gap, whole = reached.gap, original.trail.fraction[reached.vertex] == 1
     found.poses.append(Poses(pose[whole], gap.tip[whole], gap.axis_point[whole], gap.angle[whole], nc_line[whole]))
+    _check_exact_poses(match, found, reached.vertex[whole], row[whole])
 
 
-def _cl_lines_near(distances: Distances, place: Floats) -> Ints:
-    original = distances.match.original
-    rows = np.minimum(place.astype(np.int64) + 1, len(original.trail) - 1)
-    lines: Ints = original.program.line[original.pose[original.trail.owner[rows]]]
-    return lines
+def _largest(match: Match, found: Findings, reached: Reached, lines: tuple[Ints, Ints], *, mine: bool) -> None:
+    """Take what the vertices of one of the two motions found; only the largest are looked at closely."""
+    result, gap = found.largest, reached.gap
+
+    def take(worst: Worst, known: Floats, closely: Callable[[Ints], Floats]) -> None:
+        rows, some = np.flatnonzero(known > worst.value), _SOME
+        while len(rows):
+            first = rows[np.argpartition(-known[rows], some)[:some]] if len(rows) > some else rows
+            worst.update(closely(first), lines[0][first], lines[1][first])
+            rows = np.setdiff1d(rows[known[rows] > worst.value], first, assume_unique=True)
+            some *= 4
+
+    def together(name: str) -> Callable[[Ints], Floats]:
+        if not mine:
+            return lambda rows: getattr(gap, name)[rows]
+        return lambda rows: getattr(written_together(match, reached, rows), name)
+
+    take(result.together_tip, gap.tip, together("tip"))
+    take(result.together_axis_point, gap.axis_point, together("axis_point"))
+    take(result.orientation, gap.angle, together("angle"))
+    alone = written_alone if mine else original_alone
+    take(result.tip, gap.tip, lambda rows: alone(match, reached, rows, "tip"))
+    take(result.axis_point, gap.axis_point, lambda rows: alone(match, reached, rows, "axis point"))
 
 
-def _take(
-    distances: Distances, found: Findings, reached: Reached, lines: tuple[Ints, Ints], place: Floats, *, mine: bool
-) -> None:
-    """Take what the vertices of one of the two motions found."""
-    match, (cl_line, nc_line) = distances.match, lines
-    result, gap, limit = found.largest, reached.gap, match.tolerance + ARITHMETIC
-    result.together_tip.update(gap.tip, cl_line, nc_line)
-    result.together_axis_point.update(gap.axis_point, cl_line, nc_line)
-    result.orientation.update(gap.angle, cl_line, nc_line)
-    together = TOGETHER * match.tolerance + match.margin
-    own_gaps = own_gaps_of_written if mine else own_gaps_of_original
-    own_axis = match.task.own_axis
-    axis_off = axis_off_of_written if mine else axis_off_of_original
-    known = np.zeros(len(gap.tip), np.bool_)
-    tip, axis = gap.tip.copy(), gap.axis_point.copy()
-
-    def look(rows: Ints) -> None:
-        tip[rows], axis[rows] = own_gaps(match, reached, rows)
-        if own_axis:
-            axis[rows] = axis_off(match, reached, rows)
-        known[rows] = True
-
-    over = np.flatnonzero(gap.larger > limit)
-    order = over[np.argsort(-gap.larger[over])]
-    for begin in range(0, len(order), _SOME_OWN_ROWS):
-        rows = order[begin : begin + _SOME_OWN_ROWS]
-        look(rows)
-        off = int(np.count_nonzero(np.maximum(tip[rows], axis[rows]) > limit))
-        if len(over) > _MANY_OVER and 2 * off > _SOME_OWN_ROWS:
-            break  # the program is off everywhere: that is found already
-    for values, worst in ((tip, result.tip), (axis, result.axis_point)):
-        some = _OWN_ROWS
-        while True:
-            best = max(worst.value, float(values[known].max(initial=0.0)))
-            rows = np.flatnonzero(~known & (values > best))
-            if not len(rows):
-                break
-            if len(rows) > some:
-                rows = rows[np.argpartition(-values[rows], some)[:some]]
-            look(rows)
-            some *= 2
-        rows = np.flatnonzero(known)
-        worst.update(values[rows], cl_line[rows], nc_line[rows])
-    over = over[known[over]]
-    apart = over[(gap.larger[over] > together) & (np.maximum(tip, axis)[over] <= limit)]
-    if len(apart) and not own_axis:
-        amount = gap.larger[apart] if mine else common_gaps_of_original(match, reached, apart)
-        still = amount > together  # a step from a knot is not exact where the axis turns much before the next
-        apart, amount = apart[still], amount[still]
-        if len(apart):
-            found.violations.add(525, place[apart], cl_line[apart], nc_line[apart], amount)
-    for code, values in ((521, tip), (522, axis)):
-        broken = over[values[over] > limit]
-        if len(broken):
-            _broken(match, found, code, place[broken], cl_line[broken], nc_line[broken], values[broken])
-
-
-def _broken(
-    match: Match, found: Findings, code: int, place: Floats, cl_line: Ints, nc_line: Ints, amount: Floats
-) -> None:
-    """Take down where tip or axis are beyond what they may."""
-    if code == 522 and match.task.own_axis:
-        code, amount = AXIS_OFF, match.task.degrees(amount)
-    found.violations.add(code, place, cl_line, nc_line, amount)
-
-
-def check_curves(distances: Distances, found: Findings) -> None:
-    """Curves must be near the original between their knots too: CS521, CS522, CS527."""
-    match = distances.match
-    limit = match.tolerance + ARITHMETIC
-    gaps = hull_gaps(match, limit)
-    if gaps is None:
-        return
-    place, element, tip, axis = gaps
-    cl_line = _cl_lines_near(distances, place)
-    nc_line = match.nc.line[element]
-    for code, values, worst in ((521, tip, found.largest.tip), (522, axis, found.largest.axis_point)):
-        worst.update(values, cl_line, nc_line)
-        broken = np.flatnonzero(values > limit)
-        if len(broken):
-            _broken(match, found, code, place[broken], cl_line[broken], nc_line[broken], values[broken])
-
-
-def check_exact_poses(distances: Distances, found: Findings) -> None:
+def _check_exact_poses(match: Match, found: Findings, vertex: Ints, row: Ints) -> None:
     """Poses that may not be rounded must be ends of elements, to the printed digits: CS524."""
-    match, theirs = distances.match, distances.original
-    original = match.original
-    rows = np.flatnonzero(original.trail.fraction[theirs.vertex] == 1)
-    move = original.trail.owner[theirs.vertex[rows]]
-    rows = rows[match.task.exact[move]]
-    if not len(rows):
+    original, task = match.original, match.task
+    move = original.trail.owner[vertex]
+    chosen = np.flatnonzero(task.exact[move])
+    if not len(chosen):
         return
-    move = original.trail.owner[theirs.vertex[rows]]
+    vertex, row, move = vertex[chosen], row[chosen], move[chosen]
     pose = original.pose[move]
     tip, axis = original.program.tip[pose], original.program.axis[pose]
-    trail, first = match.written.trail, match.written.first
-    owner = trail.owner[np.minimum(theirs.place[rows].astype(np.int64) + 1, len(trail) - 1)]
-    exact = np.zeros(len(rows), np.bool_)
-    amount, nearest = np.full(len(rows), np.inf), owner
+    owner, first, count = match.owner[row], match.first, len(match.motion.last)
+    exact = np.zeros(len(row), np.bool_)
+    amount, nearest = np.full(len(row), np.inf), owner
     for step in range(-2, 2):
-        element = np.clip(owner + step, first, first + len(trail.last) - 1)
-        same, off = digit_errors(match.nc, element, tip, axis, match.task.axis_length)
+        element = np.clip(owner + step, first, first + count - 1)
+        same, off = digit_errors(match.nc, element, tip, axis, task.axis_length)
         exact |= same
         nearest = np.where(off < amount, element, nearest)
         amount = np.minimum(amount, off)
-    missed = np.flatnonzero(~exact)
-    for k in missed[:_MOST_MISSED].tolist():
-        exact[k] = _passed_elsewhere(distances, int(rows[k]), tip[k], axis[k])
+    for k in np.flatnonzero(~exact).tolist():
+        exact[k] = _passed_elsewhere(match, int(vertex[k]), tip[k], axis[k])
     missed = np.flatnonzero(~exact)
     if len(missed):
-        found.violations.add(
-            524,
-            theirs.vertex[rows[missed]].astype(np.float64),
-            original.program.line[pose[missed]],
-            match.nc.line[nearest[missed]],
-            amount[missed],
-        )
+        place = vertex[missed].astype(np.float64)
+        lines = original.program.line[pose[missed]], match.nc.line[nearest[missed]]
+        found.violations.add(524, place, *lines, amount[missed])
 
 
-def _passed_elsewhere(distances: Distances, row: int, tip: Floats, axis: Floats) -> bool:
+def _passed_elsewhere(match: Match, vertex: int, tip: Floats, axis: Floats) -> bool:
     """Whether an element that names a pose may stand for it though its place is another, near it or on another turn."""
-    match, theirs = distances.match, distances.original
-    trail = match.written.trail
-    beside = min(int(theirs.place[row]) + 1, len(trail) - 1)
-    window = distances.windows.around(beside)
-    if window is None:
-        return False
-    ends = trail.last[trail.last >= window.vertex]
-    ends = ends[ends < window.vertex + len(window.low)]
-    pose = theirs.vertex[row : row + 1]
-    ends = ends[distance_between(match.six[ends], match.path.six[pose]) <= match.near]
-    ends = ends[[window.may_be_at(end, pose)[0] for end in ends.tolist()]]
-    element = trail.owner[ends]
-    return bool(digit_errors(match.nc, element, tip, axis, match.task.axis_length)[0].any())
+    ends = match.motion.last[match.on[match.motion.last]]
+    here, around = match.path.length[vertex], AROUND * match.tolerance
+    length = match.path.lengths_at(match.place[ends])
+    ends = ends[slice(*np.searchsorted(length, (here - around, here + around)).tolist())]
+    tips, axes = np.tile(tip, (len(ends), 1)), np.tile(axis, (len(ends), 1))
+    exact, _ = digit_errors(match.nc, match.owner[ends], tips, axes, match.task.axis_length)
+    pose = np.array([vertex])
+    return any(match.reachable.may_be_at(end, pose)[0] for end in ends[exact].tolist())

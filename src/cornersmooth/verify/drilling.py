@@ -19,9 +19,9 @@ from cornersmooth.nc_reader.ahead import Ahead
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.cycles import Drilling, drillings
 from cornersmooth.statements.tool_changes import ToolChanges
+from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.hole_check import check_hole
 from cornersmooth.verify.hole_search import HoleSearch
-from cornersmooth.verify.polyline import Original
 
 #: elements held of what has been given out
 _KEPT = 16

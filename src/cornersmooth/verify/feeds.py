@@ -13,10 +13,9 @@ import numpy as np
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.rotary import SHORT_STEPS
-from cornersmooth.verify.distances import Distances
+from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.polyline import Original
 from cornersmooth.verify.rapids import ARITHMETIC
 
 #: a rounding reaches at most so many times as far as its first vertex that is visibly off the line
@@ -32,16 +31,12 @@ _TINY = 1e-3
 _MOST_SINGLE = 50
 
 
-def check_feeds(distances: Distances, found: Findings) -> None:
+def check_feeds(match: Match, found: Findings) -> None:
     """Every element must carry the feed of its move: CS541 a wrong feed, CS542 none, CS543 the wrong feed mode."""
-    match, off = distances.match, distances.off
     nc, original = match.nc, match.original
-    program = original.program
-    trail, first = match.written.trail, match.written.first
-    end = trail.last[1:]
-    start = trail.last[:-1]
-    feeding = match.on[start] & match.on[end] & (match.stretch[start] == match.stretch[end])
-    element = np.flatnonzero(feeding) + first + 1
+    program, last = original.program, match.motion.last
+    start, end, feeding = last[:-1], last[1:], match.feeding
+    element = np.flatnonzero(feeding) + match.first + 1
     if not len(element):
         return
     start, end = start[feeding], end[feeding]
@@ -70,11 +65,11 @@ def check_feeds(distances: Distances, found: Findings) -> None:
         if in_a_row >= _MOST_SINGLE:
             continue
         ends = int(start[k]), int(end[k])
-        good[k] = fits(k, _alike(match, int(element[k]), *ends)).any() or _elsewhere(distances, *ends, partial(fits, k))
+        good[k] = fits(k, _alike(match, int(element[k]), *ends)).any() or _elsewhere(match, *ends, partial(fits, k))
         if good[k]:
             continue
         pair = float(said[k]), float(room[k])
-        good[k] = _inside_rounding(match, off, int(start[k]), int(end[k]), int(low[k]), pair)
+        good[k] = _inside_rounding(match, int(start[k]), int(end[k]), int(low[k]), pair)
     wrong = np.flatnonzero(~good)
     if len(wrong):
         runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
@@ -117,7 +112,7 @@ def _alike(match: Match, element: int, start: int, end: int) -> Ints:
 
     Digits do not tell apart what poses a digit apart lie between, and near the pole the axis turns ahead of time.
     """
-    nc, six = match.nc, match.path.six
+    nc, six = match.nc, match.path.points
     pole = match.task.axis_length * float(nc.second_room[element - 1 : element + 1].max()) if nc.rotary else 0.0
     room = 2 * match.margin + pole  # a pose is a rounding off, and its place as far from it as the margin
     if np.linalg.norm(match.six[end] - match.six[start]) < _TINY:
@@ -134,16 +129,13 @@ def _alike(match: Match, element: int, start: int, end: int) -> Ints:
     return np.unique(match.original.trail.owner[found[0] + 1 : found[1] + 2])
 
 
-def _elsewhere(distances: Distances, start: int, end: int, fits: Callable[[Ints], Bools]) -> bool:
+def _elsewhere(match: Match, start: int, end: int, fits: Callable[[Ints], Bools]) -> bool:
     """Whether an element may run along moves that fit beside its place, or on another turn of a path to and fro.
 
     Which of the poses within the tolerance a written one stands for nobody can tell.
     """
-    window = distances.windows.around(start)
-    if window is None or end >= window.vertex + len(window.low):
-        return False
-    owner = distances.match.original.trail.owner
-    segments = window.segments(start), window.segments(end)
+    owner = match.original.trail.owner
+    segments = match.reachable.segments(start), match.reachable.segments(end)
     return all(map(len, segments)) and _joined(fits, *(owner[part + 1] for part in segments))
 
 
@@ -158,14 +150,13 @@ def _joined(fits: Callable[[Ints], Bools], first: Ints, last: Ints) -> bool:
 
 def _inside_rounding(
     match: Match,
-    off: Floats,
     start: int,
     end: int,
     move: int,
     pair: tuple[float, float],
 ) -> bool:
     """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
-    length, trail, pose = match.path.length, match.original.trail, match.original.pose
+    length, trail, pose, off = match.path.length, match.original.trail, match.original.pose, match.off
     said, room = pair[0], abs(pair[1]) + ARITHMETIC * max(abs(pair[0]), 1.0)
     creeping, slower = -_CREEPING * pair[1], bool(np.isnan(pair[1]))
     visible = match.margin / 2
@@ -213,7 +204,7 @@ def _inside_rounding(
         if 0 <= walker < len(off):
             largest = max(largest, float(off[walker]))
         # the tip tells no more than that, and the axis of a rounding that ends where it stands may be far beyond
-        stands = np.linalg.norm(match.six[vertex, :3] - match.path.six[pose_vertex, :3]) <= match.margin
+        stands = np.linalg.norm(match.six[vertex, :3] - match.path.points[pose_vertex, :3]) <= match.margin
         if far <= _BEYOND_VISIBLE * reach + match.margin or 0 < largest <= (np.inf if stands else 8 * visible):
             return True
     return False

@@ -20,7 +20,7 @@ AXIS_OFF: Final = 527
 _TEXT = {
     "CS521": "the tip leaves its path by {:.6f} mm",
     "CS522": "the axis point leaves its path by {:.6f} mm",
-    "CS523": "the path is not run in order: {:.6f} mm backwards",
+    "CS523": "the path is not run in order within the tolerance",
     "CS525": "tip and axis point are {:.6f} mm from any common pose",
     "CS527": "the tool axis is off by {:.6f} deg where the tip is nearest within its tolerance",
     "CS524": "a pose that must be passed exactly is missed by {:.6f} mm",

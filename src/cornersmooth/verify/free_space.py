@@ -111,7 +111,7 @@ class FreeSpace:
         return radius
 
     def along(self, row: int, place: float) -> Reached:
-        """What is reached of a row from one free place of it on: that, and what is free beyond without a break."""
+        """What is reached of a row from one place of it on, if it is free: that, and what is beyond without a break."""
         count = self.path.shape[1] - 1
         first = k = min(int(place), count - 1)
         found: Reached = {k - 1: (1.0, 1.0)} if place == k > 0 else {}
@@ -124,6 +124,8 @@ class FreeSpace:
             away = largest_square(self.own[:, row, None] - start) <= self.gate[part] ** 2
             for one, other, passes in zip(low.tolist(), high.tolist(), away.tolist(), strict=True):
                 if k == first:
+                    if not one - _HAIR <= place - k <= other + _HAIR:
+                        return {}
                     found[k] = place - k, max(other, place - k)
                 elif found[k - 1][1] >= 1.0 and passes and one <= 0.0 <= other:
                     found[k] = 0.0, other

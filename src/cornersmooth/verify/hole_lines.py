@@ -13,7 +13,7 @@ from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.statements.tool_changes import ToolChanges
-from cornersmooth.verify.polyline import Original
+from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
 
 #: moves behind a hole in which the next feed move or hole is looked for

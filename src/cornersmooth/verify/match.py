@@ -1,4 +1,4 @@
-"""A batch with the place of each of its vertices on the CL path; `search` finds them."""
+"""A batch with what follows from the places of its vertices on the CL path."""
 
 from __future__ import annotations
 
@@ -10,68 +10,70 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Elements
 from cornersmooth.verify.batches import Batch
-from cornersmooth.verify.polyline import CHORD_SHARE, Original, Polyline, Written, written_motion
-from cornersmooth.verify.search import Search
+from cornersmooth.verify.chain import Path, passed, points_at
+from cornersmooth.verify.cl_motion import Original
+from cornersmooth.verify.motions import Motion
+from cornersmooth.verify.nearest import larger_square
+from cornersmooth.verify.reachable import Reachable
 from cornersmooth.verify.task import Task
 
-#: parts of NC blocks beyond which nothing is looked for
-_MOST_PARTS = 16
+
+@dataclass(frozen=True)
+class Passing:
+    """Vertices of the CL path and where the written motion passes them, k of them in order.
+
+    Parameters
+    ----------
+    vertex : (k,) int64
+        Of the CL path.
+    row : (k,) int64
+        Vertex of the written motion that the step begins at.
+    share : (k,) float64
+        Of that step.
+    """
+
+    vertex: Ints
+    row: Ints
+    share: Floats
 
 
 @dataclass(frozen=True)
 class Match:
-    """A batch of elements, and where its vertices are on the CL path.
+    """A batch, v vertices.
 
     Parameters
     ----------
     task : Task
-    nc : Elements
-    written : Written
-    six : (v, 6) float64
-        Its vertices: tip and axis point.
-    on : (v,) bool
-        Whether a vertex belongs to a stretch of feed moves.
-    stretch : (v,) int64
-        Number of the stretch in this batch; -1 for none.
-    segment : (v,) int64
-        Segment of the CL path.
-    fraction : (v,) float64
-        On that segment.
-    backward : (v,) bool
-        Whether the vertex lies by more than the margin behind the one before it, as seen from its place.
-    distance : (v,) float64, mm
-        From its place, in six dimensions: neither tip nor axis point is farther; inf where a stretch begins.
-    nearest : (v,) bool
-        Whether no segment next to that of the vertex is nearer.
-    low, high : (v,) int64
-        First and last segment of the CL path in the stretch a vertex belongs to.
-    until : float
-        Place on the CL path where the next batch goes on with the last stretch; inf where that ends in this one.
-    continued : bool
-        See `Batch`.
+    batch : Batch
     """
 
     task: Task
-    nc: Elements
-    written: Written
-    six: Floats
-    on: Bools
-    stretch: Ints
-    segment: Ints
-    fraction: Floats
-    backward: Bools
-    distance: Floats
-    nearest: Bools
-    low: Ints
-    high: Ints
-    until: float
-    continued: bool
+    batch: Batch
 
-    @cached_property
+    @property
+    def nc(self) -> Elements:
+        """The elements."""
+        return self.batch.elements
+
+    @property
+    def motion(self) -> Motion:
+        """The polyline of the written motion; its elements are counted from `first` on."""
+        return self.batch.motion
+
+    @property
+    def first(self) -> int:
+        """The element at whose end the polyline begins."""
+        return self.batch.first
+
+    @property
+    def six(self) -> Floats:
+        """(v, 6) vertices: tip and axis point."""
+        return self.batch.motion.six
+
+    @property
     def place(self) -> Floats:
-        """(v,) segment plus fraction, where `on`."""
-        where: Floats = self.segment + self.fraction
-        return where
+        """(v,) segment plus fraction of the CL path; NaN where a vertex is none of a stretch, or not near it."""
+        return self.batch.way.place
 
     @property
     def original(self) -> Original:
@@ -79,7 +81,7 @@ class Match:
         return self.task.original
 
     @property
-    def path(self) -> Polyline:
+    def path(self) -> Path:
         """The CL path."""
         return self.task.path
 
@@ -94,53 +96,115 @@ class Match:
         return self.task.margin(self.nc)
 
     @cached_property
-    def slack(self) -> float:
-        """Distance by which places may be wrong, mm: more than `margin` where polylines cut curves short."""
-        trail, nc = self.original.trail, self.nc
-        bare = len(trail) == len(self.original.pose) and not len(nc.curves) and not len(nc.arcs)
-        if bare and not nc.rotary:
-            return self.margin
-        # rotary words may let the tool swing by as much
-        return self.margin + 2 * CHORD_SHARE * self.tolerance
+    def on(self) -> Bools:
+        """(v,) whether a vertex has a place."""
+        return np.isfinite(self.place)
 
     @cached_property
-    def parts(self) -> int:
-        """Elements that an NC block has become at most, up to `_MOST_PARTS`: more than one in rotary words only."""
-        edges = np.flatnonzero(np.append(np.diff(self.nc.line) != 0, True))
-        return min(int(np.diff(edges, prepend=-1).max(initial=1)), _MOST_PARTS)
+    def section(self) -> Ints:
+        """(v,) number of the stretch of each vertex in this batch; -1 for none."""
+        rows, ends = self.batch.stretches, self.motion.last
+        first, last = ends[rows["first"] - self.first], ends[rows["last"] - self.first]
+        number = np.searchsorted(first, np.arange(len(self.six)), side="right") - 1
+        inside = (number >= 0) & (np.arange(len(number)) <= last[np.maximum(number, 0)])
+        return np.where(inside, number, -1)
 
-    @property
-    def near(self) -> float:
-        """Distance within which a written vertex is taken to be on its way, mm."""
-        return 2.0 * self.tolerance + self.margin
+    @cached_property
+    def step(self) -> Bools:
+        """(v - 1,) whether each step is run beside the CL path."""
+        follows: Bools = self.on[1:] & self.on[:-1] & (self.section[1:] == self.section[:-1])
+        return follows
 
+    @cached_property
+    def feeding(self) -> Bools:
+        """(e - 1,) whether each element but the first is run beside the CL path from end to end."""
+        gone = np.concatenate(([0], np.cumsum(self.step)))
+        last = self.motion.last
+        whole: Bools = gone[last[1:]] - gone[last[:-1]] == np.diff(last)
+        return whole
 
-def match(task: Task, batch: Batch) -> Match:
-    """Find the place of every vertex of a batch."""
-    nc = batch.elements
-    written = written_motion(nc, batch.first, batch.last, task.tolerance, task.axis_length)
-    six = task.six(written.trail.tip, written.trail.axis)
-    last_vertex = written.trail.last
-    rows = batch.stretches.copy()
-    rows["first"], rows["last"] = (last_vertex[rows[name] - batch.first] for name in ("first", "last"))
-    search = Search(task, six, rows, batch.until, task.margin(nc))
-    search.find()
-    search.look_again()
-    number = search.number
-    return Match(
-        task,
-        nc,
-        written,
-        six,
-        number >= 0,
-        number,
-        search.segment,
-        search.fraction,
-        search.backward,
-        search.distance,
-        search.nearest,
-        search.low,
-        search.high,
-        batch.until,
-        batch.continued,
-    )
+    @cached_property
+    def runs(self) -> tuple[Ints, Ints]:
+        """(v,) first and last vertex of what is run beside the CL path without a break around each vertex."""
+        index = np.arange(len(self.six))
+        begins, ends = np.append(True, ~self.step), np.append(~self.step, True)
+        first = np.maximum.accumulate(np.where(begins, index, 0))
+        last = np.minimum.accumulate(np.where(ends, index, len(index))[::-1])[::-1]
+        return first, last
+
+    @cached_property
+    def owner(self) -> Ints:
+        """(v,) element that leads to each vertex, counted in `nc`."""
+        return self.motion.owner + self.first
+
+    @cached_property
+    def segment(self) -> Ints:
+        """(v,) segment of the CL path; 0 where there is no place."""
+        return np.minimum(np.nan_to_num(self.place).astype(np.int64), self.path.segments - 1)
+
+    @cached_property
+    def fraction(self) -> Floats:
+        """(v,) on that segment."""
+        return np.nan_to_num(self.place) - self.segment
+
+    @cached_property
+    def low(self) -> Ints:
+        """(v,) first segment of the CL path in the stretch a vertex belongs to."""
+        return self.batch.stretches["start"][np.maximum(self.section, 0)].astype(np.int64)
+
+    @cached_property
+    def high(self) -> Ints:
+        """(v,) last segment of the CL path in the stretch a vertex belongs to."""
+        return self.batch.stretches["stop"][np.maximum(self.section, 0)] - 1
+
+    @cached_property
+    def away(self) -> Floats:
+        """(v, 6) from its place to each vertex; zero where there is none."""
+        rows = np.flatnonzero(self.on)
+        if len(rows) == len(self.six):
+            return self.six - points_at(self.path.points, self.place).T
+        away = np.zeros(self.six.shape)
+        away[rows] = self.six[rows] - points_at(self.path.points, self.place[rows]).T
+        return away
+
+    @cached_property
+    def off(self) -> Floats:
+        """(v,) the larger distance of tip and axis point from its place, mm; 0 where there is none."""
+        return np.sqrt(larger_square(self.away))
+
+    @cached_property
+    def passing(self) -> Passing:
+        """Vertices of the path that are passed, those where runs begin included."""
+        on = np.flatnonzero(self.on)
+        if len(on) < 2:
+            return Passing(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
+        own, place = np.ascontiguousarray(self.six[on].T), self.place[on]
+        row, vertex, share = passed(own, own[:, 1:] - own[:, :-1], self.path.points, place)
+        row = on[row]
+        inside = self.step[row]
+        begin = on[np.append(True, ~self.step[on[1:] - 1])]
+        begin = begin[(self.place[begin] == self.segment[begin]) & (begin < len(self.six) - 1)]
+        begin = begin[self.step[begin]]
+        if not len(begin) and inside.all():
+            return Passing(vertex, row, share)
+        vertex = np.concatenate((vertex[inside], self.segment[begin]))
+        order = np.argsort(vertex, kind="stable")
+        row, share = np.concatenate((row[inside], begin)), np.concatenate((share[inside], np.zeros(len(begin))))
+        return Passing(vertex[order], row[order], share[order])
+
+    @cached_property
+    def reachable(self) -> Reachable:
+        """What else can be reached around a vertex."""
+        return Reachable(self.task, self.motion, self.place, self.section)
+
+    def cl_lines(self, place: Floats) -> Ints:
+        """(k,) lines of the CL file that lead to places."""
+        original = self.original
+        rows = np.minimum(np.ceil(np.nan_to_num(place)).astype(np.int64), len(original.trail) - 1)
+        lines: Ints = original.program.line[original.pose[original.trail.owner[rows]]]
+        return lines
+
+    def nc_lines(self, row: Ints) -> Ints:
+        """(k,) lines of the text that lead to written vertices."""
+        lines: Ints = self.nc.line[self.owner[row]]
+        return lines

@@ -16,13 +16,14 @@ from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Element, Elements
 from cornersmooth.nc_reader.tool import directions, written_at
 from cornersmooth.verify.bending import arc_bend, curve_bend, turn_bend, wound_bend
-from cornersmooth.verify.task import side_by_side
+from cornersmooth.verify.cl_motion import UNBOUND, divided, parts_of
+from cornersmooth.verify.task import Task, side_by_side
 
 #: bend of a step of the written motion, in tolerances (speed only: steps that are not proved are divided)
 WRITTEN_SHARE: Final = 1.0 / 32.0
 
-#: parts of an element at most; what bends more is not proved
-_MOST_PARTS: Final = 1 << 16
+#: parts of an element, or of a curve between its knots, at first (speed only: as above)
+_MOST_PARTS: Final = 64
 
 
 @dataclass(frozen=True)
@@ -73,19 +74,25 @@ def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_ax
             slope = np.linalg.norm(nc.second[at] - nc.second[at - 1], axis=1) + radius * nc.arcs.sweep
             bend[at] = arc + axis_length * wound_bend(second[at - 1], slope, arc)
     bend[:1] = 0.0
+    bend = np.minimum(bend, UNBOUND)
     share = WRITTEN_SHARE * tolerance
-    parts = parts_of(bend, share)
+    parts = parts_of(bend, share, _MOST_PARTS)
     step_bend = bend / parts**2
     curved = []
-    for group in groups(nc.curves, np.arange(len(nc.curves))):
+    for group in groups(nc.curves, np.flatnonzero(nc.curves.element > 0)):
         at = nc.curves.element[group.index]
-        spans = curve_bend(group, nc.second_is, axis_length)
-        inner = parts_of(spans.max(axis=1, initial=0.0), share)
+        spans = np.minimum(curve_bend(group, nc.second_is, axis_length), UNBOUND)
+        inner = parts_of(spans.max(axis=1, initial=0.0), share, _MOST_PARTS)
         parts[at] = inner * max(spans.shape[1], 1)
         curved.append((group, at, inner, spans))
-    last = np.cumsum(parts) - 1
-    owner = np.repeat(np.arange(len(nc)), parts)
-    fraction = (np.arange(len(owner)) - np.repeat(last + 1 - parts, parts) + 1) / np.repeat(parts, parts)
+    if not len(nc) or parts.max() == 1:
+        index = np.arange(len(nc))
+        six = side_by_side(nc.tip, directions(nc, nc.tip, nc.second), axis_length, own_axis)
+        bends = step_bend[1:].copy()
+        for _, at, _, spans in curved:
+            bends[at - 1] = spans.max(axis=1, initial=0.0)
+        return Motion(six, index, np.ones(len(nc)), index, bends)
+    owner, fraction, last = divided(parts)
     bends = step_bend[owner]
     tip, other = nc.tip[owner], nc.second[owner]
     for group, at, inner, spans in curved:
@@ -109,16 +116,10 @@ def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_ax
     return Motion(side_by_side(tip, axis, axis_length, own_axis), owner, fraction, last, bends[1:])
 
 
-def inner_points(nc: Elements, motion: Motion, number: Floats, axis_length: float, *, own_axis: bool) -> Floats:
+def inner_points(nc: Elements, motion: Motion, task: Task, number: Floats) -> Floats:
     """(k, 6) points of a written motion at vertex numbers with fractions of the steps behind them."""
     before = number.astype(np.int64)
     after = np.minimum(before + 1, len(motion.owner) - 1)
     owner = motion.owner[after]
     start = np.where(motion.owner[before] == owner, motion.fraction[before], 0.0)
-    tip, axis = written_at(nc, owner, start + (number - before) * (motion.fraction[after] - start))
-    return side_by_side(tip, axis, axis_length, own_axis)
-
-
-def parts_of(bend: Floats, share: float) -> Ints:
-    """(k,) number of equal parts whose bends are at most `share`."""
-    return np.clip(np.ceil(np.sqrt(np.minimum(bend / share, float(_MOST_PARTS) ** 2))), 1, _MOST_PARTS).astype(np.int64)
+    return task.six(*written_at(nc, owner, start + (number - before) * (motion.fraction[after] - start)))

@@ -9,15 +9,15 @@ before it was reached, and yet nothing behind it is; else what lies too far back
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.around import Around, Inner, Rows
 from cornersmooth.verify.chain import Path, Sections, chain, near_places, points_at
-from cornersmooth.verify.free_space import FreeSpace, Reached, free_interval, holds, is_all, largest_square, lowest
+from cornersmooth.verify.free_space import free_interval, is_all, largest_square, lowest
 
 #: rows before one that is not proved from which on it is worked out exactly, one after the other; farther back nothing
 #: is looked at, and the answer is NOT VERIFIED
@@ -32,7 +32,10 @@ AROUND: Final = 200.0
 
 #: parts that a bent step is divided into where it is not proved, as often as its bend is not tiny, in radii
 PARTS: Final = 8
-_TINY: Final = 1e-6
+_TINY: Final = 1e-4
+
+#: how many times longer than some rows the path beside them may be; where it is longer, the answer may be NOT VERIFIED
+LONGER: Final = 4.0
 
 #: segments around a break among which it is looked for where to go on, at most (which faults are named after it)
 _WIDEST: Final = 1 << 16
@@ -42,9 +45,6 @@ MOST_BREAKS: Final = 100
 
 #: vertices of the own polyline that are looked at together (speed only: they fit the cache)
 CHUNK: Final = 8192
-
-#: gives points (k, 3h) of the own motion at vertex numbers (k,) with fractions of the steps behind them
-Inner = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True)
@@ -182,6 +182,8 @@ class Walk:
         Passage
             Of these vertices; NaN between sections.
         """
+        if self._breaks >= MOST_BREAKS:
+            return Passage(np.full(len(own), np.nan), (), False)
         part = _Part(self, own, bend, sections)
         part.decide(inner)
         if sections.open:
@@ -233,42 +235,56 @@ class _Part:
         while section < len(self.first) and self.whole:
             section = self._go_on(section, inner)
 
-    def _meets(self, row: int, place: float) -> bool:
+    def meets(self, row: int, place: float) -> bool:
         """Whether a vertex is near a place of the path, or within the gate at its vertex."""
         off = largest_square(self.own[row] - points_at(self.path.points, np.array([place]))[:, 0])
-        limit = self.path.gate[int(place)] if place == int(place) else self.radius
-        return bool(off <= float(limit) ** 2)
+        limit = min(self.radius, float(self.path.gate[int(place)])) if place == int(place) else self.radius
+        return bool(off <= limit**2)
 
     def _go_on(self, section: int, inner: Inner | None) -> int:
         """Go on from the first vertex of a section; return the section to go on with."""
         row, begin = int(self.first[section]), float(self.begin[section])
         if np.isnan(begin):  # the motion has not come back to the path yet
             return self._resume(section, row)
-        if np.isnan(self.place[row]) and not self._meets(row, begin):
+        if np.isnan(self.place[row]) and not self.meets(row, begin):
             return self._break(section, Break(row, begin, True))
+        bad = self._prove(section, row, begin, inner)
+        while len(bad):
+            one = int(np.searchsorted(self.first, bad[0], side="right")) - 1
+            gaps = np.flatnonzero(np.diff(bad) > LOOK_BACK[0])
+            last = min(int(bad[gaps[0] if len(gaps) else -1]), int(bad[0]) + _SOON, int(self.ends[one]))
+            end = self._repair(one, int(bad[0]), last, inner)
+            if isinstance(end, Break):
+                after = self._next(one, end.row)
+                if after is None or len(self.breaks) + 1 >= self.most:
+                    return self._break(one, end)
+                self._take_down(end)
+                self.place[end.row : after] = np.nan
+                self._begin_at(one, after, float(self.place[after]))
+                end = after
+            bad = bad[bad > end]
+        return len(self.first)
+
+    def _prove(self, section: int, row: int, begin: float, inner: Inner | None) -> Ints:
+        """Find places for vertices from one on by the chain; return those that it does not prove.
+
+        Bent steps are divided as long as they are what is in the way.
+        """
         while True:
             sections = Sections(self.first, self.ends, self.begin, self.stop, self.open)
             columns = np.ascontiguousarray(self.own[row:].T)
             rest = sections.behind(section, row, begin)
             found = chain(columns, self.bend[row:], self.path, self.radius, rest)
-            for end, stop in zip(rest.last[: -1 if self.open else None], rest.stop, strict=False):
-                if self.path.gate[int(stop)] < self.radius:
-                    found.bad[end] |= not self._meets(row + int(end), float(stop))
-            bad = np.flatnonzero(found.bad) + row
-            if not len(bad) or inner is None or not self._divide(row, bad, inner):
+            for k in np.flatnonzero(self.path.gate[rest.stop.astype(np.int64)] < self.radius).tolist():
+                if not (self.open and k == len(rest.last) - 1):
+                    end = int(rest.last[k])
+                    found.bad[end] |= not self.meets(row + end, float(rest.stop[k]))
+            bent = np.flatnonzero(found.bad & ~found.far) + row
+            if not len(bent) or inner is None or not self._divide(row, bent, inner):
                 break
         _, inside = rest.of(np.arange(len(found.place)))
         self.place[row:] = np.where(found.bad | ~inside, np.nan, found.place)
-        guess = np.concatenate((self.place[:row], found.place))
-        while len(bad):
-            one = int(np.searchsorted(self.first, bad[0], side="right")) - 1
-            gaps = np.flatnonzero(np.diff(bad) > LOOK_BACK[0])
-            last = min(int(bad[gaps[0] if len(gaps) else -1]), int(self.ends[one]))
-            end = self._repair(one, int(bad[0]), last, guess)
-            if isinstance(end, Break):
-                return self._break(one, end)
-            bad = bad[bad > end]
-        return len(self.first)
+        return np.flatnonzero(found.bad) + row
 
     def _divide(self, row: int, bad: Ints, inner: Inner) -> bool:
         """Put points into bent steps, from a row on, to some vertices and beside them; say whether there were any."""
@@ -290,74 +306,98 @@ class _Part:
         self.bend = np.insert(bend, at, bend[np.repeat(steps, PARTS - 1)])
         return True
 
-    def _repair(self, section: int, first: int, last: int, guess: Floats) -> int | Break:
+    def _repair(self, section: int, first: int, last: int, inner: Inner | None) -> int | Break:
         """Work out exactly how to come past some vertices; return one after them that has a place."""
-        known, stop = int(self.known[section]), float(self.stop[section])
-        end, top = int(self.ends[section]), int(stop)
+        known, end, stop = int(self.known[section]), int(self.ends[section]), int(self.stop[section])
         unfinished = self.open and section == len(self.first) - 1
         if first == known:
             return Break(first, float(self.begin[section]), True)
-        reached: list[Reached] = []
-        begin, proved = first, False
-        for back in LOOK_BACK:
+        found = Break(first, float(self.place[first - 1]), False)
+        # whether more is wrong need not be known so well
+        for back in LOOK_BACK[: 2 if self.breaks or self.most < MOST_BREAKS else None]:
             begin = max(first - back, known, 0)
             until = end if back > _SOON else min(last + _SOON, end)
-            space = self._space(slice(begin, until + 1), top)
-            reached = [space.along(0, float(self.place[begin]))]
-            for row, here in space.sweep(0, reached[0]):
-                reached.append(here)
-                at = begin + row
-                if not here:
-                    break
-                if last < at < end and not np.isnan(self.place[at]) and holds(here, float(guess[at]), top - 1):
-                    return self._settle(space, begin, reached, float(guess[at]))
-            else:
-                if until == end and unfinished:
-                    return self._settle(space, begin, reached, lowest(reached[-1]))
-                if until == end and holds(reached[-1], stop, top - 1) and self._meets(end, stop):
-                    return self._settle(space, begin, reached, stop)
-                if until < end:
-                    continue
-                reached.append({})  # the end is not
-            proved = begin == known or self._all_known(space, reached, self.begin[section])
+            rows = Rows(begin, *(values[begin : until + 1] for values in (self.own, self.bend[:until], self.number)))
+            top = self._within_reach(begin, until, stop)
+            around = Around.of(rows, self.path, self.radius, float(self.place[begin]), top)
+            ends = -1 if until < end else None if unfinished else stop
+            places = self.place[begin : until + 1]
+            goal = around.goal(places, last - begin, ends)
+            if goal is None and around.bent:
+                around = around.finer(rows, self.path, inner)
+                goal = around.goal(places, last - begin, ends)
+            if goal is not None:
+                return self._settle(around, goal)
+            if not around.reached[0] and begin not in (known, 0):  # what bends take off leaves nothing of that place
+                continue
+            if around.reached[-1] and until < end:
+                continue
+            proved = begin == known or self._all_known(around, section)
+            row = max(around.row_reached, first)  # the chain has proved what is before that
+            found = Break(row, around.farthest(), proved and row == around.row_reached)
             if proved or begin == 0:
                 break
-        highest = max(reached[-2])
-        return Break(min(begin + len(reached) - 1, end), highest + reached[-2][highest][1], proved)
+        return found
 
-    def _space(self, rows: slice, top: int) -> FreeSpace:
-        """Rows against the path up to a vertex."""
+    def _within_reach(self, begin: int, until: int, stop: int) -> int:
+        """Vertex of the path before which some rows end, if they run beside it."""
         path = self.path
-        own, bend = self.own[rows].T, self.bend[rows.start : rows.stop - 1]
-        return FreeSpace(own, path.points[: top + 1].T, self.radius, bend, path.bend[:top], path.gate[: top + 1])
+        step = np.diff(self.own[begin : until + 1], axis=0)
+        gone = float(np.sqrt(np.einsum("ij,ij->i", step, step)).sum())
+        length = path.length_at(float(self.place[begin])) + LONGER * gone + AROUND * self.radius
+        return min(int(np.searchsorted(path.length, length)) + 1, stop)
 
-    def _settle(self, space: FreeSpace, begin: int, reached: list[Reached], place: float) -> int:
-        """Give vertices the first places from which another place of the last of them can be reached."""
-        end = begin + len(reached) - 1
-        self.place[begin : end + 1] = [lowest(one) for one in space.between(reached, place)]
-        self.place[end] = place
+    def _settle(self, around: Around, goal: float) -> int:
+        """Give vertices the first places from which another place, of the last row reached, can be reached."""
+        between = around.space.between(around.reached, around.inward(goal))
+        count = int(np.searchsorted(around.at, len(between)))
+        begin, end = around.begin, around.begin + count - 1
+        self.place[begin : end + 1] = [around.outward(lowest(between[k])) for k in around.at[:count].tolist()]
+        self.place[end] = goal
         return end
 
-    def _all_known(self, space: FreeSpace, reached: list[Reached], start: float) -> bool:
+    def _all_known(self, around: Around, section: int) -> bool:
         """Whether all that is free of one of some rows was reached."""
-        length, top = self.path.length, space.path.shape[1] - 1
-        for row in range(len(reached) - 1, -1, -1):
-            if reached[row]:
-                here, beyond = length[min(reached[row])], AROUND * self.radius
-                low, high = np.searchsorted(length, (here - beyond, here + beyond)).tolist()
-                if is_all(space, row, reached[row], slice(max(low - 1, int(start), 0), min(high + 1, top))):
+        path, first, stop = self.path, int(self.begin[section]), int(self.stop[section])
+        for row in range(len(around.reached) - 1, -1, -1):
+            reached = around.reached[row]
+            if reached:
+                here, beyond = path.length_at(around.outward(float(min(reached)))), AROUND * self.radius
+                low, high = np.searchsorted(path.length, (here - beyond, here + beyond)).tolist()
+                low, high = max(low - 1, first), min(high + 1, stop)
+                low_here, high_here = (np.searchsorted(around.places, at) for at in (low, high))
+                inside = slice(int(low_here), min(int(high_here), len(around.places) - 1))
+                point = around.space.own[:, row]
+                beside = slice(low, around.base), slice(around.top, high)
+                if is_all(around.space, row, reached, inside) and not any(self._free(point, k) for k in beside):
                     return True
         return False
 
+    def _free(self, point: Floats, segments: slice) -> bool:
+        """Whether any of some segments of the path is near a point (3h,)."""
+        if segments.start >= segments.stop:
+            return False
+        start = self.path.points[segments].T
+        way = self.path.points[segments.start + 1 : segments.stop + 1].T - start
+        low, high = free_interval(point[:, None], start, way, np.asarray(self.radius))
+        return bool((low <= high).any())
+
+    def _next(self, section: int, row: int) -> int | None:
+        """The first vertex of a section after one that the chain has proved."""
+        known = np.flatnonzero(~np.isnan(self.place[row + 1 : self.ends[section]]))
+        return row + 1 + int(known[0]) if len(known) else None
+
+    def _take_down(self, found: Break) -> None:
+        """Take down a break."""
+        self.breaks.append(replace(found, row=int(np.ceil(self.number[found.row]))))
+        self.left = found.place
+        self.whole = len(self.breaks) < self.most
+
     def _break(self, section: int, found: Break) -> int:
         """Take down a break, and find where to go on: the section that it is in."""
-        row = found.row
-        self.breaks.append(replace(found, row=int(np.ceil(self.number[row]))))
-        self.left = found.place
-        if len(self.breaks) >= self.most:
-            self.whole = False
-        self.place[row:] = np.nan
-        return self._resume(section, row)
+        self._take_down(found)
+        self.place[found.row :] = np.nan
+        return self._resume(section, found.row)
 
     def _resume(self, section: int, row: int) -> int:
         """Go on with the first vertex from one on that is near the path again, or with the next section.
@@ -381,10 +421,12 @@ class _Part:
                 if len(free):
                     place = segments.start + free + np.clip(self.left - segments.start - free, at[free], other[free])
                     return self._begin_at(section, k, float(place[np.argmin(np.abs(place - self.left))]))
-        columns = np.ascontiguousarray(self.own[row : end + 1].T)
-        for k, place in near_places(columns, path, self.radius, self.left, top):
-            if row + k < end:
-                return self._begin_at(section, row + k, place)
+        some = np.arange(row, end)
+        some = some[self.bend[np.maximum(some - 1, 0)] + self.bend[some] < self.radius]  # none of the same wrong curve
+        if len(some):
+            columns = np.ascontiguousarray(self.own[some].T)
+            for k, place in near_places(columns, path, self.radius, self.left, top):
+                return self._begin_at(section, int(some[k]), place)
         self.place[end] = np.nan
         return section + 1
 

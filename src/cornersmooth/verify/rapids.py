@@ -14,7 +14,7 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Elements, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions
-from cornersmooth.verify.polyline import Original
+from cornersmooth.verify.cl_motion import Original
 
 #: slack of arithmetic on coordinates that are a million times larger, mm
 ARITHMETIC = 1e-9

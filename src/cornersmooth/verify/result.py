@@ -83,6 +83,8 @@ class Verification:
         Holes that the text leaves out, as the caller allowed.
     taken_from_head : tuple of str
         Words of the program's own head that say how it is measured, as ``E=0.04``.
+    apart : bool
+        Whether tips and axis points were run beside their paths each on its own: not at common poses.
     rewinds : tuple of (int, int)
         NC lines where a cut is left along the tool, and where the tool comes back into it.
     """
@@ -114,6 +116,18 @@ class Verification:
     rewinds: tuple[tuple[int, int], ...] = ()
     left_out: int = 0
     taken_from_head: tuple[str, ...] = ()
+    apart: bool = False
+
+    @property
+    def motions_part(self) -> bool:
+        """Whether the two motions cannot be run beside each other."""
+        return any(problem.code in ("CS521", "CS522", "CS523", "CS525", f"CS{AXIS_OFF}") for problem in self.problems)
+
+    @property
+    def only_apart(self) -> bool:
+        """Whether the motions part though tips and axis points are near each other, each on its own."""
+        codes = {problem.code for problem in self.problems}
+        return bool(codes & {"CS523", "CS525"}) and not codes & {"CS521", "CS522", f"CS{AXIS_OFF}"}
 
     @property
     def verdict(self) -> Verdict:
@@ -169,6 +183,7 @@ class Verification:
             "problem_count": self.problem_count,
             "not_verified": self.unverified,
             "left_out": self.left_out,
+            "not_at_common_poses": self.apart,
             "taken_from_head": list(self.taken_from_head),
             "rewinds": [{"nc_line": out, "back_nc_line": back} for out, back in self.rewinds],
             "trusted": [{"nc_line": line, "text": text} for line, text in self.trusted],

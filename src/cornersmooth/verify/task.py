@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Keep, Program
 from cornersmooth.nc_reader.elements import Elements
+from cornersmooth.nc_reader.tool import unit
+from cornersmooth.verify.chain import Path
+from cornersmooth.verify.cl_motion import Original, original_motion
 from cornersmooth.verify.nearest import Gap, distance_between
-from cornersmooth.verify.polyline import Original, Polyline, original_motion
+
+#: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
+APART: Final = 2.0
 
 #: last printed digits by which the next segment must be nearer to be taken
 MARGIN_STEPS = 4.0
@@ -26,7 +32,7 @@ class Task:
     Parameters
     ----------
     original : Original
-    path : Polyline
+    path : Path
         Its trail as points.
     exact : (m,) bool
         Whether the end of every move must be passed exactly: all but the inner poses of chains at which
@@ -36,14 +42,18 @@ class Task:
     axis_tolerance : float or None, degrees
         That of the tool axis, where it has one of its own. The *axis point* then is H times the axis wherever the tip
         is: it is off by ε where the axis is off by its tolerance.
+    apart : bool
+        Whether tips and axis points need only be within ε each on its own, and within `APART` ε together: the two
+        curves of the paper do not run at common poses.
     """
 
     original: Original
-    path: Polyline
+    path: Path
     exact: Bools
     tolerance: float
     axis_length: float
     axis_tolerance: float | None = None
+    apart: bool = False
 
     @property
     def own_axis(self) -> bool:
@@ -51,20 +61,38 @@ class Task:
         return self.axis_tolerance is not None
 
     @classmethod
-    def of(cls, program: Program, tolerance: float, axis_length: float, axis_tolerance: float | None = None) -> Task:
+    def of(
+        cls,
+        program: Program,
+        tolerance: float,
+        axis_length: float,
+        axis_tolerance: float | None = None,
+        *,
+        apart: bool = False,
+    ) -> Task:
         """Make it; `axis_tolerance` in degrees takes the place of `axis_length`."""
         own_axis = axis_tolerance is not None
         if axis_tolerance is not None:
             axis_length = length_of(tolerance, axis_tolerance)
         original = original_motion(program, tolerance, axis_length)
-        path = Polyline.of(side_by_side(original.trail.tip, original.trail.axis, axis_length, own_axis))
+        trail = original.trail
+        six = side_by_side(trail.tip, trail.axis, axis_length, own_axis)
         # tips are held once only
-        original = replace(original, trail=replace(original.trail, tip=path.six[:, :3]))
-        return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance)
+        original = replace(original, trail=replace(trail, tip=six[:, :3]))
+
+        def exact(place: Floats) -> Floats:
+            return side_by_side(*original.pose_at(place), axis_length, own_axis)
+
+        path = Path.of(six, np.inf, bend=trail.bend, exact=exact)
+        return cls(original, path, _exact_poses(original), tolerance, axis_length, axis_tolerance, apart)
 
     def six(self, tip: Floats, axis: Floats) -> Floats:
         """(..., 6) tips and axis points side by side, mm."""
         return side_by_side(tip, axis, self.axis_length, self.own_axis)
+
+    def axis_of(self, six: Floats) -> Floats:
+        """(k, 3) unit tool axes of tips and axis points side by side."""
+        return unit(six[:, 3:] if self.own_axis else six[:, 3:] - six[:, :3])
 
     def gap(self, tip: Floats, axis: Floats, other_tip: Floats, other_axis: Floats) -> Gap:
         """Distances between poses taken pairwise."""

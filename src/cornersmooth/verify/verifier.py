@@ -118,6 +118,7 @@ class Verifier:
             axis_length = length_of(tolerance, axis_tolerance)
         _check_bounds(tolerance=tolerance, axis_length=axis_length)
         self._program, self._words = program, words
+        self._apart = False
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
         self._trusted, self._weights, self._slower = tuple(trusted), weights, slower
         self._skip_cycles = skip_cycles
@@ -155,9 +156,20 @@ class Verifier:
         if isinstance(self._text, Source):
             self._text.finish()
         found: Verification = self._work() if self._helper is None else self._helper.result()
+        if found.motions_part and self._axis_tolerance is None:
+            found = self._each_alone(found)
         if found.passed or not (self._skip_cycles and may_be_left_out(self._program)):
             return found
         return self._gone_over() or found
+
+    def _each_alone(self, together: Verification) -> Verification:
+        """What is found with tips and axis points on their own, where that tells more than both together."""
+        self._apart = True
+        if isinstance(self._text, Source):
+            self._text.begin_again()
+        found = self._work()
+        self._apart = not found.motions_part or (together.only_apart and not found.only_apart)
+        return replace(found, apart=True) if self._apart else together
 
     def _gone_over(self) -> Verification | None:
         """What is found with holes that the text leaves out as rapids over them, if all is right then."""
@@ -180,7 +192,8 @@ class Verifier:
 
     def _task(self) -> Task:
         options = self._options
-        return Task.of(self._program, options.tolerance, options.axis_length, self._axis_tolerance)
+        lengths = options.tolerance, options.axis_length, self._axis_tolerance
+        return Task.of(self._program, *lengths, apart=self._apart)
 
     def _of_read(self, nc: NcProgram) -> Verification:
         task = self._task()

@@ -9,7 +9,6 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import count
 from typing import Final
 
@@ -25,7 +24,6 @@ from cornersmooth.statements.tokens import TAP, Token
 from cornersmooth.verify.batches import Batches
 from cornersmooth.verify.checks import Examined
 from cornersmooth.verify.task import Task
-from cornersmooth.verify.wide_search import way_apart
 
 #: CL path length of what stands before the first motion, mm
 _BEFORE: Final = -1.0
@@ -111,7 +109,7 @@ class WordPlaces:
         standing = [places.standing(event.element - 1) for event in self.events]
         rooms = [self._rooms.get(element, 0.0) for element in standing]
         ours = said(self.events, here, rooms, reaches, [self._others.get(element, ()) for element in standing])
-        found = compare(theirs, ours, self.margin, unsaid, partial(way_apart, self.task.path), own)
+        found = compare(theirs, ours, self.margin, unsaid, self.task.path.way_apart, own)
         homes = _lengths_of("GOHOME", self.task.original.program, statements)
         at_home = {
             event.line

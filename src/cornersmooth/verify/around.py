@@ -1,0 +1,188 @@
+"""What of some rows can be reached, worked out exactly; bent motions are divided more finely there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.verify.chain import Path
+from cornersmooth.verify.free_space import FreeSpace, Reached, holds, largest_square, lowest
+
+#: bend of steps where what can be reached is worked out exactly, in radii: it is taken off the radius; and the most
+#: parts of a step there
+FINE: Final = 1e-4
+_MOST_PARTS: Final = 64
+
+#: gives points (k, 3h) of the own motion at vertex numbers (k,) with fractions of the steps behind them
+Inner = Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Own vertices one after another.
+
+    Parameters
+    ----------
+    begin : int
+        The first, counted by the caller.
+    own : (k, 3h) float64, mm
+    bend : (k - 1,) float64, mm
+    number : (k,) float64
+        Their numbers for `Inner`.
+    """
+
+    begin: int
+    own: Floats
+    bend: Floats
+    number: Floats
+
+
+@dataclass
+class Around:
+    """Some rows against a part of the path, both perhaps divided more finely, and what of them is reached.
+
+    Parameters
+    ----------
+    space : FreeSpace
+    begin : int
+        The first row.
+    at : (k,) int64
+        Where the rows are among those of the space.
+    places : (m + 1,) float64
+        Of the vertices of the space on the whole path.
+    start : float
+        The place of the first row.
+    reached : list of Reached
+        Row by row of the space, from that place on.
+    """
+
+    space: FreeSpace
+    begin: int
+    at: Ints
+    places: Floats
+    start: float
+    reached: list[Reached] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, rows: Rows, path: Path, radius: float, start: float, top: int) -> Around:
+        """Rows against the path from the place of the first up to a vertex."""
+        base = min(int(start), top - 1)
+        vertices = slice(base, top + 1)
+        points, bend, gate = path.points[vertices].T, path.bend[base:top], path.gate[vertices]
+        space = FreeSpace(rows.own.T, points, radius, rows.bend, bend, gate)
+        places = np.arange(base, top + 1, dtype=np.float64)
+        return cls(space, rows.begin, np.arange(len(rows.own)), places, start)
+
+    @property
+    def base(self) -> int:
+        """First vertex of the path."""
+        return int(self.places[0])
+
+    @property
+    def top(self) -> int:
+        """Last vertex of the path."""
+        return int(self.places[-1])
+
+    @property
+    def row_reached(self) -> int:
+        """The first row after the last of which something is reached; the last row if that is."""
+        count = len(self.reached) - (not self.reached[-1])
+        return self.begin + min(int(np.searchsorted(self.at, count)), len(self.at) - 1)
+
+    @property
+    def bent(self) -> bool:
+        """Whether either motion is bent where something was reached."""
+        last = max(max(row, default=0) for row in self.reached) + 2
+        largest = max(self.space.path_bend[:last].max(), self.space.own_bend[: len(self.reached)].max(initial=0.0))
+        return bool(largest > FINE * self.space.radius)
+
+    def finer(self, rows: Rows, path: Path, inner: Inner | None) -> Around:
+        """The same with bent steps and segments divided, as their bends are taken off the radius."""
+        space, radius = self.space, self.space.radius
+        theirs = _parts(space.path_bend, radius)
+        places, path_bend = _divided(self.places, theirs), np.repeat(space.path_bend / theirs**2, theirs)
+        gate = np.full(len(places), np.inf)
+        gate[np.append(0, np.cumsum(theirs))] = space.gate
+        ours = _parts(space.own_bend, radius) if inner is not None else np.ones(len(space.own_bend), np.int64)
+        at = np.append(0, np.cumsum(ours))
+        own = np.empty((len(space.own), at[-1] + 1))
+        own[:, at] = space.own
+        between = np.setdiff1d(np.arange(at[-1] + 1), at, assume_unique=True)
+        if inner is not None and len(between):
+            own[:, between] = inner(_divided(rows.number, ours)[between]).T
+        own_bend = np.repeat(space.own_bend / ours**2, ours)
+        finer = FreeSpace(own, path.at(places).T, radius, own_bend, path_bend, gate)
+        return Around(finer, self.begin, at, places, self.start)
+
+    def inward(self, place: float) -> float:
+        """A place of the whole path, counted here."""
+        k = min(max(int(np.searchsorted(self.places, place, side="right")) - 1, 0), len(self.places) - 2)
+        start, end = self.places[k : k + 2].tolist()
+        return float(k + min((place - start) / (end - start), 1.0))
+
+    def outward(self, place: float) -> float:
+        """A place counted here, on the whole path; before a vertex that is not passed."""
+        k = min(int(place), len(self.places) - 2)
+        start, end = self.places[k : k + 2].tolist()
+        there = start + (place - k) * (end - start)
+        return float(min(there, np.nextafter(end, start)) if place < k + 1 else there)
+
+    def goal(self, known: Floats, last: int, stop: int | None) -> float | None:
+        """Go along the rows to one behind the `last` that has a known place, or to the end; None where that fails.
+
+        Parameters
+        ----------
+        known : (k,) float64
+            Places of the rows by the chain, NaN where it does not prove them.
+        last : int
+            The last row that it does not prove, counted in these.
+        stop : int or None
+            Vertex of the path where the last row has to end; None where it may be anywhere; -1 where it must be known.
+        """
+        final, end = len(self.places) - 2, len(self.at) - 1
+        self.reached = [self.space.along(0, self.inward(self.start))]
+        if not self.reached[0]:
+            return None
+        at = 1
+        for row, here in self.space.sweep(0, self.reached[0]):
+            self.reached.append(here)
+            if not here:
+                return None
+            if row < self.at[at]:
+                continue
+            goes_on = last < at < end and self.base <= known[at] <= self.top
+            if goes_on and holds(here, self.inward(float(known[at])), final):
+                return float(known[at])
+            at = min(at + 1, end)
+        if stop == -1:
+            return None
+        if stop is None:
+            return self.outward(lowest(self.reached[-1]))
+        limit = min(self.space.radius, float(self.space.gate[-1]))
+        near = largest_square(self.space.own[:, -1] - self.space.path[:, -1]) <= limit * limit
+        return float(stop) if near and stop == self.top and holds(self.reached[-1], final + 1.0, final) else None
+
+    def farthest(self) -> float:
+        """Last place that was reached."""
+        row = next((reached for reached in reversed(self.reached) if reached), None)
+        if row is None:
+            return self.start
+        highest = max(row)
+        return self.outward(highest + row[highest][1])
+
+
+def _parts(bend: Floats, radius: float) -> Ints:
+    """(k,) into how many parts steps are divided so that their bends are fine."""
+    parts = np.ceil(np.sqrt(np.minimum(bend / (FINE * radius), _MOST_PARTS**2)))
+    return np.maximum(parts, 1).astype(np.int64)
+
+
+def _divided(values: Floats, parts: Ints) -> Floats:
+    """Ascending values (n + 1,) with as many equal parts between neighbours (n,) as asked for."""
+    step = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(step)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[step]
+    return np.append(values[step] + share * np.diff(values)[step], values[-1])

@@ -1,0 +1,108 @@
+"""Where the written motion is on the CL path, and where the two part: the decision, batch by batch.
+
+Both are run beside each other, tips and axis points together. Where the task says `apart`, each is run on its own as
+well: then together they have more room.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.model import Floats, Ints
+from cornersmooth.nc_reader.elements import Elements
+from cornersmooth.verify.chain import Path, Sections
+from cornersmooth.verify.motions import Motion, inner_points
+from cornersmooth.verify.nearest import COLUMNS, Metric
+from cornersmooth.verify.passage import Break, Walk
+from cornersmooth.verify.rapids import ARITHMETIC
+from cornersmooth.verify.task import APART, Task
+
+
+@dataclass(frozen=True)
+class Way:
+    """Where the vertices of a batch are on the CL path.
+
+    Parameters
+    ----------
+    place : (v,) float64
+        Segment plus fraction, ascending; NaN where a vertex is not of a stretch, or could not be reached.
+    breaks : tuple of (Metric, Break)
+        Where the motions part, and what does.
+    whole : bool
+        Whether all was looked at.
+    """
+
+    place: Floats
+    breaks: tuple[tuple[Metric, Break], ...]
+    whole: bool
+
+
+class Decision:
+    """Decides one batch after another.
+
+    Parameters
+    ----------
+    task : Task
+    """
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        radius = task.tolerance + ARITHMETIC
+        self._walks: list[tuple[Metric, Walk]] = [("both", Walk(task.path, (APART if task.apart else 1.0) * radius))]
+        if task.apart:
+            self._walks += [(metric, Walk(_only(task.path, metric), radius)) for metric in ("tip", "axis point")]
+        #: place on the CL path of the last vertex
+        self.reached = 0.0
+
+    def take(
+        self,
+        nc: Elements,
+        motion: Motion,
+        rows: tuple[Ints, Ints],
+        stretches: NDArray[Any],
+        *,
+        goes_on: bool,
+    ) -> Way:
+        """Go on.
+
+        Parameters
+        ----------
+        nc : Elements
+            Those that the motion is of.
+        motion : Motion
+        rows : (k,) int64, (k,) int64
+            The first and the last vertex of each stretch.
+        stretches : (k,) STRETCH
+            Where they are on the CL path.
+        goes_on : bool
+            Whether the last of them does so in the next batch.
+        """
+        start, stop = stretches["start"] + stretches["fraction"], stretches["stop"].astype(np.float64)
+        place, breaks, whole = np.zeros(0), [], True
+        for metric, walk in self._walks:
+            columns = COLUMNS[metric]
+            sections = Sections(*rows, start, stop, goes_on)
+            inner = partial(_inner, nc, motion, self._task, columns)
+            passed = walk.take(motion.six[:, columns], motion.bend, sections, inner)
+            place = passed.place if metric == "both" else place
+            breaks += [(metric, one) for one in passed.breaks]
+            whole &= passed.whole
+        self.reached = float(np.nanmax(place, initial=start[-1]))
+        return Way(place, tuple(breaks), whole)
+
+
+def _only(path: Path, metric: Metric) -> Path:
+    """Tips or axis points alone."""
+    columns, exact = COLUMNS[metric], path.exact
+    points = np.ascontiguousarray(path.points[:, columns])
+    alone = None if exact is None else lambda place: exact(place)[:, columns]
+    return Path.of(points, np.inf, bend=path.bend, exact=alone)
+
+
+def _inner(nc: Elements, motion: Motion, task: Task, columns: slice, number: Floats) -> Floats:
+    return inner_points(nc, motion, task, number)[:, columns]
