@@ -19,8 +19,9 @@ import numpy as np
 
 from cornersmooth import __version__, nc, smoothing
 from cornersmooth.cl import read
-from cornersmooth.errors import Finding, InputError, VerdictError
+from cornersmooth.errors import Finding, InputError, SettingsError, VerdictError
 from cornersmooth.memory import return_free_memory
+from cornersmooth.methods import AUTO, CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import Move, Program, SmoothProgram
 from cornersmooth.nc import Form, Frame, Written
 from cornersmooth.nc.program_frame import blend_word
@@ -212,6 +213,8 @@ def postprocess(
         As `read`, `choose_form`, `write` and `open_output` say it.
     """
     form = nc.choose_form() if form is None else form
+    if plan_feeds is not None:
+        settings = _for_planned_feeds(Settings() if settings is None else settings, form)
     processes = useful_processes() if processes is None else processes
     may_replace = check_output(target, [] if isinstance(source, (Program, bytes)) else [source], force=force)
     back = reading_back(form)
@@ -280,6 +283,19 @@ def postprocess(
     if output.failed:
         raise _failure(replace(result, path=None if path is None else path + FAILED))
     return result
+
+
+def _for_planned_feeds(settings: Settings, form: Form) -> Settings:
+    """Settings whose curves can have the feeds of a plan: a curve of G6.2 has one F, in its first block."""
+    if form.curve != "g6.2":
+        return settings
+    if settings.method == CURVES_METHOD:
+        raise SettingsError(
+            "CS274",
+            "feeds of a plan change within curves of whole runs, and a curve of G6.2 has one feed",
+            f"use --method {DEFAULT_METHOD}, or leave out --feed-from-plan",
+        )
+    return settings.but(method=DEFAULT_METHOD) if settings.method == AUTO else settings
 
 
 def _with_planned_feeds(text: bytes, program: Program, settings: Settings, form: Form, limits: Limits) -> bytes:

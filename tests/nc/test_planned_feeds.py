@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import Limits, block_feeds, plan_text
 from cornersmooth.kinematics import load_machine
 from cornersmooth.model import Program
@@ -51,7 +52,8 @@ def form_of(control: str, form: str, machine: str, tcp: bool) -> Form:
 def made(form: Form, units: str = "mm", *, planned: bool = True) -> bytes:
     stream = io.BytesIO()
     limits = LIMITS if planned else None
-    result = postprocess(program(units), stream, Settings(tolerance=0.02), form=form, plan_feeds=limits, processes=1)
+    settings = Settings(tolerance=0.02, method="proportional" if form.curve == "g6.2" else "auto")
+    result = postprocess(program(units), stream, settings, form=form, plan_feeds=limits, processes=1)
     assert result.verification is not None
     assert result.verification.passed
     return stream.getvalue()
@@ -122,3 +124,15 @@ def test_a_block_that_takes_no_time_has_a_feed() -> None:
     assert np.isfinite(feed).all()
     assert (minutes > 0.0).all()
     assert feed[1] == pytest.approx(30.0)
+
+
+def test_a_curve_of_g6_2_has_one_feed_in_its_first_block() -> None:
+    """FANUC B-63324EN/03 4.17: F stands in the first block of a curve, so no curve of a whole run can have a plan's."""
+    form, stream = choose_form("fanuc", "g6.2"), io.BytesIO()
+    result = postprocess(program(), stream, Settings(tolerance=0.02), form=form, plan_feeds=LIMITS, processes=1)
+    assert result.smoothed.settings.method == "proportional"
+    blocks = [line for line in stream.getvalue().decode().splitlines() if line.startswith("K")]
+    assert blocks
+    assert not any("F" in line for line in blocks)
+    with pytest.raises(SettingsError, match="one feed"):
+        postprocess(program(), io.BytesIO(), Settings(method="global"), form=form, plan_feeds=LIMITS)

@@ -81,6 +81,7 @@ def test_curve():
         (b"P4 K0. X0.0000", b"P4 K0. X0.0001", ("CS519", 6)),
         (b"V0.0000 W10.0000 R1.\nK0. X1.", b"V0.0001 W10.0000 R1.\nK0. X1.", ("CS519", 6)),
         (b"R2.\n", b"R2.\n(COMMENT)\n", ("CS510", 10)),
+        (b"R2.\n", b"R2. F50.\n", ("CS511", 8)),
     ],
 )
 def test_rules_of_curves(old, new, expected):

@@ -151,6 +151,11 @@ def knot_curves(
         if not named.all():
             late |= ~np.isnan(table.columns[letter][rows]) & ~np.repeat(named, size)
     complain(late, "CS511", "an axis that the first block of the curve does not name")
+    complain(
+        ~np.isnan(table.column("F")[rows]) & ~starts[rows],
+        "CS511",
+        "a feed inside a curve, which has one for all of it",
+    )
     falls = np.append(False, (np.diff(knot) < 0) & ~starts[rows][1:])
     complain(falls, "CS516", "a knot below the one before it")
     unclamped = _unclamped(knot, start, size, order)
