@@ -1,4 +1,4 @@
-"""Writes docs/codes.md: every code of an error, a warning or a problem, with its text, as the source code has them.
+"""Writes docs/codes.md: every code of an error, a warning or a problem, with its message, as the source code has them.
 
 python docs/make_codes.py
 """
@@ -30,12 +30,12 @@ PARTS = {
 HEAD = """# Codes
 
 Errors, warnings and notes carry a code that does not change; reports name it. This table is made from the source code
-(`python docs/make_codes.py`); `…` stands for what is filled in.
+(`python docs/make_codes.py`). `…` is filled in.
 
-An *error* ends the command (exit code 2 for settings, 3 for input, 4 for output); a *problem* is something that
-verification finds in a text (exit code 1); *warnings* and *notes* are findings, and the work goes on.
-A warning *to check* bears on the metal, and the verdict counts it: `PASSED, 3 to check`.
-CS551 to CS559 and CS566 say of a word that it is missing, that nothing asks for it, that it is another or elsewhere.
+An *error* ends the command, with exit code 2 for settings, 3 for input, 4 for output. A *problem* is a fault of a
+program that verification finds (exit code 1). After *warnings* and *notes* the work goes on.
+A warning *to check* bears on the metal. The verdict counts it: `PASSED, 3 to check`.
+CS551 to CS559 and CS566 are about one word each: missing, not asked for, another one, or in another place.
 """
 #: arguments by which a code is given to a method that is called with its texts
 CALLS = {"wrong_value": "wrong"}

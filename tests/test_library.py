@@ -181,7 +181,7 @@ def test_a_file_that_appears_meanwhile_is_not_replaced(tmp_path):
     def appear(stage: str, done: int, total: int) -> None:
         out.write_text("theirs")
 
-    with pytest.raises(CornersmoothError, match=r"o\.nc: error: has appeared while the text was made; use --force"):
+    with pytest.raises(CornersmoothError, match=r"o\.nc: error: has appeared while the program was made; use --force"):
         cornersmooth.postprocess(SAMPLE, out, progress=appear)
     assert out.read_text() == "theirs"
     assert [path.name for path in tmp_path.iterdir()] == ["o.nc"]
@@ -214,7 +214,7 @@ def test_a_text_that_is_changed_behind_its_verification_is_not_used(tmp_path, mo
 
     monkeypatch.setattr(pipeline, "Verifier", Spoilt)
     out = io.BytesIO() if stream else tmp_path / "o.nc"
-    with pytest.raises(CornersmoothError, match="somebody changed the text before it took its place"):
+    with pytest.raises(CornersmoothError, match="the program was changed before it took its place"):
         cornersmooth.postprocess(SAMPLE, out)
     assert not list(tmp_path.iterdir())
     assert not stream or out.getvalue() == b""

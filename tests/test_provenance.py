@@ -91,7 +91,7 @@ def test_another_file_and_another_machine_are_named(part: Path, tmp_path: Path) 
     assert run("smooth", part, "-o", out, "--force", "--machine", mill).returncode == DONE
     found = run("verify", part, out)
     assert found.returncode == USAGE
-    assert b"the text is for the machine our-mill; name its file with --machine" in found.stderr
+    assert b"the program is for the machine our-mill; name its file with --machine" in found.stderr
     assert run("verify", part, out, "--machine", mill).returncode == DONE
 
 
@@ -105,4 +105,4 @@ def test_weights_of_curves_in_rotary_words_are_named_where_all_are_one(part: Pat
     assert " PW=1" in text
     changed = tmp_path / "changed.mpf"
     changed.write_text(text.replace(" PW=1", " PW=1.01", 1))
-    assert b"a weight of 1.01, which no curve of this text has" in run("verify", part, changed).stderr
+    assert b"a weight of 1.01, which no curve of this program has" in run("verify", part, changed).stderr

@@ -136,7 +136,9 @@ class HashedStream:
         """
         with open(path, "rb") as file:
             if hashlib.file_digest(file, _HASH).hexdigest() != self.digest:
-                raise OutputError("CS407", "somebody changed the text before it took its place", "try again", file=path)
+                raise OutputError(
+                    "CS407", "somebody changed the program before it took its place", "try again", file=path
+                )
 
 
 @dataclass
@@ -306,7 +308,7 @@ def _move_to_free_place(temporary: str, target: str, told: str) -> None:
         if filecmp.cmp(temporary, target, shallow=False):  # what stands there is the same
             return
         raise OutputError(
-            "CS403", "has appeared while the text was made", "use --force to replace it", file=told
+            "CS403", "has appeared while the program was made", "use --force to replace it", file=told
         ) from None
 
 

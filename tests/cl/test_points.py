@@ -253,7 +253,7 @@ UNIT = "0,0,0,0,0,1\n"
         ("x,y,z,f\n1,2,3,4\n1,2,3,0\n", "path.csv:3: error: feed 0 is not positive; give the feed per minute"),
         ("x,y,z,f\n1,2,3,fast\n", "path.csv:2: error: 'fast' is not a number"),
         ("0,5 1,5 2,5 0,0 0,0 1,0\n", "path.csv:1: error: cannot tell decimal commas from separating commas; put semi"),
-        (b"\n1,2,3\x00\x01\n", "path.csv:2: error: the file holds bytes that are no text"),
+        (b"\n1,2,3\x00\x01\n", "path.csv:2: error: the file holds bytes that are no characters"),
         ("1,2,\N{MINUS SIGN}3\n", "path.csv:1: error: '\N{MINUS SIGN}3' is not a number"),
     ],
 )

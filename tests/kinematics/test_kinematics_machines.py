@@ -117,7 +117,7 @@ def test_what_is_wrong_is_said(old: str, new: str, message: str | None):
 def test_order_of_axes_is_checked():
     text = PLAIN.replace('carrier = "table"', 'carrier = "HEAD"').replace('carrier = "head"', 'carrier = "table"')
     text = text.replace('"HEAD"', '"head"').replace('positive = "table"\n', "")
-    with pytest.raises(SettingsError, match="the head axis C stands before the table axis B; list the axes from"):
+    with pytest.raises(SettingsError, match="the head axis C comes before the table axis B; list the axes from"):
         parse_machine(text)
 
 

@@ -174,7 +174,7 @@ def test_name_numbers_header_and_footer() -> None:
     assert [line.partition(" ")[2] for line in lines[-5:-1]] == ["G49", "G91 G28 Z0.", "G90", "M30"]
     with pytest.raises(SettingsError, match=r"unknown braces; use \{program\}, \{units\}"):
         lines_of(choose_form("fanuc"), CL, frame=Frame(header=("{date}",)))
-    with pytest.raises(SettingsError, match="characters that NC text cannot hold"):
+    with pytest.raises(SettingsError, match="characters that an NC program cannot hold"):
         lines_of(choose_form("fanuc"), CL, frame=Frame(footer=("Grüße",)))
 
 

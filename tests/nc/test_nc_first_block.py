@@ -227,7 +227,7 @@ def test_motion_without_tip_control_of_the_kinematics_is_found() -> None:
         ([line for line in lines if line not in ("M428", "M429")], "before any word of tip control"),
         ([*lines[:on], *lines[on + 1 :]], "under M429, where M428 must be in force"),
         ([*lines[: off[1]], *lines[off[1] + 1 :]], "G53 G0 Z0 under M428"),
-        ([*lines[: off[0]], *lines[off[0] + 1 :]], "M429 must be said before G53 G0 Z0"),
+        ([*lines[: off[0]], *lines[off[0] + 1 :]], "M429 must come before G53 G0 Z0"),
         ([*lines[: off[-1]], *lines[off[-1] + 1 :]], "M428 of line"),
     ):
         found = verify(program, "\n".join([*changed, ""]).encode(), control="linuxcnc", machine=own, tolerance=EPS)

@@ -54,8 +54,8 @@ _MUTANTS: dict[str, tuple[str, Callable[[str], str] | None, str]] = {
         "comes on before|not at zero at the end|without the rotary axes at zero",
     ),
     "not over the place": (r"(G0|L) X\S+ Y\S+ [AB]\S+ C\S+( FMAX)?", None, "before it is over its place"),
-    "transformation of the program before": (r"TRAFOOF", None, "TRAFOOF must be said before SUPA|TRAORI"),
-    "tilted plane of the program before": (r"PLANE RESET STAY", None, "PLANE RESET STAY must be said before"),
+    "transformation of the program before": (r"TRAFOOF", None, "TRAFOOF must come before SUPA|TRAORI"),
+    "tilted plane of the program before": (r"PLANE RESET STAY", None, "PLANE RESET STAY must come before"),
     "length on at a tool change": (r"G49", None, "G43|G234"),
 }
 
@@ -311,13 +311,18 @@ _PLANES = (
 @pytest.mark.parametrize(
     ("control", "block", "which", "said"),
     [
-        ("fanuc", "G69", 0, "G69 must be said before G68.2"),
-        ("haas", "G255", 0, "G255 must be said before G254"),
-        ("siemens", "CYCLE800()", 0, "CYCLE800() must be said before CYCLE800("),
-        ("siemens", "D1", 1, "cutting edge: it must be said behind SUPA"),
-        ("heidenhain", "PLANE RESET STAY", 0, "PLANE RESET STAY must be said before"),
-        ("siemens", f'CYCLE800(0,"",0,57{",0" * 3}{",0.000000" * 3},0,0,0,-1)', 1, "no word says how the rotary axes"),
-        ("heidenhain", "PLANE SPATIAL SPA+0.0000 SPB+0.0000 SPC+0.0000 TURN FMAX", 1, "no word says how"),
+        ("fanuc", "G69", 0, "G69 must come before G68.2"),
+        ("haas", "G255", 0, "G255 must come before G254"),
+        ("siemens", "CYCLE800()", 0, "CYCLE800() must come before CYCLE800("),
+        ("siemens", "D1", 1, "cutting edge: it must come after SUPA"),
+        ("heidenhain", "PLANE RESET STAY", 0, "PLANE RESET STAY must come before"),
+        (
+            "siemens",
+            f'CYCLE800(0,"",0,57{",0" * 3}{",0.000000" * 3},0,0,0,-1)',
+            1,
+            "no word says where the rotary axes",
+        ),
+        ("heidenhain", "PLANE SPATIAL SPA+0.0000 SPB+0.0000 SPC+0.0000 TURN FMAX", 1, "no word says where"),
         ("fanuc", "G53.1", 2, "before the tool is turned to it"),
         ("fanuc", "G0 A0.0000 C0.0000", 0, "not at zero at the end"),
         ("mitsubishi", "G0 A0.0000 C0.0000", 0, "not at zero at the end"),

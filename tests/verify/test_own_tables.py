@@ -81,7 +81,7 @@ def test_what_a_table_adds_is_named() -> None:
 def test_blocks_around_the_motion_may_be_other_ones() -> None:
     text, result = made(FRAME)
     assert "M95, NC line" in result.unverified
-    assert "cycles: G80 must be said before the first motion" in result.unverified
+    assert "cycles: G80 must come before the first motion" in result.unverified
     assert judged(FRAME, text).passed
 
 

@@ -145,7 +145,7 @@ def test_a_transformation_makes_the_work_offset_forgotten() -> None:
         on, own = lines.index("TRAORI"), lines.index("G54")
         return [*lines[:on], "G54", *lines[on:own], *lines[own + 1 :]]
 
-    assert _said_of("siemens", "", change) == ["work offset: it must be said behind TRAORI, which deselects it"]
+    assert _said_of("siemens", "", change) == ["work offset: it must come after TRAORI, which deselects it"]
 
 
 def test_no_work_offset_under_tool_tip_control() -> None:

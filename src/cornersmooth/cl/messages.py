@@ -29,7 +29,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     "CS111": ("tool axis of length zero", "give a vector from tip to spindle"),
     "CS112": ("tool axis is {length:.6g} long, not 1", "give unit vectors, or read with --lenient to normalise them"),
     "CS113": ("coordinate {value:g} is out of range", "give finite coordinates within {limit:g}"),
-    "CS114": ("{word} is incremental and stands before the first position", "begin with FROM or GOTO"),
+    "CS114": ("{word} is incremental and comes before the first position", "begin with FROM or GOTO"),
     # state
     "CS115": ("{word}/{text} is not understood", "{want}"),
     "CS116": ("{word} changes to {new} after positions in {old}", "say --units, or split the file"),
@@ -86,7 +86,7 @@ SETTINGS: Final[dict[str, tuple[str, str]]] = {
 FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS129": ("warning", "the last GOTO is cut short by the end of the file: read with the axis before it"),
     "CS130": ("warning", "unknown statement {word}; kept in place"),
-    "CS131": ("warning", "line is no CL statement; kept in place as text"),
+    "CS131": ("warning", "line is no CL statement; kept in place as a comment"),
     "CS132": ("note", "the file states no units: {units} assumed ({why})"),
     "CS133": ("warning", "the file says {stated}, read as {units} as asked for"),
     "CS134": ("warning", "GOTO numbers separated by blanks instead of commas"),
@@ -105,7 +105,7 @@ FINDINGS: Final[dict[str, tuple[Severity, str]]] = {
     "CS147": ("warning", "the tool axis turns along an arc; how it turns is not defined"),
     "CS148": ("warning", "FEDRAT without a unit is read in the unit of the file"),
     "CS149": ("note", "GOHOME without coordinates is kept as a statement"),
-    "CS185": ("warning", "FROM is where the tool is not: it feeds on from where it is; put a RAPID behind the FROM"),
+    "CS185": ("warning", "FROM is where the tool is not: it feeds on from where it is; put a RAPID after the FROM"),
     "CS191": ("note", "columns 73 to 80 are left out: they hold numbers of lines or points"),
     "CS192": ("note", "the line numbers in front of all lines are left out"),
     "CS195": ("note", "lines of numbers alone are further points of the GOTO before them"),

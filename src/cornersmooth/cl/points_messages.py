@@ -26,7 +26,7 @@ ERRORS: dict[str, tuple[str, str]] = {
         "cannot tell decimal commas from separating commas",
         "put semicolons or tabs between the columns, or write decimal points",
     ),
-    "CS161": ("the file holds bytes that are no text", "give a text file in UTF-8 or Windows-1252"),
+    "CS161": ("the file holds bytes that are no characters", "give a text file in UTF-8 or Windows-1252"),
     "CS162": ("column {column!r} is in {unit!r}", "give lengths in mm or inch and feeds per minute"),
     "CS163": ("coordinate beyond {limit:g}", "check the columns and the units"),
     "CS164": ("an empty cell where a number is expected", "fill it or leave the line out"),
@@ -40,7 +40,7 @@ ERRORS: dict[str, tuple[str, str]] = {
 #: code: (severity, sentence)
 FINDINGS: dict[str, tuple[Severity, str]] = {
     "CS170": ("note", "no columns for the tool axis: +Z is used"),
-    "CS171": ("note", "second points stand {mean:.6g} mm from the tips; only their direction is used"),
+    "CS171": ("note", "second points are {mean:.6g} mm from the tips; only their direction is used"),
     "CS172": (
         "warning",
         "distance of the second points from the tips varies from {low:.6g} to {high:.6g} mm; check the columns",

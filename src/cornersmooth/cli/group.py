@@ -16,18 +16,18 @@ from cornersmooth.cli.shutdown import Shutdown
 
 #: name of each command, its module and its line in the list of commands
 COMMANDS = {
-    "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC text."),
+    "smooth": ("cornersmooth.cli.smooth", "Round the corners of CL files and write NC programs."),
     "filter": ("cornersmooth.cli.filter", "Smooth the cutting runs of a finished NC program."),
-    "verify": ("cornersmooth.cli.verify", "Measure NC text against the CL file it was made from."),
+    "verify": ("cornersmooth.cli.verify", "Measure an NC program against the CL file it was made from."),
     "compare": (
         "cornersmooth.cli.compare",
         "Compare the programs of all forms, methods and line densities of a control.",
     ),
     "time": ("cornersmooth.cli.time", "Plan the motion directly and smoothed, and compare the times."),
     "setup": ("cornersmooth.cli.setup", "Find how to clamp a part so that its program runs fastest."),
-    "surface": ("cornersmooth.cli.surface", "Measure what the NC text leaves of the surface of the CL file."),
+    "surface": ("cornersmooth.cli.surface", "Measure what an NC program leaves of the surface of the CL file."),
     "info": ("cornersmooth.cli.info", "Say what a CL file holds and what would limit the rounding of its corners."),
-    "controls": ("cornersmooth.cli.controls", "List the controls that NC text can be written for, and their forms."),
+    "controls": ("cornersmooth.cli.controls", "List the controls that programs can be written for, and their forms."),
     "machines": ("cornersmooth.cli.machines", "List the machines whose rotary words can be written, or describe one."),
     "config": ("cornersmooth.cli.config", "Say which values hold here, and where each comes from."),
     "completion": ("cornersmooth.cli.completion", "Print what makes a shell complete commands, names and files."),

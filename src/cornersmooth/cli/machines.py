@@ -24,8 +24,8 @@ from cornersmooth.cli.options import outputs
 def command(name: str | None, table: bool, pose: str | None) -> int:
     """List the machines that come with the program, or check and describe one.
 
-    A machine is up to two rotary axes, each in a table or a head, by direction, point and limits; a TOML file describes
-    your own, or is like one of them and says only what is different.
+    A machine has up to two rotary axes, each in a table or a head, with direction, point and limits. A TOML file
+    describes your own. It may be like one of these and hold only what is different.
 
     \b
     Examples:

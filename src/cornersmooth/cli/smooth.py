@@ -67,7 +67,7 @@ _NAMED = 3
 @outputs.verbose
 @click.pass_obj
 def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
-    """Round the corners of the CL files IN and write NC text.
+    """Round the corners of the CL files IN and write NC programs.
 
     IN is an APT/CL file (NX, CATIA, Creo, ...) or a table of points (x y z i j k, or two points); - is standard input.
     The written path stays within the tolerance of the CL path, at the tool tip and at the axis point.

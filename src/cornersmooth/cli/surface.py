@@ -44,7 +44,7 @@ _SUFFIXES = (".json", ".csv", ".html", ".png", ".svg", ".pdf")
 @outputs.force
 @outputs.quiet
 def command(source: str, text: str, **given: Any) -> int:
-    """Measure the surface that the NC text NC leaves against that of the CL file IN.
+    """Measure the surface that the NC program NC leaves against that of the CL file IN.
 
     Points are taken on the envelope of the original motion of the tool, up to the length of its cutting edge (-H). At
     each the distance to the volume that the written motion sweeps says whether metal is cut below the surface (overcut)

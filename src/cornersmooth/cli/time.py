@@ -66,10 +66,10 @@ LAWS = tuple(_TITLES)
 def command(source: str, **given: Any) -> int:
     """Plan the CL file IN as it is and the program that the options write, under the same limits.
 
-    The path of the CL file is driven twice: with a stop at the end of every move, and with jumps of velocity at corners
-    as far as the acceleration allows in one period. The program is that of smooth with the same options, or --text. -v
-    adds the ideal curves of each method, which no control runs. Delays, tool changes and the strokes of hole cycles are
-    not counted. Limits are those of the tip, and of the axes of --limits or --machine.
+    The path of the CL file is planned twice: with a stop at the end of every move, and without. At corners, the
+    velocity may then jump by what the acceleration allows in one period. The program is that of smooth with the same
+    options, or --text. -v adds the ideal curves of each method, which no control runs. Delays, tool changes and the
+    strokes of hole cycles are not counted. Limits are those of the tip, and of the axes of --limits or --machine.
 
     \b
     Examples:

@@ -65,7 +65,7 @@ _ALIKE = 1e-9
 @outputs.quiet
 @outputs.verbose_found
 def command(source: str, text: str, **given: Any) -> int:
-    """Measure the NC text NC against the CL file IN, whoever wrote it.
+    """Measure the NC program NC against the CL file IN, whoever wrote it.
 
     Tip and axis point must stay within the tolerance of their paths, in order; rapids, statements, feeds and exact
     poses must be where the CL file has them. Shares no code with what smooths and writes.
@@ -205,7 +205,7 @@ def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source
     before = dict(given)
     given |= {name: value for name, (_, value) in words.items()}
     if made.machine and not given["machine"]:
-        raise SettingsError("CS225", f"the text is for the machine {made.machine}", "name its file with --machine")
+        raise SettingsError("CS225", f"the program is for the machine {made.machine}", "name its file with --machine")
     spelled = {"machine": made.machine, "no_tcp": "no", "slower": "plan"}
     taken = [
         f"{word}={spelled.get(name, f'{value:.9g}' if isinstance(value, float) else value)}"

@@ -202,7 +202,7 @@ class Machine:
         if first.carrier == "head" and second.carrier == "table":
             raise SettingsError(
                 "CS253",
-                f"{where}: the head axis {first.name} stands before the table axis {second.name}",
+                f"{where}: the head axis {first.name} comes before the table axis {second.name}",
                 "list the axes from the part to the tool",
             )
         if _parallel(first.unit, second.unit):

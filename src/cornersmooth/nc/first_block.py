@@ -111,8 +111,8 @@ class FirstBlock:
 
     def _warn_of_below(self, findings: Findings) -> None:
         text = (
-            "the first block of a tool may come from below its end, as Z of the part counts: the part is turned so "
-            "far; see that table and fixture are clear of it, or bring X and Y near before"
+            "the first block of a tool may come from below its end, as the part is turned far; "
+            "see that table and fixture are clear of it, or bring X and Y near before"
         )
         findings.add("CS392", "warning", self.line, text)
 

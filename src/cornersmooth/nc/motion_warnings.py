@@ -86,7 +86,7 @@ class MotionWarnings:
         self._looked_until = pose
         if self._tilted:
             text = (
-                "tool tip control behind a tilted tool: the rotary axes stand where it has left them, and the part "
+                "tool tip control after a tilted tool: the rotary axes are where it has left them. The part "
                 "program may turn with them (WKP); name the machine, so that they go to zero before"
             )
             self.findings.add("CS358", "warning", int(self.program.line[pose]), text)
@@ -122,6 +122,6 @@ class MotionWarnings:
             names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
             text = (
                 f"words of {names} beyond 0 to 360 deg: a modulo axis takes them only where the builder allows it "
-                "(MD30455 bit 0, else alarm 16830); else write modulo = true for the axis in a machine file"
+                "(MD30455 bit 0, else alarm 16830); write modulo = true for the axis in a machine file"
             )
             self.findings.add("CS346", "warning", int(self.program.line[run.move[rows[0]]]), text)

@@ -81,7 +81,7 @@ class Operation:
         blocks = [block for what in ("spindle", "coolant") for block in self._stopped.get(what, ())]
         if self._stopped:
             text = (
-                f"{' and '.join(self._stopped)} not given again in translated words behind a tool change: on as before"
+                f"{' and '.join(self._stopped)} not given again in translated words after a tool change: on as before"
             )
             self.findings.add("CS331", "warning", self._stopped_line, text)
         self.spindle = self._stopped.get("spindle", self.spindle)

@@ -302,6 +302,6 @@ def _filled(lines: Sequence[str], values: dict[str, str]) -> list[str]:
             known = ", ".join(f"{{{name}}}" for name in values)
             raise SettingsError("CS216", f"{line!r} has unknown braces", f"use {known}") from error
         if not (text.isascii() and text.isprintable()):
-            raise SettingsError("CS216", f"{line!r} has characters that NC text cannot hold", "use ASCII")
+            raise SettingsError("CS216", f"{line!r} has characters that an NC program cannot hold", "use ASCII")
         filled.append(text)
     return filled

@@ -162,7 +162,7 @@ class StatementWriter:
         """GOHOME without coordinates: to the height of the retract."""
         blocks = self.operation.go_home()
         if not self.form.table.program.retract:
-            text = "GOHOME without coordinates is no motion in this text; see where the tool goes"
+            text = "GOHOME without coordinates is no motion in this program; see where the tool goes"
             self.findings.add("CS332", "warning", statement.line, text)
             return [*self.comment(statement.text), *blocks]
         text = "GOHOME without coordinates is written as the retract of the control's table"
@@ -316,7 +316,7 @@ class StatementWriter:
         """END: the end of the text; in the middle of the path a stop."""
         if not (self.program.kind[statement.pose :] != Move.FROM).any():
             return []
-        text = "END stands before the last motion; written as a program stop"
+        text = "END comes before the last motion; written as a program stop"
         self.findings.add("CS318", "warning", statement.line, text)
         return [*self.comment(statement.text), *self.halt(self.words.stop)]
 

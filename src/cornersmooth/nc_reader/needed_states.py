@@ -51,7 +51,7 @@ def spline_problem(table: Table, dialect: Dialect, memory: Mapping[str, Any], le
         return None
     if not (splines := np.flatnonzero(table.column("G") == BSPLINE)).size:
         return None
-    text = f"a spline of {' and '.join(sorted(missing))}, which no SPLINEPATH(1,X,Y,Z,...) has said"
+    text = f"a spline of {' and '.join(sorted(missing))}, which no SPLINEPATH(1,X,Y,Z,...) names"
     return Problem(CONTROL_WORDS, 0, int(table.line[splines[0]]), text)
 
 

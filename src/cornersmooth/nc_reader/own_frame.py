@@ -141,7 +141,7 @@ class OwnFrame:
             if rule.off and rule.state == _LENGTH and self._moved and not self._above and self._asked:
                 yield f"{word} before the retract: it may move the tool by its length"
             if rule.ends and self._over and self._asked:
-                yield f"{word} behind the motion to where the tool comes down"
+                yield f"{word} after the motion to where the tool comes down"
             self._state.pop(rule.drops, None)
             if rule.retract:
                 if self._lost is None:
@@ -155,7 +155,7 @@ class OwnFrame:
         for rule in self._list.words:
             wanted = rule.first == when and state in ("", rule.state)
             if wanted and id(rule) not in self._said and not shadowed(self._list, rule):
-                yield f"{shown(rule.pattern)} must be said before {word}"
+                yield f"{shown(rule.pattern)} must come before {word}"
 
     def _running(self) -> list[str]:
         """Words in force that are switched off behind the last motion of a tool."""

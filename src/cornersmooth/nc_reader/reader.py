@@ -168,7 +168,7 @@ class Reader:
         for table in joined_tables(self.waiting, sys.maxsize if self.way_back.open else FEW_ROWS):
             before = self.modal
             if self.memory.get(INCREMENTAL):
-                hint = "write G90 behind a position of the machine"
+                hint = "write G90 after a position of the machine"
                 raise InputError(
                     "CS503", "motion in incremental words (G91)", hint, file=self.name, line=int(table.line[0])
                 )
@@ -268,7 +268,7 @@ class Reader:
             unknown = np.isnan(run.second[:, : len(self.rotary.names)]).any(axis=1)
             self._left_turned = False
             if unknown.any():
-                text = "motion behind a tilted plane, and no word says how the rotary axes stand"
+                text = "motion after a tilted plane, and no word says where the rotary axes are"
                 self.problems.append(Problem("CS506", 0, int(run.line[np.argmax(unknown)]), text))
 
     def _above(self, line: Line, text: str) -> None:

@@ -135,7 +135,7 @@ def knot_curves(
         complain(wrong, code, text)
 
     gap = np.append(False, (np.diff(table.line[rows]) != 1) & ~starts[rows][1:])
-    complain(gap, "CS510", "something else stands between the blocks of a curve")
+    complain(gap, "CS510", "something else is between the blocks of a curve")
     complain(np.isnan(knot), "CS512", "a curve block without its knot K")
     knot = np.nan_to_num(knot)
     single = size - points
@@ -161,7 +161,7 @@ def knot_curves(
     unclamped = _unclamped(knot, start, size, order)
     complain_curve(unclamped, "CS517", "first or last knots that are not all equal")
     crowded = _crowded(knot, start, size, order) & np.repeat(single == order, size)
-    complain(crowded, "CS517", "a knot that stands more often than the order of the curve")
+    complain(crowded, "CS517", "a knot that is repeated more often than the order of the curve")
     point_rows = rows[is_point]
     wrong = np.flatnonzero((weight <= 0) | ~np.isfinite(weight))
     text = "a weight R that is not positive"

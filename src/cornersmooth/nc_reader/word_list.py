@@ -33,7 +33,7 @@ The lists are data, one TOML file for each control in `word_lists`, with the man
     ``outside``: it may not be said while a word that ``ends`` holds. ``drops``: a state that the control forgets with
     it, and that must be said behind it. ``moves``: the tool moves, though the block names no axis.
 
-    In texts of our own (`own_frame`): ``first``: it must be said before the first retract (``"first"``), or before
+    In texts of our own (`own_frame`): ``first``: it must come before the first retract (``"first"``), or before
     another word of its state (``"used"``). ``bars``: a state of which no word that is ``tidy`` or ``ends`` may hold
     where it is said. ``tidy``: it must be switched off before another tool and at the end. ``turned``: the rotary axes
     must stand as the next motion has them. ``preset``: the one that is meant where the head names none. ``down``: one
@@ -122,7 +122,7 @@ class WordList:
 
     @cached_property
     def heads(self) -> dict[str, list[WordRule]]:
-        """Words of which one must be said before the first motion, by state."""
+        """Words of which one must come before the first motion, by state."""
         found: dict[str, list[WordRule]] = {}
         for rule in self.words:
             if rule.head and not any(self.shadows(other, rule) for other in self.words):

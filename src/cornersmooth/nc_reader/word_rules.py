@@ -88,7 +88,7 @@ class WordRules:
             if rule is None:
                 fitting = self._fitting(word)
                 if fitting and not fitting[0].never:
-                    yield Problem(NOT_LISTED, 0, number, f"{word} stands beside nothing that it belongs to")
+                    yield Problem(NOT_LISTED, 0, number, f"{word} is beside nothing that it belongs to")
                 else:
                     yield Problem(NOT_LISTED, 0, number, f"{word} is not on the list of words for this control")
 
@@ -100,7 +100,7 @@ class WordRules:
         names = [word.name for word in line.words if word.name not in "GM"]
         names += [word for word in words if word[0] in "GM"]
         for name in sorted({name for name in names if names.count(name) > 1}):
-            yield Problem(NOT_LISTED, 0, number, f"{name} stands twice in one block")
+            yield Problem(NOT_LISTED, 0, number, f"{name} is twice in one block")
         if sum(word.name == "M" for word in line.words) > 1:
             yield Problem(NOT_LISTED, 0, number, "two M words in one block")
         if sum(word in _MOTION for word in words) > 1:

@@ -168,7 +168,7 @@ class Batches:
         """Say that only one of the two motions has anything; `surplus` is the NC line of motion without any."""
         original = self.task.original
         line = 0 if surplus is not None else int(original.program.line[original.pose[move_first]])
-        text = "the NC text lacks motion of the CL file" if surplus is None else "motion that the CL file does not have"
+        text = "the program lacks motion of the CL file" if surplus is None else "motion that the CL file does not have"
         self.problems.append(Problem("CS534", line, surplus or 0, text))
 
 

@@ -311,7 +311,7 @@ class _Measured:
         program = self.task.original.program
         problems = [problem for problem in problems if self.words or problem.code != CONTROL_WORDS]
         if units != program.units:
-            text = f"the text is in {units}, the CL file in {program.units}"
+            text = f"the program is in {units}, the CL file in {program.units}"
             problems.append(Problem("CS505", 0, 1, text))
         problems += self.batches.problems + self.findings.feeds.problems + self.findings.violations.problems()
         problems += half_turns(program)

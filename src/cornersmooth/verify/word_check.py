@@ -167,7 +167,7 @@ class WordCheck:
         known = np.flatnonzero(~np.isnan(codes))
         if self._weights is not None:
             for line, weight in odd_weights(table, self._weights):
-                self._wrong(NOT_LISTED, line, f"a weight of {weight:g}, which no curve of this text has")
+                self._wrong(NOT_LISTED, line, f"a weight of {weight:g}, which no curve of this program has")
         linear = ~np.all([np.isnan(table.column(name)) for name in sorted(_LINEAR)], axis=0)
         if linear.any():
             self._spindle_at_motion()
@@ -377,7 +377,7 @@ class WordCheck:
         if self._then is not None:
             rule, line = self._then
             if rule.then is not None and not rule.then.fullmatch(text):
-                self._wrong(NOT_LISTED, line, f"{shown(rule.pattern)} without {shown(rule.then)} behind it")
+                self._wrong(NOT_LISTED, line, f"{shown(rule.pattern)} without {shown(rule.then)} after it")
             self._then = None
         before, self._before = self._before, text
         return before
@@ -417,7 +417,7 @@ class WordCheck:
         self._changed, self._high = bool(late), False
         for state, word in self._dropped.items():
             if state not in self._left:
-                self._unframed(NOT_ESTABLISHED, number, f"{state}: it must be said behind {word}, which deselects it")
+                self._unframed(NOT_ESTABLISHED, number, f"{state}: it must come after {word}, which deselects it")
         self._dropped = {}
         if self._first is None:
             self._first, self._deferred = {state: word for state, (word, _) in self._state.items()}, late
@@ -425,7 +425,7 @@ class WordCheck:
                 spoken = {word for word in self._said if any(rule.pattern.fullmatch(word) for rule in rules)}
                 if not spoken and state not in self._left:
                     wanted = " or ".join(shown(rule.pattern) for rule in rules)
-                    self._unframed(NOT_ESTABLISHED, number, f"{state}: {wanted} must be said before the first motion")
+                    self._unframed(NOT_ESTABLISHED, number, f"{state}: {wanted} must come before the first motion")
             self._retract, self._arc = 0, None
             return
         for state in self._deferred - late:

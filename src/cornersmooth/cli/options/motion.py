@@ -86,7 +86,7 @@ def limits_of(given: dict[str, Any]) -> Limits:
 feed_from_plan = click.option(
     "--feed-from-plan",
     is_flag=True,
-    help="Give every block the feed that a plan of the text reaches there, within --accel, --jerk and the limits of "
+    help="Give every block the feed that a plan of the program reaches there, within --accel, --jerk and the limits of "
     "--machine: for controls that do not look ahead.",
 )
 #: of a plan whose feeds are written
@@ -130,7 +130,7 @@ text = click.option(
     "--text",
     type=PATH,
     metavar="NC",
-    help="Plan this NC text in place of the program that these options write: its lines, digits and feeds.",
+    help="Plan this NC program in place of the one that these options write: its lines, digits and feeds.",
 )
 text_machine = click.option(
     "--text-machine",

@@ -30,14 +30,14 @@ control = click.option(
     shell_complete=completing.controls,
     default="fanuc",
     show_default=True,
-    help="Control the NC text is for: a name that 'cornersmooth controls' lists, or a TOML file.",
+    help="Control that the program is for: a name that 'cornersmooth controls' lists, or a TOML file.",
 )
 machine = click.option(
     "--machine",
     type=str,
     metavar="NAME|FILE",
     shell_complete=completing.machines,
-    help="The text has rotary words of this machine instead of tool vectors: a name that 'cornersmooth machines' "
+    help="Write rotary words of this machine instead of tool vectors: a name that 'cornersmooth machines' "
     "lists, or a TOML file.",
 )
 no_tcp = click.option(
@@ -71,7 +71,7 @@ work_offset = click.option(
 approach = click.option(
     "--approach",
     type=LENGTH,
-    help="How far the tool comes down along its axis to the first position behind a retract. [default: straight down]",
+    help="How far the tool comes down along its axis to the first position after a retract. [default: straight down]",
 )
 retract = click.option(
     "--retract",
@@ -81,8 +81,8 @@ retract = click.option(
 rewind = click.option(
     "--rewind",
     type=LENGTH,
-    help="Where a rotary axis would pass its limit in a cut, leave the cut by this length along the tool, turn the "
-    "axis back above the retract and go on. [default: an error]",
+    help="Where a rotary axis would pass its limit in a cut, leave the cut along the tool by this length. "
+    "The axis turns back above the retract, and the cut goes on. [default: an error]",
 )
 skip_cycles = click.option(
     "--skip-cycles",
@@ -109,7 +109,7 @@ header = click.option(
     "--header",
     type=PATH,
     metavar="FILE",
-    help="Lines to write behind the head; {program} and {units} are filled in.",
+    help="Lines to write after the head; {program} and {units} are filled in.",
 )
 footer = click.option("--footer", type=PATH, metavar="FILE", help="Lines to write before the tail.")
 slower = click.option(
@@ -124,8 +124,7 @@ trusted = click.option(
     type=PATH,
     multiple=True,
     metavar="FILE",
-    help="Lines that belong in the text because you put them there, as --header and --footer of smooth. May be "
-    "repeated.",
+    help="Lines of the program that you put there, as with --header and --footer of smooth. May be repeated.",
 )
 digits = click.option(
     "--digits",
@@ -141,7 +140,7 @@ modal = click.option(
 )
 no_comments = click.option("--no-comments", is_flag=True, help="Leave out what the CL file says in words.")
 no_verify = click.option(
-    "--no-verify", is_flag=True, help="Do not read the written text back and measure it before it takes its place."
+    "--no-verify", is_flag=True, help="Do not read the program back and measure it before it takes its place."
 )
 strict = click.option(
     "--strict", is_flag=True, help="Take no verdict but PASSED: else the program goes to OUT.failed, and 1 is returned."

@@ -46,8 +46,8 @@ reports = click.option(
     "reports",
     type=PATH,
     multiple=True,
-    help="Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} stands "
-    "for the input's name.",
+    help="Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} is "
+    "the input's name.",
 )
 found_reports = click.option(
     "--report",
@@ -67,7 +67,7 @@ surface_reports = click.option(
     multiple=True,
     help="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be repeated.",
 )
-as_json = click.option("--json", "as_json", is_flag=True, help="One JSON object instead of text to read.")
+as_json = click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines to read.")
 table = click.option(
     "--table", is_flag=True, help="Print the table of the name: what a TOML file of your own starts from."
 )

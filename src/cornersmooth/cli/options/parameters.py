@@ -74,7 +74,7 @@ class Jobs(click.ParamType[int]):
         try:
             number = int(value)
         except ValueError:
-            self.fail(f"{value!r} is not a number of processes; put a bare -j behind the file names", param, ctx)
+            self.fail(f"{value!r} is not a number of processes; put a bare -j after the file names", param, ctx)
         if number < 0:
             self.fail("the number of processes cannot be negative", param, ctx)
         return number

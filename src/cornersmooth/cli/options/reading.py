@@ -21,7 +21,7 @@ dialect = click.option(
     "--dialect",
     type=str,
     metavar="NAME",
-    help="CL dialect, instead of what the text looks like: nx, catia, creo, solidworks, hsm, ncl, makino or plain.",
+    help="CL dialect, instead of what the file looks like: nx, catia, creo, solidworks, hsm, ncl, makino or plain.",
 )
 units = click.option(
     "--units", type=click.Choice(["mm", "inch"]), help="Units of the input, where it does not say or says it wrong."

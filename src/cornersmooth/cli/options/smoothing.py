@@ -36,9 +36,9 @@ method = click.option(
     type=click.Choice([AUTO, *METHODS]),
     default=AUTO,
     show_default=True,
-    help="How the curves are made. auto: global in curves (g6.2, bspline, poly, spl), proportional in lines; "
-    + "; ".join(f"{item.name}: {item.summary}" for item in METHODS.values())
-    + ". Global takes less time on the machine and about a block a pose in curves; on LinuxCNC it takes more time.",
+    help="How the curves are made. With auto: global in curves (g6.2, bspline, poly, spl), proportional in lines. "
+    + " ".join(f"With {item.name}: {item.summary}." for item in METHODS.values())
+    + " Global takes less time on the machine and about a block a pose in curves; on LinuxCNC it takes more time.",
 )
 weights = click.option(
     "--weights", type=Weights(), default=(1.0, 1.0), help="Weights w1,w2 of the curves, up to 3. [default: 1,1]"
@@ -65,8 +65,8 @@ chord_tolerance = click.option(
 block_time = click.option(
     "--block-time",
     type=Duration(),
-    help="Shortest time in which the control takes a block, as in 1ms: no line along a curve is passed sooner at the "
-    "programmed feed for the sake of speed. [default: that of the control's table]",
+    help="Shortest time in which the control takes a block, as in 1ms. At the programmed feed, no line along a curve "
+    "takes less. [default: that of the control's table]",
 )
 axis_step = click.option(
     "--axis-step",
