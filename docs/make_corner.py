@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cornersmooth import Program, Settings, smooth
-from cornersmooth.smoothing import nurbs
+from cornersmooth.geometry import nurbs
 
 HERE = Path(__file__).resolve().parent
 TOLERANCE, HEIGHT = 0.6, 4.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.feedrate import bezier_halves
-from cornersmooth.smoothing import nurbs
+from cornersmooth.geometry import nurbs
 
 SIDES = np.array([0, 1])
 

@@ -17,10 +17,11 @@ import pytest
 from numpy.typing import NDArray
 
 from cornersmooth.cl import read
+from cornersmooth.geometry import nurbs
 from cornersmooth.kinematics import load_machine
 from cornersmooth.nc import Frame, fit_settings, write
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import nurbs, smooth
+from cornersmooth.smoothing import smooth
 from nc.cases import Case
 from nc.grammars import reader
 from nc.linuxcnc_controller import REMAPS, write_remaps

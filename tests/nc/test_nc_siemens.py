@@ -14,6 +14,7 @@ import pytest
 
 import cornersmooth
 from cornersmooth.cl import read
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import SmoothProgram
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.nc.curve_blocks import _intervals
@@ -21,7 +22,7 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.spline_share import SplineShare
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import nurbs, smooth
+from cornersmooth.smoothing import smooth
 from nc.grammars import reader
 from nc.promise import written
 from nc.reading import Reading

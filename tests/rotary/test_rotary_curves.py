@@ -14,13 +14,14 @@ from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
 from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.geometry import nurbs
 from cornersmooth.kinematics import Machine, load_machine, machine_names, tool_axis
 from cornersmooth.model import Move, Program, SmoothProgram, Status
 from cornersmooth.nc import choose_form, fit_settings, write
 from cornersmooth.rotary.angle_curves import RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.rotary.nurbs_knots import SPANS, CurveGroup, refinement, weight_factors
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import nurbs, smooth
+from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.segments import segments_of
 from oracle.loops import bytecodes

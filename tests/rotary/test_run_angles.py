@@ -14,13 +14,13 @@ from scipy.interpolate import BSpline
 
 import cornersmooth
 from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.kinematics import Machine, load_machine
 from cornersmooth.model import Program, Runs
 from cornersmooth.nc import Form, choose_form, fit_settings
 from cornersmooth.rotary import rotary_angles
 from cornersmooth.rotary.run_angles import Guide, run_angles
 from cornersmooth.smoothing.runs.rows import line_places, polylines_of
-from cornersmooth.smoothing.runs.splines import Splines
 from nc.cases import MACHINES, Case
 from nc.promise import random_verdict
 from nc.rotations import machine_letters, tool_direction

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import Program, SmoothProgram
-from cornersmooth.smoothing import nurbs
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import Program, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import nurbs, smooth
+from cornersmooth.smoothing import smooth
 from oracle.share import covering_share, how_many
 from smoothing.paths import plane_corner, random_program, simultaneous_deviation
 

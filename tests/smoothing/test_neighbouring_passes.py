@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cornersmooth import Program, Settings, SmoothProgram, read
+from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Floats
 from cornersmooth.smoothing import smooth
-from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.vectors import unit
 from oracle.chains import random_chains
 

@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 from scipy.optimize import NonlinearConstraint, minimize
 
 from cornersmooth import Program, Settings, smooth
+from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.smoothing.runs import solving
 from cornersmooth.smoothing.runs.banded import Gather, couplings, keep_in_planes, solve_blocks
 from cornersmooth.smoothing.runs.fitting import fit
@@ -19,7 +20,7 @@ from cornersmooth.smoothing.runs.interior import COLD, Task, smoothest
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
 from cornersmooth.smoothing.runs.rows import largest_curvature
 from cornersmooth.smoothing.runs.solving import RunCurves, solve_groups, solve_runs
-from cornersmooth.smoothing.runs.splines import Splines, Windows
+from cornersmooth.smoothing.runs.windows import Windows
 from oracle.share import covering_share, how_many
 from smoothing.runs_oracle import deviation, random_runs, spline_of, through
 

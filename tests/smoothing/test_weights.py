@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.settings import BOUNDS, Settings
-from cornersmooth.smoothing import nurbs, smooth
+from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
 from cornersmooth.smoothing.sampling import dense_rows
 from cornersmooth.smoothing.segments import lines_per_half

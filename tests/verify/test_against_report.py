@@ -110,7 +110,7 @@ def test_unequal_legs_pass_nearer_than_the_construction_says(dense: bool) -> Non
 
 def _path(smoothed, row: int, dense: bool):  # type: ignore[no-untyped-def]
     """Tips and axis points of one transition, close together."""
-    from cornersmooth.smoothing import nurbs
+    from cornersmooth.geometry import nurbs
     from cornersmooth.smoothing.sampling import nodes
     from cornersmooth.smoothing.segments import lines_of
 

@@ -14,8 +14,8 @@ from math import comb
 import numpy as np
 
 from cornersmooth.feedrate.limits import Limits
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program
-from cornersmooth.smoothing import nurbs
 from cornersmooth.vectors import norm
 
 #: tip lengths up to this are no motion of the tip, mm

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cornersmooth.feedrate import bezier_halves
+from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Floats, Ints, Program, Runs
 from cornersmooth.smoothing.runs.polylines import Pieces
 from cornersmooth.smoothing.runs.rows import polylines_of
-from cornersmooth.smoothing.runs.splines import Splines
 from cornersmooth.vectors import norm
 
 if TYPE_CHECKING:

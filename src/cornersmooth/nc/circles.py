@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cornersmooth.geometry.arcs import arc_points, arc_radii, divided
 from cornersmooth.model import Bools, Floats, Ints, Keep, Program
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Planes
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing.arcs import arc_points, arc_radii, divided
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.text import to_ticks
 from cornersmooth.vectors import norm

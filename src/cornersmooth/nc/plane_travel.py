@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.errors import InputError
+from cornersmooth.geometry.arcs import arc_points, divided
 from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane, Planes
 from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
-from cornersmooth.smoothing.arcs import arc_points, divided
 from cornersmooth.vectors import norm
 
 #: turn on an arc from one place that is looked at to the next, rad: between them it goes 1e-5 of its radius farther

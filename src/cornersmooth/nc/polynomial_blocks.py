@@ -8,11 +8,12 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints, Units
 from cornersmooth.nc.curve_blocks import Curves, KnotBlocks, NoCurves, RotaryKnotBlocks, SplineBlocks
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
-from cornersmooth.smoothing.runs.splines import Splines, ranges
 from cornersmooth.text import RowFormat, format_number, to_ticks
 
 #: control points that a curve has more than knot intervals

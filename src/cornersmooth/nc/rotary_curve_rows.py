@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
 from cornersmooth.kinematics.travel import check_travel
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.nc.findings import Findings
@@ -16,7 +17,6 @@ from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.rotary.angle_curves import RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.rotary.nurbs_knots import CurveGroup
-from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.smoothing.segments import Segments, segments_of
 

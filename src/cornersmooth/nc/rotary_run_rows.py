@@ -13,6 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from cornersmooth.errors import SettingsError
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import ranges, spread, starts
 from cornersmooth.kinematics import Machine, check_travel
 from cornersmooth.model import Bools, Floats, Ints, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
@@ -24,7 +26,6 @@ from cornersmooth.rotary import fill, insertions, rapid_moves, rotary_angles, st
 from cornersmooth.rotary.run_angles import Guide, RunAngles, lever_at, run_angles
 from cornersmooth.slices import some_runs
 from cornersmooth.smoothing.runs.rows import STEPS_PER_UNIT, SectionRows, line_places, polylines_of, section_rows
-from cornersmooth.smoothing.runs.splines import Splines, ranges, spread, starts
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 from cornersmooth.vectors import norm, unit
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.errors import InputError
+from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import solutions
 from cornersmooth.model import Bools, SmoothProgram
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_rows import check_reach, whole_rows
 from cornersmooth.rotary import rapid_moves, rotary_angles, still_poses
-from cornersmooth.smoothing.runs.splines import starts
 from cornersmooth.smoothing.sampling import dense_rows
 
 #: what a curve may turn the axis, over ε at H: tip and axis point may be off to opposite sides

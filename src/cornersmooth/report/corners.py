@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints, LimitedBy, SmoothProgram, Status
-from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.construction import RUN_CURVATURE, construction_of
 from cornersmooth.smoothing.path_distance import path_distances
 from cornersmooth.vectors import angle_between, norm

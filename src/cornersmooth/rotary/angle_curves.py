@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.errors import Finding, SettingsError
+from cornersmooth.geometry import nurbs
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import continued
 from cornersmooth.methods import DEFAULT_METHOD, METHODS
@@ -38,7 +39,6 @@ from cornersmooth.rotary.nurbs_knots import SPANS, CurveGroup, refinement, weigh
 from cornersmooth.rotary.remainders import RotaryMotion, lever_points, rotary_motion
 from cornersmooth.rotary.subdivision import Insertions
 from cornersmooth.settings import WEIGHT_DECIMALS
-from cornersmooth.smoothing import nurbs
 
 #: Numbers of knot intervals in the order of trial, and whether the rates of the ruled motion hold at the joints.
 TRIALS = tuple((spans, False) for spans in SPANS[:3]) + tuple((spans, True) for spans in SPANS[1:])

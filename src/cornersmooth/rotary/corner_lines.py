@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import continued
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.rotary.remainders import RotaryMotion, lever_points, tip_points
 from cornersmooth.rotary.subdivision import fill, insertions
-from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.segments import lines_of
 from cornersmooth.vectors import unit
 

@@ -13,11 +13,11 @@ from functools import cache
 
 import numpy as np
 
+from cornersmooth.geometry import nurbs
+from cornersmooth.geometry.nurbs import KNOTS
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.rotary.remainders import tip_points
 from cornersmooth.settings import WEIGHT_DECIMALS
-from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.nurbs import KNOTS
 
 #: Numbers of equal knot intervals of the curves, from the five-point curve on: n intervals have n + 3 control points.
 SPANS = (2, 4, 8, 16, 32)

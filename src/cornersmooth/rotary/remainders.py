@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.errors import Finding
+from cornersmooth.geometry import nurbs
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, pole_distance, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.rotary.angle_path import rapid_moves, rotary_angles, still_poses
 from cornersmooth.rotary.subdivision import Insertions, insertions
-from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.segments import Segments, segments_of
 from cornersmooth.vectors import unit
 

@@ -16,10 +16,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import spread, starts
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, tool_axis
 from cornersmooth.model import Floats, Ints, Runs
-from cornersmooth.smoothing.runs.splines import Splines, spread, starts
 from cornersmooth.vectors import dot, norm, unit
 
 #: rounds in which spans are halved, and steps below which one is not

@@ -1,6 +1,6 @@
 """How many more lines a curve of another shape takes than the curve with all weights 1 at the ratio 2/3.
 
-With the names of `cornersmooth.smoothing.nurbs`, the chord error of a line over part of a half is the error of β as a
+With the names of `cornersmooth.geometry.nurbs`, the chord error of a line over part of a half is the error of β as a
 function of σ under linear interpolation, times the length of b − a.
 """
 
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats
-from cornersmooth.smoothing import nurbs
 
 #: exponent of the graded nodes s = (j/n)^(2/3)
 GRADED = 2.0 / 3.0

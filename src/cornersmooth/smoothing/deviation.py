@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints
-from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.legs import Legs
 from cornersmooth.vectors import dot, norm, square
 

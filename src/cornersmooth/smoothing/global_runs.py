@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.errors import Finding
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import ranges, spread, starts
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
 from cornersmooth.settings import Settings
 from cornersmooth.slices import some_runs
@@ -19,7 +21,6 @@ from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.rows import TURNING
 from cornersmooth.smoothing.runs.solving import STEP, AtPoses, RunCurves, solve_groups
-from cornersmooth.smoothing.runs.splines import Splines, ranges, spread, starts
 from cornersmooth.smoothing.transition import place_corners
 from cornersmooth.vectors import angle_between
 

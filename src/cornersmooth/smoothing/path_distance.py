@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Floats, Ints, SmoothProgram
-from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.legs import legs_at
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import lines_of

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.construction import Construction
 from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
 from cornersmooth.smoothing.deviation import BETWEEN_PROBES, EXACT, Bends, keep
@@ -132,7 +132,7 @@ def place_proportional(asked: Wanted, settings: Settings) -> Placed:
 def _largest_in_the_middle(bends: Bends, length: Floats, turned: Floats) -> NDArray[np.bool_]:
     """Rows whose deviation at constant H is surely largest at u = ½; `turned` is (Q−P)−(B−A) there, mm.
 
-    The deviation where the original motion is at σ, as in `cornersmooth.smoothing.nurbs`, is at most f(σ)·(E + G·σ),
+    The deviation where the original motion is at σ, as in `cornersmooth.geometry.nurbs`, is at most f(σ)·(E + G·σ),
     with E the deviation at u = ½, f = β/c, and G the lever's turn over the half times H|O′−O|. So E is the largest
     while f·(1 + σ·G/E) ≤ 1. With all weights 1 at the ratio 2/3, f is (1−σ)³ and G may be up to 3E; with any other
     weights f is convex and falls from 1 to 0, so it is at most 1−σ and G may be up to E.

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.geometry import nurbs
+from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
+from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
-from cornersmooth.smoothing import nurbs
-from cornersmooth.smoothing.arcs import arc_lines, arc_points, divided
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.corner_table import Remainders
 from cornersmooth.smoothing.runs.rows import SectionRows, polylines_of, run_lines, section_rows
-from cornersmooth.smoothing.runs.splines import ranges
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 from cornersmooth.vectors import unit
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.geometry.arcs import arc_tangents
 from cornersmooth.model import Floats, Ints, Move, Program, SmoothProgram, Status, Trait
-from cornersmooth.smoothing.arcs import arc_tangents
 from cornersmooth.smoothing.corner_table import BATCH
 from cornersmooth.smoothing.legs import legs_at
 from cornersmooth.smoothing.proportional import wanted

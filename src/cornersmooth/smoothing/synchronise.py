@@ -13,8 +13,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import Floats, Ints
-from cornersmooth.smoothing import nurbs
 from cornersmooth.vectors import angle_between, norm
 
 #: parameters of the tip curve at which residual and jumps are reported

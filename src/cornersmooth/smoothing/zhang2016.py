@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from cornersmooth.geometry import nurbs
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
-from cornersmooth.smoothing import nurbs
 from cornersmooth.smoothing.construction import Construction
 from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
 from cornersmooth.smoothing.legs import Legs, divide, half_angle_cosine

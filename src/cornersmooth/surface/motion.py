@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry.arcs import arc_points
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.nc_reader.tool import directions, written_at
-from cornersmooth.smoothing.arcs import arc_points
 
 #: largest turn of an arc within one segment, rad: off the arc by its radius times 3e-7
 _ARC_STEP = 1.5e-3

@@ -22,12 +22,14 @@ from functools import cached_property
 
 import numpy as np
 
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import ranges, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import TAPS, Gather
 from cornersmooth.smoothing.runs.fitting import holding_poses
 from cornersmooth.smoothing.runs.interior import COLD, WARM, Task, dot, smoothest
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
-from cornersmooth.smoothing.runs.splines import Splines, Windows, ranges, spread, starts
+from cornersmooth.smoothing.runs.windows import Windows
 
 #: share of the tolerance that the samples may use
 SHARE = 0.97

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import ranges, spread
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import Gather, applied, solve_scalar
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
-from cornersmooth.smoothing.runs.splines import Splines, Windows, ranges, spread
+from cornersmooth.smoothing.runs.windows import Windows
 
 #: share of the tolerances that the fit may use: the rest is for smoothness. Less in spans that hold poses: neighbouring
 #: passes get nearly the same curve only where their knots do not show.

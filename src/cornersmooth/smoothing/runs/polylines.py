@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import spread, starts
 from cornersmooth.model import Floats, Ints
-from cornersmooth.smoothing.runs.splines import Splines, spread, starts
 
 #: steps of the shortest segment: knots stand between its ends
 _LEAST = 4

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
-from cornersmooth.smoothing.runs.splines import Splines
 
 #: parts that every stretch is looked at in, first and where that is not enough
 PARTS, MORE_PARTS = 2, 12

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import spread, starts
 from cornersmooth.model import Floats, Ints, Program, Runs
 from cornersmooth.settings import STANDING, Settings
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
-from cornersmooth.smoothing.runs.splines import Splines, spread, starts
 from cornersmooth.smoothing.segments import turn_limit
 from cornersmooth.vectors import angle_between, norm, unit
 

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.geometry.ragged import spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.processes import map_in_processes
 from cornersmooth.smoothing.runs.batches import Problem, solve_windows
@@ -19,7 +21,7 @@ from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
 from cornersmooth.smoothing.runs.proof import bounds
 from cornersmooth.smoothing.runs.rows import largest_curvature, points_at
-from cornersmooth.smoothing.runs.splines import Splines, Windows, spread, starts
+from cornersmooth.smoothing.runs.windows import Windows
 from cornersmooth.vectors import angle_between, norm
 
 #: spans of a window that are its own, and spans beside them that settle down to what the neighbour finds

@@ -1,8 +1,7 @@
-"""Cubic B-splines of runs on clamped knots, flat: knots, Greville points, basis, third derivative; windows of spans.
+"""Cubic B-splines on clamped knots, many in flat arrays: basis, derivatives, Bézier points, blossoms.
 
-Run r with m spans has m + 1 distinct knots, the first and the last four-fold, and m + 3 control points. Span i lies
-between knots i and i + 1 and belongs to the control points i to i + 3 (de Boor, A Practical Guide to Splines, IX). Rows
-of different length lie one after the other in flat arrays: `starts`, `spread` and `ranges` are their index arithmetic.
+A spline with m spans has m + 1 distinct knots, the first and the last four-fold, and m + 3 control points. Span i lies
+between knots i and i + 1 and belongs to the control points i to i + 3 (de Boor, A Practical Guide to Splines, IX).
 """
 
 from __future__ import annotations
@@ -12,40 +11,20 @@ from functools import cached_property
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints
-
-#: control points that stay at each end: with them position, first and second derivative
-HELD = 3
-
-
-def starts(counts: Ints) -> Ints:
-    """(k + 1,) where each row begins, and where the last ends."""
-    return np.concatenate((np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)))
-
-
-def spread(counts: Ints) -> tuple[Ints, Ints]:
-    """Row of every element, and its place within the row."""
-    row = np.repeat(np.arange(len(counts)), counts)
-    return row, np.arange(len(row)) - np.repeat(starts(counts)[:-1], counts)
-
-
-def ranges(begin: Ints, counts: Ints) -> Ints:
-    """Concatenation of ``begin[i] .. begin[i] + counts[i] - 1``."""
-    row, place = spread(counts)
-    whole: Ints = begin[row] + place
-    return whole
+from cornersmooth.geometry.ragged import ranges, search, spread, starts
+from cornersmooth.model import Floats, Ints
 
 
 @dataclass(frozen=True)
 class Splines:
-    """Knot vectors of r runs.
+    """Knot vectors of r splines.
 
     Parameters
     ----------
     knot : (k,) float64
-        In steps, see `Polylines`. Distinct knots of all runs, ascending in each.
+        Distinct knots of all splines, ascending from 0 in each.
     count : (r,) int64
-        Knots of each run, at least 2.
+        Distinct knots of each spline, at least 2.
     """
 
     knot: Floats
@@ -113,8 +92,24 @@ class Splines:
         means: Floats = (self._extended[begin + 1] + self._extended[begin + 2] + self._extended[begin + 3]) / 3.0
         return means
 
+    def span_at(self, run: Ints, s: Floats) -> Ints:
+        """Span (m,) of the splines `run` (m,) that each parameter s (m,) lies in."""
+        knot = search(self.knot, self.count, run, s, side="right") - 1
+        spans: Ints = np.clip(knot, self.first[run], self.first[run + 1] - 2) - run
+        return spans
+
+    def taps(self, span: Ints) -> Ints:
+        """(m, 4) the control points of spans."""
+        control: Ints = self.span_control[span][:, None] + np.arange(4)
+        return control
+
+    def points(self, control: Floats, span: Ints, s: Floats) -> Floats:
+        """Points (m, d) in spans at the parameters s (m,), from control points (controls, d)."""
+        found: Floats = np.einsum("mk,mkd->md", self.basis(span, s), control[self.taps(span)])
+        return found
+
     def basis(self, span: Ints, s: Floats) -> Floats:
-        """(m, 4) basis functions of the spans at the places s."""
+        """(m, 4) basis functions of the spans at the parameters s."""
         k = self.around(span)
         left, right = s[:, None] - k[:, 2::-1], k[:, 3:] - s[:, None]  # to the knots behind, nearest first, and ahead
         values = np.ones((len(s), 1))
@@ -165,54 +160,3 @@ class Splines:
             values = (1.0 - share) * values[:, :-1] + share * values[:, 1:]
         blossoms: Floats = values[:, 0]
         return blossoms
-
-
-@dataclass(frozen=True)
-class Windows:
-    """Windows of neighbouring spans of one run each, one behind the other.
-
-    Parameters
-    ----------
-    begin, count : (w,) int64
-        First span of each window, and its number of spans.
-    span : (spans,) int64
-        The spans of the splines that belong to the windows.
-    control : (c,) int64
-        Control points of the splines that belong to the windows; neighbouring windows may share some.
-    local : (spans,) int64
-        Index into `control` of the first control point of each span.
-    window : (c,) int64
-        Window of each control point.
-    free : (c,) bool
-        False for the outer control points, which stay.
-    """
-
-    begin: Ints
-    count: Ints
-    span: Ints
-    control: Ints
-    local: Ints
-    window: Ints
-    free: Bools
-
-    @classmethod
-    def of(cls, splines: Splines, begin: Ints, count: Ints) -> Windows:
-        """Windows of `count` spans from the spans `begin` on."""
-        span = ranges(begin, count)
-        control = ranges(splines.span_control[begin], count + 3)
-        local = ranges(starts(count + 3)[:-1], count)
-        window, place = spread(count + 3)
-        free = (place >= HELD) & (place < count[window] + 3 - HELD)
-        return cls(begin, count, span, control, local, window, free)
-
-    @classmethod
-    def where(cls, splines: Splines, wanted: Bools) -> Windows:
-        """Windows of the rows of neighbouring spans that are wanted (spans,), those without freedom left out."""
-        run = splines.span_run
-        inside = wanted[1:] & wanted[:-1] & (run[1:] == run[:-1])
-        starts_here = wanted & ~np.concatenate(([False], inside))
-        ends_here = wanted & ~np.concatenate((inside, [False]))
-        begin, end = np.flatnonzero(starts_here), np.flatnonzero(ends_here)
-        count = end - begin + 1
-        able = count > HELD
-        return cls.of(splines, begin[able], count[able])

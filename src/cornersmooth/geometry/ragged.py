@@ -1,0 +1,47 @@
+"""Rows of different length, one after the other in flat arrays: index arithmetic."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from cornersmooth.model import Floats, Ints
+
+
+def starts(counts: Ints) -> Ints:
+    """(k + 1,) where each row begins, and where the last ends."""
+    return np.concatenate((np.zeros(1, np.int64), np.cumsum(counts, dtype=np.int64)))
+
+
+def spread(counts: Ints) -> tuple[Ints, Ints]:
+    """Row of every element, and its place within the row."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) - np.repeat(starts(counts)[:-1], counts)
+
+
+def ranges(begin: Ints, counts: Ints) -> Ints:
+    """Concatenation of ``begin[i] .. begin[i] + counts[i] - 1``."""
+    row, place = spread(counts)
+    whole: Ints = begin[row] + place
+    return whole
+
+
+def search(values: Floats, counts: Ints, row: Ints, place: Floats, side: Literal["left", "right"] = "left") -> Ints:
+    """`np.searchsorted` within rows.
+
+    Parameters
+    ----------
+    values : (n,) float64
+        From 0 on and ascending in each row.
+    counts : (k,) int64
+        Elements of each row, at least 1.
+    row, place : (m,) int64 and float64
+
+    Returns
+    -------
+    (m,) int64
+        Indices into `values`.
+    """
+    base = starts(np.floor(values[starts(counts)[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
+    return np.searchsorted(values + np.repeat(base, counts), place + base[row], side=side)
