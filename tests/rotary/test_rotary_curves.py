@@ -15,11 +15,18 @@ from scipy.spatial import cKDTree
 
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.geometry import nurbs
+from cornersmooth.geometry.nurbs import refinement
 from cornersmooth.kinematics import Machine, load_machine, machine_names, tool_axis
 from cornersmooth.model import Move, Program, SmoothProgram, Status
 from cornersmooth.nc import choose_form, fit_settings, write
-from cornersmooth.rotary.angle_curves import RotaryCurves, angle_allowance, rotary_curves
-from cornersmooth.rotary.nurbs_knots import SPANS, CurveGroup, refinement, weight_factors
+from cornersmooth.rotary.angle_curves import (
+    SPANS,
+    CurveGroup,
+    RotaryCurves,
+    angle_allowance,
+    rotary_curves,
+    weight_factors,
+)
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
 from cornersmooth.smoothing.construction import construction_of

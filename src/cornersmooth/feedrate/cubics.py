@@ -86,8 +86,7 @@ class RunPieces:
         splines = Splines(runs.knot, runs.knot_count)
         pieces = Pieces.of(splines, lines)
         origin = lines.point[pieces.segment, :3]
-        hull = runs.control[splines.span_control[pieces.span][:, None] + np.arange(4)]
-        hull = splines.bernstein(pieces.span, pieces.low, pieces.high) @ hull
+        hull = splines.bezier(runs.control, pieces.span, pieces.low, pieces.high)
         tip, axis_point = (
             bezier_halves.polynomial(hull[..., part] - origin[:, None]) for part in (slice(0, 3), slice(3, 6))
         )

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from cornersmooth.geometry.ragged import spread
 from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.settings import Settings
 from cornersmooth.vectors import dot, norm
@@ -103,9 +104,8 @@ def arc_tangents(program: Program, rows: Ints, share: float) -> Floats:
 
 def divided(counts: Ints) -> tuple[Ints, Floats]:
     """Rows and shares of the ends of the parts when arc r is divided into ``counts[r]`` equal parts."""
-    rows = np.repeat(np.arange(len(counts)), counts)
-    first = np.cumsum(counts) - counts
-    share: Floats = (np.arange(len(rows)) - first[rows] + 1) / counts[rows]
+    rows, place = spread(counts)
+    share: Floats = (place + 1) / counts[rows]
     return rows, share
 
 

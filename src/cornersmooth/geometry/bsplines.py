@@ -86,10 +86,16 @@ class Splines:
         return knots
 
     @cached_property
-    def greville(self) -> Floats:
-        """(controls,) steps: mean of the three inner knots of each control point; those of a line stand there."""
+    def inner_knots(self) -> Floats:
+        """(controls, 3) the knots whose blossom each control point is."""
         begin = np.arange(len(self.control_run)) + 4 * self.control_run
-        means: Floats = (self._extended[begin + 1] + self._extended[begin + 2] + self._extended[begin + 3]) / 3.0
+        knots: Floats = self._extended[begin[:, None] + np.arange(1, 4)]
+        return knots
+
+    @cached_property
+    def greville(self) -> Floats:
+        """(controls,) mean of the three inner knots of each control point; those of a line stand there."""
+        means: Floats = self.inner_knots.sum(axis=1) / 3.0
         return means
 
     def span_at(self, run: Ints, s: Floats) -> Ints:
@@ -150,10 +156,21 @@ class Splines:
             rows.append(values[:, 0])
         return np.stack(rows, axis=1)
 
+    def bezier(self, control: Floats, span: Ints, low: Floats, high: Floats) -> Floats:
+        """(m, 4, d) Bézier points of the parts low..high of spans, from control points (controls, d)."""
+        points: Floats = self.bernstein(span, low, high) @ control[self.taps(span)]
+        return points
+
+    def on_knots(self, finer: Splines, control: Floats) -> Floats:
+        """Control points (c, d) of the same curves on knots that contain these: knot insertion by blossoms."""
+        run, place = spread(finer.count + 2)
+        local = np.clip(place - 1, 0, finer.count[run] - 2)  # a span that the control point belongs to
+        return self.blossom(self.span_at(run, finer.knot[finer.first[run] + local]), finer.inner_knots, control)
+
     def blossom(self, span: Ints, arguments: Floats, control: Floats) -> Floats:
         """(m, d) blossoms of the spans' cubics at three arguments (m, 3) each, from control points (controls, d)."""
         k = self.around(span)
-        values = control[self.span_control[span][:, None] + np.arange(4)]
+        values = control[self.taps(span)]
         for level in range(3):
             begin, end = k[:, level:3], k[:, 3 : 6 - level]
             share = ((arguments[:, level, None] - begin) / (end - begin))[:, :, None]

@@ -15,11 +15,20 @@ parameter; β is largest at u = ½, where it is c = ρ·w1/(2(w1 + w2)) and σ =
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cache
+
 import numpy as np
 
+from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.model import Bools, Corners, Floats, Ints, Program
 
 KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0)
+
+DEGREE = 3
+
+#: all shares of the five control points in those of dyadic refinements are multiples of this and more
+_BINARY_DIGIT = 2.0**-20
 
 
 def deviation_factor(weights: Floats, ratio: Floats) -> Floats:
@@ -206,3 +215,63 @@ def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Flo
     p1 = ((n1 * w) @ points - d1 * p0) / d0
     p2 = ((n2 * w) @ points - 2.0 * d1 * p1 - d2 * p0) / d0
     return p0, p1, p2
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """The five-point curve on `spans` equal knot intervals, p = spans + 3 control points.
+
+    Parameters
+    ----------
+    spans : int
+    splines : Splines
+        The one knot vector.
+    from_five : (p, 5) float64
+        Homogeneous control points are this matrix times the five homogeneous ones; rows sum to one.
+    """
+
+    spans: int
+    splines: Splines
+    from_five: Floats
+
+    @property
+    def knots(self) -> Floats:
+        """(p + 4,) clamped, from 0 to 1."""
+        return np.concatenate((np.zeros(DEGREE), self.splines.knot, np.ones(DEGREE)))
+
+    @property
+    def points(self) -> int:
+        """Number of control points."""
+        return self.spans + DEGREE
+
+    def basis(self, u: Floats) -> Floats:
+        """Polynomial basis at parameters in [0, 1]: (m,) -> (m, p)."""
+        span, values = self.splines.span_at(np.zeros(len(u), np.int64), u), np.zeros((len(u), self.points))
+        np.put_along_axis(values, self.splines.taps(span), self.splines.basis(span, u), axis=1)
+        return values
+
+    def rational_basis(self, u: Floats, weights: Floats) -> Floats:
+        """Rational basis for g curves at common parameters: (m,), (g, p) -> (g, m, p), or (1, m, p) if all agree."""
+        if len(weights) and (weights == weights[0]).all():
+            weights = weights[:1]
+        weighted = self.basis(u) * weights[:, None, :]
+        shares: Floats = weighted / weighted.sum(axis=2, keepdims=True)
+        return shares
+
+    def homogeneous(self, weights: Floats) -> Floats:
+        """Weights of the refined curves: (g, 5) -> (g, p)."""
+        refined: Floats = weights @ self.from_five.T
+        return refined
+
+    def control_points(self, points: Floats, weights: Floats) -> Floats:
+        """Control points of the refined curves: (g, 5, d) with the weights (g, 5) -> (g, p, d)."""
+        refined: Floats = (self.from_five @ (points * weights[:, :, None])) / self.homogeneous(weights)[:, :, None]
+        return refined
+
+
+@cache
+def refinement(spans: int) -> Refinement:
+    """Knots with so many intervals, a power of two from 2 on."""
+    own, finer = (Splines(np.linspace(0.0, 1.0, n + 1), np.array([n + 1])) for n in (2, spans))
+    matrix = np.round(own.on_knots(finer, np.eye(5)) / _BINARY_DIGIT) * _BINARY_DIGIT
+    return Refinement(spans, finer, matrix)

@@ -219,13 +219,6 @@ def _splines(curve: NDArray[np.int8], spline: Floats, counts: Ints) -> Splines:
 @cache
 def _bezier_matrix(points: int) -> Floats:
     """Matrix from control points to the Bézier points of all knot intervals, four rows each."""
-    from scipy.interpolate import BSpline
-
-    spans = points - _DEGREE
-    knots = np.concatenate(([0.0] * _DEGREE, np.arange(spans + 1.0), [float(spans)] * _DEGREE))
-    share = np.array([0.0, 1.0, 2.0, 3.0]) / 3.0
-    bernstein = np.stack(((1 - share) ** 3, 3 * share * (1 - share) ** 2, 3 * share**2 * (1 - share), share**3), axis=1)
-    places = (np.arange(spans)[:, None] + share).ravel()
-    basis = BSpline(knots, np.eye(points), _DEGREE)(places).reshape(spans, 4, points)
-    matrix: Floats = (np.linalg.inv(bernstein) @ basis).reshape(-1, points)
-    return matrix
+    span = np.arange(points - _DEGREE)
+    equal = Splines(np.arange(len(span) + 1.0), np.array([len(span) + 1]))
+    return equal.bezier(np.eye(points), span, equal.knot[:-1], equal.knot[1:]).reshape(-1, points)

@@ -15,8 +15,7 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.rotary import rapid_moves
-from cornersmooth.rotary.angle_curves import RotaryCurves, angle_allowance, rotary_curves
-from cornersmooth.rotary.nurbs_knots import CurveGroup
+from cornersmooth.rotary.angle_curves import CurveGroup, RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.smoothing.segments import Segments, segments_of
 

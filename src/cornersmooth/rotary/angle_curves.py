@@ -35,11 +35,14 @@ from cornersmooth.rotary.angle_fit import (
     measured,
 )
 from cornersmooth.rotary.corner_lines import CornerLines, corner_lines
-from cornersmooth.rotary.nurbs_knots import SPANS, CurveGroup, refinement, weight_factors
-from cornersmooth.rotary.remainders import RotaryMotion, lever_points, rotary_motion
+from cornersmooth.rotary.remainders import RotaryMotion, lever_points, rotary_motion, tip_points
 from cornersmooth.rotary.subdivision import Insertions
 from cornersmooth.settings import WEIGHT_DECIMALS
 
+#: Numbers of equal knot intervals of the curves, from the five-point curve on: n intervals have n + 3 control points.
+SPANS = (2, 4, 8, 16, 32)
+#: Knots with more intervals than this would need more than three decimals in [0, 1]: they run to a higher end.
+SPANS_PER_UNIT = 8
 #: Numbers of knot intervals in the order of trial, and whether the rates of the ruled motion hold at the joints.
 TRIALS = tuple((spans, False) for spans in SPANS[:3]) + tuple((spans, True) for spans in SPANS[1:])
 #: Share of the allowance that a curve may take where it is measured; the rest is for what lies between.
@@ -51,6 +54,66 @@ CHUNK = 1 << 15
 #: A curve on even segments whose angles vary by D (rad, both axes and both legs) errs by less than this times D² away
 #: from the pole. Where that is within the allowance the error has one hump on either half, and needs few samples.
 GENTLE, GENTLE_SAMPLES = 0.8, 4
+
+
+@dataclass(frozen=True)
+class CurveGroup:
+    """Curves that share a knot vector: g curves with p control points each.
+
+    A writer prints for each of them, in FANUC's form (B-63324EN/03 4.17), p blocks with the knot, X Y Z, both rotary
+    words and the weight of one control point each, ``K<knots[i]> X.. Y.. Z.. <angles> R<weights>``, G6.2 P4 in the
+    first; then the last four knots in blocks of their own. The first control point is the current position digit for
+    digit: the end of the straight remainder before it, or the last control point of the curve before.
+
+    Parameters
+    ----------
+    smoothed : SmoothProgram
+        What they are of.
+    row : (g,) int64
+        Rows of `Corners`, ascending.
+    knots : (p + 4,) float64
+        As they are to be written: from 0, with three decimals at most. The parameter u of the corner is the knot
+        parameter over the last knot.
+    weights : (g, p) float64
+        As they are to be written: with three decimals at most. All of a curve may have a power of two as common factor.
+    angles : (g, p, 2) float64, degrees
+        Control points of the rotary angles in the order of `Machine.axes`.
+    orientation_error : (g,) float64, degrees
+        Largest angle between the axis that the angles give and the direction of Q(u) − P(u), as measured.
+    ruled : (g,) bool
+        Beside straight remainders that do not run evenly the angles join with the rates of the ruled motion, not with
+        those of the line, which follows it by steps: a kink like those where points are inserted.
+    """
+
+    smoothed: SmoothProgram
+    row: Ints
+    knots: Floats
+    weights: Floats
+    angles: Floats
+    orientation_error: Floats
+    ruled: Bools
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @property
+    def points(self) -> int:
+        """Control points of each curve."""
+        return int(self.angles.shape[1])
+
+    @property
+    def tip(self) -> Floats:
+        """(g, p, 3) control points of the tip: `tips` of all curves."""
+        return self.tips(slice(None))
+
+    def tips(self, chosen: slice) -> Floats:
+        """Control points of the tip of some curves, in mm: the same curves as those of the five points, exactly."""
+        rows = self.row[chosen]
+        tip = tip_points(self.smoothed, rows)
+        spans = self.points - nurbs.DEGREE
+        if spans == SPANS[0]:
+            return tip
+        return nurbs.refinement(spans).control_points(tip, nurbs.full_weights(self.smoothed.corners.weights[rows]))
 
 
 @dataclass(frozen=True)
@@ -240,7 +303,7 @@ class _Work:
 
         These are measured in so many `samples` in each knot interval.
         """
-        refined, targets = refinement(spans), self.targets(chosen, ruled)
+        refined, targets = nurbs.refinement(spans), self.targets(chosen, ruled)
         if spans == SPANS[0]:
             start, end = end_points(refined, targets)
             middle = (start[:, 2:] + end[:, :1]) / 2  # the same, but for where two transitions are joined
@@ -279,7 +342,7 @@ class _Work:
 
 def _group(smoothed: SmoothProgram, smooth_rows: Ints, spans: int, found: list[_Found]) -> CurveGroup:
     """All curves on so many knot intervals, as they are to be written; `smooth_rows` as in `RotaryMotion.rows`."""
-    refined = refinement(spans)
+    refined = nurbs.refinement(spans)
     numbers = np.sort(np.concatenate([part.numbers for part in found]))
     rows = smooth_rows[numbers]
     angles, error = np.empty((len(rows), refined.points, 2)), np.empty(len(rows))
@@ -291,7 +354,7 @@ def _group(smoothed: SmoothProgram, smooth_rows: Ints, spans: int, found: list[_
     return CurveGroup(
         smoothed=smoothed,
         row=rows,
-        knots=refined.knots * refined.end,
+        knots=refined.knots * max(1, spans // SPANS_PER_UNIT),
         weights=np.round(own * weight_factors(own)[:, None], WEIGHT_DECIMALS),
         angles=angles,
         orientation_error=error,
@@ -306,3 +369,30 @@ def _lines_finding(smoothed: SmoothProgram, machine: Machine, lines: Ints) -> tu
     first = int(smoothed.program.line[smoothed.corners.pose[lines[0]]])
     text = f"no curve in {' and '.join(machine.names)} keeps the tolerance at this corner: it is written as lines"
     return (Finding("CS366", "note", first, text, len(lines)),)
+
+
+def weight_factors(weights: Floats) -> Floats:
+    """Smallest powers of two that leave the weights of each curve no more decimals than controls keep.
+
+    Parameters
+    ----------
+    weights : (g, p) float64
+        Refined weights of curves whose own five have no more decimals than that.
+
+    Returns
+    -------
+    (g,) float64
+        1 where all weights are 1.
+    """
+    factors = np.ones(len(weights))
+    scale = 10.0**WEIGHT_DECIMALS
+    pending = np.arange(len(weights))
+    # Dyadic parameters have at most log2(spans / 2) binary digits, three of them make a blossom, the knot ½ two more.
+    for _ in range(3 * (SPANS[-1].bit_length() - 2) + 2):
+        ticks = weights[pending] * (factors[pending] * scale)[:, None]
+        inexact = (np.abs(ticks - np.round(ticks)) > 1e-6).any(axis=1)
+        pending = pending[inexact]
+        if not len(pending):
+            break
+        factors[pending] *= 2.0
+    return factors

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.geometry import nurbs
+from cornersmooth.geometry.nurbs import Refinement
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, radians, rotate, tool_axis
 from cornersmooth.model import Floats
-from cornersmooth.rotary.nurbs_knots import Refinement
 
 #: Fitted at so many samples in each knot interval, measured at so many.
 FIT_SAMPLES, MEASURE_SAMPLES = 6, 8

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import spread, starts
+from cornersmooth.geometry.ragged import search, starts
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, tool_axis
 from cornersmooth.model import Floats, Ints, Runs
@@ -61,9 +61,7 @@ class Guide:
         """Angles (k, 2) evenly between the known ones, and the branch (k,) of both neighbours, -1 for none."""
         counts = np.bincount(self.run)
         first = starts(counts)
-        base = starts(np.floor(self.s[first[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
-        before = np.searchsorted(self.s + base[self.run], s + base[run], side="right") - 1
-        before = np.clip(before, first[run], first[run + 1] - 2)
+        before = np.clip(search(self.s, counts, run, s, side="right") - 1, first[run], first[run + 1] - 2)
         share = (s - self.s[before]) / (self.s[before + 1] - self.s[before])
         angles = self.angles[before] + share[:, None] * (self.angles[before + 1] - self.angles[before])
         one, other = self.branch[before], self.branch[before + 1]
@@ -122,34 +120,12 @@ def lever_at(splines: Splines, control: Floats, run: Ints, s: Floats) -> Floats:
 
 def _at(splines: Splines, control: Floats, run: Ints, s: Floats) -> Floats:
     """(m, d) points at places of runs, from control points (c, d)."""
-    span = _span_at(splines, run, s)
-    points: Floats = np.einsum(
-        "mk,mkd->md", splines.basis(span, s), control[splines.span_control[span][:, None] + np.arange(4)]
-    )
-    return points
-
-
-def _span_at(splines: Splines, run: Ints, s: Floats) -> Ints:
-    """Span that each place lies in."""
-    base = starts(splines.knot[splines.first[1:] - 1].astype(np.int64) + 2)[:-1].astype(np.float64)
-    keys = splines.knot + np.repeat(base, splines.count)
-    knot = np.searchsorted(keys, s + base[run], side="right") - 1
-    spans: Ints = np.clip(knot, splines.first[run], splines.first[run + 1] - 2) - run
-    return spans
-
-
-def _inner_knots(splines: Splines) -> Floats:
-    """(c, 3) the knots whose blossom each control point is."""
-    run, place = spread(splines.count + 2)
-    local = np.minimum(place, splines.count[run] - 2)
-    around = splines.around(splines.span_first[run] + local)
-    knots: Floats = around[np.arange(len(run))[:, None], (place - local)[:, None] + np.arange(3)]
-    return knots
+    return splines.points(control, splines.span_at(run, s), s)
 
 
 def _fitted(machine: Machine, splines: Splines, control: Floats, guide: Guide, cone: float) -> Floats:
     """(c, 2) control points of the angles."""
-    knots, run = _inner_knots(splines), splines.control_run
+    knots, run = splines.inner_knots, splines.control_run
     count = len(knots)
     wanted, points, change = np.empty((count, len(SHARES), 2)), np.zeros((count, 2)), np.empty((count, 2))
     parts = [slice(begin, begin + CHUNK) for begin in range(0, count, CHUNK)]
@@ -197,11 +173,8 @@ def _bounds(machine: Machine, splines: Splines, control: Floats, angles: Floats,
     bounds = np.full(count, np.inf)
     for begin in range(0, count, CHUNK):
         span = np.arange(begin, min(begin + CHUNK, count))
-        taps = splines.span_control[span][:, None] + np.arange(4)
-        whole = splines.bernstein(
-            span, splines.knot[splines.span_knot[span]], splines.knot[splines.span_knot[span] + 1]
-        )
-        lever, words = whole @ (control[taps, 3:] - control[taps, :3]), whole @ angles[taps]
+        ends = splines.knot[splines.span_knot[span]], splines.knot[splines.span_knot[span] + 1]
+        lever, words = (splines.bezier(points, span, *ends) for points in (control[:, 3:] - control[:, :3], angles))
         bend = _lever_bend(lever) + _axis_bend(machine, lever, np.radians(words))
         least = np.sqrt(bend / (8.0 * PROOF * np.radians(tolerance)))
         number = np.exp2(np.ceil(np.log2(np.clip(least, 2.0, 2.0 * MOST_SAMPLES)))).astype(np.int64)
@@ -262,7 +235,4 @@ def _halved(splines: Splines, control: Floats, span: Ints) -> tuple[Splines, Flo
     middle = np.floor((splines.knot[at] + splines.knot[at + 1]) / 2.0)
     more = np.bincount(splines.span_run[span], minlength=len(splines.count))
     refined = Splines(np.insert(splines.knot, at + 1, middle), splines.count + more)
-    run, place = spread(refined.count + 2)
-    local = np.clip(place - 1, 0, refined.count[run] - 2)  # a span that the control point belongs to
-    start = refined.knot[refined.span_knot[refined.span_first[run] + local]]
-    return refined, splines.blossom(_span_at(splines, run, start), _inner_knots(refined), control)
+    return refined, splines.on_knots(refined, control)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry.ragged import spread, starts
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status, Trait
 from cornersmooth.vectors import dot, norm, square
 
@@ -289,9 +290,8 @@ def _in_order(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Boo
     assert rows.position is not None
     assert limits.tip_of is not None
     count = end - start + 1
-    line = np.repeat(np.arange(len(start)), count)
-    first = np.cumsum(count) - count
-    row = np.arange(len(line)) - first[line] + start[line]
+    line, place = spread(count)
+    row = place + start[line]
     s, begin, finish = rows.parameter, start[line], end[line]
     length = s[end] - s[start]
     share = ((s[row] - s[begin]) / np.where(length > 0.0, length, 1.0)[line])[:, None]
@@ -308,9 +308,8 @@ def _in_order(rows: Vertices, limits: LineLimits, start: Ints, end: Ints) -> Boo
 
 def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints, *, halves: bool) -> Floats:
     """(q,) largest share of the limits in use, at the `count` rows inside lines or halfway between rows."""
-    line = np.repeat(np.arange(len(start)), count)
-    first = np.cumsum(count) - count
-    row = np.arange(len(line)) - first[line] + start[line] + (not halves)
+    line, place = spread(count)
+    row = place + start[line] + (not halves)
     s, low = rows.parameter, rows.parameter[start]
     length = s[end] - low
 
@@ -330,5 +329,5 @@ def _off(rows: Vertices, limits: LineLimits, start: Ints, end: Ints, count: Ints
     lever = at(rows.original_axis_point) - original_tip
     lever *= (limits.axis_length / np.maximum(norm(lever), np.finfo(np.float64).tiny))[:, None]
     off = np.maximum(norm(tip - original_tip) / limits.tip, norm(axis_point - original_tip - lever) / limits.axis_point)
-    largest: Floats = np.maximum.reduceat(off, first)
+    largest: Floats = np.maximum.reduceat(off, starts(count)[:-1])
     return largest

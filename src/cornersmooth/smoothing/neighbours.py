@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Ints, Move, Program
 from cornersmooth.vectors import norm
 
@@ -41,7 +42,7 @@ def find_neighbours(program: Program, axis_length: float, distance: float) -> Ne
     chains = program.chains
     chain_length = chains[:, 1] - chains[:, 0]
     reached = np.zeros(n, np.bool_)  # by a linear move inside a chain
-    members = _ranges(chains[:, 0] + 1, chain_length)
+    members = ranges(chains[:, 0] + 1, chain_length)
     reached[members] = True
     first = np.full(n, -1, np.int64)
     last = np.full(n, -1, np.int64)
@@ -77,11 +78,3 @@ def _closer(program: Program, one: Ints, other: Ints, axis_length: float, distan
     turn = axis_length * (program.axis[one] - program.axis[other])
     near: Bools = (norm(step) <= distance) & (norm(step + turn) <= distance)
     return near
-
-
-def _ranges(start: Ints, length: Ints) -> Ints:
-    """Concatenation of ``start[i] .. start[i] + length[i] - 1``."""
-    total = int(length.sum())
-    begin = np.cumsum(length) - length
-    ranges: Ints = np.arange(total) + np.repeat(start - begin, length)
-    return ranges

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import spread, starts
+from cornersmooth.geometry.ragged import search, spread, starts
 from cornersmooth.model import Floats, Ints
 
 #: steps of the shortest segment: knots stand between its ends
@@ -70,10 +70,7 @@ class Polylines:
 
     def segment_at(self, run: Ints, s: Floats) -> Ints:
         """Index of the pose before each place; the last segment at the end of a run."""
-        base = self._base
-        keys = self.s + np.repeat(base, self.count)
-        before = np.searchsorted(keys, s + base[run], side="right") - 1
-        first = self.first
+        before, first = search(self.s, self.count, run, s, side="right") - 1, self.first
         inside: Ints = np.clip(before, first[run], first[run + 1] - 2)
         return inside
 
@@ -88,12 +85,6 @@ class Polylines:
         share = (s - self.s[before]) / (self.s[before + 1] - self.s[before])
         points: Floats = self.point[before] + share[:, None] * (self.point[before + 1] - self.point[before])
         return points
-
-    @property
-    def _base(self) -> Floats:
-        """What keeps the runs apart on one scale."""
-        ends = self.s[self.first[1:] - 1]
-        return np.concatenate(([0.0], np.cumsum(ends[:-1] + 1.0)))
 
 
 def _floors(along: Floats, first: Ints, count: Ints) -> Floats:

@@ -53,10 +53,7 @@ def _bound(
 ) -> Floats:
     largest = np.zeros((len(rows), 2))
     span, segment = pieces.span[rows], pieces.segment[rows]
-    hull = (
-        splines.bernstein(span, pieces.low[rows], pieces.high[rows])
-        @ control[splines.span_control[span][:, None] + np.arange(4)]
-    )
+    hull = splines.bezier(control, span, pieces.low[rows], pieces.high[rows])
     start, step = lines.point[segment], lines.point[segment + 1] - lines.point[segment]
     length = lines.s[segment + 1] - lines.s[segment]
     low, width = (pieces.low[rows] - lines.s[segment]) / length, (pieces.high[rows] - pieces.low[rows]) / length

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import spread, starts
+from cornersmooth.geometry.ragged import search, spread, starts
 from cornersmooth.model import Floats, Ints, Program, Runs
 from cornersmooth.settings import STANDING, Settings
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
@@ -53,8 +53,7 @@ def polylines_of(runs: Runs, tip: Floats, axis_point: Floats) -> Polylines:
 
 def points_at(control: Floats, splines: Splines, span: Ints, s: Floats) -> tuple[Floats, Floats]:
     """Tips (mm) and unit axes (m, 3) on the curves at places s of the spans."""
-    basis = splines.basis(span, s)
-    points = np.einsum("mk,mkd->md", basis, control[splines.span_control[span][:, None] + np.arange(4)])
+    points = splines.points(control, span, s)
     return points[:, :3], unit(points[:, 3:] - points[:, :3])
 
 
@@ -68,8 +67,7 @@ def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Fl
     for begin in range(0, len(pieces.span), _TOGETHER):
         rows = slice(begin, begin + _TOGETHER)
         span, segment, low, high = pieces.span[rows], pieces.segment[rows], pieces.low[rows], pieces.high[rows]
-        points = control[splines.span_control[span][:, None] + np.arange(4), :3]
-        hull = splines.bernstein(span, low, high) @ points
+        hull = splines.bezier(control[:, :3], span, low, high)
         first, second = 3.0 * slope @ np.diff(hull, axis=1), 6.0 * bend @ np.diff(hull, 2, axis=1)
         speed = norm(first)
         # where the tip all but stands there is no curvature to speak of
@@ -156,8 +154,7 @@ def _effort(
     runs: Runs, splines: Splines, lines: Polylines, pieces: Pieces, program: Program, settings: Settings
 ) -> Floats:
     """(p,) lines that each piece asks for: by its bend and the chord tolerance, and by the turn of the axis."""
-    controls = runs.control[splines.span_control[pieces.span][:, None] + np.arange(4)]
-    hull = splines.bernstein(pieces.span, pieces.low, pieces.high) @ controls
+    hull = splines.bezier(runs.control, pieces.span, pieces.low, pieces.high)
     bends = 6.0 * np.diff(hull, 2, axis=1)  # second derivatives at both ends, over the whole piece
     size = np.maximum(norm(bends[..., :3]), norm(bends[..., 3:])).max(axis=1)
     way = norm(hull[:, 3, :3] - hull[:, 0, :3])
@@ -204,10 +201,8 @@ def section_rows(runs: Runs, program: Program) -> SectionRows:
     splines = Splines(runs.knot, runs.knot_count)
     begin_run, begin_s, end_s = _cuts(runs, splines, program)
     # distinct knots of every section: its ends and the run's knots between
-    base = starts(splines.knot[splines.first[1:] - 1].astype(np.int64) + 2)[:-1].astype(np.float64)
-    keys = splines.knot + np.repeat(base, splines.count)
-    inside = np.searchsorted(keys, begin_s + base[begin_run], side="right")
-    after = np.searchsorted(keys, end_s + base[begin_run], side="left")
+    inside = search(splines.knot, splines.count, begin_run, begin_s, side="right")
+    after = search(splines.knot, splines.count, begin_run, end_s)
     spans = after - inside + 1
     # clamped knots u of a section with m spans: m + 7, control points m + 3
     section, place = spread(spans + 7)
@@ -220,9 +215,7 @@ def section_rows(runs: Runs, program: Program) -> SectionRows:
     # any span that the control point belongs to: the run's span at the middle of one of the section's
     local = np.clip(number - 1, 0, spans[owner] - 1)
     low = u[first_u[owner] + local + 3]
-    knot = np.searchsorted(keys, low + base[begin_run[owner]], side="right") - 1
-    span = knot - begin_run[owner]
-    points = splines.blossom(span, arguments, runs.control)
+    points = splines.blossom(splines.span_at(begin_run[owner], low), arguments, runs.control)
     last = number == spans[owner] + 2
     return SectionRows(
         move=_moves(runs, begin_run, end_s)[owner],
@@ -269,9 +262,5 @@ def _cuts(runs: Runs, splines: Splines, program: Program) -> tuple[Ints, Floats,
 
 def _moves(runs: Runs, run: Ints, s: Floats) -> Ints:
     """Pose in whose segment each place lies; a pose is in the segment that leads to it."""
-    first = starts(runs.count)
-    base = starts(runs.s[first[1:] - 1].astype(np.int64) + 2)[:-1].astype(np.float64)
-    keys = runs.s + np.repeat(base, runs.count)
-    at = np.searchsorted(keys, s + base[run], side="left")
-    poses: Ints = runs.pose[at]
+    poses: Ints = runs.pose[search(runs.s, runs.count, run, s)]
     return poses

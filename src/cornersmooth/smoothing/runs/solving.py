@@ -223,8 +223,7 @@ def _touched(splines: Splines, pieces: Pieces, control: Ints) -> Ints:
     """Pieces that hang on any of the control points."""
     moved = np.zeros(len(splines.control_run), np.bool_)
     moved[control] = True
-    spans = moved[splines.span_control[:, None] + np.arange(4)].any(axis=1)
-    return np.flatnonzero(spans[pieces.span])
+    return np.flatnonzero(moved[splines.taps(pieces.span)].any(axis=1))
 
 
 def _some(pieces: Pieces, rows: Ints) -> Pieces:
@@ -314,11 +313,7 @@ def solve_groups(
 def _measured(curves: RunCurves) -> AtPoses:
     lines, splines = curves.lines, curves.splines
     run, _ = spread(lines.count)
-    base = starts(splines.knot[splines.first[1:] - 1].astype(np.int64) + 1)[:-1]
-    keys = splines.knot + np.repeat(base, splines.count)
-    knot = np.searchsorted(keys, lines.s + base[run], side="right") - 1
-    knot = np.clip(knot, splines.first[run], splines.first[run + 1] - 2)
-    tip, axis = points_at(curves.control, splines, knot - run, lines.s)
+    tip, axis = points_at(curves.control, splines, splines.span_at(run, lines.s), lines.s)
     lever = lines.point[:, 3:] - lines.point[:, :3]
     size = norm(lever)[:, None]
     off = tip - lines.point[:, :3]
