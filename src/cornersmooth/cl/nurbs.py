@@ -82,13 +82,15 @@ def lines_of(curve: Curve, start: tuple[float, float, float], tolerance: float) 
     (m, 3) float64, (m,) int64
         Points, and the lines of the control points next to them; None if there would be more than `MOST_LINES` a point.
     """
+    from scipy.interpolate import BSpline  # which takes long to load
+
     control = np.array([start, *curve.points])
     inner = np.array(curve.knots) / curve.knots[-1]
     knots = np.concatenate((np.zeros(DEGREE + 1), inner, np.ones(DEGREE)))
     spans = np.unique(knots)
     # chord error of a piece of length h is at most h²/8·max|C″|, and C″ lies in the hull of its control points
-    bend = _second_derivative(control, knots)
-    size = np.linalg.norm(bend, axis=1)
+    spline = BSpline(knots, control, DEGREE)
+    size = np.linalg.norm(spline.derivative(2).c, axis=1)
     first = np.searchsorted(knots, spans[:-1], side="right") - 1 - DEGREE  # first control point of the span
     largest = np.maximum(size[first], size[first + 1])
     with np.errstate(over="ignore"):
@@ -100,29 +102,8 @@ def lines_of(curve: Curve, start: tuple[float, float, float], tolerance: float) 
     step = np.arange(1, pieces.sum() + 1) - np.repeat(begin, pieces)
     u = np.repeat(spans[:-1], pieces) + step * np.repeat(np.diff(spans) / pieces, pieces)
     u[np.cumsum(pieces) - 1] = spans[1:]
-    points = _evaluate(control, knots, u)
+    points: Floats = spline(u)
     points[-1] = control[-1]
     greville = (knots[2:-2] + knots[1:-3] + knots[3:-1]) / DEGREE
     near = np.clip(np.searchsorted(greville, u), 1, len(curve.lines)) - 1
     return points, np.array(curve.lines, np.int64)[near]
-
-
-def _second_derivative(control: Floats, knots: Floats) -> Floats:
-    """(n-2, 3) control points of C″ (Piegl and Tiller, The NURBS Book, equation 3.8)."""
-    for degree in (DEGREE, DEGREE - 1):
-        width = knots[degree + 1 : degree + len(control)] - knots[1 : len(control)]
-        control = degree * np.diff(control, axis=0) / width[:, None]
-        knots = knots[1:-1]
-    return control
-
-
-def _evaluate(control: Floats, knots: Floats, u: Floats) -> Floats:
-    """Points at the parameters `u`, by de Boor's algorithm for all at once."""
-    span = np.clip(np.searchsorted(knots, u, side="right") - 1, DEGREE, len(control) - 1)
-    points = [control[span - DEGREE + j] for j in range(DEGREE + 1)]
-    for level in range(1, DEGREE + 1):
-        for j in range(DEGREE, level - 1, -1):
-            low = knots[span - DEGREE + j]
-            share = ((u - low) / (knots[span + 1 + j - level] - low))[:, None]
-            points[j] = (1 - share) * points[j - 1] + share * points[j]
-    return points[DEGREE]

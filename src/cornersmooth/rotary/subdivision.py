@@ -1,26 +1,46 @@
 """Points to insert so that axes which move linearly in their words keep the tool on the ruled motion.
 
 In a straight block every axis runs evenly from word to word. With tool centre point control the tip then runs straight,
-but the tool axis follows its rotary angles and not the shortest turn, and near the pole the two differ much; without it
-the tip leaves its line too.
+but the tool axis follows its rotary angles and not the shortest turn; without it the tip leaves its line too.
 
-Which division is enough is for `cornersmooth.rotary.chord_error` to say, and to prove.
+A division is enough only where that is proved: by bounds of the derivatives alone (`chord_bounds`), or by so many
+samples that the same bounds leave nearly nothing to what lies between them.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.geometry.ragged import spread
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.poses import solutions, wrap
+from cornersmooth.kinematics.poses import angle_between, continued, solutions, tool_axis, wrap
+from cornersmooth.kinematics.position import machine_position, tip_position
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.rotary.axis_findings import limit_error
-from cornersmooth.rotary.chord_error import InterpolationError, Intervals, ruled
+from cornersmooth.rotary.chord_bounds import axis_bend, ruled_bend, tip_bend
+from cornersmooth.vectors import dot, unit
 
 #: Rounds of division.
 ROUNDS = 28
+#: Shares of an interval at which its error is looked at first: an error that vanishes at all three is none.
+SAMPLES = (0.25, 0.5, 0.75)
+#: The most parts that an interval is divided into at once.
+PARTS = 64
+#: The error of a smooth motion at a quarter of its way is ¾ of its largest. Where that holds to SMOOTH of it, and no
+#: axis turns by more than SMOOTH_TURN (degrees), the error falls with the square of the number of parts, to AIM.
+SMOOTH, SMOOTH_TURN, AIM = 0.1, 30.0, 0.93
+#: An error whose bound is below this share of the tolerance is not looked at; the rest is left to poses at the pole.
+SURE = 0.5
+#: Share of the tolerance that a proof leaves to what lies between its samples, and the most intervals between them.
+PROOF, MOST_SAMPLES = 0.02, 256
+#: Squares of vectors that are nearer to 1 are those of unit vectors.
+UNIT = 1e-6
+#: Samples of proofs that are worked on at a time.
+CHUNK = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -114,23 +134,21 @@ def insertions(
         A rotary axis would leave its limits on the way between two poses within them (CS362).
     """
     rapid = np.zeros(len(axis), np.bool_) if rapid is None else rapid
-    motion = InterpolationError(machine, tip, axis, tolerance, tip_tolerance, max_step)
+    motion = RuledMotion(machine, tip, axis, tolerance, tip_tolerance, max_step)
     found: list[Intervals] = []
-    open_ = _segments(machine, axis, angles, np.flatnonzero(~rapid[1:]), None)
+    open_ = motion.segments(angles, np.flatnonzero(~rapid[1:]), branches=False)
     for number in range(ROUNDS + 1):
         parts = motion.parts(open_)
         open_, parts = open_.take(parts > 1), parts[parts > 1]
         if not len(parts) or number == ROUNDS:
             break
         if not number:
-            open_ = _segments(machine, axis, angles, open_.segment, tolerance / 2)
+            open_ = motion.segments(angles, open_.segment, branches=True)
         open_, inserted = motion.divide(open_, parts)
         found.append(inserted)
-    segment = np.concatenate([part.segment for part in found] or [np.zeros(0, np.int64)])
-    fraction = np.concatenate([part.start for part in found] or [np.zeros(0)])
-    inner = np.concatenate([part.start_angles for part in found] or [np.zeros((0, 2))])
-    order = np.lexsort((fraction, segment))
-    segment, fraction, inner = segment[order], fraction[order], inner[order]
+    new = open_.take(np.zeros(0, np.int64)).and_those(found)
+    new = new.take(np.lexsort((new.start, new.segment)))
+    segment, fraction, inner = new.segment, new.start, new.start_angles
     limits = machine.limits
     inside = np.clip(inner, limits[:, 0], limits[:, 1])
     # At the pole the second axis may stop at its limit; anywhere else the way itself is outside.
@@ -163,21 +181,220 @@ def fill(tip: Floats, axis: Floats, angles: Floats, more: Insertions) -> FilledP
     )
 
 
-def _segments(machine: Machine, axis: Floats, angles: Floats, segment: Ints, cone: float | None) -> Intervals:
-    """Whole segments, with the branches that the angles at both ends are on: -1 in the cone, or if there is none."""
-    count = len(segment)
-    branch = np.full((2, count), -1)
-    if cone is not None:
-        for side, pose in enumerate((segment, segment + 1)):
-            found = solutions(machine, axis[pose])
+def ruled(tip: Floats, axis: Floats, segment: Ints, fraction: Floats) -> tuple[Floats, Floats]:
+    """Tip and unit axis of the ruled motion at fractions of segments: both ends of the axis run linearly."""
+    share = fraction[:, None]
+    direction = axis[segment] * (1 - share) + axis[segment + 1] * share
+    length = np.linalg.norm(direction, axis=1, keepdims=True)
+    direction = np.where(length > 0, direction / np.where(length > 0, length, 1.0), axis[segment])
+    return tip[segment] * (1 - share) + tip[segment + 1] * share, direction
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Parts of segments: where they begin and end, and what stands there."""
+
+    segment: Ints
+    start: Floats
+    end: Floats
+    start_angles: Floats
+    end_angles: Floats
+    start_branch: Ints
+    end_branch: Ints
+
+    @property
+    def turn(self) -> Floats:
+        """(p, 2) degrees."""
+        return np.abs(self.end_angles - self.start_angles)
+
+    def take(self, which: Bools | Ints) -> Intervals:
+        """Return the chosen ones."""
+        return Intervals(*(values[which] for values in vars(self).values()))
+
+    def and_those(self, others: list[Intervals]) -> Intervals:
+        """Return these and others."""
+        return Intervals(*(np.concatenate([vars(one)[name] for one in (self, *others)]) for name in vars(self)))
+
+
+@dataclass(frozen=True)
+class RuledMotion:
+    """The path, and how exactly it is to be followed."""
+
+    machine: Machine
+    tip: Floats
+    axis: Floats
+    tolerance: float
+    tip_tolerance: float | None
+    max_step: float | None
+
+    def segments(self, angles: Floats, segment: Ints, *, branches: bool) -> Intervals:
+        """Whole segments, if asked for with the branches of their ends: -1 in the cone of the pole."""
+        branch = np.full((2, len(segment)), -1)
+        for side, pose in enumerate((segment, segment + 1) if branches else ()):
+            found = solutions(self.machine, self.axis[pose])
             off = np.abs(wrap(found.angles - angles[pose, None, :])).sum(axis=2)
-            branch[side] = np.where(found.pole_distance <= cone, -1, np.argmin(off, axis=1))
-    return Intervals(
-        segment=segment,
-        start=np.zeros(count),
-        end=np.ones(count),
-        start_angles=angles[segment],
-        end_angles=angles[segment + 1],
-        start_branch=branch[0],
-        end_branch=branch[1],
-    )
+            branch[side] = np.where(found.pole_distance <= self.tolerance / 2, -1, np.argmin(off, axis=1))
+        ends = np.zeros(len(segment)), np.ones(len(segment))
+        return Intervals(segment, *ends, angles[segment], angles[segment + 1], *branch)
+
+    def parts(self, intervals: Intervals) -> Ints:
+        """Into how many parts each interval is to be divided: 1 where it is good as it is."""
+        turn = intervals.turn
+        parts = np.ones(len(turn), np.int64)
+        if self.max_step is not None:
+            parts += np.ceil(turn.max(axis=1, initial=0.0) / self.max_step - 1).clip(0).astype(np.int64)
+        check = self._not_obvious(intervals)
+        checked = intervals.take(check)
+        bends = self._bends(checked)
+        doubtful = np.flatnonzero((bends[0] + bends[1] > SURE) | (bends[2] > 1.0))
+        check = check[doubtful]
+        parts[check] = np.maximum(parts[check], self._checked(checked.take(doubtful), bends[:, doubtful]))
+        return np.minimum(parts, PARTS)
+
+    def _not_obvious(self, part: Intervals) -> Ints:
+        """Intervals but for whole segments with turns so small that both motions leave their chord by next to nothing.
+
+        Between unit vectors the ruled axis bends by 1.3 times the square of the turns at most where these are below ½.
+        """
+        turn = np.radians(part.turn.sum(axis=1))
+        obvious = (turn <= min(0.5, math.sqrt(SURE * math.radians(self.tolerance) * 8 / 2.3))) & (part.end == 1.0)
+        obvious &= (part.start == 0.0) & (self.tip_tolerance is None)
+        if obvious.any():
+            units = np.abs(dot(self.axis, self.axis) - 1) < UNIT
+            obvious &= units[part.segment] & units[part.segment + 1]
+        return np.flatnonzero(~obvious)
+
+    def _checked(self, part: Intervals, bends: Floats) -> Ints:
+        """Into how many parts to divide intervals with errors that may be too large: by what is found on them."""
+        ends = self._ends(part)
+        excess = np.full((len(SAMPLES), len(part.segment)), np.inf)
+        for share, least in zip(SAMPLES, excess, strict=True):
+            for _, tip, axis in self._errors(part, ends, np.full(len(least), share)):
+                np.minimum(least, np.maximum(tip, axis), out=least)
+        worst = excess.max(axis=0, initial=0.0)
+        smooth = (np.abs(excess[[0, 2]] - 0.75 * excess[1]) <= SMOOTH * excess[1]).all(axis=0)
+        smooth &= part.turn.sum(axis=1) <= SMOOTH_TURN
+        count = np.where(smooth, np.ceil(np.sqrt(np.minimum(worst, 1e9) / AIM)), 2).astype(np.int64)
+        parts = np.where(worst > 1, np.maximum(count, 2), 1)
+        samples = np.sqrt(np.maximum(np.maximum(bends[0] + bends[1], bends[2]), 0.0) / PROOF)
+        samples = np.exp2(np.ceil(np.log2(np.maximum(samples, 1.0))))
+        parts[samples > MOST_SAMPLES] = np.maximum(parts[samples > MOST_SAMPLES], 2)
+        for number in np.unique(samples[parts == 1]).astype(np.int64).tolist():
+            group = np.flatnonzero((parts == 1) & (samples == number))
+            size = max(1, CHUNK // (number + 1))
+            for begin in range(0, len(group), size):
+                some = group[begin : begin + size]
+                proved = self._proved(part.take(some), bends[:, some], [end[some] for end in ends], number)
+                parts[some[~proved]] = 2
+        return parts
+
+    def _proved(self, part: Intervals, bends: Floats, ends: list[Floats], number: int) -> Bools:
+        """Whether the error of intervals keeps its tolerances everywhere: measured in so many even samples and more."""
+        shape = (len(part.segment), number + 1)
+        samples = np.tile(np.arange(number + 1) / number, shape[0])
+        repeated = part.take(np.repeat(np.arange(shape[0]), number + 1))
+        repeated_ends = [np.repeat(end, number + 1, axis=0) for end in ends]
+        proved: Bools = np.zeros(shape[0], np.bool_)
+        for along, tip, axis in self._errors(repeated, repeated_ends, samples):
+            # any way of pairing the two motions will do: this one is even between the samples
+            step = np.diff(along.reshape(shape), axis=1)
+            between = bends[0] / number**2 + bends[1] * (step**2).max(axis=1)
+            fits = tip.reshape(shape).max(axis=1) + bends[2] / number**2 <= 1
+            proved |= fits & (axis.reshape(shape).max(axis=1) + between <= 1)
+        return proved
+
+    def _bends(self, part: Intervals) -> Floats:
+        """(3, p) how far intervals may leave their chords over the tolerances: real axis, ruled axis, tip."""
+        turn = np.radians(part.turn)
+        tolerance = np.radians(self.tolerance)
+        start, end = (self._lever(part.segment, fraction) for fraction in (part.start, part.end))
+        bends = np.zeros((3, len(turn)))
+        bends[0] = axis_bend(self.machine, turn, unit(start), unit(end), tolerance) / (8 * tolerance)
+        bends[1] = ruled_bend(start, end) / (8 * tolerance)
+        if self.tip_tolerance is not None:
+            _, _, from_, to = self._ends(part)
+            bends[2] = tip_bend(self.machine, from_, to, turn) / (8 * self.tip_tolerance)
+        return bends
+
+    def _lever(self, segment: Ints, fraction: Floats) -> Floats:
+        """Axis of the ruled motion, not of unit length."""
+        share = fraction[:, None]
+        lever: Floats = self.axis[segment] * (1 - share) + self.axis[segment + 1] * share
+        return lever
+
+    def _ends(self, part: Intervals) -> list[Floats]:
+        """Tip and linear words at both ends of each interval: four times (p, 3), mm; nothing where the tip is kept."""
+        if self.tip_tolerance is None:
+            return []
+        start, _ = ruled(self.tip, self.axis, part.segment, part.start)
+        end, _ = ruled(self.tip, self.axis, part.segment, part.end)
+        return [
+            start,
+            end,
+            machine_position(self.machine, start, part.start_angles),
+            machine_position(self.machine, end, part.end_angles),
+        ]
+
+    def _errors(self, part: Intervals, ends: list[Floats], fraction: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
+        """Errors at one share of each interval, the ruled motion paired with the real one in two ways.
+
+        Yields
+        ------
+        along, tip, axis : (p,) float64
+            Share of the ruled motion, first the same one, then where it is nearest to the tip; errors there of tip and
+            axis over their tolerances. Where the tip hardly moves the nearest share says nothing.
+        """
+        share = fraction[:, None]
+        words = part.start_angles * (1 - share) + part.end_angles * share
+        axis = tool_axis(self.machine, words)
+        nearest = self._swept(part, axis, fraction)
+        if self.tip_tolerance is not None:
+            start, end, from_, to = ends
+            real, way = tip_position(self.machine, from_ * (1 - share) + to * share, words) - start, end - start
+            square = dot(way, way)
+            foot = dot(real, way) / np.where(square > 0, square, 1.0)
+            nearest = np.where(square > 0, np.clip(foot, 0, 1), nearest)
+        for along in (fraction, nearest):
+            _, wanted = ruled(self.tip, self.axis, part.segment, part.start + along * (part.end - part.start))
+            tip = np.zeros(len(along))
+            if self.tip_tolerance is not None:
+                tip = np.linalg.norm(real - along[:, None] * way, axis=1) / self.tip_tolerance
+            yield along, tip, angle_between(axis, wanted) / self.tolerance
+
+    def _swept(self, part: Intervals, axis: Floats, fraction: Floats) -> Floats:
+        """Share of each interval where the ruled axis is nearest to another, where the tip stands: else `fraction`.
+
+        About a standing tip nothing says when the axis is where: all that counts is the great circle that it sweeps.
+        """
+        still = np.flatnonzero((self.tip[part.segment] == self.tip[part.segment + 1]).all(axis=1))
+        along = fraction.copy()
+        if len(still):
+            some = part.take(still)
+            start, end = self._lever(some.segment, some.start), self._lever(some.segment, some.end)
+            normal = np.cross(start, end)
+            gone, left = (dot(np.cross(*pair), normal) for pair in ((start, axis[still]), (axis[still], end)))
+            whole = gone + left
+            swept = np.divide(gone, whole, out=fraction[still].copy(), where=whole > 0.0)
+            along[still] = np.clip(swept, 0.0, 1.0)
+        return along
+
+    def divide(self, intervals: Intervals, count: Ints) -> tuple[Intervals, Intervals]:
+        """Divide each interval into so many equal parts: the new intervals, and those that start with a new point."""
+        owner, number = spread(count)
+        share = (number / count[owner])[:, None]
+        old = intervals.take(owner)
+        start = old.start + (old.end - old.start) * share[:, 0]
+        words = old.start_angles * (1 - share) + old.end_angles * share
+        branch = old.start_branch.copy()
+        new = np.flatnonzero(number > 0)
+        # A point between a pose in the cone and one outside is on the branch of the latter.
+        at = old.take(new)
+        known = np.where(at.start_branch < 0, at.end_branch, at.start_branch)
+        known[(at.start_branch >= 0) & (at.end_branch >= 0) & (at.start_branch != at.end_branch)] = -1
+        _, axis = ruled(self.tip, self.axis, at.segment, start[new])
+        words[new], branch[new] = continued(self.machine, axis, words[new], known, self.tolerance / 2)
+        last = number == count[owner] - 1
+        end, end_words, end_branch = old.end.copy(), old.end_angles.copy(), old.end_branch.copy()
+        end[~last], end_words[~last], end_branch[~last] = start[new], words[new], branch[new]
+        divided = Intervals(old.segment, start, end, words, end_words, branch, end_branch)
+        return divided, divided.take(new)
