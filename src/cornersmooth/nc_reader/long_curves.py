@@ -15,8 +15,8 @@ from cornersmooth.nc_reader.splines import CurveTable
 
 #: pieces that a part is divided into, and the turn of the tool up to which that will do, rad; in rotary words half as
 #: many will do, since each becomes a curve of a higher degree
-_PIECES = {4: 0.035, 16: 0.14, 64: 0.56, 256: np.inf}
-_ROTARY_PIECES = {number // 2: turn for number, turn in _PIECES.items()}
+_PIECES = {1: np.inf}
+_ROTARY_PIECES = _PIECES
 
 
 def cut_long(curves: CurveTable, *, rotary: bool = False) -> tuple[CurveTable, Bools]:

@@ -23,20 +23,11 @@ from cornersmooth.nc_reader.splines import CurveTable
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine, RotaryAxis
 
-#: share of the tolerance by which lines may leave the motion they stand for, and least length, mm
+#: share of the tolerance by which a motion may leave the lines that stand for it, tip and axis point; least length, mm
 LINE_SHARE, LEAST = 5e-3, 1e-7
 
 #: lines that one block becomes at most
 MOST_LINES: Final = 4096
-
-#: radians that the tool turns in a line at most, where it turns by more than a right angle
-_WIDEST = 0.2
-
-#: degrees from which on only the first and the last turn of a block are looked at: no limit to the size of mistakes
-_MANY_TURNS = 1080.0
-
-#: lines that a turn becomes there
-_LINES_A_TURN = 64
 
 #: order of the curves that stand for curves in angles, and how often their spans are halved
 _ORDER, _HALVINGS = 8, 6
@@ -76,7 +67,7 @@ class Rotary:
     tip_control : bool
         Whether X Y Z are the tip, or the linear axes of the machine.
     tolerance, axis_length : float, mm
-        What decides how fine motion is cut.
+        ε and H.
     tip_step, angle_step : float
         Last printed digits, mm and degrees.
     """
@@ -201,8 +192,7 @@ class Rotary:
         feed, room = run.feed, run.feed_room
         if inverse_time:
             feed, room = self._timed(feed, position, tip, vector, angles)
-        turn = np.abs(np.diff(angles, axis=0)).sum(axis=1)
-        count = self._counts(run, position, turn, angles, tip, vector)
+        count = self._counts(run, position, angles)
         if not len(count) or count.max() == 1:
             return replace(run, tip=tip[1:], second=vector[1:], curves=curves, feed=feed, feed_room=room)
         last = np.cumsum(count) - 1
@@ -210,7 +200,7 @@ class Rotary:
         left = last[owner] - np.arange(len(owner))
         inner = np.flatnonzero(left)
         own = owner[inner]
-        at = _shares(count[own], left[inner], turn[own])[:, None]
+        at = (1.0 - left[inner] / count[own])[:, None]
         fine_tip, fine_vector = tip[1:][owner], vector[1:][owner]
         words = [start[own] + at * (start[own + 1] - start[own]) for start in (position, angles)]
         fine_tip[inner], fine_vector[inner] = self.tips(*words), self.directions(words[1])
@@ -247,36 +237,62 @@ class Rotary:
         return found
 
     @property
-    def _fine(self) -> float:
+    def sagitta(self) -> float:
+        """How far a motion may leave the lines that stand for it, mm, of tip and axis point."""
         return max(LINE_SHARE * self.tolerance, LEAST)
 
-    def _counts(
-        self, run: Executed, position: Floats, degrees: Floats, angles: Floats, tip: Floats, vector: Floats
-    ) -> Ints:
-        """Number of lines that each element becomes; `degrees` are what both axes turn in it."""
+    def _counts(self, run: Executed, position: Floats, angles: Floats) -> Ints:
+        """Number of lines that each element becomes.
+
+        A motion leaves its chord by no more than an eighth of its largest second derivative. A tool vector on a chord
+        is not longer than one, so that its direction is hardly farther off than its end.
+        """
         count = np.ones(len(run.kind), np.int64)
-        turn = np.radians(degrees)
-        bound = self.axis_length * turn**2
-        if not self.tip_control:
-            way = np.linalg.norm(np.diff(position, axis=0), axis=1)
-            bound += turn**2 * self.levers(position[:-1]) + 2 * turn * way
-        from_somewhere = ~np.isnan(position[:-1]).any(axis=1)
-        rows = np.flatnonzero((run.kind == Element.LINE) & (bound / 4 > self._fine) & from_somewhere)
-        if not len(rows):
-            return count
-        off = np.zeros(len(rows))
-        for share in (0.25, 0.5, 0.75):
-            words = [start[rows] + share * (start[rows + 1] - start[rows]) for start in (position, angles, tip, vector)]
-            here, there = self.tips(*words[:2]) - words[2], self.directions(words[1])
-            chord = words[3] / np.maximum(np.linalg.norm(words[3], axis=1), 1e-12)[:, None]
-            point = here + self.axis_length * (there - chord)
-            off = np.maximum(off, np.maximum(np.linalg.norm(here, axis=1), np.linalg.norm(point, axis=1)))
-        # 4/3: the quarters of a parabola are as far from its chord as three quarters of the middle
-        count[rows] = np.clip(np.ceil(np.sqrt(off * 4 / 3 / self._fine)), 1, MOST_LINES)
-        # a turn of the tool by more than a right angle has no chord to be compared with
-        wide = np.ceil(np.minimum(turn[rows], np.radians(_MANY_TURNS)) / _WIDEST).astype(np.int64)
-        count[rows] = np.where(degrees[rows] > _MANY_TURNS, 2 * _LINES_A_TURN + 1, np.maximum(count[rows], wide))
+        turned = np.flatnonzero(
+            (run.kind == Element.LINE) & (angles[1:] != angles[:-1]).any(axis=1) & ~np.isnan(position[:-1]).any(axis=1)
+        )
+        turn = np.radians(np.abs(angles[turned + 1] - angles[turned]))
+        tip, axis = self._second_derivatives(position[turned], position[turned + 1], angles[turned], turn)
+        lines = np.ceil(np.sqrt((tip + self.axis_length * axis) / (8.0 * self.sagitta)))
+        count[turned] = np.clip(lines, 1, MOST_LINES)
         return count
+
+    def _second_derivatives(self, start: Floats, end: Floats, angles: Floats, turn: Floats) -> tuple[Floats, Floats]:
+        """(b,) bounds of the second derivatives of tip (mm) and tool vector by the share of a block.
+
+        Parameters
+        ----------
+        start, end : (b, 3) float64, mm
+            Words of the linear axes.
+        angles : (b, 2) float64, degrees
+            Where it begins.
+        turn : (b, 2) float64, rad
+            Size of the turns.
+        """
+        machine = self.machine
+        none = np.zeros(len(start))
+        moved = _Moved(np.broadcast_to(machine.tool, start.shape), none, none)
+        for index in (1, 0):
+            moved = moved.turned(machine.axes[index], angles[:, index], turn[:, index], np.zeros(3))
+        axis_bend = moved.bend
+        if self.tip_control:
+            return none, axis_bend
+        nose = machine.tool_length * machine.tool
+        moved = _Moved(np.zeros_like(start), none, none)
+        for index in (1, 0):
+            axis = machine.axes[index]
+            if axis.carrier == "head":
+                moved = moved.turned(axis, angles[:, index], turn[:, index], nose + np.array(axis.point))
+        moved = replace(
+            moved,
+            point=moved.point + start + machine.part_zero,
+            way=moved.way + np.linalg.norm(end - start, axis=1),
+        )
+        for index in (1, 0):
+            axis = machine.axes[index]
+            if axis.carrier == "table":
+                moved = moved.turned(axis, angles[:, index], turn[:, index], np.array(axis.point))
+        return moved.bend, axis_bend
 
     def _timed(
         self, rate: Floats, position: Floats, tip: Floats, vector: Floats, angles: Floats
@@ -387,7 +403,7 @@ class Rotary:
         true = at(between)
         close = np.einsum("ij,ksjd->ksid", _bernstein(between), bezier)
         off = np.linalg.norm(close[..., 3:6] / close[..., 6:] - true[..., 3:6] / true[..., 6:], axis=3)
-        good = off.max(axis=(1, 2)) * self.axis_length <= self._fine / 10
+        good = off.max(axis=(1, 2)) * self.axis_length <= self.sagitta / 10
         joined = np.concatenate((bezier[:, :, :-1].reshape(len(points), -1, 7), bezier[:, -1, -1:]), axis=1)
         return joined[:, :, :6] / joined[:, :, 6:], joined[:, :, 6], good
 
@@ -399,17 +415,26 @@ def tool_vectors(machine: Machine, angles: Floats) -> Floats:
     return _turned(first, angles[:, 0], _turned(second, angles[:, 1], tool))
 
 
-def _shares(count: Ints, left: Ints, turn: Floats) -> Floats:
-    """Shares of blocks at which lines end that have `left` others behind them in their block.
+@dataclass(frozen=True)
+class _Moved:
+    """Points that move, b of them: where they begin, and bounds of the way they go and of their second derivative."""
 
-    They are even but where a block turns more often than makes sense: there they are in its first and its last turn.
-    """
-    even = 1.0 - left / count
-    whole = np.minimum(360.0 / np.maximum(turn, 360.0), 0.5)
-    behind, before = whole * left / _LINES_A_TURN, whole * (count - left) / _LINES_A_TURN
-    many = np.where(left <= _LINES_A_TURN, 1.0 - behind, before)
-    shares: Floats = np.where(turn > _MANY_TURNS, many, even)
-    return shares
+    point: Floats
+    way: Floats
+    bend: Floats
+
+    def turned(self, axis: RotaryAxis, degrees: Floats, turn: Floats, centre: Floats) -> _Moved:
+        """Turn them evenly about an axis, by `turn` (rad), from `degrees` on.
+
+        With a turn of a and an arm r, (R r)' = R (a x r + r') and (R r)" = R (a x (a x r) + 2 a x r' + r").
+        """
+        arm = self.point - centre
+        reach = np.linalg.norm(np.cross(axis.unit, arm), axis=1) + self.way
+        return _Moved(
+            centre + _turned(axis, degrees, arm),
+            turn * reach + self.way,
+            turn**2 * reach + 2.0 * turn * self.way + self.bend,
+        )
 
 
 def _apart(a: Floats, b: Floats) -> Floats:
@@ -429,8 +454,7 @@ def _bernstein(t: Floats) -> Floats:
 
 def _turned(axis: RotaryAxis, degrees: Floats, vectors: Floats) -> Floats:
     """Vectors (n, 3) turned with an axis as seen from the part: Rodrigues' rotation."""
-    direction = np.asarray(axis.direction, np.float64)
-    direction = direction / np.linalg.norm(direction)
+    direction = axis.unit
     sense = 1.0 if axis.positive == "tool" else -1.0
     angle = sense * np.radians(degrees)
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
