@@ -128,9 +128,7 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
     element_rows = placed
     if not (straight | is_arc).all():
         before = np.array((*modal.tip, *modal.second))
-        curves, cut = cut_long(
-            _curves(table, six, placed, code, before, _TIP + letters, problems), rotary=bool(modal.rotary)
-        )
+        curves, cut = cut_long(_curves(table, six, placed, code, before, _TIP + letters, problems))
         element_rows = placed & (straight | is_arc)
         element_rows[curves.row] = True
     rows = np.flatnonzero(element_rows)

@@ -1,36 +1,23 @@
-"""Curves through several corners, cut at their knots.
-
-Places on a curve are looked for from the straight lines between its knots. A long curve is cut into the parts between
-two knots, and each part gets inner knots enough for that.
-"""
+"""Curves through several corners, cut at their knots: each part belongs to one block, and is near one place."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.splines import CurveTable
-
-#: pieces that a part is divided into, and the turn of the tool up to which that will do, rad; in rotary words half as
-#: many will do, since each becomes a curve of a higher degree
-_PIECES = {1: np.inf}
-_ROTARY_PIECES = _PIECES
+from cornersmooth.nc_reader.splines import BEZIER_KNOTS, CurveTable
 
 
-def cut_long(curves: CurveTable, *, rotary: bool = False) -> tuple[CurveTable, Bools]:
+def cut_long(curves: CurveTable) -> tuple[CurveTable, Bools]:
     """Cut curves through several corners at their knots, so that what is measured is near one place of the path.
 
     Cubics with all weights 1, distinct inner knots and a parameter that does not run from 0 to 1 are cut; the curve of
-    one corner has knots from 0 to 1. `rotary` says that the second triples are degrees. The part between two knots
-    belongs to the block whose control point ends it.
+    one corner has knots from 0 to 1. The part between two knots belongs to the block whose control point ends it.
 
     Returns
     -------
     CurveTable
-        Parts have knots from 0 to 1 and inner ones, so that places on them are known well enough to begin
-        with; each starts where the one before it ends.
+        Each part has knots from 0 to 1, and starts where the one before it ends.
     cut : (c,) bool
         Which of the curves are parts.
     """
@@ -57,7 +44,16 @@ def cut_long(curves: CurveTable, *, rotary: bool = False) -> tuple[CurveTable, B
     block = end - curves.points[owner] + 4 + k  # of the control point that ends each part
     end = np.where(mine, block, end)
     row = np.where(mine & (k > 0), block, row)
-    parts = CurveTable.joined(list(_refined(row[mine], end[mine], bezier, rotary)))
+    count = len(bezier)
+    parts = CurveTable(
+        row=row[mine],
+        end=end[mine],
+        order=np.full(count, 4, np.int64),
+        points=np.full(count, 4, np.int64),
+        control=bezier.reshape(-1, 6),
+        weight=np.ones(4 * count),
+        knot=np.tile(BEZIER_KNOTS, count),
+    )
     others = curves.only(np.flatnonzero(~long))
     joined = CurveTable.joined([parts, others])
     return joined, np.isin(joined.row, parts.row)
@@ -77,48 +73,3 @@ def _intervals_alone(curves: CurveTable, knot: Ints, point: Ints) -> Floats:
     start = before + (c - b) / (d - b) * (second - before)
     end = third + (d - c) / (e - c) * (behind - third)
     return np.stack((start, second, third, end), axis=1)
-
-
-def _refined(row: Ints, end: Ints, bezier: Floats, rotary: bool) -> Iterator[CurveTable]:
-    """Cubics with Bézier points (r, 4, 6) as curves with inner knots, from 0 to 1."""
-    if rotary:
-        turn = np.radians(np.abs(np.diff(bezier[..., 3:], axis=1)).sum(axis=(1, 2)))
-    else:
-        lever = bezier[..., 3:] - bezier[..., :3]
-        size = np.linalg.norm(lever, axis=2)
-        unit = lever / np.where(size > 0, size, 1.0)[..., None]
-        turn = np.linalg.norm(np.diff(unit, axis=1), axis=2).sum(axis=1)
-    least = 0.0
-    for number, most in (_ROTARY_PIECES if rotary else _PIECES).items():
-        chosen = np.flatnonzero((turn >= least) & (turn < most))
-        least = most
-        if not len(chosen):
-            continue
-        knots = np.concatenate(([0.0] * 3, np.arange(number + 1) / number, [1.0] * 3))
-        control = _blossoms(knots) @ bezier[chosen]
-        count, points = control.shape[:2]
-        yield CurveTable(
-            row=row[chosen],
-            end=end[chosen],
-            order=np.full(count, 4, np.int64),
-            points=np.full(count, points, np.int64),
-            control=control.reshape(-1, 6),
-            weight=np.ones(count * points),
-            knot=np.tile(knots, count),
-        )
-
-
-def _blossoms(knots: Floats) -> Floats:
-    """(k, 4) from the Bézier points of a cubic to its control points on knots from 0 to 1."""
-    rows = []
-    for j in range(len(knots) - 4):
-        x, y, z = knots[j + 1 : j + 4]
-        rows.append(
-            (
-                (1 - x) * (1 - y) * (1 - z),
-                x * (1 - y) * (1 - z) + (1 - x) * y * (1 - z) + (1 - x) * (1 - y) * z,
-                x * y * (1 - z) + x * (1 - y) * z + (1 - x) * y * z,
-                x * y * z,
-            )
-        )
-    return np.array(rows)

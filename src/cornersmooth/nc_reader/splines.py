@@ -23,7 +23,8 @@ SPLINE_ORDER, LARGEST_WEIGHT = 4, 3.0
 #: mm or degrees by which an SPL may begin beside where the block before has ended (iTNC 530: 1 µm), and rounding
 _GAP = 1.1e-3
 
-_KNOTS = np.array([0.0] * 4 + [1.0] * 4)
+#: of a cubic by its Bézier points
+BEZIER_KNOTS = np.array([0.0] * 4 + [1.0] * 4)
 
 
 @dataclass
@@ -368,5 +369,5 @@ def _bezier(rows: Ints, *points: Floats) -> CurveTable:
         points=np.full(count, 4, np.int64),
         control=np.stack(points, axis=1).reshape(-1, 6),
         weight=np.ones(4 * count),
-        knot=np.tile(_KNOTS, count),
+        knot=np.tile(BEZIER_KNOTS, count),
     )
