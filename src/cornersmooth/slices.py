@@ -1,12 +1,23 @@
-"""Parts of what travels: some poses of a program, some of its runs."""
+"""Parts of what travels: some rows of any columns, some poses of a program, some of its runs."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
-from cornersmooth.model import Arcs, Bools, Program, Runs
+from cornersmooth.model import Arcs, Bools, Ints, Program, Runs
+
+Columns = TypeVar("Columns")
+
+
+def some_rows(columns: Columns, which: slice | Bools | Ints) -> Columns:
+    """Rows of a dataclass whose fields are arrays of the same length; what is no array stays."""
+    own: dict[str, Any] = {
+        name: column[which] for name, column in vars(columns).items() if isinstance(column, np.ndarray)
+    }
+    return replace(columns, **own)  # type: ignore[type-var]
 
 
 def some_poses(program: Program, first: int, stop: int) -> Program:

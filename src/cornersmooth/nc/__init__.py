@@ -34,10 +34,8 @@ from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
 from cornersmooth.nc.rewound_curve_rows import curve_rows_of, rewound_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.run_reach import within_reach
-from cornersmooth.nc.run_writer import RunWriter
 from cornersmooth.nc.statement_writer import StatementWriter
 from cornersmooth.nc.warnings import add_warnings
-from cornersmooth.nc.writers import Writers
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.sampling import Rows, curve_rows, dense_rows
 
@@ -208,9 +206,9 @@ def write(
     stretch = chosen.stretch(smoothed.settings.axis_length)
     writer = BlockWriter(chosen, program, statements, findings, circles, stretch, values["blend"], modal=frame.modal)
     approach = max(frame.approach, POINT_APPROACH) if chosen.orientation == "point" else frame.approach
-    writers = Writers(writer, upright, planes)
-    runs = RunWriter(program, writers, statements, operation, findings, approach, frame.retract)
-    motion = MotionWriter(runs, native)
+    motion = MotionWriter(
+        program, writer, upright, planes, statements, operation, findings, approach, frame.retract, native
+    )
     of_rows = Findings()  # rows are made in a thread of their own: what is said of them comes last, whenever it is met
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
@@ -225,9 +223,8 @@ def write(
                 progress(int(rows.move[-1]) + 1, len(program))
         for lines in motion.finish():
             text.write(lines)
-        text.write_blocks(motion.end())
     findings.take(of_rows)
-    return Written(text.blocks + runs.written, findings.all())
+    return Written(text.blocks + motion.written, findings.all())
 
 
 def _rows(smoothed: SmoothProgram, form: Form, circles: Circles, planes: Planes, findings: Findings) -> Iterator[Rows]:

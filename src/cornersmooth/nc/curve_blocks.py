@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc.run import Run
+from cornersmooth.slices import some_rows
 from cornersmooth.text import format_number
 
 
@@ -160,7 +161,7 @@ class SplineBlocks(NoCurves):
         if run.spline is not None:
             run = replace(run, spline=_intervals(run.spline, run.curve))
         self._open &= bool((run.curve > 0).any())  # a run of lines alone gets no prefixes of ours
-        return run.only(run.curve != 1)
+        return some_rows(run, run.curve != 1)
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
         """``BSPLINE`` where a spline begins."""

@@ -8,7 +8,7 @@ stays plain moves. Where cycles are asked for, a tool with cutter compensation r
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
@@ -166,12 +166,6 @@ def _can_stand_upright(form: Form) -> bool:
     place = np.array([[11.0, -7.0, 5.0]])
     upright = np.abs(tool_axis(form.machine, zero) - (0.0, 0.0, 1.0)).max() <= _ALONG_Z
     return bool(upright and np.abs(machine_position(form.machine, place, zero) - place).max() <= _SAME_PLACE)
-
-
-def upright_form(form: Form) -> Form:
-    """Return the form of a tool that stays along Z, without words of its axis."""
-    assert form.upright is not None
-    return replace(form, orientation="fixed", mode=form.upright)
 
 
 def hole_feeds(cycle: Cycle, program: Program, poses: Ints) -> tuple[Floats, Ints]:

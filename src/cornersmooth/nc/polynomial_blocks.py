@@ -14,6 +14,7 @@ from cornersmooth.model import Bools, Floats, Ints, Units
 from cornersmooth.nc.curve_blocks import Curves, KnotBlocks, NoCurves, RotaryKnotBlocks, SplineBlocks
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
+from cornersmooth.slices import some_rows
 from cornersmooth.text import RowFormat, format_number, to_ticks
 
 #: control points that a curve has more than knot intervals
@@ -52,7 +53,7 @@ class _Polynomials(NoCurves):
 
         Its tangents stay: their control points move with the ends.
         """
-        kept = run.only((run.curve == 0) | (run.curve > _DEGREE))
+        kept = some_rows(run, (run.curve == 0) | (run.curve > _DEGREE))
         curved = np.flatnonzero(kept.curve > 0)
         if len(curved):
             assert kept.bezier is not None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,13 +64,6 @@ class Run:
     def __len__(self) -> int:
         return len(self.ticks)
 
-    def part(self, first: int, stop: int) -> Run:
-        """Return rows from `first` to `stop`, the latter excluded."""
-        columns: dict[str, Any] = {
-            name: None if column is None else column[first:stop] for name, column in vars(self).items()
-        }
-        return Run(**columns)
-
     def first_as_said(self, program: Program) -> Run:
         """Give the first move the program's feed where it has a time, which counts the way from the pose before."""
         if self.mode[0] != INVERSE_TIME:
@@ -79,10 +71,3 @@ class Run:
         feed, mode = self.feed.copy(), self.mode.copy()
         feed[0], mode[0] = program.feed[self.move[0]], program.feed_mode[self.move[0]]
         return replace(self, feed=feed, mode=mode)
-
-    def only(self, chosen: Bools) -> Run:
-        """Return the chosen rows."""
-        columns: dict[str, Any] = {
-            name: None if column is None else column[chosen] for name, column in vars(self).items()
-        }
-        return Run(**columns)
