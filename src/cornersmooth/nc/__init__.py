@@ -223,7 +223,7 @@ def write(
                 progress(int(rows.move[-1]) + 1, len(program))
         for lines in motion.finish():
             text.write(lines)
-    findings.take(of_rows)
+    findings.add_all(of_rows.all())
     return Written(text.blocks + motion.written, findings.all())
 
 

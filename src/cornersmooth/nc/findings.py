@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from cornersmooth.errors import Finding, Severity
@@ -19,9 +20,9 @@ class Findings:
         new = Finding(code, severity, line, text, count) if old is None else replace(old, count=old.count + count)
         self._found[code, text] = new
 
-    def take(self, other: Findings) -> None:
-        """Count what was noticed elsewhere, behind what was noticed here."""
-        for finding in other.all():
+    def add_all(self, others: Iterable[Finding]) -> None:
+        """Count what was noticed elsewhere."""
+        for finding in others:
             self.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
 
     def all(self) -> tuple[Finding, ...]:

@@ -10,12 +10,12 @@ import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.geometry.arcs import arc_points, divided
-from cornersmooth.kinematics import Machine, check_travel, solutions, tool_axis
+from cornersmooth.kinematics import Machine, solutions, tool_axis
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane, Planes
-from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
+from cornersmooth.nc.tool_machines import ToolTravel
 from cornersmooth.vectors import norm
 
 #: turn on an arc from one place that is looked at to the next, rad: between them it goes 1e-5 of its radius farther
@@ -45,17 +45,14 @@ def check_travel_in_planes(planes: Planes, program: Program, form: Form, finding
     machine = form.machine
     if machine is None or not machine.travel:
         return
-    tools = tools_of_poses(program) if machine.tool_lengths else None
+    travel = ToolTravel(program, machine)
     for number, plane in enumerate(planes.planes):
         places = np.flatnonzero((planes.of == number) & (program.kind != Move.FROM))
         tip, poses = _on_the_way(program, places)
         fit, refused = [], None
         for angles in _angles(machine, plane):
             try:
-                for chosen, one in machines_of_rows(machine, tools, poses):
-                    own = poses[chosen]
-                    turned = np.tile(angles, (len(own), 1))
-                    check_travel(one, tip[chosen], turned, program.line[own], program.source.name)
+                travel.check(tip, np.tile(angles, (len(tip), 1)), poses)
                 fit.append(angles)
             except InputError as error:
                 refused = refused or error
@@ -70,7 +67,7 @@ def check_travel_in_planes(planes: Planes, program: Program, form: Form, finding
 def check_travel_without_axes(machine: Machine, program: Program) -> None:
     """Refuse a program beyond the travel of a machine without rotary axes (CS374)."""
     tip, poses = _on_the_way(program, np.flatnonzero(program.kind != Move.FROM))
-    check_travel(machine, tip, np.zeros((len(tip), 2)), program.line[poses], program.source.name)
+    ToolTravel(program, machine).check(tip, np.zeros((len(tip), 2)), poses)
 
 
 def _on_the_way(program: Program, poses: Ints) -> tuple[Floats, Ints]:

@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from cornersmooth.model import Bools, Corners, Move, Runs, SmoothProgram
+from cornersmooth.model import Bools, Move, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_curve_rows import rotary_curve_rows
-from cornersmooth.nc.rotary_rows import rotary_rows, whole_rows
+from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.rotary_run_rows import rotary_run_rows
-from cornersmooth.rotary import rapid_moves, rewound_angles, still_poses
-from cornersmooth.slices import some_poses, some_runs
+from cornersmooth.nc.rotary_words import rotary_way
+from cornersmooth.slices import some_poses, some_rows, some_runs
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 
 
@@ -66,39 +65,24 @@ def rewound_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) 
 
 def _left(smoothed: SmoothProgram, form: Form) -> Bools:
     """(n,) poses between rapids, these included, around a place where a cut is left."""
-    program, settings = smoothed.program, smoothed.settings
-    tip, axis, move = whole_rows(dense_rows(smoothed))
-    if not len(move) or form.machine is None:
-        return np.zeros(len(program), np.bool_)
-    _, source, left = rewound_angles(
-        form.machine,
-        tip,
-        axis,
-        tolerance=form.rotary_tolerance(settings.tolerance, settings.axis_scale),
-        rapid=rapid_moves(program.kind)[move],
-        line=program.line[move],
-        file=program.source.name,
-        still=still_poses(program.kind)[move],
-        still_tolerance=form.angle_rounding,
-    )
-    cut = np.cumsum((program.kind != Move.LINEAR) & (program.kind != Move.ARC))
-    in_lines: Bools = np.isin(cut, cut[move[source[left]]])
+    kind = smoothed.program.kind
+    way = rotary_way(dense_rows(smoothed), smoothed, form, Findings())
+    cut = np.cumsum((kind != Move.LINEAR) & (kind != Move.ARC))
+    in_lines: Bools = np.isin(cut, cut[way.move[way.left]])
     return in_lines
 
 
 def _part(smoothed: SmoothProgram, first: int, stop: int) -> SmoothProgram:
     """Poses from `first` to before `stop`, both at rapids; statements before the first pose stay before it."""
-    program, corners, runs = smoothed.program, smoothed.corners, smoothed.runs
+    corners, runs = smoothed.corners, smoothed.runs
     own = (corners.pose >= first) & (corners.pose < stop)
-    columns: dict[str, Any] = {
-        name: column[own] for name, column in vars(corners).items() if isinstance(column, np.ndarray)
-    }
-    columns |= {name: columns[name] - first for name in ("pose", "before", "after")}
+    part = some_rows(corners, own)
+    moved = {name: getattr(part, name) - first for name in ("pose", "before", "after")}
     extra = {name: column[own] for name, column in corners.extra.items()}
     return replace(
         smoothed,
-        program=some_poses(program, first, stop),
-        corners=Corners(**columns, extra=extra),
+        program=some_poses(smoothed.program, first, stop),
+        corners=replace(part, **moved, extra=extra),
         runs=None if runs is None else _runs(runs, first, stop),
     )
 

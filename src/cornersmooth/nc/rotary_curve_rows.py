@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cornersmooth.errors import SettingsError
 from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
-from cornersmooth.kinematics.travel import check_travel
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rewinds import from_zero
+from cornersmooth.nc.rotary_words import machine_of, note_inserted
+from cornersmooth.nc.tool_machines import ToolTravel
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.rotary.angle_curves import CurveGroup, RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.smoothing.sampling import Rows
@@ -36,9 +36,7 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
     SettingsError
         The method has no curves in rotary axes.
     """
-    program, settings, machine = smoothed.program, smoothed.settings, form.machine
-    if machine is None:
-        raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
+    program, settings, machine = smoothed.program, smoothed.settings, machine_of(form)
     step, resolution = form.rounding(program.units), form.angle_rounding
     left = (settings.tolerance - math.sqrt(3.0) / 2.0 * step) / settings.axis_scale
     found = rotary_curves(
@@ -49,22 +47,18 @@ def rotary_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -
         angle_resolution=resolution,
         file=program.source.name,
     )
-    for finding in found.findings:
-        findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
+    findings.add_all(found.findings)
     jumps = np.union1d(found.inserted.unsolved, smoothed.corners.pose[found.lines.unsolved])
-    if len(jumps):
-        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
-        findings.add("CS369", "warning", int(program.line[jumps[0]]), text, len(jumps))
-    if len(found.inserted):
-        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
-        findings.add("CS367", "note", int(program.line[found.inserted.segment.min()]), text, len(found.inserted))
+    first = found.inserted.segment.min(initial=len(program) - 1)
+    note_inserted(machine, len(found.inserted), int(program.line[first]), program.line[jumps], findings)
     if any(len(group) for group in found.groups):
         warn_of_curves(form, findings)
     angles, rapid = found.pose_angles, rapid_moves(program.kind)
     shift = from_zero(form, program, program.axis, angles, np.arange(len(program)), rapid)
+    travel = ToolTravel(program, machine)
     for chunk in _Table(smoothed, found).chunks():
         chunk.other[:] += shift[chunk.move]
-        check_travel(machine, chunk.tip, chunk.other, program.line[chunk.move], program.source.name)
+        travel.check(chunk.tip, chunk.other, chunk.move)
         yield chunk
 
 

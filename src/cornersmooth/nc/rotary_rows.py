@@ -1,47 +1,28 @@
-"""Rows in rotary words of a machine: angles for tool vectors, points where angles need them, inverse time.
-
-Solution and turn of the rotary axes are chosen with a look ahead over the whole path, so all of its rows are held at
-once here.
-"""
+"""Rows of lines in rotary words: points where angles need them, inverse time where the control counts so."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.kinematics import Machine, inverse_time, machine_position, solutions
-from cornersmooth.kinematics.travel import check_travel
-from cornersmooth.memory import return_free_memory
+from cornersmooth.kinematics import Machine, inverse_time, machine_position
 from cornersmooth.methods import METHODS
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, SmoothProgram
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import LONG_CHUNK, corner_blends, line_limits
-from cornersmooth.nc.rewinds import from_zero
-from cornersmooth.nc.tool_machines import machines_of_rows, tools_of_poses
-from cornersmooth.rotary import (
-    FilledPath,
-    Insertions,
-    fill,
-    insertions,
-    rapid_moves,
-    rewound_angles,
-    rotary_angles,
-    still_poses,
-)
-from cornersmooth.rotary.axis_findings import reach_error
+from cornersmooth.nc.rotary_words import RotaryWay, machine_of, note_inserted, rotary_way
+from cornersmooth.nc.tool_machines import ToolTravel
+from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices
 from cornersmooth.smoothing.sampling import Rows
 from cornersmooth.vectors import norm
 
 #: dense rows handed on at a time
-CHUNK = 1 << 15
+_CHUNK = 1 << 15
 
 #: deg/min that no rotary axis exceeds where we time its blocks ourselves
 _FASTEST_TURN = 36_000.0
@@ -61,36 +42,6 @@ INVERSE_TIME_DECIMALS = 3
 
 #: turns below this many degrees are none
 _NO_TURN = 1e-9
-
-
-@dataclass
-class InsertedPoints:
-    """Points that lines of rotary words needed so far, and CL lines where no points help."""
-
-    count: int = 0
-    first_line: int = 0
-    unsolved: list[int] = field(default_factory=list)
-
-    def add(self, more: Insertions, line: Ints) -> None:
-        """Count those of a chunk of rows with these CL lines (n,)."""
-        if len(more) and not self.count:
-            self.first_line = int(line[more.segment[0] + 1])
-        self.count += len(more)
-        self.unsolved += line[more.unsolved + 1].tolist()
-
-    def warn(self, findings: Findings) -> None:
-        """Name where no points help."""
-        if self.unsolved:
-            text = (
-                "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
-            )
-            findings.add("CS369", "warning", self.unsolved[0], text, len(self.unsolved))
-
-    def tell(self, machine: Machine, findings: Findings) -> None:
-        """Say how many there are."""
-        if self.count:
-            text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
-            findings.add("CS367", "note", self.first_line, text, self.count)
 
 
 def rotary_rows(
@@ -122,127 +73,114 @@ def rotary_rows(
     InputError
         The machine cannot follow the path.
     """
-    program, settings, machine = smoothed.program, smoothed.settings, form.machine
-    if machine is None:
-        raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
-    poses = whole_rows(rows)
-    if not len(poses[2]):
+    way = rotary_way(rows, smoothed, form, findings)
+    for part, _ in lines_of_way(way, smoothed, form, findings, long=long, in_planes=in_planes):
+        yield part
+
+
+def lines_of_way(
+    way: RotaryWay,
+    smoothed: SmoothProgram,
+    form: Form,
+    findings: Findings,
+    *,
+    long: bool = False,
+    in_planes: Bools | None = None,
+) -> Iterator[tuple[Rows, Ints]]:
+    """Rows of a way, with the points that its lines need, some thousand at a time; parameters as in `rotary_rows`.
+
+    Yields
+    ------
+    rows : Rows
+    source : (r,) int64
+        Row of the way that each is, -1 for an inserted point.
+    """
+    if not len(way.move):
         return
-    tools = tools_of_poses(program) if machine.tool_lengths else None
-    own_machine, machine = machine, machine.with_longest_tool()
-    tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
-    way = _way(poses, program, machine, form, tolerance, findings)
-    del poses  # all that is still held as long as rows are written counts
-    return_free_memory()
-    tip, axis, move, angles, rapid, left = way.tip, way.axis, way.move, way.angles, way.rapid, way.left
-    file = program.source.name
+    program, settings = smoothed.program, smoothed.settings
+    machine, travel = machine_of(form).with_longest_tool(), ToolTravel(program, machine_of(form))
     largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
     limits = line_limits(settings, form, largest_turn)
-    timed = _timed_cuts(angles, move, program) if form.orientation == "machine" else None
-    inserted, times = InsertedPoints(), _BlockTimes(smoothed, form, machine, limits)
-    size = LONG_CHUNK if long else CHUNK
-    for begin in range(0, max(len(move) - 1, 1), size):
+    timed = _timed_cuts(way.angles, way.move, program) if form.orientation == "machine" else None
+    times = _BlockTimes(smoothed, form, machine, limits)
+    count, first_line, unsolved = 0, 0, np.zeros(0, np.int64)
+    size = LONG_CHUNK if long else _CHUNK
+    for begin in range(0, max(len(way.move) - 1, 1), size):
         here = slice(begin, begin + size + 1)  # the last row of a chunk is the start of the next
-        line = program.line[move[here]]
+        move, left = way.move[here], way.left[here]
+        line = program.line[move]
         more = insertions(
             machine,
-            tip[here],
-            axis[here],
-            angles[here],
-            tolerance=tolerance,
-            rapid=rapid[here],
+            way.tip[here],
+            way.axis[here],
+            way.angles[here],
+            tolerance=form.rotary_tolerance(settings.tolerance, settings.axis_scale),
+            rapid=way.free[here],
             tip_tolerance=TIP_SHARE * settings.tolerance if form.orientation == "machine" else None,
             max_step=largest_turn,
             line=line,
-            file=file,
+            file=program.source.name,
         )
-        inserted.add(more, line)
-        filled = fill(tip[here], axis[here], angles[here], more)
-        held = left[here] | np.append(left[here][1:], False)  # both rows of a place where a cut is left
-        start, at_pose = segments_of_rows(move, here.start, here.stop)
+        first_line = first_line if count or not len(more) else int(line[more.segment[0] + 1])
+        count, unsolved = count + len(more), np.append(unsolved, line[more.unsolved + 1])
+        filled = fill(way.tip[here], way.axis[here], way.angles[here], more)
+        start, at_pose = segments_of_rows(way.move, here.start, here.stop)
+        held = left | np.append(left[1:], False)  # both rows of a place where a cut is left
+        chunk = _Chunk(move, start, at_pose, held, left, None if timed is None else timed[here])
         blend = None
         if long:
-            row = filled.pose
-            exact = at_pose[row] & ~filled.inserted
-            found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move[here][row], start[row], exact)
-            found = replace(found, fixed=found.fixed | (held[row] & ~filled.inserted))
+            found = chunk.vertices(filled, smoothed)
             kept = fewest_lines(found, limits)
             filled = filled.only(kept)
-            blend = corner_blends(found, kept, rapid[here][filled.pose], limits, settings, form)
+            blend = corner_blends(found, kept, way.free[here][filled.pose], limits, settings, form)
         own = slice(1 if begin else 0, None)
-        of_timed = None if timed is None else timed[here]
-        filled, rate = times.of(filled, (move[here], start, at_pose, held), left[here], of_timed, own)
-        seen = np.arange(len(filled.pose))[own]
-        if in_planes is not None:
-            seen = seen[~in_planes[move[here][filled.pose[seen]]]]
-        for chosen, one in machines_of_rows(own_machine, tools, move[here][filled.pose[seen]]):
-            rows_of_tool = seen[chosen]
-            at = filled.pose[rows_of_tool]
-            check_travel(one, filled.tip[rows_of_tool], filled.angles[rows_of_tool], line[at], file)
-        count = len(filled.pose[own])
-        yield Rows(
-            tip=filled.tip[own],
-            other=filled.angles[own],
-            move=move[here][filled.pose[own]],
-            curve=np.zeros(count, np.int8),
-            joined=np.zeros(count, np.bool_),
+        filled, rate = times.of(filled, chunk, own)
+        pose, inserted = filled.pose[own], filled.inserted[own]
+        tip, angles = filled.tip[own], filled.angles[own]
+        seen = slice(None) if in_planes is None else ~in_planes[move[pose]]
+        travel.check(tip[seen], angles[seen], move[pose[seen]])
+        part = Rows(
+            tip=tip,
+            other=angles,
+            move=move[pose],
+            curve=np.zeros(len(pose), np.int8),
+            joined=np.zeros(len(pose), np.bool_),
             rate=None if rate is None else rate[own],
             blend=None if blend is None else blend[own],
-            left=(left[here][filled.pose] & ~filled.inserted)[own] if left.any() else None,
+            left=left[pose] & ~inserted if way.left.any() else None,
         )
-    inserted.warn(findings)
+        yield part, np.where(inserted, -1, begin + pose)
     times.tell(findings)
-    inserted.tell(machine, findings)
+    note_inserted(machine, count, first_line, unsolved, findings)
 
 
 @dataclass(frozen=True)
-class _Way:
-    """Rows with their angles, n of them: more than were given where cuts are left.
+class _Chunk:
+    """Rows of a way, n of them.
 
     Parameters
     ----------
-    tip, axis : (n, 3) float64
-    move : (n,) int64
-    angles : (n, 2) float64, degrees
-    rapid, left : (n,) bool
-        Whether the way to the row cuts nothing; whether the tool comes back there into a cut that it has left.
+    move, start : (n,) int64
+        Move of each, and the pose that its segment starts from.
+    at_pose, held, left : (n,) bool
+        Whether it is the last of its move, stays whatever ε allows, and comes back into a cut that was left.
+    timed : (n,) bool or None
+        Whether it is timed by us; None where only turns are that.
     """
 
-    tip: Floats
-    axis: Floats
     move: Ints
-    angles: Floats
-    rapid: Bools
+    start: Ints
+    at_pose: Bools
+    held: Bools
     left: Bools
+    timed: Bools | None
 
-
-def _way(
-    poses: tuple[Floats, Floats, Ints],
-    program: Program,
-    machine: Machine,
-    form: Form,
-    tolerance: float,
-    findings: Findings,
-) -> _Way:
-    """Choose the angles of all rows, given as tip, axis and move."""
-    tip, axis, move = poses
-    rapid, file = rapid_moves(program.kind)[move], program.source.name
-    check_reach(machine, program, axis, move, tolerance)
-    how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": program.line[move], "file": file}
-    how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
-    left = np.zeros(len(move), np.bool_)
-    if form.rewind:
-        path, source, left = rewound_angles(machine, tip, axis, **how)
-        if left.any():
-            tip, axis, move = tip[source], axis[source], move[source]
-            rapid = rapid[source] | left
-            _tell_rewinds(machine, path.angles, left, program.line[move], findings)
-    else:
-        path = rotary_angles(machine, tip, axis, **how)
-    for finding in path.findings:
-        findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
-    angles = path.angles + from_zero(form, program, axis, path.angles, move, rapid)
-    return _Way(tip, axis, move, angles, rapid, left)
+    def vertices(self, filled: FilledPath, smoothed: SmoothProgram) -> Vertices:
+        """Where the original motion is at the rows of a path that was made of these."""
+        row, own = filled.pose, ~filled.inserted
+        at_pose = self.at_pose[row] & own
+        found = vertices(smoothed, filled.tip, filled.axis, filled.angles, self.move[row], self.start[row], at_pose)
+        return replace(found, fixed=found.fixed | (self.held[row] & own))
 
 
 @dataclass
@@ -257,25 +195,22 @@ class _BlockTimes:
     slowed: int = 0
     first_slowed: int = 0
 
-    def of(
-        self, filled: FilledPath, rows: tuple[Ints, Ints, Bools, Bools], left: Bools, timed: Bools | None, own: slice
-    ) -> tuple[FilledPath, Floats | None]:
-        """The path without rows that are too short, and their rates; `rows` as in `_merged`, `own` count."""
+    def of(self, filled: FilledPath, chunk: _Chunk, own: slice) -> tuple[FilledPath, Floats | None]:
+        """The path without rows that are too short, and their rates; those of `own` count."""
         program, settings, fastest = self.smoothed.program, self.smoothed.settings, self.form.mode.motion.fastest
-        move = rows[0]
-        rate = _rates(filled, move, left, timed, program, settings, self.form)
+        rate = _rates(filled, chunk, program, settings, self.form)
         if rate is None:
             return filled, None
         if fastest:
             if self.form.orientation == "machine" and (rate > fastest).any():
                 before = len(filled.pose)
-                filled = _merged(self.smoothed, self.machine, filled, rows, rate, self.limits, fastest)
+                filled = _merged(self.smoothed, self.machine, filled, chunk, rate, self.limits, fastest)
                 self.merged += before - len(filled.pose)
-                rate = _rates(filled, move, left, timed, program, settings, self.form)
+                rate = _rates(filled, chunk, program, settings, self.form)
             assert rate is not None
             beyond = np.flatnonzero(rate[own] > fastest)
             if len(beyond) and not self.slowed:
-                self.first_slowed = int(program.line[move[filled.pose[own][beyond[0]]]])
+                self.first_slowed = int(program.line[chunk.move[filled.pose[own][beyond[0]]]])
             self.slowed += len(beyond)
             rate = np.minimum(rate, fastest)
         return filled, np.round(rate, INVERSE_TIME_DECIMALS)
@@ -295,7 +230,7 @@ def _merged(
     smoothed: SmoothProgram,
     machine: Machine,
     filled: FilledPath,
-    rows: tuple[Ints, Ints, Bools, Bools],
+    chunk: _Chunk,
     rate: Floats,
     limits: LineLimits,
     fastest: float,
@@ -304,15 +239,10 @@ def _merged(
 
     Parameters
     ----------
-    rows : (n,) int64, (n,) int64, (n,) bool, (n,) bool
-        Move of each row of the unfilled path, the pose that its segment starts from, whether it is at a pose, and
-        whether it stays in any case.
     rate : (m,) float64, 1/min
     """
-    own, inserted = filled.pose, filled.inserted
-    move, start, at_pose = rows[0][own], rows[1][own], rows[2][own] & ~inserted
-    found = vertices(smoothed, filled.tip, filled.axis, filled.angles, move, start, at_pose)
-    fixed = found.fixed | (rows[3][own] & ~inserted)
+    found = chunk.vertices(filled, smoothed)
+    fixed = found.fixed
     quick = rate > fastest
     minutes = np.where(np.isfinite(rate), 1.0 / np.where(rate > 0.0, rate, 1.0), 0.0)
     # a row stays where it ends a part of the time that is long enough
@@ -328,7 +258,7 @@ def _merged(
         turn=min(limits.turn, _MERGED_TURN),
     )
     if not METHODS[smoothed.settings.method].one_parameter:
-        fixed |= _beside_far_corners(found, at_pose, limits)
+        fixed = fixed | _beside_far_corners(found, chunk.at_pose[filled.pose] & ~filled.inserted, limits)
     return filled.only(fewest_lines(replace(found, fixed=fixed | ends | ~between, position=position), limits))
 
 
@@ -343,58 +273,6 @@ def _beside_far_corners(rows: Vertices, at_pose: Bools, limits: LineLimits) -> B
     move = np.concatenate(([0], np.cumsum(at_pose)[:-1]))
     beside: Bools = np.isin(move, move[far]) | np.isin(move, move[far] + 1)
     return beside
-
-
-def check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, tolerance: float) -> None:
-    """Refuse the first pose that an axis is missing for, or a method that turns the tool to where one is."""
-    if len(machine.names) > 1:
-        return
-    file = program.source.name
-    beyond = np.where(program.kind == Move.FROM, 0.0, solutions(machine, program.axis).beyond)
-    poses = np.flatnonzero(beyond > tolerance)
-    if len(poses):
-        pose = int(poses[0])
-        raise reach_error(machine, program.axis[pose], float(beyond[pose]), int(program.line[pose]), file)
-    rows = np.flatnonzero(solutions(machine, axis).beyond > tolerance)
-    if len(rows):
-        what = (
-            f"the method turns the tool out of what {machine.names[0]} of {machine.name} reaches, within the tolerance"
-        )
-        hint = "use --method proportional, which does not"
-        raise InputError("CS361", what, hint, file=file, line=int(program.line[move[rows[0]]]))
-
-
-def _tell_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, findings: Findings) -> None:
-    """Say where cuts are left, for each axis that turns there."""
-    rows = np.flatnonzero(left)
-    turn = np.abs(angles[rows] - angles[rows - 1])
-    column = int(np.argmax(turn[0]))
-    text = (
-        f"the cut is left along the tool and gone on with where {machine.names[column]} has turned by "
-        f"{turn[0, column]:.4g} deg above the retract: expect a mark on the part"
-    )
-    findings.add("CS376", "warning", int(line[rows[0]]), text, len(rows))
-
-
-def whole_rows(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:
-    """Tip, axis and move of all rows; what they were gathered in is given back part by part."""
-    tips: deque[Floats] = deque()
-    axes: deque[Floats] = deque()
-    moves: deque[Ints] = deque()
-    for chunk in rows:
-        tips.append(chunk.tip)
-        axes.append(chunk.other)
-        moves.append(chunk.move)
-    total = sum(map(len, moves))
-    tip, axis, move = np.empty((total, 3)), np.empty((total, 3)), np.empty(total, np.int64)
-    for whole, parts in ((tip, tips), (axis, axes), (move, moves)):
-        begin = 0
-        while parts:
-            part = parts.popleft()
-            whole[begin : begin + len(part)] = part
-            begin += len(part)
-        return_free_memory()
-    return tip, axis, move
 
 
 def _cuts(move: Ints, program: Program) -> Bools:
@@ -415,19 +293,16 @@ def _timed_cuts(angles: Floats, move: Ints, program: Program) -> Bools:
     return timed
 
 
-def _rates(
-    path: FilledPath, move: Ints, left: Bools, timed: Bools | None, program: Program, settings: Settings, form: Form
-) -> Floats | None:
+def _rates(path: FilledPath, chunk: _Chunk, program: Program, settings: Settings, form: Form) -> Floats | None:
     """(m,) moves per minute where blocks are timed by us, NaN elsewhere; None where none is.
 
-    `timed` says which rows without inserted ones; else it is every block in which only rotary axes turn, for controls
-    that want it. Where the tip stands still, the axis point runs with the feed: so it does where the tip stays within ε
-    and the axis point does not. `left` says of rows without inserted
-    ones where the tool comes back into a cut that it has left.
+    Where the tip stands still, the axis point runs with the feed: so it does where the tip stays within ε and the axis
+    point does not.
     """
+    timed = chunk.timed
     if timed is None and not form.mode.timed_turns:
         return None
-    own = move[path.pose]
+    own = chunk.move[path.pose]
     step = np.diff(path.tip, axis=0, prepend=path.tip[:1])
     swing = step + settings.axis_scale * np.diff(path.axis, axis=0, prepend=path.axis[:1])
     length = norm(step)
@@ -441,7 +316,7 @@ def _rates(
     rate = np.full(len(own), np.nan)
     rate[chosen] = inverse_time(way[chosen], program.feed[own[chosen]], turn[chosen], _FASTEST_TURN)
     rate[~np.isfinite(rate)] = np.nan
-    back = left[path.pose] & ~path.inserted
+    back = chunk.left[path.pose] & ~path.inserted
     if back.any():
         rate[back] = program.feed[own[back]] / form.rewind if timed is not None else np.nan
         rate[back & ~chosen] = np.nan

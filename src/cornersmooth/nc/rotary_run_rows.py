@@ -8,53 +8,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
-from cornersmooth.errors import SettingsError
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges, spread, starts
-from cornersmooth.kinematics import Machine, check_travel
+from cornersmooth.kinematics import Machine
 from cornersmooth.model import Bools, Floats, Ints, Runs, SmoothProgram
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.nc.rotary_curve_rows import warn_of_curves
-from cornersmooth.nc.rotary_rows import CHUNK, LARGEST_TURN, InsertedPoints, whole_rows
-from cornersmooth.rotary import fill, insertions, rapid_moves, rotary_angles, still_poses
+from cornersmooth.nc.rotary_rows import lines_of_way
+from cornersmooth.nc.rotary_words import RotaryWay, machine_of, rotary_way
+from cornersmooth.nc.tool_machines import ToolTravel
 from cornersmooth.rotary.run_angles import Guide, RunAngles, lever_at, run_angles
-from cornersmooth.slices import some_runs
+from cornersmooth.slices import some_rows, some_runs
 from cornersmooth.smoothing.runs.rows import STEPS_PER_UNIT, SectionRows, line_places, polylines_of, section_rows
 from cornersmooth.smoothing.sampling import Rows, dense_rows
 from cornersmooth.vectors import norm, unit
 
 #: share of what rotary axes may take of ε that a curve may use: the rest is for the digits of its control points
 _SHARE = 0.95
-
-
-@dataclass(frozen=True)
-class _Path:
-    """Rows of lines, n of them, and what rotary axes have there.
-
-    Parameters
-    ----------
-    tip, axis : (n, 3) float64
-        mm, and unit vectors.
-    angles : (n, 2) float64, degrees
-    move : (n,) int64
-    free : (n,) bool
-        Nothing is looked at on the way into the row: a rapid, or a section.
-    section : (n,) int64
-        Section that ends in the row, -1 for a line.
-    """
-
-    tip: Floats
-    axis: Floats
-    angles: Floats
-    move: Ints
-    free: Bools
-    section: Ints
 
 
 @dataclass(frozen=True)
@@ -98,36 +72,18 @@ def rotary_run_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> 
     InputError
         The machine cannot follow the path.
     """
-    program, settings, machine, runs = smoothed.program, smoothed.settings, form.machine, smoothed.runs
+    program, settings, machine, runs = smoothed.program, smoothed.settings, machine_of(form), smoothed.runs
     assert runs is not None
-    if machine is None:
-        raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
-    tip, axis, move = whole_rows(dense_rows(smoothed))
-    tolerance, file = form.rotary_tolerance(settings.tolerance, settings.axis_scale), program.source.name
-    rapid = rapid_moves(program.kind)[move]
-    found = rotary_angles(
-        machine,
-        tip,
-        axis,
-        tolerance=tolerance,
-        rapid=rapid,
-        line=program.line[move],
-        file=file,
-        still=still_poses(program.kind)[move],
-        still_tolerance=form.angle_rounding,
-    )
-    for finding in found.findings:
-        findings.add(finding.code, finding.severity, finding.line, finding.text, finding.count)
-    angles = found.angles + from_zero(form, program, axis, found.angles, move, rapid)
-    check_travel(machine, tip, angles, program.line[move], file)
-    path = _Path(tip, axis, angles, move, rapid, np.full(len(move), -1))
-    runs, rows = _followed(smoothed, runs, path)
-    sections = None
+    way = rotary_way(dense_rows(smoothed), smoothed, form, findings)
+    ToolTravel(program, machine).check(way.tip, way.angles, way.move)
+    section, sections = np.full(len(way.move), -1), None
+    runs, rows = _followed(smoothed, runs, way)
     if len(runs):
-        guide = Guide(rows.run, rows.s, path.angles[rows.row], found.branch[rows.row].astype(np.int64))
+        tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
+        guide = Guide(rows.run, rows.s, way.angles[rows.row], way.branch[rows.row].astype(np.int64))
         fitted = run_angles(runs, machine, guide, tolerance=_SHARE * tolerance, cone=tolerance / 2)
         sections = _sections(fitted, smoothed, machine, _SHARE * tolerance)
-        path = _with_sections(path, fitted.runs, rows, sections)
+        way, section = _with_sections(way, fitted.runs, rows, sections)
         lost = np.flatnonzero(~sections.good)
         if len(lost):
             text = "stretch of a run written in lines: on curves the rotary axes would leave the tolerance"
@@ -135,7 +91,8 @@ def rotary_run_rows(smoothed: SmoothProgram, form: Form, findings: Findings) -> 
             findings.add("CS378", "note", int(program.line[pose[0]]), text, len(lost))
         if sections.good.any():
             warn_of_curves(form, findings)
-    yield from _rows(smoothed, form, path, sections, tolerance, findings)
+    for lines, source in lines_of_way(way, smoothed, form, findings):
+        yield _with_curves(lines, np.where(source < 0, -1, section[source]), sections)
 
 
 @dataclass(frozen=True)
@@ -147,7 +104,7 @@ class _RunRows:
     s: Floats
 
 
-def _followed(smoothed: SmoothProgram, runs: Runs, path: _Path) -> tuple[Runs, _RunRows]:
+def _followed(smoothed: SmoothProgram, runs: Runs, path: RotaryWay) -> tuple[Runs, _RunRows]:
     """The runs that begin where a row ends and in which no solution may change, with their rows."""
     program = smoothed.program
     lines = polylines_of(runs, program.tip, program.tip + smoothed.settings.axis_length * program.axis)
@@ -194,8 +151,11 @@ def _sections(fitted: RunAngles, smoothed: SmoothProgram, machine: Machine, tole
     return _Sections(rows, first, run, begin, end, good)
 
 
-def _with_sections(path: _Path, runs: Runs, rows: _RunRows, sections: _Sections) -> _Path:
-    """The path with good sections in the place of the rows within them; rows where other lines meet them are added."""
+def _with_sections(path: RotaryWay, runs: Runs, rows: _RunRows, sections: _Sections) -> tuple[RotaryWay, Ints]:
+    """The way with good sections in the place of the rows within them, and the section that ends in each row, else -1.
+
+    Rows where other lines meet sections are added.
+    """
     row = rows.row
     counts = np.bincount(rows.run)
     base = starts(np.floor(rows.s[starts(counts)[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
@@ -216,7 +176,7 @@ def _with_sections(path: _Path, runs: Runs, rows: _RunRows, sections: _Sections)
     number, point, ends = number[once], point[once], once < len(chosen)
     known = np.searchsorted(keys, place)
     meets = keys[known] == place
-    angles, section = path.angles.copy(), path.section.copy()
+    angles, section = path.angles.copy(), np.full(len(path.move), -1)
     at = row[known[meets]]
     angles[at] = sections.rows.points[point[meets], 3:]
     section[at[ends[meets]]] = number[meets & ends]
@@ -233,69 +193,26 @@ def _with_sections(path: _Path, runs: Runs, rows: _RunRows, sections: _Sections)
 
     numbers = np.where(ends[new], number[new], -1)
     whole = np.concatenate((section[kept], numbers))[order]
-    return _Path(
+    found = RotaryWay(
         tip=joined(path.tip, sections.rows.points[point[new], :3]),
         axis=joined(path.axis, unit(lever)),
         angles=joined(angles, sections.rows.points[point[new], 3:]),
         move=np.concatenate((path.move[kept], sections.rows.move[sections.first[number[new] + 1] - 1]))[order],
+        branch=np.zeros(0, np.int8),
         free=np.concatenate((path.free[kept], np.zeros(len(new), np.bool_)))[order] | (whole >= 0),
-        section=whole,
+        left=np.zeros(len(order), np.bool_),
     )
+    return found, whole
 
 
-def _rows(
-    smoothed: SmoothProgram,
-    form: Form,
-    path: _Path,
-    sections: _Sections | None,
-    tolerance: float,
-    findings: Findings,
-) -> Iterator[Rows]:
-    """Rows of the path some thousand at a time, with the points that its lines need."""
-    program, machine, settings = smoothed.program, form.machine, smoothed.settings
-    assert machine is not None
-    file, inserted = program.source.name, InsertedPoints()
-    largest_turn = min(settings.axis_step or LARGEST_TURN, LARGEST_TURN)
-    edges = [*range(0, max(len(path.move) - 1, 1), CHUNK), max(len(path.move) - 1, 1)]
-    for begin, end in pairwise(edges):
-        here = slice(begin, end + 1)  # the last row of a chunk is the start of the next
-        line = program.line[path.move[here]]
-        more = insertions(
-            machine,
-            path.tip[here],
-            path.axis[here],
-            path.angles[here],
-            tolerance=tolerance,
-            rapid=path.free[here],
-            max_step=largest_turn,
-            line=line,
-            file=file,
-        )
-        inserted.add(more, line)
-        filled = fill(path.tip[here], path.axis[here], path.angles[here], more)
-        own = slice(1 if begin else 0, None)
-        pose = filled.pose[own]
-        section = np.where(filled.inserted[own], -1, path.section[here][pose])
-        yield _with_curves(filled.tip[own], filled.angles[own], path.move[here][pose], section, sections)
-    inserted.warn(findings)
-    inserted.tell(machine, findings)
-
-
-def _with_curves(tip: Floats, angles: Floats, move: Ints, section: Ints, sections: _Sections | None) -> Rows:
-    """Rows with the control points of sections in the place of the rows that end them."""
-    counts = np.ones(len(move), np.int64)
+def _with_curves(lines: Rows, section: Ints, sections: _Sections | None) -> Rows:
+    """Rows of lines with the control points of sections in the place of the rows that end them."""
+    counts = np.ones(len(section), np.int64)
     curved = section >= 0
     if sections is not None:
         counts[curved] = np.diff(sections.first)[section[curved]]
     owner, _ = spread(counts)
-    rows = Rows(
-        tip=tip[owner],
-        other=angles[owner],
-        move=move[owner],
-        curve=np.zeros(len(owner), np.int8),
-        joined=np.zeros(len(owner), np.bool_),
-        spline=np.tile((0.0, 1.0, 0.0), (len(owner), 1)),
-    )
+    rows = replace(some_rows(lines, owner), spline=np.tile((0.0, 1.0, 0.0), (len(owner), 1)))
     if sections is None or not curved.any():
         return rows
     at = np.flatnonzero(curved[owner])

@@ -12,9 +12,9 @@ from cornersmooth.errors import InputError
 from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics import solutions
 from cornersmooth.model import Bools, SmoothProgram
+from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.rotary_rows import check_reach, whole_rows
-from cornersmooth.rotary import rapid_moves, rotary_angles, still_poses
+from cornersmooth.nc.rotary_words import rotary_way
 from cornersmooth.smoothing.sampling import dense_rows
 
 #: what a curve may turn the axis, over ε at H: tip and axis point may be off to opposite sides
@@ -29,25 +29,13 @@ def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:
     smoothed : SmoothProgram
     form : Form
     """
-    program, settings, machine = smoothed.program, smoothed.settings, form.machine
-    if smoothed.runs is None or machine is None or not form.rotary or form.rewind:
+    if smoothed.runs is None or form.machine is None or not form.rotary or form.rewind:
         return smoothed
     near = _near_limits(smoothed, form)
     if not near.any():
         return smoothed
-    tip, axis, move = whole_rows(dense_rows(smoothed))
-    tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
     try:
-        check_reach(machine, program, axis, move, tolerance)
-        rotary_angles(
-            machine,
-            tip,
-            axis,
-            tolerance=tolerance,
-            rapid=rapid_moves(program.kind)[move],
-            still=still_poses(program.kind)[move],
-            still_tolerance=form.angle_rounding,
-        )
+        rotary_way(dense_rows(smoothed), smoothed, form, Findings())
     except InputError:
         from cornersmooth.smoothing.global_runs import corner_by_corner  # which takes long to load
 

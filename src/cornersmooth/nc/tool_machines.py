@@ -1,38 +1,51 @@
-"""Which tool moves to each pose, and the machine with its length: heads swing the tip by that."""
+"""Which tool moves to each pose, and the travel of the machine with its length: heads swing the tip by that."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from cornersmooth.kinematics import Machine
-from cornersmooth.model import Bools, Ints, Program
+from cornersmooth.kinematics import Machine, check_travel
+from cornersmooth.model import Floats, Ints, Program
 from cornersmooth.nc.cycle_blocks import tool_loads
 
 
-def tools_of_poses(program: Program) -> Ints:
-    """(n,) number of the tool that moves to each pose, -1 before the first."""
-    loads = tool_loads(program)
-    begins = np.array([pose for pose, _ in loads], np.int64)
-    numbers = np.array([-1, *(number for _, (number, _) in loads)], np.int64)
-    found: Ints = numbers[np.searchsorted(begins, np.arange(len(program)), side="right")]
-    return found
+@dataclass(frozen=True)
+class ToolTravel:
+    """The travel of a machine for the tools of a program, each with its own length."""
 
+    program: Program
+    machine: Machine
 
-def machines_of_rows(machine: Machine, tools: Ints | None, move: Ints) -> Iterator[tuple[Bools | slice, Machine]]:
-    """Rows with the machine that moves them.
+    @cached_property
+    def _tools(self) -> Ints:
+        """(n,) number of the tool that moves to each pose, -1 before the first."""
+        loads = tool_loads(self.program) if self.machine.tool_lengths else []
+        begins = np.array([pose for pose, _ in loads], np.int64)
+        numbers = np.array([-1, *(number for _, (number, _) in loads)], np.int64)
+        found: Ints = numbers[np.searchsorted(begins, np.arange(len(self.program)), side="right")]
+        return found
 
-    Parameters
-    ----------
-    machine : Machine
-    tools : (n,) int64 or None
-        As `tools_of_poses` gives them; None where all have one length.
-    move : (r,) int64
-        Pose of each row.
-    """
-    if tools is None:
-        yield slice(None), machine
-        return
-    for number in np.unique(tools[move]).tolist():
-        yield tools[move] == number, machine.with_tool(number)
+    def check(self, tip: Floats, angles: Floats, move: Ints) -> None:
+        """Refuse rows that the linear axes cannot reach.
+
+        Parameters
+        ----------
+        tip : (r, 3) float64, mm
+        angles : (r, 2) float64, degrees
+        move : (r,) int64
+            Pose of each row.
+
+        Raises
+        ------
+        InputError
+            CS374, as `check_travel` raises it.
+        """
+        if not self.machine.travel:
+            return
+        tools, file = self._tools[move], self.program.source.name
+        for number in np.unique(tools).tolist():
+            rows = tools == number
+            check_travel(self.machine.with_tool(number), tip[rows], angles[rows], self.program.line[move[rows]], file)

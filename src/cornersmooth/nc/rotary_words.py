@@ -1,0 +1,161 @@
+"""Rotary words of rows: the angles of the form's machine, chosen with a look ahead over the whole path."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cornersmooth.errors import InputError, SettingsError
+from cornersmooth.kinematics import Machine, solutions
+from cornersmooth.memory import return_free_memory
+from cornersmooth.model import Bools, Floats, Ints, Move, Program, SmoothProgram
+from cornersmooth.nc.findings import Findings
+from cornersmooth.nc.form import Form
+from cornersmooth.nc.rewinds import from_zero
+from cornersmooth.rotary import rapid_moves, rewound_angles, rotary_angles, still_poses
+from cornersmooth.rotary.axis_findings import reach_error
+from cornersmooth.smoothing.sampling import Rows
+
+
+@dataclass(frozen=True)
+class RotaryWay:
+    """Rows with their angles, n of them: more than were given where cuts are left.
+
+    Parameters
+    ----------
+    tip, axis : (n, 3) float64, mm and unit vectors
+    move : (n,) int64
+    angles : (n, 2) float64, degrees
+        In the order of the machine's axes.
+    branch : (n,) int8
+        As in `cornersmooth.rotary.RotaryPath`.
+    free, left : (n,) bool
+        Whether nothing is looked at on the way to the row, as it cuts nothing; whether the tool comes back there into a
+        cut that it has left.
+    """
+
+    tip: Floats
+    axis: Floats
+    move: Ints
+    angles: Floats
+    branch: NDArray[np.int8]
+    free: Bools
+    left: Bools
+
+
+def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findings: Findings) -> RotaryWay:
+    """Angles of rows with tool vectors; all rows are held at once.
+
+    Parameters
+    ----------
+    rows : iterator of Rows
+    smoothed : SmoothProgram
+    form : Form
+        With rotary words.
+    findings : Findings
+        Takes what the kinematics notice.
+
+    Raises
+    ------
+    InputError
+        The machine cannot follow the path.
+    """
+    program, settings, machine = smoothed.program, smoothed.settings, machine_of(form).with_longest_tool()
+    tip, axis, move = whole_rows(rows)
+    if not len(move):
+        none = np.zeros(0, np.bool_)
+        return RotaryWay(tip, axis, move, np.zeros((0, 2)), np.zeros(0, np.int8), none, none)
+    tolerance = form.rotary_tolerance(settings.tolerance, settings.axis_scale)
+    rapid, file = rapid_moves(program.kind)[move], program.source.name
+    _check_reach(machine, program, axis, move, tolerance)
+    how: dict[str, Any] = {"tolerance": tolerance, "rapid": rapid, "line": program.line[move], "file": file}
+    how |= {"still": still_poses(program.kind)[move], "still_tolerance": form.angle_rounding}
+    left = np.zeros(len(move), np.bool_)
+    if form.rewind:
+        path, source, left = rewound_angles(machine, tip, axis, **how)
+        if left.any():
+            tip, axis, move = tip[source], axis[source], move[source]
+            rapid = rapid[source] | left
+            _note_rewinds(machine, path.angles, left, program.line[move], findings)
+    else:
+        path = rotary_angles(machine, tip, axis, **how)
+    findings.add_all(path.findings)
+    angles = path.angles + from_zero(form, program, axis, path.angles, move, rapid)
+    return_free_memory()  # rows are written while all of this is held
+    return RotaryWay(tip, axis, move, angles, path.branch, rapid, left)
+
+
+def machine_of(form: Form) -> Machine:
+    """Machine of a form with rotary words.
+
+    Raises
+    ------
+    SettingsError
+        CS215: it has none.
+    """
+    if form.machine is None:
+        raise SettingsError("CS215", f"{form.control} form {form.name} needs a machine", "name it with --machine")
+    return form.machine
+
+
+def note_inserted(machine: Machine, count: int, line: int, unsolved: Ints, findings: Findings) -> None:
+    """Say how many points lines of rotary words needed, the first at a line, and at which lines no points help."""
+    if len(unsolved):
+        text = "the tool axis jumps further than rotary axes can follow within the tolerance; see what it does there"
+        findings.add("CS369", "warning", int(unsolved[0]), text, len(unsolved))
+    if count:
+        text = f"point inserted so that {' and '.join(machine.names)} keep the tool within the tolerance"
+        findings.add("CS367", "note", line, text, count)
+
+
+def whole_rows(rows: Iterator[Rows]) -> tuple[Floats, Floats, Ints]:
+    """Tip, axis and move of all rows; what they were gathered in is given back part by part."""
+    columns: tuple[deque[Any], ...] = (deque(), deque(), deque())
+    for chunk in rows:
+        for column, part in zip(columns, (chunk.tip, chunk.other, chunk.move), strict=True):
+            column.append(part)
+    total = sum(map(len, columns[2]))
+    tip, axis, move = np.empty((total, 3)), np.empty((total, 3)), np.empty(total, np.int64)
+    for whole, parts in zip((tip, axis, move), columns, strict=True):
+        begin = 0
+        while parts:
+            part = parts.popleft()
+            whole[begin : begin + len(part)] = part
+            begin += len(part)
+        return_free_memory()
+    return tip, axis, move
+
+
+def _check_reach(machine: Machine, program: Program, axis: Floats, move: Ints, tolerance: float) -> None:
+    """Refuse the first pose that an axis is missing for, or a method that turns the tool to where one is."""
+    if len(machine.names) > 1:
+        return
+    file = program.source.name
+    beyond = np.where(program.kind == Move.FROM, 0.0, solutions(machine, program.axis).beyond)
+    poses = np.flatnonzero(beyond > tolerance)
+    if len(poses):
+        pose = int(poses[0])
+        raise reach_error(machine, program.axis[pose], float(beyond[pose]), int(program.line[pose]), file)
+    rows = np.flatnonzero(solutions(machine, axis).beyond > tolerance)
+    if len(rows):
+        what = (
+            f"the method turns the tool out of what {machine.names[0]} of {machine.name} reaches, within the tolerance"
+        )
+        hint = "use --method proportional, which does not"
+        raise InputError("CS361", what, hint, file=file, line=int(program.line[move[rows[0]]]))
+
+
+def _note_rewinds(machine: Machine, angles: Floats, left: Bools, line: Ints, findings: Findings) -> None:
+    rows = np.flatnonzero(left)
+    turn = np.abs(angles[rows] - angles[rows - 1])
+    column = int(np.argmax(turn[0]))
+    text = (
+        f"the cut is left along the tool and gone on with where {machine.names[column]} has turned by "
+        f"{turn[0, column]:.4g} deg above the retract: expect a mark on the part"
+    )
+    findings.add("CS376", "warning", int(line[rows[0]]), text, len(rows))
