@@ -170,7 +170,7 @@ def test_help_has_examples(args: list[str]) -> None:
 
 def test_help_names_all_dialects() -> None:
     said = " ".join(run("info", "--help").stdout.decode().split())
-    listed = re.search(r"CL dialect, instead of what the text looks like: (.+?)\.", said)
+    listed = re.search(r"CL dialect, instead of what the file looks like: (.+?)\.", said)
     assert listed
     assert set(re.split(r", | or ", listed[1])) == set(NAMES)
 

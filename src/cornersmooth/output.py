@@ -136,9 +136,7 @@ class HashedStream:
         """
         with open(path, "rb") as file:
             if hashlib.file_digest(file, _HASH).hexdigest() != self.digest:
-                raise OutputError(
-                    "CS407", "somebody changed the program before it took its place", "try again", file=path
-                )
+                raise OutputError("CS407", "the program was changed before it took its place", "try again", file=path)
 
 
 @dataclass
