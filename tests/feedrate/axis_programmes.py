@@ -16,8 +16,8 @@ from linear_programmes import NARROWEST, WIDEST, _crawl, _differences, _duration
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, diags_array, vstack
 
+from cornersmooth.feedrate.intervals import path_limits
 from cornersmooth.feedrate.limits import Limits
-from cornersmooth.feedrate.speed_limits import find_speed_limits
 from cornersmooth.feedrate.timelaw import TimeLaw, shares_at
 from cornersmooth.model import Floats
 
@@ -46,7 +46,7 @@ def reference_time(law: TimeLaw, limits: Limits, step: float) -> float:
     sides = [orders(x[1:-1] + away) for away in (BESIDE, -BESIDE)]
     speed, accel, jerk = axes.limits
     h, n = np.diff(x), len(x) - 2
-    speed_limits = find_speed_limits(path, limits)
+    speed_limits, _ = path_limits(path, limits)
     upper = node_caps(x, speed_limits.edge, speed_limits.cap)[1:-1].copy()
     for one, _, _ in sides:
         upper = np.minimum(upper, ((speed / np.maximum(np.abs(one), 1e-12)) ** 2).min(axis=1))

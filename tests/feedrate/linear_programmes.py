@@ -1,6 +1,6 @@
 """Reference times of short paths by sequential linear programmes.
 
-An independent check of `lookahead`: another discretisation and another solver. With z = v² at nodes, differences of z
+An independent check of `windows`: another discretisation and another solver. With z = v² at nodes, differences of z
 give acceleration and jerk; speed and acceleration limits are linear. The jerk limit |z″|/2 ≤ J·z^(−1/2) is replaced by
 the tangent of its right side at the profile before, which lies below the convex function, so every programme keeps the
 true limit. `scipy.optimize.linprog` (HiGHS) maximises z with the weights −∂T/∂z; rounds are repeated until the time
@@ -19,9 +19,9 @@ from scipy.sparse import csr_array, diags_array, vstack
 
 from cornersmooth.feedrate import scurve
 from cornersmooth.feedrate.grid import Resolution, make_grid
+from cornersmooth.feedrate.intervals import Intervals, path_limits
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Path
-from cornersmooth.feedrate.speed_limits import SpeedLimits, find_speed_limits
 from cornersmooth.model import Floats
 
 #: change of the time, relative, below which a round brought nothing
@@ -50,9 +50,9 @@ def reference_time(path: Path, limits: Limits, resolution: Resolution = FINE) ->
     resolution : Resolution
         How close the nodes are.
     """
-    speed_limits = find_speed_limits(path, limits)
+    speed_limits, stops = path_limits(path, limits)
     total = 0.0
-    for run, lead in enumerate(speed_limits.element[:-1]):
+    for run, lead in enumerate(stops[:-1]):
         accel, jerk = limits.accel, limits.jerk
         if path.rapid[lead]:
             _, accel, jerk = limits.rapid_limits
@@ -65,13 +65,13 @@ def reference_time(path: Path, limits: Limits, resolution: Resolution = FINE) ->
             speed = np.sqrt(bound[:1])
             total += float(scurve.rest_to_rest(length, speed, np.array(accel), np.array(jerk))[0].sum())
         else:
-            x = _nodes(speed_limits, run, accel, jerk, resolution)
+            x = _nodes(speed_limits, run, resolution)
             total += fastest(x, node_caps(x, speed_limits.edge[begin : end + 1], bound), accel, jerk)[0]
     return total
 
 
-def _nodes(speed_limits: SpeedLimits, run: int, accel: float, jerk: float, resolution: Resolution) -> Floats:
-    grid = make_grid(speed_limits, np.array([run]), np.array([accel]), np.array([jerk]), resolution)
+def _nodes(speed_limits: Intervals, run: int, resolution: Resolution) -> Floats:
+    grid = make_grid([speed_limits], np.array([run]), resolution)
     return np.append(grid.start, grid.start[-1] + grid.width[-1])
 
 

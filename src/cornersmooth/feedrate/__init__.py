@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from cornersmooth.feedrate.axis_limits import AxisLimits
 from cornersmooth.feedrate.axispeaks import AxisPeaks, axis_peaks
 from cornersmooth.feedrate.compare import Comparison, compare
 from cornersmooth.feedrate.limiting import limiting
@@ -12,7 +11,6 @@ from cornersmooth.feedrate.timelaw import States, TimeLaw
 from cornersmooth.feedrate.written import BlockLimits, block_feeds, plan_text
 
 __all__ = [
-    "AxisLimits",
     "AxisPeaks",
     "BlockLimits",
     "Comparison",

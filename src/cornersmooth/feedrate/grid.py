@@ -8,11 +8,12 @@ are one long cell.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cornersmooth.feedrate.speed_limits import SpeedLimits
+from cornersmooth.feedrate.intervals import Intervals
 from cornersmooth.model import Bools, Floats, Ints
 
 #: smallest size of a cell over the length of the path: smaller ones would be lost in the digits of the coordinate
@@ -50,6 +51,8 @@ class Grid:
     start, width : (n,) float64, mm
     cap : (n,) float64
         Bound of v² over the whole cell.
+    rows : (5, n) float64
+        Largest rows of `Intervals` in the cell.
     first : (r,) int64
         First cell of each run.
     """
@@ -57,6 +60,7 @@ class Grid:
     start: Floats
     width: Floats
     cap: Floats
+    rows: Floats
     first: Ints
 
     @property
@@ -64,36 +68,34 @@ class Grid:
         """(r,) last cell of each run."""
         return np.append(self.first[1:], len(self.start)) - 1
 
+    @property
+    def run(self) -> Ints:
+        """(n,) number of the run that each cell belongs to."""
+        return np.repeat(np.arange(len(self.first)), self.last - self.first + 1)
+
     def of(self, runs: Bools) -> Grid:
         """Cells of some runs, (r,) bool."""
         size = self.last - self.first + 1
         cells = np.repeat(runs, size)
         first = np.cumsum(size[runs]) - size[runs]
-        return Grid(self.start[cells], self.width[cells], self.cap[cells], first)
+        return Grid(self.start[cells], self.width[cells], self.cap[cells], self.rows[:, cells], first)
 
 
-def make_grid(
-    speed_limits: SpeedLimits,
-    runs: Ints,
-    accel: Floats,
-    jerk: Floats,
-    resolution: Resolution | None = None,
-    more: SpeedLimits | None = None,
-) -> Grid:
+def make_grid(limits: Sequence[Intervals], runs: Ints, resolution: Resolution | None = None) -> Grid:
     """Cells for the given runs.
 
     Parameters
     ----------
-    speed_limits : SpeedLimits
+    limits : sequence of Intervals
+        Of the same path; the first are those of the path speed.
     runs : (r,) int64
         Which runs, ascending.
-    accel, jerk : (r,) float64
-    more : SpeedLimits, optional
-        More limits, over other intervals of the same path.
     """
     resolution = Resolution() if resolution is None else resolution
-    begin, end = speed_limits.edge[speed_limits.run[runs]], speed_limits.edge[speed_limits.run[runs + 1]]
-    rows = [_intervals(each, runs) for each in (speed_limits, more) if each is not None]
+    own = limits[0]
+    begin, end = own.edge[own.run[runs]], own.edge[own.run[runs + 1]]
+    accel, jerk = 0.5 / own.rows[0, own.run[runs]], 1.0 / own.rows[2, own.run[runs]]
+    rows = [_intervals(each, runs) for each in limits]
     run, low, cap, before = (np.concatenate([part[i] for part in rows]) for i in range(4))
     highest = np.maximum.reduceat(cap[: len(rows[0][0])], np.flatnonzero(np.isnan(rows[0][3])))
     cap, before = np.minimum(cap, highest[run]), np.minimum(before, highest[run])
@@ -103,7 +105,7 @@ def make_grid(
 
     # the cells next to the stops
     front, back = _end_cells(half_speed, run, low, change, begin, end, accel, jerk)
-    smallest = SMALLEST * speed_limits.edge[-1]
+    smallest = SMALLEST * own.edge[-1]
     least = np.minimum(smallest, (end - begin) / 12.0)  # else a cell far along the path may have no length at all
     front, back = np.maximum(resolution.end * front, least), np.maximum(resolution.end * back, least)
 
@@ -153,24 +155,31 @@ def make_grid(
     starts[np.cumsum(borders + 2) - 1] = False
     at_start = np.flatnonzero(starts)
     start, stop = edge[at_start], edge[at_start + 1]
-    grid = Grid(start, stop - start, np.full(len(start), np.inf), first)
-    for each in (speed_limits, more):
-        if each is not None:
-            met = np.minimum.reduceat(np.append(each.cap, np.inf), cell_intervals(each, grid, runs))[::2]
-            np.minimum(grid.cap, met, out=grid.cap)
-    return grid
+    grid = Grid(start, stop - start, np.full(len(start), np.inf), np.zeros((5, len(start))), first)
+    return in_cells(limits, grid, runs)
 
 
-def _intervals(speed_limits: SpeedLimits, runs: Ints) -> tuple[Ints, Floats, Floats, Floats]:
+def in_cells(limits: Sequence[Intervals], grid: Grid, runs: Ints) -> Grid:
+    """Cells with the strictest limits of all intervals that each meets."""
+    cap, rows = np.full(len(grid.start), np.inf), np.zeros((5, len(grid.start)))
+    for each in limits:
+        met = cell_intervals(each, grid, runs)
+        cap = np.minimum(cap, np.minimum.reduceat(np.append(each.cap, np.inf), met)[::2])
+        own = np.concatenate((each.rows, np.zeros((5, 1))), axis=1)
+        rows = np.maximum(rows, np.maximum.reduceat(own, met, axis=1)[:, ::2])
+    return replace(grid, cap=cap, rows=rows)
+
+
+def _intervals(limits: Intervals, runs: Ints) -> tuple[Ints, Floats, Floats, Floats]:
     """Of all intervals of the runs: number of the run, start, bound of v², and that of the interval before or NaN."""
-    counts = speed_limits.run[runs + 1] - speed_limits.run[runs]
+    counts = limits.run[runs + 1] - limits.run[runs]
     of_interval = np.repeat(np.arange(len(runs)), counts)
     begin = np.cumsum(counts) - counts
-    interval = np.arange(len(of_interval)) + np.repeat(speed_limits.run[runs] - begin, counts)
-    cap = speed_limits.cap[interval]
+    interval = np.arange(len(of_interval)) + np.repeat(limits.run[runs] - begin, counts)
+    cap = limits.cap[interval]
     before = np.concatenate((cap[:1], cap[:-1]))
     before[begin] = np.nan
-    return of_interval, speed_limits.edge[interval], cap, before
+    return of_interval, limits.edge[interval], cap, before
 
 
 def _end_cells(
@@ -202,15 +211,11 @@ def _end_cells(
     return np.minimum(cells[0], outermost[0]), np.minimum(cells[1], outermost[1])
 
 
-def cell_intervals(speed_limits: SpeedLimits, grid: Grid, runs: Ints) -> Ints:
+def cell_intervals(limits: Intervals, grid: Grid, runs: Ints) -> Ints:
     """(2n,) pairs of the first interval met in each cell and the one after the last, for ``ufunc.reduceat``."""
-    cells = np.diff(np.append(grid.first, len(grid.start)))
-    owner = np.repeat(runs, cells)
-    return _met(speed_limits, grid.start, grid.start + grid.width, speed_limits.run[owner], speed_limits.run[owner + 1])
-
-
-def _met(speed_limits: SpeedLimits, start: Floats, stop: Floats, begin: Ints, end: Ints) -> Ints:
-    slack = 1e-9 * (stop - start)  # so that a junction on a border counts for both cells
-    low = np.clip(np.searchsorted(speed_limits.edge, start - slack, side="right") - 1, begin, end - 1)
-    high = np.clip(np.searchsorted(speed_limits.edge, stop + slack, side="left"), low + 1, end)
+    owner = runs[grid.run]
+    begin, end, stop = limits.run[owner], limits.run[owner + 1], grid.start + grid.width
+    slack = 1e-9 * (stop - grid.start)  # so that a junction on a border counts for both cells
+    low = np.clip(np.searchsorted(limits.edge, grid.start - slack, side="right") - 1, begin, end - 1)
+    high = np.clip(np.searchsorted(limits.edge, stop + slack, side="left"), low + 1, end)
     return np.stack((low, high), axis=1).ravel()

@@ -50,7 +50,7 @@ TO_LIMIT = 0.95
 SHORT, RAISED = 0.1, 2.0
 
 
-def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS) -> Floats:
+def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS, begin: float = COLD) -> Floats:
     """Fastest profile of every run.
 
     Parameters
@@ -62,6 +62,8 @@ def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS) -> F
         Remaining duality gap over the time at which a profile is taken.
     most : int
         Newton steps after which it is taken in any case.
+    begin : float
+        Duality gap over the time to begin with.
 
     Returns
     -------
@@ -70,7 +72,7 @@ def solve(batch: Batch, c: Floats, gap: float = GAP, most: int = MAX_STEPS) -> F
     """
     slack, z = batch.slacks(c)
     time = float((batch.weight / np.sqrt(c)).sum())
-    dual = (WARM if batch.signed else COLD) * time / slack.size / slack
+    dual = begin * time / slack.size / slack
     worst = 1.0
     for _ in range(most):
         bites = [0.5 * values**-1.5 for values in z]  # −d(z^(−1/2))/dz

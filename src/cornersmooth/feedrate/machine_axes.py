@@ -18,7 +18,7 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import taylor
-from cornersmooth.feedrate.motion import taylor_along
+from cornersmooth.feedrate.motion import known_by_way, taylor_along
 from cornersmooth.feedrate.path import NO_TURN, Kind, Path
 from cornersmooth.kinematics import Machine, solutions
 from cornersmooth.kinematics.machine import PARALLEL
@@ -77,10 +77,7 @@ class MachineAxes:
         """
         tip, axis, speed = taylor_along(self.path, element, share)
         position = self.positions(element, share, tip, axis)
-        with np.errstate(over="ignore", invalid="ignore"):
-            one, two, three = taylor.by_way(position, speed)
-        one, two, three = (np.where(np.isfinite(order), order, np.inf) for order in (one, two, three))
-        return position[0], one, two, three
+        return position[0], *known_by_way(position, speed)
 
     def positions(self, element: Ints, share: Floats, tip: Floats, axis: Floats) -> Floats:
         """Taylor series (4, m, 5) of the axes from those of tip and tool axis, (4, m, 3) each."""

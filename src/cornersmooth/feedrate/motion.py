@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import comb
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,21 +10,14 @@ from cornersmooth.feedrate import arcs, taylor
 from cornersmooth.feedrate.cubics import cubics, curved
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Floats, Ints
-from cornersmooth.vectors import norm
 
 _NO_SPEED = np.finfo(np.float64).tiny
 
 
-class Derivatives(NamedTuple):
-    """Lengths (m,) of the first three derivatives of a vector by the path coordinate."""
+def derivatives(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
+    """First three derivatives (2, m, 3) of tip and tool axis by the path coordinate.
 
-    first: Floats
-    second: Floats
-    third: Floats
-
-
-def derivatives(path: Path, element: Ints, share: Floats, position: Callable[[Floats, Floats], Floats]) -> Derivatives:
-    """How fast something that depends on tip and tool axis changes along the path.
+    Per mm, mm², mm³; per rad where the tip stands still; infinite where it comes to a stand.
 
     Parameters
     ----------
@@ -35,18 +26,18 @@ def derivatives(path: Path, element: Ints, share: Floats, position: Callable[[Fl
     share : (m,) float64
         Where on each element: the part of its length for lines and arcs, the parameter t of its half for curves. Curves
         of the paper's method are taken at v = u.
-    position : callable
-        From the Taylor series of tip and unit tool axis, (4, m, 3) each, to that of the position, (4, m, d).
-
-    Returns
-    -------
-    Derivatives
-        Per mm, mm², mm³; per rad where the tip stands still; infinite where it comes to a stand.
     """
     tip, axis, speed = taylor_along(path, element, share)
-    with np.errstate(over="ignore", invalid="ignore"):  # the tip comes to a stand
-        found = [norm(order) for order in taylor.by_way(position(tip, axis), speed)]
-    return Derivatives(*(np.where(np.isfinite(order), order, np.inf) for order in found))
+    one, two, three = known_by_way(np.concatenate((tip, axis), axis=-1), speed)
+    return tuple(np.stack((order[:, :3], order[:, 3:])) for order in (one, two, three))  # type: ignore[return-value]
+
+
+def known_by_way(series: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
+    """First three derivatives by the way, infinite where the tip comes to a stand (see `taylor.by_way`)."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        one, two, three = taylor.by_way(series, speed)
+    one, two, three = (np.where(np.isfinite(order), order, np.inf) for order in (one, two, three))
+    return one, two, three
 
 
 def taylor_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:

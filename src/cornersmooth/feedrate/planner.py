@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -10,17 +10,18 @@ from typing import Literal
 
 import numpy as np
 
-from cornersmooth.feedrate import lookahead, scurve
-from cornersmooth.feedrate.axis_limits import AxisLimits, LimitCoefficients, find_limit_coefficients
-from cornersmooth.feedrate.grid import Resolution, make_grid
+from cornersmooth.feedrate import scurve
+from cornersmooth.feedrate.grid import Resolution, in_cells, make_grid
+from cornersmooth.feedrate.intervals import AxisLimits, Intervals, axis_limits, path_limits
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
-from cornersmooth.feedrate.signed_limits import ROUGH, Given, faster
-from cornersmooth.feedrate.speed_limits import SpeedLimits, find_speed_limits
+from cornersmooth.feedrate.signed_limits import ROUGH, Places, faster
+from cornersmooth.feedrate.speed_problem import problem_of
 from cornersmooth.feedrate.timelaw import TimeLaw, crossing_time
+from cornersmooth.feedrate.windows import solve_runs
 from cornersmooth.kinematics import Machine
-from cornersmooth.model import Bools, Floats, Ints, Program, SmoothProgram
+from cornersmooth.model import Floats, Ints, Program, SmoothProgram
 from cornersmooth.settings import Settings
 
 Baseline = Literal["exact_stop", "velocity_jump"]
@@ -35,7 +36,6 @@ def plan(
     smooth_program: SmoothProgram,
     limits: Limits | None = None,
     *,
-    axes: Sequence[AxisLimits] = (),
     machine: Machine | None = None,
     resolution: Resolution | None = None,
     progress: Progress | None = None,
@@ -51,8 +51,6 @@ def plan(
     ----------
     smooth_program : SmoothProgram
     limits : Limits, optional
-    axes : sequence of AxisLimits, optional
-        Limits of axes whose position is a function of tip and tool axis.
     machine : Machine, optional
         Keep the limits of its five axes.
     resolution : Resolution, optional
@@ -71,7 +69,7 @@ def plan(
     path = build_path(
         smooth_program.program, smooth_program.corners, smooth_program.settings, limits, runs=smooth_program.runs
     )
-    return plan_path(path, limits, axes=axes, machine=machine, resolution=resolution, progress=progress)
+    return plan_path(path, limits, machine=machine, resolution=resolution, progress=progress)
 
 
 def direct(
@@ -129,7 +127,6 @@ def plan_path(
     path: Path,
     limits: Limits,
     *,
-    axes: Sequence[AxisLimits] = (),
     machine: Machine | None = None,
     resolution: Resolution | None = None,
     progress: Progress | None = None,
@@ -143,7 +140,7 @@ def plan_path(
         own = path.part(begin, stop)
         own_axes = None if machine_axes is None else replace(machine_axes, path=own)
         report = None if progress is None else partial(_report, progress, len(path), begin, stop)
-        own, found, length = _plan_part(own, limits, axes, own_axes, resolution, report)
+        own, found, length = _plan_part(own, limits, own_axes, resolution, report)
         found[1] = found[1] + start[begin]
         phases.append(found)
         junctions.append(own.junction_speed[1:])
@@ -181,7 +178,6 @@ def _report(progress: Progress, elements: int, begin: int, end: int, done: int, 
 def _plan_part(
     path: Path,
     limits: Limits,
-    axes: Sequence[AxisLimits],
     machine_axes: MachineAxes | None,
     resolution: Resolution | None,
     progress: Progress | None,
@@ -190,38 +186,29 @@ def _plan_part(
     if machine_axes is not None:
         path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
     path = replace(path, junction_speed=_not_crowded(path, limits.period))
-    speed_limits = find_speed_limits(path, limits)
-    runs = len(speed_limits.run) - 1
-    lead = speed_limits.element[:-1]  # first element of each run
-    accel = np.where(path.rapid[lead], limits.rapid_limits[1], limits.accel)
-    jerk = np.where(path.rapid[lead], limits.rapid_limits[2], limits.jerk)
-    accel = np.where(path.turning[lead], limits.angular_limits[1], accel)
-    jerk = np.where(path.turning[lead], limits.angular_limits[2], jerk)
-
-    if runs:
-        lowest = np.minimum.reduceat(speed_limits.cap, speed_limits.run[:-1])
-        highest = np.maximum.reduceat(speed_limits.cap, speed_limits.run[:-1])
-        level = lowest == highest
-    else:
-        level = np.zeros(0, np.bool_)
-    coefficients = find_limit_coefficients(path, limits, speed_limits, axes, machine_axes)
-    if coefficients is not None and runs:
-        level &= ~_exceeding(coefficients, accel, jerk, lowest)
-    parts = [_level_runs(speed_limits, np.flatnonzero(level), accel, jerk)]
+    own, stops = path_limits(path, limits)
+    more = axis_limits(path, limits, stops, machine_axes)
+    lowest, highest, rows = own.strictest
+    level = lowest == highest
+    if more is not None:
+        cap, _, others = more.all.strictest
+        level &= (cap >= lowest) & (others <= rows).all(axis=0)
+    parts = [_level_runs(own, np.flatnonzero(level))]
     uneven = np.flatnonzero(~level)
     if len(uneven):
-        parts.append(_uneven_runs(speed_limits, coefficients, uneven, accel, jerk, resolution, progress))
+        parts.append(_uneven_runs(own, more, uneven, resolution, progress))
     run, *phases = (np.concatenate([part[i] for part in parts]) for i in range(7))
     order = np.argsort(run, kind="stable")
     order = order[phases[0][order] > 0.0]
-    return path, [phase[order] for phase in phases], float(speed_limits.edge[-1])
+    return path, [phase[order] for phase in phases], float(own.edge[-1])
 
 
-def _level_runs(speed_limits: SpeedLimits, runs: Ints, accel: Floats, jerk: Floats) -> tuple[Floats | Ints, ...]:
+def _level_runs(limits: Intervals, runs: Ints) -> tuple[Floats | Ints, ...]:
     """Phases of runs with one speed limit: S-curves in closed form."""
-    begin, end = speed_limits.edge[speed_limits.run[runs]], speed_limits.edge[speed_limits.run[runs + 1]]
-    limit = np.sqrt(speed_limits.cap[speed_limits.run[runs]])
-    duration, signed, _ = scurve.rest_to_rest(end - begin, limit, accel[runs], jerk[runs])
+    first = limits.run[runs]
+    begin, end, limit = limits.edge[first], limits.edge[limits.run[runs + 1]], np.sqrt(limits.cap[first])
+    accel, jerk = 0.5 / limits.rows[0, first], 1.0 / limits.rows[2, first]
+    duration, signed, _ = scurve.rest_to_rest(end - begin, limit, accel, jerk)
     way, speed, rising = np.empty_like(duration), np.empty_like(duration), np.empty_like(duration)
     x, v, a = begin, np.zeros(len(runs)), np.zeros(len(runs))
     for phase in range(duration.shape[1]):
@@ -242,33 +229,17 @@ def _level_runs(speed_limits: SpeedLimits, runs: Ints, accel: Floats, jerk: Floa
     )
 
 
-def _exceeding(coefficients: LimitCoefficients, accel: Floats, jerk: Floats, cap: Floats) -> Bools:
-    """(r,) bool: runs in which vectors ask for more than the limits of the path speed."""
-    begin = coefficients.speed_limits.run[:-1]
-    slope, level, bend, cross, cube = np.maximum.reduceat(coefficients.rows, begin, axis=1)
-    more: Bools = (slope > 0.5 / accel) | (bend > 1.0 / jerk) | (level > 0.0) | (cross > 0.0) | (cube > 0.0)
-    return more | (np.minimum.reduceat(coefficients.speed_limits.cap, begin) < cap)
-
-
 def _uneven_runs(
-    speed_limits: SpeedLimits,
-    coefficients: LimitCoefficients | None,
-    runs: Ints,
-    accel: Floats,
-    jerk: Floats,
-    resolution: Resolution | None,
-    progress: Progress | None,
+    own: Intervals, more: AxisLimits | None, runs: Ints, resolution: Resolution | None, progress: Progress | None
 ) -> tuple[Floats | Ints, ...]:
     """Phases of runs whose speed limit changes on the way: one per cell."""
-    more = None if coefficients is None else coefficients.speed_limits
-    given = Given(speed_limits, coefficients, runs, accel[runs], jerk[runs])
-    grid = make_grid(speed_limits, runs, accel[runs], jerk[runs], resolution, more)
-    batch = given.problem(grid)
-    if coefficients is None or coefficients.samples is None:
-        c = lookahead.solve_runs(batch, grid, progress)
+    grid = make_grid([own] if more is None else [own, more.all], runs, resolution)
+    batch = problem_of(grid)
+    if more is None or more.samples is None:
+        c = solve_runs(batch, grid, progress)
     else:
-        c = faster(given, grid, batch, lookahead.solve_runs(batch, grid, progress, gap=ROUGH))
-    of_cell = lookahead.run_of_cells(grid)
+        free = in_cells([own, more.vectors], grid, runs)
+        c = faster(grid, free, Places.of(grid, runs, more), batch, solve_runs(batch, grid, progress, gap=ROUGH))
     z, slope, bend = batch.forms(c)
     v, a = np.sqrt(z), 0.5 * slope  # at the end of each cell
     before_v = np.concatenate(([0.0], v[:-1]))
@@ -285,4 +256,4 @@ def _uneven_runs(
         rate[end] = 0.0
     before_v[first] = 0.0
     before_a[first] = 0.0
-    return runs[of_cell], duration, grid.start, before_v, before_a, rate, constant
+    return runs[grid.run], duration, grid.start, before_v, before_a, rate, constant

@@ -11,17 +11,17 @@ limit.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from cornersmooth.feedrate.axis_limits import LimitCoefficients, parabola
 from cornersmooth.feedrate.grid import Grid, cell_intervals
 from cornersmooth.feedrate.interior_point import GAP
-from cornersmooth.feedrate.lookahead import batch_of, run_of_cells, solve_runs
-from cornersmooth.feedrate.speed_limits import SpeedLimits
-from cornersmooth.feedrate.speed_problem import Batch, Signed
+from cornersmooth.feedrate.intervals import AxisLimits, parabola
+from cornersmooth.feedrate.speed_problem import Batch, Row, both_signs, problem_of
+from cornersmooth.feedrate.windows import solve_runs
 from cornersmooth.model import Bools, Floats, Ints
 
 #: axes that have their limits with signs in each cell, and rounds
@@ -58,29 +58,38 @@ _HAIR = 1e-9
 _MOST_TRIES = 200
 
 
-#: at the start and at the end of cells, what accelerations ask of z and z′, and jerks of z, z′ and z″/2, over the
-#: limits: (d, n) each
-Asked = tuple[tuple[tuple[Floats, ...], tuple[Floats, ...]], tuple[tuple[Floats, ...], tuple[Floats, ...]]]
+class _Signed(NamedTuple):
+    """|level·z + slope·z′ + bend·z″/2| of d axes at node k (`at` 0) or k + 1, over the limits there, (d, n) each.
 
-
-class Worst(NamedTuple):
-    """A jerk inside of each cell, by z, z′ and z″/2 of the node at its start, over its limit at that node.
-
-    axis (n,) int64, rows (3, n) float64.
+    Jerks, or accelerations where `bend` is None; of the axes `axis` (d, n) where these are not all in order.
     """
 
-    axis: Ints
-    rows: Floats
+    at: int
+    level: Floats
+    slope: Floats
+    bend: Floats | None
+    axis: Ints | None = None
 
-    def seen(self, z: Floats, slope: Floats, bend: Floats) -> Floats:
-        """(n,) share of the limit that is used."""
-        level, steep, bent = self.rows
-        found: Floats = np.sqrt(np.maximum(z, 0.0)) * np.abs(level * z + steep * slope + bent * bend)
-        return found
+    def use(self, seen: tuple[list[Floats], list[Floats], Floats], most: Floats) -> None:
+        """Raise shares of the limits (all axes, n) to those that are used here."""
+        z, slope, bend = seen[0][self.at], seen[1][self.at], seen[2]
+        used = self.level * z + self.slope * slope
+        if self.bend is not None:
+            used = np.sqrt(np.maximum(z, 0.0)) * (used + self.bend * bend)
+        place = slice(None) if self.axis is None else (self.axis, np.arange(len(z)))
+        most[place] = np.maximum(most[place], np.abs(used))
+
+    def rows(self, axis: Ints, share: Floats) -> list[Row]:
+        """Limits of one axis (n,) in each slot, times `share` (n,)."""
+        slot = np.arange(len(axis))
+        level, slope = (share * part[axis, slot] for part in (self.level, self.slope))
+        if self.bend is None:
+            return both_signs(self.at, level, slope, None, np.ones(len(slot)))
+        return both_signs(self.at, level, slope, share * self.bend[axis, slot], None)
 
 
 @dataclass(frozen=True)
-class _Places:
+class Places:
     """Where axes are looked at: samples of the intervals, and ends and middles of all cells; p places by their slots.
 
     Parameters
@@ -95,6 +104,8 @@ class _Places:
         By how much they may be larger between this place and the next.
     accel, jerk : (d,) float64
         Limits.
+    unknown : (n,) bool
+        Slots whose cell meets an interval in which derivatives are not finite.
     """
 
     slot: Ints
@@ -103,11 +114,12 @@ class _Places:
     bump: Floats
     accel: Floats
     jerk: Floats
+    unknown: Bools
 
     @classmethod
-    def of(cls, grid: Grid, coefficients: LimitCoefficients) -> _Places:
+    def of(cls, grid: Grid, runs: Ints, limits: AxisLimits) -> Places:
         """All of them in the cells that lie between two others."""
-        samples, edge = coefficients.samples, coefficients.speed_limits.edge
+        samples, edge = limits.samples, limits.vectors.edge
         assert samples is not None
         width = np.diff(edge)
         shares = np.stack((np.zeros(len(width)), samples.middle, np.ones(len(width))), axis=1)
@@ -138,6 +150,7 @@ class _Places:
             between += factor * value[..., number]
         slot = np.concatenate((cell, own)) - 1
         way = np.concatenate((at - grid.start[cell], here - grid.start[own]))
+        met = cell_intervals(limits.vectors, grid, runs)
         order = np.lexsort((way, slot))
         order = order[slot[order] >= 0]
         return cls(
@@ -147,12 +160,13 @@ class _Places:
             np.concatenate((flat_bump, samples.missed[:, :, interval]), axis=2).astype(np.float64)[..., order],
             _USED * samples.accel,
             _USED * samples.jerk,
+            np.append(np.maximum.reduceat(np.append(~samples.known, False), met)[2::2], False),
         )
 
-    def uses(self, batch: Batch, c: Floats) -> tuple[list[Floats], Worst]:
+    def uses(self, batch: Batch, c: Floats) -> tuple[list[Floats], _Signed | None]:
         """(d, n) share of the limits that accelerations and jerks of every axis use in the cell of each slot.
 
-        Second comes the place of each cell in which a jerk is largest.
+        Second come the jerks that are most beyond their limits, one in each cell.
         """
         z, slope, bend = batch.forms(c)
         s = self.slot
@@ -171,41 +185,39 @@ class _Places:
             found.append(np.where(_inner_cells(batch), used, 0.0))
         return found, self._worst(values, begin, z, here, found[1])
 
-    def _worst(self, jerks: Floats, begin: Ints, z: Floats, here: Floats, used: Floats) -> Worst:
+    def _worst(self, jerks: Floats, begin: Ints, z: Floats, here: Floats, used: Floats) -> _Signed | None:
         """Of each cell in which a jerk is beyond its limit the place where it is most so; nothing in the others."""
         most = jerks.max(axis=0)
         count = np.diff(np.append(begin, len(most)))
         hit = np.flatnonzero(most >= np.repeat(np.maximum.reduceat(most, begin), count))
-        place = hit[np.searchsorted(hit, begin)]
-        slot = self.slot[begin]
+        place, slot = hit[np.searchsorted(hit, begin)], self.slot[begin]
         wrong = used.max(axis=0)[slot] > 1.0
         place, slot = place[wrong], slot[wrong]
-        axis = np.zeros(len(z), np.int64)
-        axis[slot] = jerks[:, place].argmax(axis=0)
-        rows = np.zeros((3, len(z)))
         if not len(slot):
-            return Worst(axis, rows)
-        scale = np.sqrt(here[place] / np.maximum(z[slot], 1e-300)) / self.jerk[axis[slot]]
-        one, two, three = scale * self.value[:, axis[slot], place]
-        x = self.way[place]
-        rows[0, slot] = three
-        rows[1, slot] = three * x + 1.5 * two
-        rows[2, slot] = (three * x + 3.0 * two) * x + one
-        return Worst(axis, rows)
+            return None
+        axis = np.zeros((1, len(z)), np.int64)
+        axis[0, slot] = own = jerks[:, place].argmax(axis=0)
+        one, two, three = (
+            np.sqrt(here[place] / np.maximum(z[slot], 1e-300)) / self.jerk[own] * self.value[:, own, place]
+        )
+        x, rows = self.way[place], np.zeros((3, 1, len(z)))
+        rows[:, 0, slot] = three, three * x + 1.5 * two, (three * x + 3.0 * two) * x + one
+        return _Signed(0, rows[0], rows[1], rows[2], axis)
 
-    def rows(self, batch: Batch) -> Asked:
-        """What is asked at the start and at the end of every cell."""
+    def at_ends(self, batch: Batch) -> tuple[list[_Signed], list[_Signed]]:
+        """Accelerations, and jerks, at the start and at the end of every cell."""
         begin = np.flatnonzero(np.diff(self.slot, prepend=-1))
         last = np.append(begin[1:], len(self.slot)) - 1
         where, inner = self.slot[begin], _inner_cells(batch)
         accel, jerk = 1.0 / self.accel[:, None], 1.0 / self.jerk[:, None]
-        found = []
-        for chosen in (begin, last):  # places of a cell are in order
+        accels, jerks = [], []
+        for at, chosen in enumerate((begin, last)):  # places of a cell are in order
             q = np.zeros((*self.value.shape[:2], len(batch)))
             q[..., where] = self.value[..., chosen]
-            q = np.where(inner, q, 0.0)
-            found.append(((accel * q[1], 0.5 * accel * q[0]), (jerk * q[2], 1.5 * jerk * q[1], jerk * q[0])))
-        return found[0], found[1]
+            one, two, three = np.where(inner, q, 0.0)
+            accels.append(_Signed(at, accel * two, 0.5 * accel * one, None))
+            jerks.append(_Signed(at, jerk * three, 1.5 * jerk * two, jerk * one))
+        return accels, jerks
 
 
 def _inner_cells(batch: Batch) -> Bools:
@@ -215,74 +227,18 @@ def _inner_cells(batch: Batch) -> Bools:
     return inner
 
 
-@dataclass(frozen=True)
-class Given:
-    """What the runs that are planned have to keep.
-
-    Parameters
-    ----------
-    speed_limits : SpeedLimits
-        Of the path.
-    coefficients : LimitCoefficients or None
-    runs : (r,) int64
-        As for `make_grid`.
-    accel, jerk : (r,) float64
-        Of the path in each run.
-    """
-
-    speed_limits: SpeedLimits
-    coefficients: LimitCoefficients | None
-    runs: Ints
-    accel: Floats
-    jerk: Floats
-
-    def problem(self, grid: Grid) -> Batch:
-        """The problem that keeps sums of amounts."""
-        of_cell = run_of_cells(grid)
-        rows = None if self.coefficients is None else self._largest(self.coefficients, grid)
-        return batch_of(grid, self.accel[of_cell], self.jerk[of_cell], rows)
-
-    def problem_of_others(self, grid: Grid) -> Batch:
-        """The problem without accelerations and jerks of the machine's axes."""
-        of_cell, others = run_of_cells(grid), self._known.others
-        assert others is not None
-        free = replace(grid, cap=np.minimum(self._cap(self.speed_limits, grid), self._cap(others.speed_limits, grid)))
-        return batch_of(free, self.accel[of_cell], self.jerk[of_cell], self._largest(others, grid))
-
-    def unknown(self, grid: Grid) -> Bools:
-        """(n,) bool: slots whose cell meets an interval in which derivatives are not finite."""
-        samples, limits = self._known.samples, self._known.speed_limits
-        assert samples is not None
-        met = cell_intervals(limits, grid, self.runs)
-        found = np.maximum.reduceat(np.append(~samples.known, False), met)[::2]
-        return np.append(found[1:], False)
-
-    @property
-    def _known(self) -> LimitCoefficients:
-        assert self.coefficients is not None
-        return self.coefficients
-
-    def _cap(self, limits: SpeedLimits, grid: Grid) -> Floats:
-        least: Floats = np.minimum.reduceat(np.append(limits.cap, np.inf), cell_intervals(limits, grid, self.runs))[::2]
-        return least
-
-    def _largest(self, coefficients: LimitCoefficients, grid: Grid) -> Floats:
-        rows = np.concatenate((coefficients.rows, np.zeros((5, 1))), axis=1)
-        met = cell_intervals(coefficients.speed_limits, grid, self.runs)
-        largest: Floats = np.maximum.reduceat(rows, met, axis=1)[:, ::2]
-        return largest
-
-
-def faster(given: Given, grid: Grid, batch: Batch, best: Floats) -> Floats:
+def faster(grid: Grid, free: Grid, places: Places, batch: Batch, best: Floats) -> Floats:
     """Faster profiles than those that keep sums of amounts.
 
     Parameters
     ----------
-    given : Given
-        With `coefficients` that have samples of a machine's axes.
     grid : Grid
+        With all limits as amounts.
+    free : Grid
+        The same cells without accelerations and jerks of the machine's axes.
+    places : Places
     batch : Batch
-        The problem with sums of amounts.
+        The problem of `grid`.
     best : (n,) float64
         Strictly feasible coefficients of it.
 
@@ -291,24 +247,23 @@ def faster(given: Given, grid: Grid, batch: Batch, best: Floats) -> Floats:
     (n,) float64
         Coefficients that keep every limit; none of the runs is slower.
     """
-    assert given.coefficients is not None
-    places, bare = _Places.of(grid, given.coefficients), given.problem_of_others(grid)
-    for at in (batch.first, batch.last - 1):  # next to the stops sums of amounts are kept
-        for name in ("node_cap", "accel_level", "accel_slope"):
-            getattr(bare, name)[at] = getattr(batch, name)[at]
-    asked = places.rows(bare)
-    run = np.repeat(np.arange(len(batch.first)), batch.last - batch.first + 1)
-    summed, going = given.unknown(grid), np.ones(len(batch.first), np.bool_)
-    slower, stuck = np.zeros(len(batch.first)), np.zeros(len(batch.first), np.bool_)
-    inside: list[Worst] = []
-    c, taken, highest = best.copy(), *([np.zeros_like(part[0]) for part in asked[0]] for _ in range(2))
-    held = [np.zeros(part[0].shape, np.bool_) for part in asked[0]]
+    first, last = batch.first, batch.last
+    inner = np.ones(len(batch), np.bool_)
+    inner[first] = inner[last] = False  # next to the stops sums of amounts are kept
+    free = replace(free, cap=np.where(inner, free.cap, grid.cap), rows=np.where(inner, free.rows, grid.rows))
+    bare = problem_of(free)
+    ends = places.at_ends(bare)
+    run = np.repeat(np.arange(len(first)), last - first + 1)
+    summed, going = places.unknown.copy(), np.ones(len(first), np.bool_)
+    slower, stuck = np.zeros(len(first)), np.zeros(len(first), np.bool_)
+    inside: list[_Signed] = []
+    c, (taken, highest) = best.copy(), np.zeros((2, 2, len(places.accel), len(batch)))
+    held = np.zeros(taken.shape, np.bool_)
     for number in range(ROUNDS):
         uses, worst = places.uses(bare, c)
-        if worst.rows.any():
-            inside.append(worst)
-        for own, high, asks, used, seen in zip(taken, highest, held, uses, _seen(bare, c, asked, inside), strict=True):
-            now = np.maximum(used - seen, 0.0) / np.maximum(used, 1.0) + _ROOM
+        inside += [] if worst is None else [worst]
+        for own, high, asks, used, limits in zip(taken, highest, held, uses, (ends[0], ends[1] + inside), strict=True):
+            now = np.maximum(used - _seen(bare, c, limits, used.shape), 0.0) / np.maximum(used, 1.0) + _ROOM
             own[:] = now if number < _TRIALS else np.maximum(own, now)
             if number:
                 beyond = asks & (used > 1.0)
@@ -319,9 +274,12 @@ def faster(given: Given, grid: Grid, batch: Batch, best: Floats) -> Floats:
             np.maximum(high, used, out=high)
             asks[:] = False
             np.put_along_axis(asks, np.argpartition(-high, AXES - 1, axis=0)[:AXES], True, axis=0)
-        problem = replace(_summed(bare, batch, summed), signed=_signed(asked, held, taken, summed, inside))
+        # the cell of a slot is the next one of the grid; sums use the same share of their limits
+        cells = inner & np.concatenate(([False], summed[:-1]))
+        problem = problem_of(replace(free, rows=np.where(cells, grid.rows / _USED, free.rows)))
+        problem = replace(problem, rows=(*problem.rows, *_rows(ends, held, taken, summed, inside)))
         start, gap = _within(problem, best, run), GAP if number else ROUGH
-        c[going[run]] = solve_runs(problem.of(going), grid.of(going), start=start[going[run]], gap=gap, most=_STEPS)
+        c[going[run]] = solve_runs(problem.of(going), free.of(going), start=start[going[run]], gap=gap, most=_STEPS)
         # sums of amounts keep limits by themselves, with less room for what lies between samples than is measured here
         found = _slower([np.where(summed, 0.0, used) for used in places.uses(bare, c)[0]], batch)
         slower, stuck = found, stuck | (found <= slower + _ROOM)
@@ -334,40 +292,28 @@ def faster(given: Given, grid: Grid, batch: Batch, best: Floats) -> Floats:
     return best
 
 
-def _seen(batch: Batch, c: Floats, asked: Asked, inside: list[Worst]) -> list[Floats]:
-    """(d, n) what accelerations and jerks use at the ends of each cell, over the limits."""
-    z, slope, bend = batch.forms(c)
-    found = []
-    for ((level, steep), (cube, cross, bent)), here, rise in zip(
-        asked, (z, _next(z)), (slope, _next(slope)), strict=True
-    ):
-        root = np.sqrt(np.maximum(here, 0.0))
-        found.append((np.abs(level * here + steep * rise), root * np.abs(cube * here + cross * rise + bent * bend)))
-    (accel, jerk), (other_accel, other_jerk) = found
-    jerk = np.maximum(jerk, other_jerk)
-    for worst in inside:
-        place = worst.axis, np.arange(len(z))
-        jerk[place] = np.maximum(jerk[place], worst.seen(z, slope, bend))
-    return [np.maximum(accel, other_accel), jerk]
+def _seen(batch: Batch, c: Floats, limits: Sequence[_Signed], shape: tuple[int, ...]) -> Floats:
+    """(d, n) largest share of the limits of each axis that is used where these count."""
+    most, seen = np.zeros(shape), batch.seen_by_rows(c, 0.0)
+    for limit in limits:
+        limit.use(seen, most)
+    return most
 
 
-def _signed(
-    asked: Asked, held: list[Bools], taken: list[Floats], summed: Bools, inside: list[Worst]
-) -> tuple[Signed, ...]:
+def _rows(
+    ends: Sequence[Sequence[_Signed]], held: Bools, taken: Floats, summed: Bools, inside: Sequence[_Signed]
+) -> list[Row]:
     """Limits of the axes that come nearest to theirs in each slot, but where sums of amounts are kept."""
-    found = []
-    slot = np.arange(len(summed))
-    for kind, (chosen, own) in enumerate(zip(held, taken, strict=True)):
+    share = np.where(summed, 0.0, 1.0 / (1.0 - np.minimum(taken, _MOST)))
+    slot, found = np.arange(len(summed)), []
+    for limits, chosen, own in zip(ends, held, share, strict=True):
         for axis in np.nonzero(chosen.T)[1].reshape(-1, AXES).T:
-            share = np.where(summed, 0.0, 1.0 / (1.0 - np.minimum(own[axis, slot], _MOST)))
-            for at, parts in enumerate(asked):
-                level, slope, *bend = (share * part[axis, slot] for part in parts[kind])
-                found.append(Signed(at, level, slope, bend[0] if bend else None))
-    for worst in inside:
-        own = taken[1][worst.axis, np.arange(len(summed))]
-        share = np.where(summed, 0.0, 1.0 / (1.0 - np.minimum(own, _MOST)))
-        found.append(Signed(0, *(share * worst.rows)))
-    return tuple(found)
+            for limit in limits:
+                found += limit.rows(axis, own[axis, slot])
+    for limit in inside:
+        assert limit.axis is not None
+        found += limit.rows(np.zeros_like(slot), share[1][limit.axis[0], slot])
+    return found
 
 
 def _near(where: Bools) -> Bools:
@@ -376,16 +322,6 @@ def _near(where: Bools) -> Bools:
     at = np.arange(len(where))
     near: Bools = total[np.minimum(at + _BESIDE + 1, len(where))] > total[np.maximum(at - _BESIDE, 0)]
     return near
-
-
-def _summed(bare: Batch, batch: Batch, where: Bools) -> Batch:
-    """The problem with sums of amounts in some cells, which use the same share of their limits."""
-    names = ("jerk_level", "jerk_slope", "jerk_bend")
-    ends = where | np.concatenate(([False], where[:-1]))
-    changed = {name: np.where(where, getattr(batch, name) / _USED, getattr(bare, name)) for name in names}
-    for name in ("accel_level", "accel_slope"):
-        changed[name] = np.where(ends, getattr(batch, name) / _USED, getattr(bare, name))
-    return replace(bare, **changed)
 
 
 def _slower(uses: list[Floats], batch: Batch) -> Floats:
@@ -406,8 +342,3 @@ def _within(batch: Batch, c: Floats, run: Ints) -> Floats:
         hit = np.bincount(run, beyond) > 0
         slower = np.where(hit[run], _SLOWER * slower, slower)
     return slower
-
-
-def _next(values: Floats) -> Floats:
-    """Values (..., n) of the slot behind; the last sees itself."""
-    return np.concatenate((values[..., 1:], values[..., -1:]), axis=-1)

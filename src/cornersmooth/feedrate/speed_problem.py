@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from cornersmooth.feedrate.grid import Grid
 from cornersmooth.model import Bools, Floats, Ints
 
+#: last coefficients of a window that stay at the crawl: its last two nodes then neither accelerate nor brake
+CRAWLING = 3
+#: the right side of a limit in slots without a cell
+FREE = 1e30
 #: the profile that the iteration starts from, over what the limits let a constant one be at each place
 START = 0.5
 #: most that the logarithm of this profile changes from slot to slot: cells are as long as changes of speed need
@@ -30,40 +35,23 @@ class Row(NamedTuple):
     bend: Floats | None
     right: Floats | None
 
-
-class Signed(NamedTuple):
-    """A limit whose terms may cancel: |level·z + slope·z′ + bend·z″/2| ≤ z^(−1/2), or ≤ 1 where `bend` is None.
-
-    (n,) each; z and z′ are those of node k (`at` 0) or of node k + 1 (`at` 1).
-    """
-
-    at: int
-    level: Floats
-    slope: Floats
-    bend: Floats | None
-
-    def part(self, slots: slice | Bools) -> Signed:
+    def of(self, slots: slice | Bools) -> Row:
         """A copy of some slots."""
-        bend = None if self.bend is None else self.bend[slots].copy()
-        return Signed(self.at, self.level[slots].copy(), self.slope[slots].copy(), bend)
+        parts = (self.level, self.slope, self.bend, self.right)
+        level, slope, bend, right = (None if part is None else part[slots].copy() for part in parts)
+        return Row(self.at, level, slope, bend, right)
+
+    def free(self, slots: slice) -> None:
+        """Take the limit away from some slots."""
+        for part in (self.level, self.slope, self.bend):
+            if part is not None:
+                part[slots] = 0.0
 
 
-#: arrays of `Batch` that have one value, or column, per slot
-_PER_SLOT = (
-    "near",
-    "far",
-    "slope",
-    "bend",
-    "node_cap",
-    "cell_cap",
-    "accel_level",
-    "accel_slope",
-    "jerk_level",
-    "jerk_slope",
-    "jerk_bend",
-    "weight",
-    "frozen",
-)
+def both_signs(at: int, level: Floats | None, slope: Floats, bend: Floats | None, right: Floats | None) -> list[Row]:
+    """A limit of an amount: |level·z + slope·z′ + bend·z″/2| ≤ `right`, or z^(−1/2)."""
+    minus = (None if level is None else -level), -slope, (None if bend is None else -bend)
+    return [Row(at, level, slope, bend, right), Row(at, *minus, right)]
 
 
 @dataclass(frozen=True)
@@ -79,12 +67,6 @@ class Batch:
         Node k: z = near·c[k] + far·c[k+1], z′ = slope·(c[k+1] − c[k]).
     bend : (3, n) float64
         Cell k: z″/2 = Σ bend[i]·c[k+i].
-    node_cap, cell_cap : (n,) float64
-        Bounds of z at node k and of coefficient k.
-    accel_level, accel_slope : (n,) float64
-        Node k: accel_level·z + accel_slope·|z′| ≤ 1.
-    jerk_level, jerk_slope, jerk_bend : (n,) float64
-        Cell k: jerk_level·z + jerk_slope·|z′| + jerk_bend·|z″/2| ≤ z^(−1/2).
     weight : (n,) float64
         The time is about Σ weight/√c.
     first, last : (r,) int64
@@ -93,69 +75,73 @@ class Batch:
         That coefficient over its neighbour where the run starts (ends) at rest; NaN where it does not.
     frozen : (n,) bool
         Coefficients that keep their value.
-    signed : tuple of Signed
-        More limits.
+    rows : tuple of Row
+        All limits.
     """
 
     near: Floats
     far: Floats
     slope: Floats
     bend: Floats
-    node_cap: Floats
-    cell_cap: Floats
-    accel_level: Floats
-    accel_slope: Floats
-    jerk_level: Floats
-    jerk_slope: Floats
-    jerk_bend: Floats
     weight: Floats
     first: Ints
     last: Ints
     first_ratio: Floats
     last_ratio: Floats
     frozen: Bools
-    signed: tuple[Signed, ...] = ()
+    rows: tuple[Row, ...]
 
     def __len__(self) -> int:
         return len(self.near)
 
-    def of(self, runs: Bools) -> Batch:
-        """The problem of some runs, (r,) bool."""
-        size = self.last - self.first + 1
-        slots = np.repeat(runs, size)
-        last = np.cumsum(size[runs]) - 1
-        values = {name: getattr(self, name)[..., slots] for name in _PER_SLOT}
+    def slots(self, chosen: slice | Bools, runs: Bools | Ints) -> Batch:
+        """Some slots on their own; `runs` (r,) are those that lie in them."""
+        size = (self.last - self.first + 1)[runs]
+        last = np.cumsum(size) - 1
         return Batch(
-            **values,
-            first=last + 1 - size[runs],
+            near=self.near[chosen].copy(),
+            far=self.far[chosen].copy(),
+            slope=self.slope[chosen].copy(),
+            bend=self.bend[:, chosen].copy(),
+            weight=self.weight[chosen],
+            first=last + 1 - size,
             last=last,
             first_ratio=self.first_ratio[runs],
             last_ratio=self.last_ratio[runs],
-            signed=tuple(limit.part(slots) for limit in self.signed),
+            frozen=self.frozen[chosen].copy(),
+            rows=tuple(row.of(chosen) for row in self.rows),
         )
 
-    @cached_property
-    def rows(self) -> tuple[Row, ...]:
-        """All limits."""
-        one = np.ones(len(self))
-        level = self.accel_level if self.accel_level.any() else None
-        rows = [Row(0, one, None, None, self.node_cap), Row(2, one, None, None, self.cell_cap)]
-        rows += [Row(0, level, sign * self.accel_slope, None, one) for sign in (1.0, -1.0)]
-        bends = (self.jerk_bend, -self.jerk_bend)
-        if self.jerk_level.any() or self.jerk_slope.any():
-            slopes = (self.jerk_slope, -self.jerk_slope)
-            rows += [Row(at, self.jerk_level, slope, bend, None) for at in (0, 1) for slope in slopes for bend in bends]
-            rows.append(Row(3, self.jerk_level, None, bends[1], None))
-        else:
-            rows += [Row(at, None, None, bend, None) for at in (0, 1) for bend in bends]
-            # where z″ < 0 the largest z in the cell may lie inside
-            rows.append(Row(3, None, None, bends[1], None))
-        for limit in self.signed:
-            right = one if limit.bend is None else None
-            for sign in (1.0, -1.0):
-                bend = None if limit.bend is None else sign * limit.bend
-                rows.append(Row(limit.at, sign * limit.level, sign * limit.slope, bend, right))
-        return tuple(rows)
+    def of(self, runs: Bools) -> Batch:
+        """The problem of some runs, (r,) bool."""
+        return self.slots(np.repeat(runs, self.last - self.first + 1), runs)
+
+    def window(self, begin: int, end: int) -> Batch:
+        """Slots `begin` to `end`; where a run is cut its coefficients are frozen at the cut."""
+        whole = (self.first >= begin) & (self.last < end)
+        if whole.any():
+            return self.slots(slice(begin, end), whole)
+        run = np.searchsorted(self.first, [begin], side="right") - 1
+        cut_front, cut_back = begin > self.first[run], end <= self.last[run]
+        part = replace(
+            self.slots(slice(begin, end), run),
+            first=np.array([0]),
+            last=np.array([end - begin - 1]),
+            first_ratio=np.where(cut_front, np.nan, self.first_ratio[run]),
+            last_ratio=np.where(cut_back, np.nan, self.last_ratio[run]),
+        )
+        if cut_front[0]:
+            part.frozen[:2] = True
+        if cut_back[0]:
+            part.frozen[-CRAWLING:] = True
+            part.near[-1] = part.far[-1] = part.slope[-1] = 0.0
+            part.bend[:, -2:] = 0.0
+            for row in part.rows:
+                if row.bend is not None or row.at == 1:
+                    row.free(slice(-2, None))
+                elif row.at == 0:
+                    row.free(slice(-1, None))
+        return part
 
     @cached_property
     def idle(self) -> Floats:
@@ -221,6 +207,79 @@ class Batch:
         c[self.first[at_rest]] = self.first_ratio[at_rest] * c[self.first[at_rest] + 1]
         at_rest = ~np.isnan(self.last_ratio)
         c[self.last[at_rest]] = self.last_ratio[at_rest] * c[self.last[at_rest] - 1]
+
+
+def problem_of(grid: Grid) -> Batch:
+    """The optimisation problem of all runs of a grid, by amounts.
+
+    The cells of a run are its slots: the first and the last, next to the stops, are driven with constant jerk.
+    """
+    n, use = len(grid.start), grid.rows
+    first, last = grid.first, grid.last
+    inner = grid.width.copy()
+    inner[first] = 0.0
+    inner[last] = 0.0
+    following = np.append(inner[1:], 0.0)
+    both = inner + following
+    node = np.ones(n, np.bool_)
+    node[last] = False
+    safe = np.where(node, both, 1.0)
+    near, far = np.where(node, following / safe, 0.0), np.where(node, inner / safe, 0.0)
+    slope = np.where(node, 2.0 / safe, 0.0)
+
+    cell = node.copy()
+    cell[last - 1] = False
+    width = np.where(cell, np.append(grid.width[1:], 1.0), 1.0)
+    slope_after = np.append(slope[1:], 0.0)
+    bend = np.where(cell, np.stack((slope, -slope - slope_after, slope_after)) / (2.0 * width), 0.0)
+
+    at_node = np.maximum(use[:2], np.concatenate((use[:2, 1:], use[:2, -1:]), axis=1))
+    in_cell = np.where(cell, np.concatenate((use[2:, 1:], use[2:, -1:]), axis=1), 0.0)
+    in_cell[0] = np.where(cell, in_cell[0], use[2])
+
+    node_cap = np.where(node, np.minimum(grid.cap, np.append(grid.cap[1:], np.inf)), FREE)
+    for end, at in ((first, first), (last, last - 1)):
+        e = grid.width[end]
+        with_unit_speed = use[2, end] * (2.0 / 9.0) / e**2 + use[3, end] * (4.0 / 3.0) / e + use[4, end]
+        with np.errstate(divide="ignore"):  # where nothing is asked for, nothing is limited
+            node_cap[at] = np.minimum(node_cap[at], np.cbrt(with_unit_speed) ** -2)
+    cell_cap = grid.cap.copy()
+    cell_cap[first] = FREE
+    cell_cap[last] = FREE
+
+    weight = inner / 3.0
+    weight[:-1] += inner[1:] / 3.0
+    weight[1:] += inner[:-1] / 3.0
+    weight[first] += 3.0 * grid.width[first]
+    weight[last] += 3.0 * grid.width[last]
+    return Batch(
+        near=near,
+        far=far,
+        slope=slope,
+        bend=bend,
+        weight=weight,
+        first=first,
+        last=last,
+        first_ratio=1.0 / (1.0 + 2.0 * grid.width[first + 1] / (3.0 * grid.width[first])),
+        last_ratio=1.0 / (1.0 + 2.0 * grid.width[last - 1] / (3.0 * grid.width[last])),
+        frozen=np.zeros(n, np.bool_),
+        rows=_rows(node_cap, cell_cap, at_node[0], np.where(node, at_node[1], 0.0), in_cell),
+    )
+
+
+def _rows(node_cap: Floats, cell_cap: Floats, slope: Floats, level: Floats, jerk: Floats) -> tuple[Row, ...]:
+    """Limits of amounts: of z at nodes and in cells, of accelerations at nodes, of jerks (3, n) in cells."""
+    one = np.ones(len(slope))
+    rows = [Row(0, one, None, None, node_cap), Row(2, one, None, None, cell_cap)]
+    power = level if level.any() else None
+    rows += [Row(0, power, sign * slope, None, one) for sign in (1.0, -1.0)]
+    bend, cross, cube = jerk
+    several = bool(cube.any() or cross.any())
+    slopes = (cross, -cross) if several else (None,)
+    power = cube if several else None
+    rows += [Row(at, power, steep, sign * bend, None) for at in (0, 1) for steep in slopes for sign in (1.0, -1.0)]
+    # where z″ < 0 the largest z in the cell may lie inside
+    return (*rows, Row(3, power, None, -bend, None))
 
 
 def left_side(row: Row, z: list[Floats], slope: list[Floats], bend: Floats) -> Floats:
