@@ -83,4 +83,4 @@ def test_the_manual_page_has_every_command_and_option() -> None:
 def test_the_manual_page_is_rendered_without_a_warning() -> None:
     done = subprocess.run(["groff", "-man", "-ww", "-Tascii"], input=run("man").stdout, capture_output=True, check=True)
     assert done.stderr == b""
-    assert b"Round the corners of the CL files IN and write NC text." in done.stdout
+    assert b"Round the corners of the CL files IN and write NC programs." in done.stdout

@@ -7,6 +7,7 @@ import errno
 import os
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import click
@@ -35,6 +36,13 @@ COMMANDS = {
 }
 
 EXIT_INTERRUPTED = 130
+
+
+def _pages() -> Path:
+    """The folder of the documents: in the package, or beside its source."""
+    package = Path(__file__).resolve().parent.parent
+    return next((path for path in (package / "docs", package.parents[1] / "docs") if path.is_dir()), package)
+
 
 #: as of a program that is ended by the signal of a closed pipe: who reads has enough
 EXIT_CLOSED_PIPE = 141
@@ -72,6 +80,8 @@ class LazyGroup(click.Group):
         """List the commands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+        with formatter.section("Pages that helps name"):
+            formatter.write_dl([("docs/", str(_pages()))])
 
 
 @click.group(
