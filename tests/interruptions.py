@@ -142,11 +142,12 @@ class Bench:
             found.wrong.append("it does not say that it was interrupted")
         # a batch has a line for each file that was done before, and warnings of those files
         of_files = [line for line in lines[:-1] if one.batch and (line.startswith("PASSED") or "warning: " in line)]
+        of_files += [line for line in lines[:-1] if one.batch and line.startswith(("warning   CS", f"{FILES} files: "))]
         if found.code in (130, 143) and len(lines) != len(of_files) + 1:
             found.wrong.append("not one line")
         if "Traceback" in found.said or "Error" in found.said or "Exception" in found.said:
             found.wrong.append("Python is showing")
-        if found.code == 3 and sum("error:" in line for line in lines) != 1:
+        if found.code == 3 and sum("error:" in line for line in lines if not line.startswith("error ")) != 1:
             found.wrong.append("not one line of error")
         for path in (*out.iterdir(), *scratch.iterdir()):
             if path.parent == scratch or path.suffix != ".nc":

@@ -187,7 +187,7 @@ def test_the_command_line_says_it_everywhere(tmp_path: Path) -> None:
     assert " AXIS=0.4 " in text
     assert "CYCLE832(0.00100,_ORI_FINISH,0.04000)" in text
     contents = json.loads(report.read_text())
-    assert contents["settings"]["axis_tolerance"] == 0.4
+    assert contents["settings"]["axis_tolerance_deg"] == 0.4
     assert contents["verification"]["axis_tolerance_deg"] == 0.4
     assert contents["verification"]["max_axis_point_deviation_mm"] is None
     assert 0.2 < contents["verification"]["max_orientation_deviation_deg"] <= 0.4
@@ -199,7 +199,7 @@ def test_the_command_line_says_it_everywhere(tmp_path: Path) -> None:
     found = run("verify", SAMPLE, out, "--axis-tolerance", "0.1", "--report", tmp_path / "v.json")
     assert found.returncode == 1
     assert "the tool axis is off by" in found.stderr.decode()
-    first = json.loads((tmp_path / "v.json").read_text())["problems"][0]
+    first = json.loads((tmp_path / "v.json").read_text())["verification"]["problems"][0]
     assert first["code"] == "CS527"
     assert 0.1 < first["amount_deg"] <= 0.4
     both = run("smooth", SAMPLE, "-o", tmp_path / "p.nc", "--axis-tolerance", "0.4", "-H", "20")

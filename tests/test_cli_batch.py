@@ -6,15 +6,17 @@ import csv
 import errno
 import json
 import os
+import re
 import signal
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
 
 from interruptions import FILES, Bench
 from oracle.chains import cl_text, random_chains
-from oracle.command import BAD_INPUT, BAD_OUTPUT, DONE, SMALL, USAGE, run
+from oracle.command import BAD_INPUT, BAD_OUTPUT, DONE, SMALL, USAGE, run, started
 from oracle.share import share
 
 
@@ -88,7 +90,7 @@ def test_what_has_changed_is_not_skipped(tree: Path, tmp_path: Path) -> None:
     (tree / "one.cls").write_bytes(SMALL)
     (out / "a" / "two.nc").write_bytes(b"edited by hand")
     said = lines(tree, "-d", out, code=BAD_OUTPUT)
-    assert [line for line in said if "exists already" in line] == [
+    assert [line for line in said if "exists already" in line and not line.startswith("error ")] == [
         f"{out / name}: error: exists already; use --force to replace it" for name in ("one.nc", "a/two.nc")
     ]
     assert said[-1] == "3 files: 1 skipped, 2 errors"
@@ -135,7 +137,8 @@ def test_summaries_have_a_row_for_each_file(tree: Path, tmp_path: Path) -> None:
     out, text, table = tmp_path / "nc", tmp_path / "s.json", tmp_path / "s.csv"
     lines(tree, "-d", out, "--summary", text, code=BAD_INPUT)
     found = json.loads(text.read_text())
-    assert found["counts"] == {"PASSED": 3, "INCOMPLETE": 0, "NOT VERIFIED": 0, "FAILED": 0, "skipped": 0, "error": 1}
+    none = dict.fromkeys(("INCOMPLETE", "NOT VERIFIED", "FAILED", "skipped", "not done"), 0)
+    assert found["counts"] == {"PASSED": 3, "error": 1} | none
     failed, first = found["files"][:2]
     assert (failed["status"], failed["exit_code"], failed["corners"]) == ("error", BAD_INPUT, None)
     assert "bad.cls:9: error" in failed["reason"]
@@ -167,3 +170,57 @@ def test_a_batch_that_was_interrupted_goes_on_where_it_was(tmp_path: Path) -> No
     counts = result.stderr.decode().splitlines()[-1]
     assert counts.startswith(f"{FILES} files: ")
     assert files_in(out) == bench.whole
+
+
+def test_failures_and_warnings_are_told_once_more_at_the_end(tree: Path, tmp_path: Path) -> None:
+    """Of three files with a warning each, and one that cannot be read."""
+    (tree / "bad.cls").write_bytes(SMALL.replace(b"GOTO/10,10,0,0,0.1,1", b"GOTO/10,nan,0,0,0.1,1"))
+    for name in ("one.cls", "a/two.NCL"):
+        (tree / name).write_bytes(b"BREAKCHIPS/7\nBREAKCHIPS/7\n" + (tree / name).read_bytes())
+    text, table = tmp_path / "s.json", tmp_path / "s.csv"
+    said = lines(tree, "-d", tmp_path / "nc", "--summary", text, code=BAD_INPUT)
+    failed = [line for line in said if line.startswith("error ")]
+    assert len(failed) == 1
+    assert re.fullmatch(r"error +.*bad\.cls:9: error: .*", failed[0])
+    found = json.loads(text.read_text())
+    counted = {line.split()[1] for line in said if line.startswith("warning   CS")}
+    assert counted == set(found["warnings"])
+    # each warning of a file is in its row, and the sum over the rows is that of the code
+    for code, all_of_them in found["warnings"].items():
+        counts = [row["warnings"][code] for row in found["files"] if code in row["warnings"]]
+        assert (all_of_them["files"], all_of_them["count"]) == (len(counts), sum(counts))
+    (own,) = [each for each in found["warnings"].values() if each["text"].startswith("unknown statement BREAKCHIPS")]
+    assert (own["files"], own["count"]) == (2, 4)
+    assert said.index(failed[0]) == len(said) - 2 - len(counted)
+    assert said[-1].startswith("4 files: ")
+    lines(tree, "-d", tmp_path / "nc", "--summary", table, "--force", code=BAD_INPUT)
+    rows = {Path(row["source"]).name: row for row in csv.DictReader(table.read_text().splitlines())}
+    assert re.search(r"\bCS\d+ 2\b", rows["one.cls"]["warnings"])
+    assert rows["bad.cls"]["warnings"] == ""
+    quiet = run("smooth", tree, "-d", tmp_path / "nc", "--force", "-q").stderr.decode()
+    assert quiet.count("bad.cls") == 1
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_an_interrupted_batch_leaves_its_summary(jobs: str, tmp_path: Path) -> None:
+    """The second of three files never ends, being a pipe that nobody writes to."""
+    for name in ("a.cls", "c.cls"):
+        (tmp_path / name).write_bytes(SMALL)
+    os.mkfifo(tmp_path / "b.cls")
+    sources = [tmp_path / f"{name}.cls" for name in "abc"]
+    words = ["-d", tmp_path / "nc", "-j", jobs, "--summary", tmp_path / "s.json"]
+    with started("smooth", *sources, *words) as process:
+        done = [tmp_path / "nc" / f"{name}.nc" for name in ("a" if jobs == "1" else "ac")]
+        deadline = time.monotonic() + 60
+        while not all(path.exists() for path in done) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        time.sleep(0.5)  # the row of a file follows the file
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    found = json.loads((tmp_path / "s.json").read_text())
+    assert [row["status"] for row in found["files"]] == ["PASSED", "not done", ["not done", "PASSED"][jobs == "2"]]
+    ended = said.decode().splitlines()
+    assert ended[-1] == f"interrupted: {jobs} of 3 done; run again to continue"
+    assert ended[-2].startswith(f"3 files: {jobs} PASSED")
+    assert f"{3 - int(jobs)} not done" in ended[-2]

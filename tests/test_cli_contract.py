@@ -105,7 +105,7 @@ def test_reports(small: Path, tmp_path: Path) -> None:
     result = run("smooth", small, "-o", "o.nc", "--report", "r.json", "--report", "r.csv", cwd=tmp_path)
     assert result.returncode == DONE
     report = json.loads((tmp_path / "r.json").read_text())
-    assert report["schema"] == "cornersmooth-report/1"
+    assert report["schema"] == "cornersmooth-report/2"
     assert report["summary"]["corners"] == report["summary"]["smoothed"] == 2
     head, *rows = (tmp_path / "r.csv").read_text().splitlines()
     assert head == (

@@ -78,7 +78,7 @@ def test_make_run_smooths_all_of_them_within_their_tolerances(tmp_path: Path):
     reports = {path.stem: json.loads(path.read_text()) for path in made.glob("*.json")}
     assert set(reports) == {"paper_table1", "impeller_nx", "impeller_catia"}
     for name, report in reports.items():
-        summary, tolerance = report["summary"], report["settings"]["tolerance"]
+        summary, tolerance = report["summary"], report["settings"]["tolerance_mm"]
         assert summary["smoothed"] == summary["corners"] > 0
         assert 0.9 * tolerance < max(summary["max_tip_error_mm"], summary["max_axis_error_mm"]) <= tolerance
         assert f"{name}.nc" in done.stdout

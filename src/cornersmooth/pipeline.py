@@ -6,7 +6,6 @@ will be written, how the text is to be read back) is put together here.
 
 from __future__ import annotations
 
-import hashlib
 import io
 import os
 import time
@@ -29,14 +28,16 @@ from cornersmooth.nc_reader import CONTROLS, NcProgram, read_nc
 from cornersmooth.nc_reader.elements import Element
 from cornersmooth.output import FAILED, Target, check_output, open_output, path_of
 from cornersmooth.provenance import Provenance
-from cornersmooth.report import report
-from cornersmooth.report.verdict import Judgement, judge, trusted_blocks
+from cornersmooth.report import NcFile, report
+from cornersmooth.report.record import planned_times, sha256_of
+from cornersmooth.report.verdict import Judgement, Saving, judge, trusted_blocks
 from cornersmooth.settings import Settings
 from cornersmooth.verdict import Verdict
 from cornersmooth.verify import Verification, Verifier, useful_processes
 
 if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
+    from cornersmooth.kinematics import Machine
 
 #: called with the stage, what is done of it, and all of it
 Progress = Callable[[str, int, int], None]
@@ -64,6 +65,8 @@ class Result:
         Time of the stages ``read``, ``smooth``, ``write`` and ``verify``.
     path : str or None
         File that holds the text; None where it went to a stream, or nowhere.
+    source_sha256, sha256 : str
+        Of the CL file, empty where it is not known, and of the written program.
     """
 
     program: Program
@@ -76,6 +79,8 @@ class Result:
     findings: tuple[Finding, ...]
     seconds: Mapping[str, float] = field(default_factory=dict)
     path: str | None = None
+    source_sha256: str = ""
+    sha256: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -87,17 +92,35 @@ class Result:
         """The verdict and what it rests on."""
         return judge(self.verification, self.findings, self.unverified)
 
-    def report(self) -> dict[str, Any]:
-        """Everything that the JSON report says; see `cornersmooth.report`."""
-        own = len(self.smoothed.findings)
+    def report(
+        self, *, command: str = "", loosened: str = "", saving: Saving | None = None, limits: Machine | None = None
+    ) -> dict[str, Any]:
+        """Everything that the JSON report says; see `cornersmooth.report`.
+
+        Parameters
+        ----------
+        command : str
+            Command line that made it.
+        loosened : str
+            What settings made looser than the default.
+        saving : Saving, optional
+            Planned times.
+        limits : Machine, optional
+            Whose limits these keep, in place of those of the machine of the form.
+        """
+        form, own = self.form, len(self.smoothed.findings)
         return report(
             self.smoothed,
-            dense=not self.form.curve,
+            dense=not form.curve,
             blocks_out=self.written.blocks,
-            seconds=self.seconds,
             findings=self.findings[own:],
             verification=self.verification,
             unverified=self.unverified,
+            source_sha256=self.source_sha256,
+            nc_file=NcFile.of(self.path, self.sha256, form),
+            command=command,
+            loosened=loosened,
+            times=planned_times(saving, limits or form.machine),
         )
 
 
@@ -275,7 +298,20 @@ def postprocess(
         if verification is not None:
             findings += tuple(trusted_blocks(verification))
         path = path_of(target)
-        result = Result(program, smoothed, form, frame, written, verification, unverified, findings, seconds, path)
+        result = Result(
+            program,
+            smoothed,
+            form,
+            frame,
+            written,
+            verification,
+            unverified,
+            findings,
+            seconds,
+            path,
+            provenance.sha256,
+            output.stream.digest,
+        )
         judgement = result.judgement
         output.failed = judgement.verdict is Verdict.FAILED or (strict and judgement.verdict is not Verdict.PASSED)
         if mark:
@@ -322,12 +358,6 @@ def _provenance(
     source: Program | bytes | str | os.PathLike[str], program: Program, settings: Settings, form: Form
 ) -> Provenance:
     """What the text says of how it was made."""
-    digest = ""
-    if isinstance(source, bytes):
-        digest = hashlib.sha256(source).hexdigest()
-    elif not isinstance(source, Program):
-        with open(source, "rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
     # on more knots, as angles of rotary axes need them, the same curves have other weights, but where all are 1
     any_weights = form.rotary and set(settings.weights) != {1.0}
     return Provenance(
@@ -341,7 +371,7 @@ def _provenance(
         machine=form.machine.name if form.machine is not None and form.rotary else "",
         tcp=form.orientation != "machine",
         source=program.source.name,
-        sha256=digest,
+        sha256="" if isinstance(source, Program) else sha256_of(source),
         weights=None if any_weights else (1.0, *settings.weights),
     )
 

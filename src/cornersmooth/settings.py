@@ -236,9 +236,18 @@ class Settings:
         return replace(self, **changes)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values in field order, for the report."""
-        return {item.name: getattr(self, item.name) for item in fields(self)}
+        """Plain values in field order, for the report; keys carry their unit."""
+        names = (item.name for item in fields(self))
+        return {f"{name}_{UNITS[name]}" if name in UNITS else name: getattr(self, name) for name in names}
 
+
+#: unit of each setting that has one
+UNITS = {
+    **dict.fromkeys(("tolerance", "axis_length", "chord_tolerance", "tip_resolution"), "mm"),
+    **dict.fromkeys(("axis_point_resolution", "duplicate_distance", "shortest_line"), "mm"),
+    **dict.fromkeys(("axis_tolerance", "reversal_angle", "max_axis_step", "axis_step"), "deg"),
+    "block_time": "s",
+}
 
 #: What the axis point may be off, over ε, where the axis has a tolerance of its own. The larger, the less the way of
 #: the tip takes of what the axis may turn (a tenth of it at most), and the longer is H.

@@ -26,7 +26,7 @@ def test_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert contents["seconds"]["direct_exact_stop"] == pytest.approx(0.7777, abs=1e-4)
     assert contents["limits"]["period_s"] == pytest.approx(0.002)
     assert contents["limits"]["feed_mm_per_min"] == 1800.0
-    assert contents["settings"]["tolerance"] == 0.15
+    assert contents["settings"]["tolerance_mm"] == 0.15
 
 
 def test_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,7 +9,8 @@ import pytest
 
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.model import Arcs, Move, Program, Source, Statement
-from cornersmooth.report.info import Spread, describe, info_json
+from cornersmooth.report import report_json
+from cornersmooth.report.info import Spread, describe
 from oracle.loops import bytecodes
 
 UP = (0.0, 0.0, 1.0)
@@ -99,7 +100,7 @@ def test_next_to_nothing_can_be_described(poses: int):
     info = describe(Program.from_poses(np.zeros((poses, 3)), np.tile(UP, (poses, 1))), 0.01, 10)
     assert info.poses == poses
     assert info.motion.segment_length_mm == Spread(0, None, None, None, None, None)
-    json.loads(info_json(info))
+    json.loads(report_json(info.as_dict()))
 
 
 def test_helices_are_told_from_arcs():
@@ -114,8 +115,8 @@ def test_helices_are_told_from_arcs():
 
 def test_json_holds_it_all():
     info = describe(square(), 0.02, 25.0)
-    contents = json.loads(info_json(info))
-    assert contents["schema"] == "cornersmooth-info/1"
+    contents = json.loads(report_json(info.as_dict()))
+    assert contents["schema"] == "cornersmooth-info/2"
     assert contents["corners"]["tolerance_mm"] == 0.02
     assert contents["corners"]["axis_length_mm"] == 25
     assert contents["statements"] == {"SPINDL": 2, "PARTNO": 1}

@@ -17,7 +17,6 @@ from cornersmooth.report.verification import (
     along_lines,
     histogram_lines,
     verification_csv,
-    verification_json,
 )
 from cornersmooth.verify import verify
 from cornersmooth.verify.cl_motion import original_motion
@@ -80,7 +79,7 @@ def test_reports_and_refusals(files, tmp_path, capsys):
     source, text = files
     found, rows = tmp_path / "found.json", tmp_path / "poses.csv"
     assert run(["verify", source, text, "-e", "0.04", "--report", str(found), "--report", str(rows)]) == 0
-    contents = json.loads(found.read_text())
+    contents = json.loads(found.read_text())["verification"]
     assert contents["schema"] == "cornersmooth-verification/1"
     assert contents["max_tip_deviation_mm"] == pytest.approx(0.05 / np.sqrt(2))
     assert contents["where"]["max_tip_deviation_mm"] == {"cl_line": 6, "nc_line": 11}
@@ -129,6 +128,6 @@ def test_distribution_along_the_path():
     table = along_lines(along, 0.02)
     assert f"{along.tip.max():.6f}" in "\n".join(table)
     assert "".join(verification_csv(program, found)).count("\n") == 1 + np.isfinite(found.pose_tip).sum()
-    assert json.loads(verification_json(found))["poses"] == len(program)
+    assert found.to_dict()["poses"] == len(program)
     over = verify(program, encode(lines), tolerance=0.01)
     assert histogram_lines(over)[-1].lstrip().startswith("over 0.01 mm")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import os
 import shlex
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ from cornersmooth.cli.files import check_inputs, check_path, read_input, target_
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import progress_bar, say_line
+from cornersmooth.cli.show import progress_bar, say_json, say_line
 from cornersmooth.output import open_output
 
 if TYPE_CHECKING:
@@ -92,7 +91,7 @@ def command(source: str, **given: Any) -> int:
         contents = table.as_dict()
         for row, text in zip(contents["rows"], commands, strict=True):
             row["command"] = text
-        click.echo(json.dumps(contents, indent=1))
+        say_json(contents)
     elif not given["quiet"]:
         for line in _lines(table, commands, bool(given["verbose"])):
             say_line(line)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import click
 
 from cornersmooth.cli import shop
+from cornersmooth.cli.options import outputs
 from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.show import say_line
+from cornersmooth.cli.show import say_json, say_line
 
 
 @click.command(
@@ -15,7 +16,8 @@ from cornersmooth.cli.show import say_line
     epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
 )
 @click.argument("source", type=PATH, metavar="[IN]", default=".")
-def command(source: str) -> int:
+@outputs.as_json
+def command(source: str, as_json: bool) -> int:
     """Say which values 'cornersmooth smooth' would use for the file or folder IN, and where each comes from.
 
     Options come first, then the environment (CORNERSMOOTH_TOLERANCE), the file cornersmooth.toml in the folder of the
@@ -33,9 +35,17 @@ def command(source: str) -> int:
         for option in shop.settable(smooth):
             value = context.params[str(option.name)]
             value = getattr(value, "name", value)  # a control or machine of one's own
-            told = "" if value is None else ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
-            rows.append((shop.keys(option)[0], told, shop.origin(context, str(option.name))))
-    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
-    for key, value, origin in rows:
+            rows.append((shop.keys(option)[0], value, shop.origin(context, str(option.name))))
+    if as_json:
+        values = [dict(zip(("key", "value", "from"), row, strict=True)) for row in rows]
+        say_json({"schema": "cornersmooth-config/1", "values": values})
+        return 0
+    lines = [(key, _told(value), origin) for key, value, origin in rows]
+    widths = [max(len(line[column]) for line in lines) for column in (0, 1)]
+    for key, value, origin in lines:
         say_line(f"{key:<{widths[0]}}  {value:<{widths[1]}}  {origin}")
     return 0
+
+
+def _told(value: object) -> str:
+    return "" if value is None else ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import click
 
 from cornersmooth.cli import completing
 from cornersmooth.cli.options import outputs
+from cornersmooth.cli.show import say_json
+
+if TYPE_CHECKING:
+    from cornersmooth.nc import Control
 
 #: what the modes of a form are called for people
 _MODES = {
@@ -24,7 +30,8 @@ _MODES = {
 )
 @click.argument("name", required=False, metavar="[NAME|FILE]", shell_complete=completing.controls)
 @outputs.table
-def command(name: str | None, table: bool) -> int:
+@outputs.as_json
+def command(name: str | None, table: bool, as_json: bool) -> int:
     """List the controls with their forms, or check and describe one.
 
     A TOML file of your own is like one of them and says only what is different; see docs/controls.md.
@@ -36,22 +43,43 @@ def command(name: str | None, table: bool) -> int:
       cornersmooth controls siemens --table > mine.toml
       cornersmooth controls mine.toml
     """
-    from cornersmooth.nc import control_aliases, control_names, control_table, load_control
+    from cornersmooth.nc import control_names, control_table, load_control
 
     if table:
         if name is None:
             raise click.UsageError("--table needs the name of a control")
+        if as_json:
+            raise click.UsageError("--table and --json exclude each other")
         click.echo(control_table(name), nl=False)
         return 0
-    names = [name] if name else list(control_names())
-    aliases = control_aliases()
-    for control in map(load_control, names):
-        click.echo(f"{control.name}: {control.description}" if control.description else control.name)
-        if others := [alias for alias, own in aliases.items() if own == control.name and not control.own]:
-            click.echo(f"  also called {', '.join(others)}")
-        for form in control.forms.values():
-            click.echo(f"  -f {form.name}: {form.description}" if form.description else f"  -f {form.name}")
-            click.echo(f"     with {', '.join(_MODES[mode] for mode in form.modes)}")
-        for extra in control.extras.values():
-            click.echo(f"  --with {extra.name}: {extra.description}" if extra.description else f"  --with {extra.name}")
+    controls = [_values(load_control(one)) for one in ([name] if name else control_names())]
+    if as_json:
+        say_json({"schema": "cornersmooth-controls/1", "controls": controls})
+        return 0
+    for control in controls:
+        click.echo(_told("", control))
+        if control["aliases"]:
+            click.echo(f"  also called {', '.join(control['aliases'])}")
+        for form in control["forms"]:
+            click.echo(_told("  -f ", form))
+            click.echo(f"     with {', '.join(form['with'])}")
+        for extra in control["functions"]:
+            click.echo(_told("  --with ", extra))
     return 0
+
+
+def _values(control: Control) -> dict[str, Any]:
+    """What is told of a control."""
+    from cornersmooth.nc import control_aliases
+
+    aliases = [alias for alias, own in control_aliases().items() if own == control.name and not control.own]
+    forms = [{**_named(form), "with": [_MODES[mode] for mode in form.modes]} for form in control.forms.values()]
+    return {**_named(control), "aliases": aliases, "forms": forms, "functions": [*map(_named, control.extras.values())]}
+
+
+def _named(item: Any) -> dict[str, Any]:
+    return {"name": item.name, "description": item.description}
+
+
+def _told(before: str, item: dict[str, Any]) -> str:
+    return f"{before}{item['name']}: {item['description']}" if item["description"] else f"{before}{item['name']}"

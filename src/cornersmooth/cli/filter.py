@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,16 +14,20 @@ from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
 from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
 from cornersmooth.cli.options import motion, nc_text, outputs, smoothing
 from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand, loosened
-from cornersmooth.cli.show import console, more, print_line, printable, say_line
+from cornersmooth.cli.shop import ShopCommand, command_line, loosened
+from cornersmooth.cli.show import console, more, print_line, printable, say_json, say_line
 from cornersmooth.errors import CornersmoothError
-from cornersmooth.output import make_folder, open_output
+from cornersmooth.output import FAILED, make_folder, open_output
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.filter import Filtered
     from cornersmooth.filter.checking import Checked, Wrong
     from cornersmooth.nc import Form
+    from cornersmooth.report import NcFile
+    from cornersmooth.report.record import Kind
+    from cornersmooth.report.verdict import Judgement
+    from cornersmooth.settings import Settings
 
 #: names of NC programs, for folders
 PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia", "*.iso", "*.gcode")
@@ -57,6 +63,8 @@ units = click.option("--units", type=click.Choice(["mm", "inch"]), help="Units o
 @smoothing.axis_tolerance
 @outputs.directory
 @outputs.glob
+@outputs.json_reports
+@outputs.as_json
 @smoothing.method
 @smoothing.line_options
 @motion.limits
@@ -87,14 +95,18 @@ def command(inputs: tuple[str, ...], **given: Any) -> int:
     targets = [_target(one, folder) if folder else output or STANDARD for one in files]
     if len(set(targets)) < len(targets):
         raise click.UsageError("two inputs would be written to one name; give each a -d of its own")
-    for target in targets:
-        check_path(target, [one.path for one in files], force=given["force"])
+    reports = [[path.replace("{stem}", one.stem) for path in given["reports"]] for one in files]
+    _check_reports(reports, given["reports"])
+    if given["as_json"] and (STANDARD in targets or len(files) != 1):
+        raise click.UsageError("--json needs one input and -o FILE; --report '{stem}.json' tells of several")
+    for path in (*targets, *chain.from_iterable(reports)):
+        check_path(path, [one.path for one in files], force=given["force"])
     if folder:
         make_folder(folder)
     worst = 0
-    for one, target in zip(files, targets, strict=True):
+    for one, target, own in zip(files, targets, reports, strict=True):
         try:
-            worst = max(worst, _filter(one.path, target, form, settings, given))
+            worst = max(worst, _filter(one.path, target, own, form, settings, given))
         except CornersmoothError as error:
             if len(files) == 1:
                 raise
@@ -122,18 +134,33 @@ def form_of(given: dict[str, Any]) -> Form:
     return choose_form(control, given.get("form"), machine=nc_text.machine_of(given), tcp=not given["no_tcp"])
 
 
+def _check_reports(reports: Sequence[Sequence[str]], given: Sequence[str]) -> None:
+    """Refuse names of reports that say another form, or are the same for several inputs."""
+    if wrong := [path for path in given if not path.lower().endswith(".json")]:
+        raise click.UsageError(f"--report {wrong[0]}: let the name end in .json")
+    paths = [*chain.from_iterable(reports)]
+    if len(set(paths)) < len(paths):
+        raise click.UsageError("two reports have the same name; with several inputs put {stem} into it")
+
+
 def _target(one: Input, folder: str) -> str:
     path = os.path.join(folder, one.stem + os.path.splitext(one.path)[1])
     os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
     return path
 
 
-def _filter(source: str, target: str, form: Form, settings: Any, given: dict[str, Any]) -> int:
+def _filter(
+    source: str, target: str, reports: Sequence[str], form: Form, settings: Settings, given: dict[str, Any]
+) -> int:
     """Filter one program; return the exit code."""
     from cornersmooth.filter import filter_program
+    from cornersmooth.report import NcFile, report_json
+    from cornersmooth.report.record import planned_times
+    from cornersmooth.report.verdict import Saving
     from cornersmooth.verify import useful_processes
 
     data, name = read_input(source)
+    axes = nc_text.machine_of(given, "limits")
     found = filter_program(
         data,
         form,
@@ -141,39 +168,68 @@ def _filter(source: str, target: str, form: Form, settings: Any, given: dict[str
         tip_from_start=given["tip_control"],
         inch=given["units"] == "inch",
         verify=not given["no_verify"],
-        axes=nc_text.machine_of(given, "limits"),
+        axes=axes,
         processes=useful_processes(),
     )
     bad = found.verdict is Verdict.FAILED or (given["strict"] and found.verdict is not Verdict.PASSED)
     with open_output(target_of(target), hold=bad, replace=given["force"]) as output:
         output.failed = bad
         output.stream.write(found.data)
-    if not given["quiet"]:
-        _show(name, found, settings.tolerance, given["verbose"], given["units"])
+    judgement = judgement_of(found, settings.tolerance)
+    path = None if target == STANDARD else target + FAILED * bad
+    written = NcFile.of(path, output.stream.digest, form)
+    saving = None if found.seconds is None else Saving(*found.seconds, against="the program as it was")
+    times = planned_times(saving, axes)
+    contents = _report("filter", judgement, found.checked, (name, data), written, settings, times)
+    contents["summary"] = {
+        "cuts": found.cuts,
+        "smoothed": found.smoothed,
+        "runs": found.runs,
+        "lines_in": found.lines,
+        "lines_out": found.new_lines,
+    }
+    contents["left_as_it_is"] = [asdict(left) for left in found.left]
+    for report in reports:
+        with open_output(target_of(report)) as output:
+            output.stream.write(report_json(contents).encode("utf-8", "backslashreplace"))
+    line = contents["verdict_text"]
+    if given["as_json"]:
+        say_json(contents)
+    elif not given["quiet"]:
+        _show(name, line, found, given["verbose"], given["units"])
     elif loosened(settings.tolerance):
-        print_line(f"{name}: {first_line(found, settings.tolerance)}")
+        print_line(f"{name}: {line}")
     return int(bad)
 
 
-def verify_with_program(old: bytes, path: str, given: dict[str, Any]) -> int:
+def verify_with_program(source: str, old: bytes, path: str, given: dict[str, Any]) -> int:
     """Compare an NC program with what was made of it; return the exit code of ``verify``."""
     from cornersmooth.filter import verify_programs
+    from cornersmooth.report import NcFile, report_json
+    from cornersmooth.report.record import sha256_of
+    from cornersmooth.report.verdict import Judgement
     from cornersmooth.verify import useful_processes
 
     new, name = read_input(path)
-    settings = smoothing.settings_of(given)
-    found = verify_programs(old, new, form_of(given), settings, processes=useful_processes())
+    settings, form = smoothing.settings_of(given), form_of(given)
+    found = verify_programs(old, new, form, settings, processes=useful_processes())
     verdict = Verdict.of(problems=len(found.wrong))
+    judgement = Judgement(verdict, 0, 0, "", _problems(found.wrong) or _measured(found, settings.tolerance))
+    written = replace(NcFile.of(None if path == STANDARD else path, sha256_of(new), form), form=None)
+    contents = _report("verify", judgement, found, (source, old), written, settings)
+    for report in given["reports"]:
+        with open_output(target_of(report)) as output:
+            output.stream.write(report_json(contents).encode("utf-8", "backslashreplace"))
     _show_wrong(name, found.wrong)
-    loose = loosened(settings.tolerance)
-    if loose or not given["quiet"]:
-        what = (_problems(found.wrong) or _measured(found, settings.tolerance), loose)
-        say_line(f"{verdict}: {'; '.join(filter(None, what))}")
+    if given["as_json"]:
+        say_json(contents)
+    elif loosened(settings.tolerance) or not given["quiet"]:
+        say_line(contents["verdict_text"])
     return int(verdict is not Verdict.PASSED)
 
 
-def describe_program(data: bytes, name: str) -> tuple[str, ...]:
-    """Say in lines what an NC program holds, as far as words tell that need no machine."""
+def describe_program(data: bytes, name: str) -> dict[str, Any]:
+    """Say what an NC program holds, as far as words tell that need no machine."""
     from cornersmooth.filter.runs import ProgramReader
     from cornersmooth.filter.vocabulary import VOCABULARIES
     from cornersmooth.nc_reader.recognition import recognise_control
@@ -181,12 +237,14 @@ def describe_program(data: bytes, name: str) -> tuple[str, ...]:
 
     control = recognise_control(data[:HEAD])
     reading = ProgramReader(control if control in VOCABULARIES else "fanuc", None).read(data)
-    looks = f", looks like {control}" if control else ""
-    return (
-        f"file   {name}: an NC program{looks}, {len(reading.why)} lines",
-        f"cuts   {reading.cuts}",
-        "       'cornersmooth filter' smooths them, and says which cannot be; name the control and the machine there",
-    )
+    return {
+        "schema": "cornersmooth-info/2",
+        "name": name,
+        "format": "nc",
+        "looks_like": control or None,
+        "lines": len(reading.why),
+        "cuts": reading.cuts,
+    }
 
 
 def _problems(wrong: Sequence[Wrong]) -> str:
@@ -205,10 +263,10 @@ def _show_wrong(name: str, wrong: Sequence[Wrong]) -> None:
         print_line(f"{name}: {more(len(wrong) - _WRONG_SHOWN, 'problem')}")
 
 
-def _show(name: str, found: Filtered, tolerance: float, verbose: int, given_units: str | None) -> None:
+def _show(name: str, line: str, found: Filtered, verbose: int, given_units: str | None) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
     out = console()
-    out.print(printable(first_line(found, tolerance)), style="bold")
+    out.print(printable(line), style="bold")
     print_line(f"{name}: {found.lines} lines, {found.new_lines} after; all outside of runs is the same byte for byte")
     if found.checked is not None:
         _show_wrong(name, found.checked.wrong)
@@ -230,17 +288,50 @@ def _show(name: str, found: Filtered, tolerance: float, verbose: int, given_unit
         out.print("--tip-control says that tool tip control is on where the program begins")
 
 
-def first_line(found: Filtered, tolerance: float) -> str:
-    """Give the verdict in one line, and what settings loosen."""
-    return "; ".join(filter(None, (_verdict_text(found, tolerance), loosened(tolerance))))
+def judgement_of(found: Filtered, tolerance: float) -> Judgement:
+    """Give the verdict, and what it rests on."""
+    from cornersmooth.report.verdict import Judgement
 
-
-def _verdict_text(found: Filtered, tolerance: float) -> str:
-    what = f"{found.smoothed} of {found.cuts} cuts smoothed in {found.runs} runs"
+    what, unverified = f"{found.smoothed} of {found.cuts} cuts smoothed in {found.runs} runs", ""
     if found.checked is None:
-        return f"{found.verdict}: {what}; it was not asked for"
-    if found.checked.wrong:
-        return f"{found.verdict}: {_problems(found.checked.wrong)}; {what}"
-    if not found.runs:
-        return f"{found.verdict}: {what}; the program is the same byte for byte"
-    return f"{found.verdict}: {what} {_measured(found.checked, tolerance)}"
+        unverified = "it was not asked for"
+        what = f"{what}; {unverified}"
+    elif found.checked.wrong:
+        what = f"{_problems(found.checked.wrong)}; {what}"
+    elif not found.runs:
+        what = f"{what}; the program is the same byte for byte"
+    else:
+        what = f"{what} {_measured(found.checked, tolerance)}"
+    return Judgement(found.verdict, 0, 0, unverified, what)
+
+
+def _report(
+    kind: Kind,
+    judgement: Judgement,
+    checked: Checked | None,
+    source: tuple[str, bytes],
+    program: NcFile,
+    settings: Settings,
+    times: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """The report of a filtered program, or of one that was compared with the one it was made from."""
+    from cornersmooth.report.record import record, sha256_of
+
+    name, data = source
+    contents = record(
+        kind,
+        judgement,
+        source={"name": name, "sha256": sha256_of(data), "format": "nc"},
+        program=program,
+        settings=settings.as_dict(),
+        command=command_line(),
+        loosened=loosened(settings.tolerance),
+        times=times,
+    )
+    contents["compared"] = checked and {
+        "max_tip_deviation_mm": checked.tip,
+        "max_axis_point_deviation_mm": checked.axis_point,
+        "problem_count": len(checked.wrong),
+        "problems": [{"nc_line": one.line, "text": one.text} for one in checked.wrong],
+    }
+    return contents

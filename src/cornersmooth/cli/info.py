@@ -11,7 +11,7 @@ from cornersmooth.cli.files import read_input
 from cornersmooth.cli.options import outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import say_line
+from cornersmooth.cli.show import say_json, say_line
 
 if TYPE_CHECKING:
     from cornersmooth.report.info import Info, Spread
@@ -45,16 +45,22 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     from cornersmooth.cli.filter import describe_program
     from cornersmooth.nc_reader.recognition import first_block
     from cornersmooth.provenance import HEAD
-    from cornersmooth.report.info import describe, info_json
+    from cornersmooth.report.info import describe
 
     data, name = read_input(source, size_limit=not given["no_size_limit"])
     if first_block(data[:HEAD]):
-        for line in describe_program(data, name):
-            say_line(line)
+        told = describe_program(data, name)
+        if as_json:
+            say_json(told)
+            return 0
+        looks = f", looks like {told['looks_like']}" if told["looks_like"] else ""
+        say_line(f"file   {name}: an NC program{looks}, {told['lines']} lines")
+        say_line(f"cuts   {told['cuts']}")
+        say_line("       'cornersmooth filter' smooths them; name the control and the machine there")
         return 0
     info = describe(read(data, name=name, **reading.reading_of(given)), tolerance, axis_length)
     if as_json:
-        click.echo(info_json(info), nl=False)
+        say_json(info.as_dict())
         return 0
     rows = [row for part in (_file(info), _motion(info), _axis(info), _corners(info)) for row in part]
     width = max(len(label) for label, _ in rows)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import traceback
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
@@ -31,6 +32,9 @@ _OURS = {
     ".csv": b"corner,line,x,y,z,tip_angle_deg,",
     ".html": b"<!doctype html>\n<!-- cornersmooth page -->\n",
 }
+
+#: what becomes of a file: a verdict, nothing as before, or none of both
+STATUSES = (*map(str, Verdict), "skipped", "error", "not done")
 
 #: exit code for a fault of the program itself
 EXIT_INTERNAL = 70
@@ -82,6 +86,8 @@ class Job:
         Name of a run that does a file again where a worker was lost, although that may have written it; empty for none.
     loosened : str
         What settings made looser than the default; the line of the verdict says it.
+    command : str
+        Command line, for reports.
     """
 
     source: str
@@ -106,6 +112,7 @@ class Job:
     beginning: bool = False
     run: str = ""
     loosened: str = ""
+    command: str = ""
 
 
 @dataclass
@@ -120,8 +127,12 @@ class Outcome:
     skipped: str = ""
     #: the verdict in one line, of an earlier run where nothing had to be done; empty where there is none
     verdict_text: str = ""
+    #: whether the run was interrupted before it came to an end
+    unfinished: bool = False
     #: planned times
     saving: Saving | None = None
+    #: time of each stage, s
+    seconds: Mapping[str, float] = field(default_factory=dict)
     #: lines that standard output did not get
     held_back: int = 0
 
@@ -132,8 +143,8 @@ class Outcome:
 
     @property
     def status(self) -> str:
-        """What became of it: ``skipped``, a verdict, or ``error`` where it did not come to one."""
-        return "skipped" if self.skipped else self.verdict or "error"
+        """What became of it: ``skipped``, a verdict, or ``error`` where it did not come to one, or ``not done``."""
+        return "not done" if self.unfinished else "skipped" if self.skipped else self.verdict or "error"
 
 
 def check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | None]:
@@ -157,7 +168,7 @@ def check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | 
     if replace_target is None:
         may_replace[job.target] = None
     for path in job.reports:
-        suffix = os.path.splitext(path)[1].lower()
+        suffix = _form_of(path)
         if suffix not in _OURS:
             what = f"cannot tell the form of the report {path}"
             raise SettingsError("CS221", what, "let it end in .json, .csv or .html")
@@ -234,6 +245,7 @@ def _may_replace(job: Job, made_of: str, outcome: Outcome) -> bool | None:
 def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[str, Any]:
     """Make text and reports; a verdict that is not good enough goes to the outcome, and why there was nothing to do."""
     from cornersmooth.pipeline import postprocess
+    from cornersmooth.report import corners_csv, report_json
 
     source, name = read_input(job.source, size_limit=job.reading["size_limit"])
     made_of = ""
@@ -271,47 +283,45 @@ def _smooth_file(job: Job, outcome: Outcome, progress: Progress | None) -> dict[
         outcome.message = _say_failed(name, result, failure)
     if beginning is not None:
         outcome.held_back = beginning.held_back
-    contents = result.report()
-    contents["verdict_text"] = "; ".join(filter(None, (contents["verdict_text"], job.loosened)))
-    outcome.verdict_text = contents["verdict_text"]
-    for path in job.reports:
-        saving = _write_report(path, job, bool(may_replace[path]), source, result, contents)
-        outcome.saving = saving or outcome.saving
+    outcome.seconds = result.seconds
+    outcome.verdict_text = "; ".join(filter(None, (result.judgement.text, job.loosened)))
+    pages = [path for path in job.reports if _form_of(path) == ".html"]
+    for path in pages:
+        outcome.saving = _write_page(path, job, bool(may_replace[path]), source, result) or outcome.saving
     good = result.verdict in (Verdict.PASSED, Verdict.INCOMPLETE)
     if good and job.timed and not outcome.saving and len(result.program) <= job.plan:
-        outcome.saving = _planned(job, result, progress)
+        from cornersmooth.saving import planned_saving
+
+        outcome.saving = planned_saving(
+            result.program, result.smoothed.settings, result.form, axes=job.axes, progress=progress
+        )
+    contents = result.report(command=job.command, loosened=job.loosened, saving=outcome.saving, limits=job.axes)
+    for path in job.reports:
+        if path not in pages:
+            table = _form_of(path) == ".csv"
+            texts = corners_csv(result.smoothed, dense=not result.form.curve) if table else [report_json(contents)]
+            _write(path, texts, bool(may_replace[path]))
     return contents
 
 
-def _planned(job: Job, result: Result, progress: Progress | None) -> Saving | None:
-    from cornersmooth.saving import planned_saving
-
-    return planned_saving(result.program, result.smoothed.settings, result.form, axes=job.axes, progress=progress)
+def _form_of(path: str) -> str:
+    return os.path.splitext(path)[1].lower()
 
 
-def _write_report(
-    path: str, job: Job, may_replace: bool, source: bytes, result: Result, contents: dict[str, Any]
-) -> Saving | None:
-    """Write a report; return the times that were planned for it."""
-    from cornersmooth.report import corners_csv, report_json
+def _write_page(path: str, job: Job, may_replace: bool, source: bytes, result: Result) -> Saving | None:
+    """Write a page; return the times that were planned for it."""
+    from cornersmooth.page.pages import page_and_saving
 
-    suffix, saving = os.path.splitext(path)[1].lower(), None
-    if suffix == ".json":
-        texts = iter([report_json(contents)])
-    elif suffix == ".csv":
-        texts = corners_csv(result.smoothed, dense=not result.form.curve)
-    else:
-        from cornersmooth.page.pages import page_and_saving
+    timed = len(result.program) <= job.plan
+    page, saving = page_and_saving(result, source=source, frame=result.frame, axes=job.axes, timed=timed, tool=job.tool)
+    _write(path, [page], may_replace)
+    return saving
 
-        timed = len(result.program) <= job.plan
-        page, saving = page_and_saving(
-            result, source=source, frame=result.frame, axes=job.axes, timed=timed, tool=job.tool
-        )
-        texts = iter([page])
+
+def _write(path: str, texts: Iterable[str], may_replace: bool) -> None:
     with open_output(target_of(path), replace=may_replace) as output:
         for text in texts:
             output.stream.write(text.encode("utf-8", "backslashreplace"))  # names need not be UTF-8
-    return saving
 
 
 def _say_failed(name: str, result: Result, failure: VerdictError) -> str:

@@ -12,7 +12,7 @@ from cornersmooth.cli.files import read_input
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import progress_bar, say_line
+from cornersmooth.cli.show import progress_bar, say_json, say_line
 
 if TYPE_CHECKING:
     from cornersmooth.model import Floats
@@ -84,7 +84,6 @@ def command(source: str, **given: Any) -> int:
     from cornersmooth.cl import read
     from cornersmooth.nc import choose_form
     from cornersmooth.processes import useful_processes
-    from cornersmooth.report.timelaw import comparison_json
     from cornersmooth.setup import find_setups
 
     machine = nc_text.machine_of(given, "limits")
@@ -103,7 +102,7 @@ def command(source: str, **given: Any) -> int:
             progress=progress,
         )
     if given["as_json"]:
-        click.echo(comparison_json(found.as_dict()), nl=False)
+        say_json(found.as_dict())
     elif not given["quiet"]:
         for line in _lines(found, "the machine" if machine is None else machine.name):
             say_line(line)

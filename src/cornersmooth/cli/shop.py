@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import stat
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -82,6 +83,10 @@ class Shop:
     origins: dict[str, str] = field(default_factory=dict)
 
 
+#: key of the command line in a context
+_TYPED = f"{__name__}.typed"
+
+
 class ShopCommand(click.Command):
     """A command whose options have defaults in shop settings."""
 
@@ -92,6 +97,7 @@ class ShopCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the shop settings that go with the input, then the options."""
+        ctx.meta[_TYPED] = shlex.join(["cornersmooth", str(self.name), *args])
         if ctx.resilient_parsing:  # a shell wants to complete what is not whole yet
             with contextlib.suppress(SettingsError, click.UsageError):
                 ctx.meta[__name__] = Shop(find_files(_first_look(self, ctx, list(args))[0]))
@@ -122,6 +128,11 @@ def _name_strangers(path: str) -> None:
         print_line(f"{path}: warning: these settings are obeyed, and belong to another user")
     elif found.st_mode & stat.S_IWOTH:
         print_line(f"{path}: warning: these settings are obeyed, and anybody may change them")
+
+
+def command_line() -> str:
+    """Command line of this run, as a shell reads it."""
+    return str(click.get_current_context().meta[_TYPED])
 
 
 def loosened(tolerance: float | None) -> str:

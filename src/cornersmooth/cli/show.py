@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -92,7 +92,7 @@ def show_verdict(contents: dict[str, Any], saving: Saving | None = None) -> None
     console().print(printable(first_line(contents, saving)), style="bold")
 
 
-def show_summary(contents: dict[str, Any], verbose: int) -> None:
+def show_summary(contents: dict[str, Any], seconds: Mapping[str, float], verbose: int) -> None:
     """Print the small table of one file, and its sharp corners."""
     from rich.text import Text
 
@@ -113,15 +113,15 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
         "limited by",
         f"the tolerance ({summary['limited_by_tolerance']} of them), segment length ({summary['limited_by_segment']})",
     )
-    own_axis = settings["axis_tolerance"] is not None
-    allowed = f"tolerance {settings['tolerance']:g} mm"
+    own_axis = settings["axis_tolerance_deg"] is not None
+    allowed = f"tolerance {settings['tolerance_mm']:g} mm"
     if own_axis:
-        say("error", f"tip {summary['max_tip_error_mm']:.4f} mm, {allowed}, axis {settings['axis_tolerance']:g}°")
+        say("error", f"tip {summary['max_tip_error_mm']:.4f} mm, {allowed}, axis {settings['axis_tolerance_deg']:g}°")
     else:
         say(
             "error",
             f"tip {summary['max_tip_error_mm']:.4f} mm, axis point {summary['max_axis_error_mm']:.4f} mm "
-            f"(H {settings['axis_length']:g} mm), {allowed}",
+            f"(H {settings['axis_length_mm']:g} mm), {allowed}",
         )
     say("tool axis", f"turned by up to {summary['max_orientation_error_deg']:.4f}° from the original")
     say("method", method_text(summary))
@@ -138,8 +138,7 @@ def show_summary(contents: dict[str, Any], verbose: int) -> None:
         )
     say("blocks", f"{summary['blocks_in']} in, {summary['blocks_out']} out")
     if verbose:
-        times = ", ".join(f"{stage} {value:.3f}" for stage, value in summary["seconds"].items())
-        say("seconds", times)
+        say("seconds", ", ".join(f"{stage} {value:.3f}" for stage, value in seconds.items()))
     shown = contents["sharp"] if verbose else contents["sharp"][:_SHARP_SHOWN]
     for corner in shown:
         print_line(f"{given['name']}{sharp_text(corner)}, stays sharp")
@@ -166,6 +165,14 @@ def printable(text: str) -> str:
 def print_line(text: str) -> None:
     """Print a line to standard error: no markup, no wrapping."""
     print(printable(text), file=sys.stderr)  # noqa: T201
+
+
+def say_json(contents: Mapping[str, Any]) -> None:
+    """Print one JSON object to standard output."""
+    from cornersmooth.report import report_json
+
+    text = report_json(contents)
+    print(text.encode("utf-8", "backslashreplace").decode(), end="")  # names need not be UTF-8  # noqa: T201
 
 
 def say_line(text: str) -> None:

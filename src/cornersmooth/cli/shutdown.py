@@ -31,11 +31,14 @@ class Shutdown:
         Gives the line that is printed.
     clean : callable or None
         What is called first.
+    keep : callable or None
+        What is called after it: writes what has to outlast the run.
     """
 
     def __init__(self) -> None:
         self.say: Callable[[], str] = lambda: "interrupted"
         self.clean: Callable[[], None] | None = None
+        self.keep: Callable[[], None] | None = None
         self._owner = os.getpid()
 
     def install(self) -> None:
@@ -51,7 +54,7 @@ class Shutdown:
         code = 128 + number
         if os.getpid() != self._owner:  # forked a moment ago: all this is the parent's
             os._exit(code)
-        for step in (self.clean, _kill_children, _remove_unfinished, self._tell):
+        for step in (self.clean, _kill_children, _remove_unfinished, self.keep, self._tell):
             try:
                 if step is not None:
                     step()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -15,10 +16,19 @@ from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_in
 from cornersmooth.cli.job import Job, Outcome, check, run_job
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand, loosened
-from cornersmooth.cli.show import more, print_line, progress_bar, show_findings, show_summary, show_verdict
+from cornersmooth.cli.shop import ShopCommand, command_line, loosened
+from cornersmooth.cli.show import (
+    more,
+    print_line,
+    printable,
+    progress_bar,
+    say_json,
+    show_findings,
+    show_summary,
+    show_verdict,
+)
 from cornersmooth.cli.shutdown import Shutdown
-from cornersmooth.cli.summary import check_summary, counts_line, line_of, row_of, write_summary
+from cornersmooth.cli.summary import batch_report, check_summary, end_lines, interrupted_line, line_of, write_summary
 from cornersmooth.output import make_folder
 from cornersmooth.verdict import Verdict
 
@@ -49,6 +59,7 @@ _NAMED = 3
 @outputs.jobs
 @outputs.scheduler
 @outputs.reports
+@outputs.as_json
 @surface.tool
 @nc_text.writing_options
 @smoothing.method
@@ -94,26 +105,42 @@ def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
             outcome = run_job(jobs[0], progress)
         if outcome.held_back and not quiet:
             print_line(f"... {more(outcome.held_back, 'line')}; -o FILE writes them, -o - shows them all")
-        if outcome.contents and not quiet:
+        told = outcome.contents and not quiet and not given["as_json"]
+        if told:
             show_verdict(outcome.contents, outcome.saving)
         _tell(outcome, quiet, verbose)
-        if outcome.contents and not quiet:
-            show_summary(outcome.contents, verbose)
+        if outcome.contents and given["as_json"]:
+            say_json(outcome.contents)
+        if told:
+            show_summary(outcome.contents, outcome.seconds, verbose)
         return outcome.exit_code
-    rows, worst = [], 0
+    worst = 0
     with progress_bar(quiet, rate=True) as progress:
         batch = Batch(jobs, given["jobs"], progress, scheduler=given["scheduler"] or "")
+
+        def keep() -> None:
+            if given["summary"]:
+                write_summary(given["summary"], batch.rows())
+
+        def lines() -> Iterator[str]:
+            if not quiet:
+                yield from map(printable, end_lines(batch.rows()))
+
+        ending.keep = keep
+        ending.say = lambda: "\n".join((*lines(), interrupted_line(batch.rows())))
         for outcome in batch.run(ending):
             told = outcome.status != "error" and not quiet and (progress is None or verbose > 0)
             if told:
                 print_line(line_of(outcome))
             _tell(outcome, quiet, verbose, told)
-            rows.append(row_of(outcome))
             worst = max(worst, outcome.exit_code)
-    if given["summary"]:
-        write_summary(given["summary"], rows)
-    if not quiet:
-        print_line(counts_line(rows))
+    ending.keep = None
+    keep()
+    if given["as_json"]:
+        say_json(batch_report(batch.rows()))
+    else:
+        for line in lines():
+            print_line(line)
     return worst
 
 
@@ -165,9 +192,10 @@ def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:
                 tool=given["tool"],
                 beginning=not folder and not output and _to_terminal(),
                 plan=sys.maxsize if given["time"] else TIMED_POSES,
-                timed=not (given["quiet"] or folder),
+                timed=given["time"] or not (given["quiet"] or folder),
                 axes=nc_text.machine_of(given, "limits"),
                 loosened=loosened(settings.tolerance),
+                command=command_line(),
             )
         )
     _check_targets(jobs)
@@ -183,6 +211,8 @@ def _check_usage(inputs: tuple[str, ...], given: dict[str, Any]) -> None:
     """Refuse options that do not go together, or not with so many inputs."""
     folder = given["directory"]
     check_together(inputs, given)
+    if given["as_json"] and not folder and given["output"] in (None, STANDARD):
+        raise click.UsageError("--json needs -o FILE or -d FOLDER: standard output is for the JSON object")
     if given["summary"] and not folder:
         raise click.UsageError("--summary is for batches, which need -d FOLDER; --report tells of a single file")
     if given["scheduler"] and (not folder or given["jobs"] != 1):

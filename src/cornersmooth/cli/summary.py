@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from cornersmooth.cli.batch import STATUSES
 from cornersmooth.cli.files import target_of
-from cornersmooth.cli.job import Outcome
+from cornersmooth.cli.job import STATUSES, Outcome
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
 from cornersmooth.verdict import Verdict
@@ -34,9 +32,39 @@ def line_of(outcome: Outcome) -> str:
 def _second(contents: Mapping[str, Any]) -> str:
     """What is told of the axis."""
     summary = contents["summary"]
-    if contents["settings"]["axis_tolerance"] is not None:
+    if contents["settings"]["axis_tolerance_deg"] is not None:
         return f"tool axis {summary['max_orientation_error_deg']:.4f}°"
     return f"axis point {summary['max_axis_error_mm']:.4f} mm"
+
+
+def end_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Say at the end of a batch what is to be looked at: each failure, the warnings by code, the counts."""
+    for row in rows:
+        if row["exit_code"]:
+            what = row["verdict_text"].partition(": ")[2] if row["verdict"] else row["reason"].splitlines()[0]
+            name = "" if what.startswith(row["source"]) else f"{row['source']}: "
+            yield f"{row['status']:<8}  {name}{what}"
+    for code, found in warnings_of(rows).items():
+        files = f"{found['files']} file{'s' * (found['files'] != 1)}"
+        yield f"warning   {code} in {files}, {found['count']} times, as in {found['first']}: {found['text']}"
+    yield counts_line(rows)
+
+
+def interrupted_line(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Say how far an interrupted batch came."""
+    ready = sum(row["status"] not in ("error", "not done", Verdict.FAILED) for row in rows)
+    return f"interrupted: {ready} of {len(rows)} done; run again to continue"
+
+
+def warnings_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Count the warnings of all files by their codes, those in the most files first."""
+    found: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        for code, (count, text) in row["warnings"].items():
+            own = found.setdefault(code, {"files": 0, "count": 0, "first": row["source"], "text": text})
+            own["files"] += 1
+            own["count"] += count
+    return dict(sorted(found.items(), key=lambda item: (-item[1]["files"], item[0])))
 
 
 def counts_line(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -58,7 +86,6 @@ def row_of(outcome: Outcome) -> dict[str, Any]:
     """Everything that is told of a file; None where there is nothing to tell."""
     contents = outcome.contents
     summary = contents.get("summary", {})
-    seconds = summary.get("seconds")
     return {
         "source": outcome.job.source,
         "output": outcome.job.target,
@@ -77,8 +104,19 @@ def row_of(outcome: Outcome) -> dict[str, Any]:
         "max_axis_error_mm": summary.get("max_axis_error_mm"),
         "blocks": summary.get("blocks_out"),
         "findings": len(contents["findings"]) if contents else None,
-        "seconds": round(sum(seconds.values()), 6) if seconds else None,
+        "warnings": _warnings(contents.get("findings", ())),
+        "seconds": round(sum(outcome.seconds.values()), 6) if outcome.seconds else None,
     }
+
+
+def _warnings(findings: Iterable[Mapping[str, Any]]) -> dict[str, tuple[int, str]]:
+    """How often each warning was met, and the first text that it has."""
+    found: dict[str, tuple[int, str]] = {}
+    for finding in findings:
+        if finding["severity"] == "warning":
+            count, text = found.get(finding["code"], (0, finding["text"]))
+            found[finding["code"]] = (count + finding["count"], text)
+    return dict(sorted(found.items()))
 
 
 def check_summary(path: str) -> None:
@@ -93,16 +131,31 @@ def check_summary(path: str) -> None:
         raise SettingsError("CS221", f"cannot tell the form of the summary {path}", "let it end in .json or .csv")
 
 
-def write_summary(path: str, rows: list[dict[str, Any]]) -> None:
+def batch_report(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What became of a batch: counts, warnings by code, a row for each file."""
+    return {
+        "schema": "cornersmooth-batch/2",
+        "counts": {status: sum(row["status"] == status for row in rows) for status in STATUSES},
+        "warnings": warnings_of(rows),
+        "files": [{**row, "warnings": _counts(row)} for row in rows],
+    }
+
+
+def write_summary(path: str, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write a row for each file, as `row_of` gives them; as JSON, with the counts."""
+    from cornersmooth.report.record import report_json
+
     text = io.StringIO()
     if path.lower().endswith(".json"):
-        counts = {status: sum(row["status"] == status for row in rows) for status in STATUSES}
-        whole = {"schema": "cornersmooth-batch/1", "counts": counts, "files": rows}
-        text.write(json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+        text.write(report_json(batch_report(rows)))
     else:
         table = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
         table.writeheader()
-        table.writerows(rows)
+        told = ("; ".join(f"{code} {count}" for code, count in _counts(row).items()) for row in rows)
+        table.writerows({**row, "warnings": warnings} for row, warnings in zip(rows, told, strict=True))
     with open_output(target_of(path)) as output:
         output.stream.write(text.getvalue().encode("utf-8", "backslashreplace"))
+
+
+def _counts(row: Mapping[str, Any]) -> dict[str, int]:
+    return {code: count for code, (count, _) in row["warnings"].items()}

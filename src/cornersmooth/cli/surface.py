@@ -11,7 +11,7 @@ from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_inpu
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import say_line
+from cornersmooth.cli.show import say_json, say_line
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
 
@@ -41,6 +41,7 @@ _SUFFIXES = (".json", ".csv", ".html", ".png", ".svg", ".pdf")
 @nc_text.no_tcp
 @reading.reading_options
 @outputs.surface_reports
+@outputs.as_json
 @outputs.force
 @outputs.quiet
 def command(source: str, text: str, **given: Any) -> int:
@@ -91,7 +92,9 @@ def command(source: str, text: str, **given: Any) -> int:
         with open_output(target_of(path)) as output:
             for part in _report(path, program, data, nc, found, given):
                 output.stream.write(part)
-    if not given["quiet"]:
+    if given["as_json"]:
+        say_json(found.as_dict())
+    elif not given["quiet"]:
         for line in surface_lines(found):
             say_line(line)
     return 0 if found.kept else 1
@@ -117,11 +120,12 @@ def _tool(program: Program, asked: Tool | None) -> Tool:
 
 def _report(path: str, program: Program, source: bytes, nc: Any, found: SurfaceMap, given: dict[str, Any]) -> Any:
     """Parts of a report, as bytes."""
-    from cornersmooth.report.surface import draw_surface, surface_csv, surface_json
+    from cornersmooth.report import report_json
+    from cornersmooth.report.surface import draw_surface, surface_csv
 
     suffix = os.path.splitext(path)[1].lower()
     if suffix == ".json":
-        yield surface_json(found).encode("utf-8")
+        yield report_json(found.as_dict()).encode("utf-8")
     elif suffix == ".csv":
         for part in surface_csv(found):
             yield part.encode("utf-8")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ from cornersmooth.cli.files import check_inputs, check_path, read_input, target_
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import print_line, progress_bar, say_line
+from cornersmooth.cli.show import print_line, progress_bar, say_json, say_line
 from cornersmooth.methods import METHODS
 from cornersmooth.output import open_output
 
@@ -111,9 +110,7 @@ def command(source: str, **given: Any) -> int:
             for text in timelaw_csv(compared.laws[given["law"]]):
                 output.stream.write(text.encode("utf-8"))
     if given["as_json"]:
-        from cornersmooth.report.timelaw import comparison_json
-
-        click.echo(comparison_json(compared.as_dict()), nl=False)
+        say_json(compared.as_dict())
     elif not given["quiet"]:
         for line in _tables(compared, bool(given["verbose"])):
             say_line(line)
@@ -181,7 +178,7 @@ def _by_own_law(data: bytes, name: str, given: dict[str, Any]) -> int:
     seconds = timing.written(text, program)[0]
     if given["as_json"]:
         contents = {"seconds": {"unsmoothed": before, "as_written": seconds}, "unsmoothed": against}
-        click.echo(json.dumps({"schema": "cornersmooth-time/1", **contents, "law": law_of_lines(timing)}, indent=1))
+        say_json({"schema": "cornersmooth-time/1", **contents, "law": law_of_lines(timing)})
     elif not given["quiet"]:
         say_line(f"{before:>12.3f} s  {against}")
         say_line(f"{seconds:>12.3f} s  as written")

@@ -15,16 +15,16 @@ import click
 from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_input, read_lines, target_of
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
-from cornersmooth.cli.shop import ShopCommand, loosened
-from cornersmooth.cli.show import more, print_line, say_line, show_findings
+from cornersmooth.cli.shop import ShopCommand, command_line, loosened
+from cornersmooth.cli.show import more, print_line, say_json, say_line, show_findings
 from cornersmooth.errors import SettingsError
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import open_output
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
-    from cornersmooth.model import Program
     from cornersmooth.nc_reader import NcProgram, Problem
+    from cornersmooth.report import NcFile
     from cornersmooth.report.deviation_profile import Distribution
     from cornersmooth.verify import Verification, Where
 
@@ -60,6 +60,7 @@ _ALIKE = 1e-9
 @reading.reading_options
 @reading.tool_options
 @outputs.found_reports
+@outputs.as_json
 @surface.tool
 @outputs.force
 @outputs.quiet
@@ -87,9 +88,12 @@ def command(source: str, text: str, **given: Any) -> int:
     from cornersmooth.nc_reader.recognition import first_block
     from cornersmooth.nc_reader.source import readable_twice
     from cornersmooth.provenance import HEAD
-    from cornersmooth.report import findings_table
+    from cornersmooth.report import findings_table, report_json
     from cornersmooth.report.deviation_profile import deviation_along
+    from cornersmooth.report.record import cl_file, record, sha256_of
     from cornersmooth.report.verdict import judge, trusted_blocks
+    from cornersmooth.report.verification import verification_csv
+    from cornersmooth.settings import UNITS
     from cornersmooth.verify import useful_processes, verify
 
     if source == text == STANDARD:
@@ -99,7 +103,7 @@ def command(source: str, text: str, **given: Any) -> int:
     _check_outputs(source, text, given)
     data, name = read_input(source, size_limit=not given["no_size_limit"])
     if first_block(data[:HEAD]):
-        return verify_with_program(data, text, given)
+        return verify_with_program(name, data, text, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)
     own = own_words(nc_text.control_of(given))
@@ -109,7 +113,7 @@ def command(source: str, text: str, **given: Any) -> int:
     how = {**measures, **reader}
     program = read(data, name=name, **reading.reading_of(given))
     pages = [path for path in given["reports"] if path.lower().endswith(".html")]
-    if given["verbose"] or pages:  # it is looked at more than once
+    if given["verbose"] or given["reports"] or given["as_json"]:  # it is looked at more than once
         nc = readable_twice(nc)
     trusted = [line for path in given["trusted"] for line in read_lines(path)]
     if head.remark:  # first: what follows may be hard to understand without it
@@ -127,7 +131,23 @@ def command(source: str, text: str, **given: Any) -> int:
     found = replace(found, taken_from_head=head.taken).not_verified(*head.loose)
     if head.problem is not None:
         found = found.with_problem(head.problem)
-    _write_reports(program, found, [path for path in given["reports"] if path not in pages])
+    findings = (*program.findings, *trusted_blocks(found))
+    loose = loosened(given["tolerance"])
+    contents = record(
+        "verify",
+        judge(found, findings),
+        source=cl_file(program, sha256_of(data)),
+        program=_nc_file(text, nc, head.form, given),
+        settings={f"{name}_{UNITS[name]}": value for name, value in measures.items()},
+        findings=findings,
+        command=command_line(),
+        loosened=loose,
+    )
+    contents["verification"] = found.to_dict()
+    for path in given["reports"]:
+        if path not in pages:
+            table = path.lower().endswith(".csv")
+            _write(path, verification_csv(program, found) if table else [report_json(contents)])
     if pages:
         from cornersmooth.page import verified_page
 
@@ -139,10 +159,10 @@ def command(source: str, text: str, **given: Any) -> int:
             _write(path, [page])
     for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
         print_line(line)
-    findings = (*program.findings, *trusted_blocks(found))
-    loose = loosened(given["tolerance"])
-    verdict = "; ".join(filter(None, (judge(found, findings).text, loose)))
-    if given["quiet"]:
+    verdict = contents["verdict_text"]
+    if given["as_json"]:
+        say_json(contents)
+    elif given["quiet"]:
         if loose or found.verdict not in (Verdict.PASSED, Verdict.FAILED):
             print_line(f"{text}: {verdict}")
     else:
@@ -169,6 +189,8 @@ class _Head:
         What is not verified because the program itself loosens the check.
     weights : tuple of float or None
         Weights of its curves; None for any.
+    form : str or None
+        In which it was written; None where it does not say.
     remark : str
         What is strange about it; empty for nothing.
     problem : Problem or None
@@ -177,6 +199,7 @@ class _Head:
     taken: tuple[str, ...] = ()
     loose: tuple[str, ...] = ()
     weights: tuple[float, ...] | None = None
+    form: str | None = None
     remark: str = ""
     problem: Problem | None = None
 
@@ -218,7 +241,7 @@ def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source
         text = "the program was made from another CL file, or that has changed since: its SHA-256 is another"
         problem = Problem("CS567", 0, 1, text)
     loose = tuple(_loose(before, given, set(words)))
-    return _Head(tuple(taken), loose, made.weights, problem=problem)
+    return _Head(tuple(taken), loose, made.weights, made.form, problem=problem)
 
 
 def _typed(context: click.Context, name: str) -> bool:
@@ -282,11 +305,20 @@ def _check_outputs(source: str, text: str, given: dict[str, Any]) -> None:
         check_path(path, [source, text], force=given["force"])
 
 
-def _write_reports(program: Program, found: Verification, paths: list[str]) -> None:
-    from cornersmooth.report.verification import verification_csv, verification_json
+def _nc_file(text: str, nc: bytes | str | os.PathLike[str], form: str | None, given: dict[str, Any]) -> NcFile:
+    """What is told of the program; its hash only where it can be read again."""
+    from cornersmooth.report import NcFile
+    from cornersmooth.report.record import sha256_of
 
-    for path in paths:
-        _write(path, verification_csv(program, found) if path.lower().endswith(".csv") else [verification_json(found)])
+    machine = nc_text.machine_of(given)
+    return NcFile(
+        name=None if text == STANDARD else text,
+        sha256=sha256_of(nc) if isinstance(nc, bytes) or os.path.isfile(nc) else None,
+        control=nc_text.control_of(given).name,
+        form=form,
+        machine=None if machine is None else machine.name,
+        tcp=not given["no_tcp"],
+    )
 
 
 def _write(path: str, parts: Iterable[str]) -> None:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics.dynamics import LINEAR
 from cornersmooth.kinematics.machine import Machine
-from cornersmooth.kinematics.poses import solutions, tool_axis
+from cornersmooth.kinematics.poses import Solutions, solutions, tool_axis
 from cornersmooth.kinematics.position import machine_position
 from cornersmooth.kinematics.travel import nose_position
+from cornersmooth.model import Floats
 
 _WORD = re.compile(r"([A-Za-z])\s*=?\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -53,42 +57,106 @@ def parse_pose(machine: Machine, text: str) -> dict[str, float]:
     return pose
 
 
-def describe_pose(machine: Machine, pose: Mapping[str, float]) -> str:
-    """Say which way the tool points and where the linear axes stand, in a few lines.
+@dataclass(frozen=True)
+class Posed:
+    """A machine at given rotary angles.
 
     Parameters
     ----------
     machine : Machine
-    pose : mapping of str to float
-        Degrees of the rotary words, mm of the tip in part coordinates: all of them, as `parse_pose` gives them.
+    angles : (2,) float64, degrees
+        In the order of the machine's axes; zero for those that it has not.
+    tip : (3,) float64, mm
+        In part coordinates.
     """
-    angles = np.array([[*(pose[name] for name in machine.names), 0.0, 0.0][:2]])
-    tip = np.array([[pose[name] for name in LINEAR]])
-    axis = tool_axis(machine, angles)
-    words, nose = machine_position(machine, tip, angles)[0], nose_position(machine, tip, angles)[0]
-    lines = [
-        f"{machine.name} at {_rotary(machine, angles[0])} deg" if machine.names else machine.name,
-        f"  tool vector       {_words('IJK', axis[0], 7)}",
-        f"  tip on the part   {_words(LINEAR, tip[0])} mm",
-        f"  machine position  {_words(LINEAR, words)} mm, from the zero of the part, tool length taken off",
-        f"  spindle nose      {_words(LINEAR, nose)} mm with the heads at zero, as travel and points are given",
-    ]
-    found = solutions(machine, axis)
-    if found.singular[0]:
-        lines.append(f"  at the pole: {machine.names[0]} does not turn the tool axis")
-    elif len(machine.names) == 2:
-        other = [pair for pair in found.angles[0] if np.abs(_turned(pair - angles[0])).max() > _SAME]
-        told = " or ".join(_rotary(machine, pair) for pair in other[:1])
-        lines += [f"  same tool vector  {told} deg"] * bool(told)
-    for index, axis_of in enumerate(machine.axes):
-        value = float(angles[0, index])
-        if not axis_of.low <= value <= axis_of.high:
-            lines.append(f"  beyond the limits: {axis_of.name} goes from {axis_of.low:g} to {axis_of.high:g} deg")
-    for item in machine.travel:
-        value = float(nose[LINEAR.index(item.name)])
-        if not item.low <= value <= item.high:
-            lines.append(f"  beyond the travel: {item.name} goes from {item.low:g} to {item.high:g} mm")
-    return "\n".join(lines)
+
+    machine: Machine
+    angles: Floats
+    tip: Floats
+
+    @classmethod
+    def of(cls, machine: Machine, pose: Mapping[str, float]) -> Posed:
+        """Take the words of a pose, all of them, as `parse_pose` gives them."""
+        angles = [*(pose[name] for name in machine.names), 0.0, 0.0][:2]
+        return cls(machine, np.array(angles), np.array([pose[name] for name in LINEAR]))
+
+    @cached_property
+    def axis(self) -> Floats:
+        """(3,) unit vector from the tip to the spindle, in part coordinates."""
+        found: Floats = tool_axis(self.machine, self.angles[None])[0]
+        return found
+
+    @cached_property
+    def position(self) -> Floats:
+        """(3,) words of the linear axes, mm, from the zero of the part, the tool length taken off."""
+        found: Floats = machine_position(self.machine, self.tip[None], self.angles[None])[0]
+        return found
+
+    @cached_property
+    def nose(self) -> Floats:
+        """(3,) place of the spindle nose, mm, with the heads at zero: as travel and points are given."""
+        found: Floats = nose_position(self.machine, self.tip[None], self.angles[None])[0]
+        return found
+
+    @cached_property
+    def _found(self) -> Solutions:
+        return solutions(self.machine, self.axis[None])
+
+    @property
+    def other(self) -> Floats | None:
+        """(2,) other angles with the same tool vector, degrees; None where there are none, and at the pole."""
+        if self._found.singular[0] or len(self.machine.names) != 2:
+            return None
+        others = [pair for pair in self._found.angles[0] if np.abs(_turned(pair - self.angles)).max() > _SAME]
+        return others[0] if others else None
+
+    @property
+    def beyond(self) -> list[str]:
+        """What is beyond the limits of the rotary axes, and beyond the travel."""
+        rotary = zip(self.machine.axes, self.angles.tolist(), strict=False)
+        linear = ((item, float(self.nose[LINEAR.index(item.name)])) for item in self.machine.travel)
+        return [
+            f"beyond the {word}: {item.name} goes from {item.low:g} to {item.high:g} {unit}"
+            for word, unit, places in (("limits", "deg", rotary), ("travel", "mm", linear))
+            for item, value in places
+            if not item.low <= value <= item.high
+        ]
+
+    def describe(self) -> str:
+        """Say which way the tool points and where the linear axes stand, in a few lines."""
+        machine = self.machine
+        told = "with the heads at zero, as travel and points are given"
+        lines = [
+            f"{machine.name} at {_rotary(machine, self.angles)} deg" if machine.names else machine.name,
+            f"  tool vector       {_words('IJK', self.axis, 7)}",
+            f"  tip on the part   {_words(LINEAR, self.tip)} mm",
+            f"  machine position  {_words(LINEAR, self.position)} mm, from the zero of the part, tool length taken off",
+            f"  spindle nose      {_words(LINEAR, self.nose)} mm {told}",
+        ]
+        if self._found.singular[0]:
+            lines.append(f"  at the pole: {machine.names[0]} does not turn the tool axis")
+        elif self.other is not None:
+            lines.append(f"  same tool vector  {_rotary(machine, self.other)} deg")
+        return "\n".join((*lines, *(f"  {text}" for text in self.beyond)))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values; keys carry their unit."""
+
+        def named(angles: Floats) -> dict[str, float]:
+            return dict(zip(self.machine.names, angles.tolist(), strict=False))
+
+        return {
+            "schema": "cornersmooth-pose/1",
+            "machine": self.machine.name,
+            "angles_deg": named(self.angles),
+            "tool_vector": self.axis.tolist(),
+            "tip_mm": self.tip.tolist(),
+            "machine_position_mm": self.position.tolist(),
+            "spindle_nose_mm": self.nose.tolist(),
+            "singular": bool(self._found.singular[0]),
+            "other_angles_deg": None if self.other is None else named(self.other),
+            "beyond": self.beyond,
+        }
 
 
 def _rotary(machine: Machine, angles: np.ndarray) -> str:

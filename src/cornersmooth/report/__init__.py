@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +10,7 @@ import numpy as np
 from cornersmooth.errors import Finding
 from cornersmooth.model import Floats, Ints, LimitedBy, Move, SmoothProgram, Status, Trait
 from cornersmooth.report.corners import corner_table, worst_corners
+from cornersmooth.report.record import SCHEMA, NcFile, cl_file, findings_table, record, report_json
 from cornersmooth.report.verdict import judge, sharp_corners
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import dot, norm
@@ -19,9 +18,7 @@ from cornersmooth.vectors import dot, norm
 if TYPE_CHECKING:
     from cornersmooth.verify import Verification
 
-__all__ = ["SCHEMA", "corners_csv", "report", "report_json"]
-
-SCHEMA = "cornersmooth-report/1"
+__all__ = ["SCHEMA", "NcFile", "corners_csv", "findings_table", "report", "report_json"]
 
 _CSV_BLOCK = 4096
 
@@ -31,12 +28,16 @@ def report(
     *,
     dense: bool = True,
     blocks_out: int | None = None,
-    seconds: Mapping[str, float] | None = None,
     findings: tuple[Finding, ...] = (),
     verification: Verification | None = None,
     unverified: str = "",
+    source_sha256: str = "",
+    nc_file: NcFile | None = None,
+    command: str = "",
+    loosened: str = "",
+    times: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Everything the JSON report says (docs/smooth.md); keys carry their unit.
+    """Everything that the JSON report of ``smooth`` says; ``report.schema.json`` describes it.
 
     Parameters
     ----------
@@ -44,22 +45,21 @@ def report(
         Whether transitions are written as lines, not as curves: where their legs are unequal, errors differ.
     blocks_out : int, optional
         NC blocks written.
-    seconds : mapping, optional
-        Time of each stage.
     findings : tuple of Finding
         Those of the writer, besides those of the program.
     verification : Verification, optional
-        What `cornersmooth.verify` measured in the written text.
+        What `cornersmooth.verify` measured in the written program.
     unverified : str
-        What of the text was not verified, and why; empty for nothing.
+        What was not verified, and why; empty for nothing.
+    source_sha256 : str
+        Of the CL file; empty where it is not known.
+    nc_file : NcFile, optional
+    command, loosened, times
+        As `record` has them.
     """
-    from cornersmooth import __version__
-
     told = (*smoothed.findings, *findings)
-    judgement = judge(verification, told, unverified)
     program, corners = smoothed.program, smoothed.corners
     done, runs = corners.rounded, smoothed.runs
-    chains = program.chains
     worst = worst_corners(smoothed, dense=dense)
     sharp, listed = sharp_corners(smoothed)
     own = smoothed.settings.axis_tolerance is not None  # bounds of runs hold at another distance from the tip then
@@ -83,7 +83,6 @@ def report(
         "length_mm": _feed_length(smoothed),
         "blocks_in": int(np.count_nonzero(program.kind != Move.FROM)),
         "blocks_out": blocks_out,
-        "seconds": dict(seconds or {}),
     }
     if runs is not None:
         summary["runs"] = len(runs)
@@ -91,40 +90,21 @@ def report(
         summary["control_points"] = len(runs.control)
         summary["control_points_per_pose"] = len(runs.control) / max(len(runs.pose), 1)
     summary |= construction_of(smoothed.settings.method).report_summary(corners)
-    contents: dict[str, Any] = {
-        "schema": SCHEMA,
-        **judgement.as_dict(),
-        "not_verified": judgement.unverified,
-        "tool": {"name": "cornersmooth", "version": __version__},
-        "input": {
-            "name": program.source.name,
-            "format": program.source.format,
-            "dialect": program.source.dialect,
-            "units": program.units,
-            "poses": len(program),
-            "feed_moves": int(np.isin(program.kind, (Move.LINEAR, Move.ARC)).sum()),
-            "statements": len(program.statements),
-            "chains": len(chains),
-        },
-        "settings": smoothed.settings.as_dict(),
-        "summary": summary,
-        "findings": findings_table(told),
-        "worst": _records(smoothed, worst.rows, dense=dense),
-        "sharp": listed,
-    }
+    contents = record(
+        "smooth",
+        judge(verification, told, unverified),
+        source=cl_file(program, source_sha256),
+        program=nc_file,
+        settings=smoothed.settings.as_dict(),
+        findings=told,
+        command=command,
+        loosened=loosened,
+        times=times,
+    )
+    contents |= {"summary": summary, "worst": _records(smoothed, worst.rows, dense=dense), "sharp": listed}
     if verification is not None:
         contents["verification"] = verification.to_dict()
     return contents
-
-
-def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
-    """Findings as plain values."""
-    return [{**asdict(finding), "to_check": finding.to_check} for finding in findings]
-
-
-def report_json(contents: Mapping[str, Any]) -> str:
-    """Contents as JSON text; numbers that JSON has no word for (NaN, infinity) become null."""
-    return json.dumps(_plain(contents), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def corners_csv(smoothed: SmoothProgram, *, dense: bool = True) -> Iterator[str]:
@@ -164,13 +144,3 @@ def _feed_length(smoothed: SmoothProgram) -> float:
     rise = dot(end - start, arcs.normal)
     spoke = spoke - dot(spoke, arcs.normal)[:, None] * arcs.normal
     return straight + float(np.hypot(norm(spoke) * arcs.sweep, rise).sum())
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None
-    return value

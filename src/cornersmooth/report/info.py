@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from dataclasses import asdict, dataclass
 from typing import Any, Final, Literal
@@ -16,7 +15,7 @@ from cornersmooth.smoothing.axis_steps import axis_step_findings
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import angle_between, dot, norm
 
-SCHEMA: Final = "cornersmooth-info/1"
+SCHEMA: Final = "cornersmooth-info/2"
 
 #: change of the axis, rad, below which it is seen as standing still: six printed decimals leave 1e-6
 AXIS_NOISE: Final = 1e-5
@@ -206,11 +205,6 @@ def describe(program: Program, tolerance: float, axis_length: float) -> Info:
         corners=_corners(program, settings),
         findings=(*program.findings, *axis_step_findings(program, settings)),
     )
-
-
-def info_json(info: Info) -> str:
-    """Info as JSON text."""
-    return json.dumps(info.as_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 @dataclass(frozen=True)

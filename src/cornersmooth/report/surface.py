@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from io import BytesIO
 from typing import Any
@@ -27,11 +26,6 @@ _COLOURS = ("#a63603", "#d9540d", "#f08a3c", "#eebb88", "#c9c9c9", "#9ecae1", "#
 
 #: points drawn
 _POINTS = 30_000
-
-
-def surface_json(surface: SurfaceMap) -> str:
-    """One JSON object with a final line end."""
-    return json.dumps(surface.as_dict(), indent=1, allow_nan=False) + "\n"
 
 
 def surface_csv(surface: SurfaceMap) -> Iterator[str]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -63,8 +61,3 @@ def axis_columns(law: TimeLaw) -> tuple[str, ...]:
     if law.machine_axes is None:
         return ()
     return tuple(f"machine_{name.lower()}_{'mm' if name in LINEAR else 'deg'}" for name in law.machine_axes.names)
-
-
-def comparison_json(contents: Mapping[str, Any]) -> str:
-    """`Comparison.as_dict` as JSON text."""
-    return json.dumps(contents, indent=1, ensure_ascii=False, allow_nan=False) + "\n"

@@ -1,8 +1,7 @@
-"""What the verification found, as JSON, as CSV and as lines to read."""
+"""What the verification found, as CSV and as lines to read."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 
 import numpy as np
@@ -31,11 +30,6 @@ _ROWS = 20
 
 #: rows of CSV text made at a time
 _BLOCK = 10_000
-
-
-def verification_json(found: Verification) -> str:
-    """One JSON object with a final line end."""
-    return json.dumps(found.to_dict(), indent=1, sort_keys=False, allow_nan=False) + "\n"
 
 
 def verification_csv(program: Program, found: Verification) -> Iterator[str]:

@@ -49,6 +49,13 @@ reports = click.option(
     help="Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} is "
     "the input's name.",
 )
+json_reports = click.option(
+    "--report",
+    "reports",
+    type=PATH,
+    multiple=True,
+    help="Write what was done: .json. May be repeated; {stem} stands for the input's name.",
+)
 found_reports = click.option(
     "--report",
     "reports",
