@@ -33,9 +33,7 @@ def test_curves_bend_no_more(seed, second, weighted):
     curves = Curves(
         np.arange(count),
         np.full(count, order),
-        np.arange(count) * points,
         np.full(count, points),
-        np.arange(count) * len(knot),
         np.concatenate((tip, other), axis=2).reshape(-1, 6),
         weight.ravel(),
         np.tile(knot, count),

@@ -22,7 +22,7 @@ Where is what:
 - tables to elements: `reader` holds the modal state, `execution` executes: `arcs`, `splines`, `long_curves`, `rotary`;
   `needed_states` says which words want another state; `way_back` leads back from retracts,
   `left_cuts` back into cuts
-- what comes out: `path_elements`, `elements`; `ahead` reads on as far as need be, `curves` evaluates, `reading` puts a
+- what comes out: `elements`; `ahead` reads on as far as need be, `curves` evaluates, `reading` puts a
   whole text together
 """
 

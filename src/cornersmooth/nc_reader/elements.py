@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
+from functools import cached_property
 from typing import Any, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Units
+from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
 
 #: what the second triple of a motion block is: the tool vector, or a point on the tool axis
 Second = Literal["vector", "point"]
@@ -32,63 +33,96 @@ class Curves:
     Parameters
     ----------
     element : (c,) int64
-        Index of the path element each curve is.
-    order : (c,) int64
-        Degree plus one.
-    first_point, points : (c,) int64
-        Where a curve's control points start in the tables below, and how many there are.
-    first_knot : (c,) int64
-        Where its ``points + order`` knots start.
+        Index of the path element each curve is, ascending; while a run is executed, of the block it begins with.
+    order, points : (c,) int64
+        Degree plus one, and how many control points there are.
     point : (p, 6) float64
         Control points of tip and of tool vector or axis point, mm (vectors: 1).
     weight : (p,) float64
     knot : (q,) float64
+        ``points + order`` of each curve.
+    end : (c,) int64
+        The block each curve ends with, while a run is executed.
     """
 
     element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     order: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    first_point: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     points: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    first_knot: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     point: Floats = field(default_factory=lambda: np.zeros((0, 6)))
     weight: Floats = field(default_factory=lambda: np.zeros(0))
     knot: Floats = field(default_factory=lambda: np.zeros(0))
+    end: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __len__(self) -> int:
         return len(self.element)
+
+    @cached_property
+    def first_point(self) -> Ints:
+        """(c,) where the control points of each curve start."""
+        first: Ints = np.cumsum(self.points) - self.points
+        return first
+
+    @cached_property
+    def first_knot(self) -> Ints:
+        """(c,) where the knots of each curve start."""
+        size = self.points + self.order
+        first: Ints = np.cumsum(size) - size
+        return first
 
     def part(self, first: int, stop: int) -> Curves:
         """Curves that are elements from `first` to `stop`, the latter excluded."""
         a, b = np.searchsorted(self.element, (first, stop)).tolist()
         if a == b:
             return Curves()
-        order, points = self.order[a:b], self.points[a:b]
         point, knot = int(self.first_point[a]), int(self.first_knot[a])
-        last_point = int(self.first_point[b - 1] + points[-1])
-        last_knot = int(self.first_knot[b - 1] + points[-1] + order[-1])
+        last_point = int(self.first_point[b - 1] + self.points[b - 1])
+        last_knot = int(self.first_knot[b - 1] + self.points[b - 1] + self.order[b - 1])
         return Curves(
             self.element[a:b] - first,
-            order,
-            self.first_point[a:b] - point,
-            points,
-            self.first_knot[a:b] - knot,
+            self.order[a:b],
+            self.points[a:b],
             self.point[point:last_point],
             self.weight[point:last_point],
             self.knot[knot:last_knot],
+            self.end[a:b],
+        )
+
+    def only(self, chosen: Ints) -> Curves:
+        """Some of the curves."""
+        place, at = slices(self.points, chosen), slices(self.points + self.order, chosen)
+        return Curves(
+            self.element[chosen],
+            self.order[chosen],
+            self.points[chosen],
+            self.point[place],
+            self.weight[place],
+            self.knot[at],
+            self.end[chosen],
         )
 
     @classmethod
-    def joined(cls, parts: Sequence[Curves], start: Sequence[int]) -> Curves:
-        """Curves of parts of a text whose elements are counted from `start` on."""
+    def joined(cls, parts: Sequence[Curves], start: Sequence[int] | None = None) -> Curves:
+        """Curves of several tables, whose elements are counted from `start` on, in the order of their elements."""
+        start = [0] * len(parts) if start is None else start
         pairs = [(part, first) for part, first in zip(parts, start, strict=False) if len(part)]
         if not pairs:
             return cls()
-        own = {name: np.concatenate([getattr(part, name) for part, _ in pairs]) for name in vars(pairs[0][0])}
+        if len(pairs) == 1 and not pairs[0][1]:
+            return pairs[0][0]
+        own = {one.name: np.concatenate([getattr(part, one.name) for part, _ in pairs]) for one in fields(cls)}
         own["element"] = np.concatenate([part.element + first for part, first in pairs])
-        own["first_point"] = np.cumsum(own["points"]) - own["points"]
-        size = own["points"] + own["order"]
-        own["first_knot"] = np.cumsum(size) - size
-        return cls(**own)
+        whole = cls(**own)
+        rises = (np.diff(whole.element) >= 0).all()
+        return whole if rises else whole.only(np.argsort(whole.element, kind="stable"))
+
+
+def slices(size: Ints, chosen: Ints) -> Ints:
+    """Indices of the parts `chosen` of a table that consists of parts of given sizes."""
+    first = np.cumsum(size) - size
+    count = size[chosen]
+    start = np.cumsum(count) - count
+    index: Ints = np.arange(int(count.sum())) + np.repeat(first[chosen] - start, count)
+    return index
 
 
 @dataclass(frozen=True)
@@ -222,11 +256,11 @@ class Elements:
     feed_room: Floats
     second_room: Floats
     tip_room: Floats
-    curves: Curves
-    arcs: NcArcs
-    second_is: Second
-    tip_step: float
-    second_step: float
+    curves: Curves = field(default_factory=Curves)
+    arcs: NcArcs = field(default_factory=NcArcs)
+    second_is: Second = "vector"
+    tip_step: float = 0.0
+    second_step: float = 0.0
     rotary: bool = False
 
     def __len__(self) -> int:
@@ -237,6 +271,25 @@ class Elements:
         rows = slice(first, stop)
         own: dict[str, Any] = {name: getattr(self, name)[rows] for name in _COLUMNS}
         return replace(self, **own, curves=self.curves.part(first, stop), arcs=self.arcs.part(first, stop))
+
+    def only(self, kept: Bools) -> Elements:
+        """Those of the elements, among them all curves and arcs."""
+        own: dict[str, Any] = {name: getattr(self, name)[kept] for name in _COLUMNS}
+        return replace(self, **own).moved_on(np.cumsum(kept) - 1)
+
+    def divided(self, owner: Ints, last: Ints) -> Elements:
+        """Every element as often as it is in `owner`, ascending; curves and arcs are the `last` of theirs."""
+        own: dict[str, Any] = {name: getattr(self, name)[owner] for name in _COLUMNS}
+        return replace(self, **own).moved_on(last)
+
+    def moved_on(self, number: Ints) -> Elements:
+        """The same with other numbers for the elements that are curves and arcs."""
+        curves, arcs = self.curves, self.arcs
+        return replace(
+            self,
+            curves=replace(curves, element=number[curves.element]),
+            arcs=replace(arcs, element=number[arcs.element]),
+        )
 
     def at_most(self) -> Self:
         """Return the same elements with feeds below which those of the moves may not be (`feed_room` NaN).

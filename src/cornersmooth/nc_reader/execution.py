@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.arcs import circles
-from cornersmooth.nc_reader.elements import Element, Problem
+from cornersmooth.nc_reader.elements import Curves, Element, Elements, NcArcs, Problem
 from cornersmooth.nc_reader.long_curves import cut_long
-from cornersmooth.nc_reader.splines import CurveTable, interval_curves, knot_curves, poly_curves, spl_curves
+from cornersmooth.nc_reader.splines import interval_curves, knot_curves, poly_curves, spl_curves
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, POLY, SPL, Table
 
 _TIP, _VECTOR, _POINT = "XYZ", "IJK", "UVW"
@@ -44,6 +43,8 @@ class Modal:
         U V W have been met: they are the axis point.
     rotary : str
         Addresses of the rotary axes, nearest to the part first; empty for texts without any.
+    vector_length : float
+        Of the shortest tool vector so far.
     """
 
     code: float = float("nan")
@@ -56,39 +57,14 @@ class Modal:
     plane: int = 17
     points: bool = False
     rotary: str = ""
+    vector_length: float = math.inf
 
     def but(self, **changes: Any) -> Modal:
         """Return a copy with some values changed."""
         return replace(self, **changes)
 
 
-@dataclass
-class Executed:
-    """Path elements of one run, in units of the text; the fields are those of `NcProgram` and its tables."""
-
-    kind: NDArray[np.uint8]
-    tip: Floats
-    second: Floats
-    line: Ints
-    feed: Floats
-    per_revolution: Bools
-    feed_room: Floats
-    curves: CurveTable = field(default_factory=CurveTable)
-    arc_element: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    arc_centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    arc_normal: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    arc_sweep: Floats = field(default_factory=lambda: np.zeros(0))
-    #: of the shortest tool vector that is said; `second` has unit vectors
-    vector_length: float = math.inf
-    problems: list[Problem] = field(default_factory=list)
-
-    @property
-    def curve_element(self) -> Ints:
-        """(c,) the elements that are curves."""
-        return np.flatnonzero(self.kind == Element.CURVE)
-
-
-def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
+def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elements, Modal]:
     """Run the blocks of a table.
 
     Parameters
@@ -97,11 +73,13 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
         Of r blocks, ending where no curve is open.
     modal : Modal
         Before the first block.
+    problems : list of Problem
+        Takes what breaks the rules.
 
     Returns
     -------
-    Executed
-        The second triple of a text with rotary words are their degrees.
+    Elements
+        In units of the text, without room. The second triple of a text with rotary words are their degrees.
     Modal
         After the last block.
     """
@@ -115,32 +93,31 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
     straight = (code <= 1) | np.isnan(code)
     is_arc = np.zeros(len(table), np.bool_) if straight.all() else (code == 2) | (code == 3)
     letters = modal.rotary or (_POINT if points else _VECTOR)
-    problems: list[Problem] = []
-    vector_length = math.inf
+    vector_length = modal.vector_length
     if modal.rotary or points:
         known = modal.rotary or modal.points  # else there has been a vector, which is no point
         placed |= held.columns(table, letters, modal.second if known else (np.nan,) * 3, second)
     else:
         given = _vectors(table, modal, straight, second, problems)
-        vector_length = _to_unit_length(second, given)
+        vector_length = min(vector_length, _to_unit_length(second, given))
         placed |= given
-    curves = CurveTable()
+    curves = Curves()
     element_rows = placed
     if not (straight | is_arc).all():
         before = np.array((*modal.tip, *modal.second))
         curves, cut = cut_long(_curves(table, six, placed, code, before, _TIP + letters, problems))
         element_rows = placed & (straight | is_arc)
-        element_rows[curves.row] = True
+        element_rows[curves.element] = True
     rows = np.flatnonzero(element_rows)
     ends = rows
     if len(curves):
         ends = rows.copy()
-        curved = np.searchsorted(rows, curves.row)
+        curved = np.searchsorted(rows, curves.element)
         ends[curved] = curves.end
     feed = held.fill(table.column("F"), modal.feed)
     end = six if ends is rows and len(rows) == len(six) else six.take(ends, axis=0)
     if len(curves) and cut.any():  # between its knots a curve does not end in a control point
-        end[curved[cut]] = curves.control[np.cumsum(curves.points)[cut] - 1]
+        end[curved[cut]] = curves.point[(curves.first_point + curves.points)[cut] - 1]
     rapid = code[rows] == 0
     kind = np.where(rapid, np.uint8(Element.RAPID), np.uint8(Element.LINE))
     if is_arc.any():
@@ -148,17 +125,18 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
     if len(curves):
         kind[curved] = Element.CURVE
         rapid = kind == Element.RAPID
-    run = Executed(
+    none = np.zeros(len(rows))
+    run = Elements(
         kind=kind,
         tip=end[:, :3],
         second=end[:, 3:],
         line=table.line[rows],
         feed=np.where(rapid, np.nan, feed[rows]),
         per_revolution=np.full(len(rows), modal.per_revolution),
-        feed_room=np.zeros(len(rows)),
-        curves=curves,
-        vector_length=vector_length,
-        problems=problems,
+        feed_room=none,
+        second_room=none.copy(),
+        tip_room=none.copy(),
+        curves=replace(curves, element=curved) if len(curves) else curves,
     )
     unknown = np.flatnonzero(np.isnan(code[rows]))
     if len(unknown):
@@ -167,27 +145,27 @@ def execute(table: Table, modal: Modal) -> tuple[Executed, Modal]:
     if modal.inverse_time:
         _check_inverse_time(table, code, rows, problems)
     if len(curves):
-        _check_starts(run, modal, code[rows[curved]] == NURBS)
+        _check_starts(run, modal, code[rows[curved]] == NURBS, problems)
     if is_arc.any():
-        _add_arcs(run, modal, table, rows, code)
+        run = replace(run, arcs=_arcs(run, modal, table, rows, code, problems))
     after = modal.but(
         code=float(code[-1]),
         tip=tuple(tip[-1].tolist()),
         second=tuple(second[-1].tolist()),
         feed=float(feed[-1]),
         points=points,
+        vector_length=vector_length,
     )
     return run, after
 
 
-def _add_arcs(run: Executed, modal: Modal, table: Table, rows: Ints, code: Floats) -> None:
-    """Give the arcs of a run their circles; `rows` are the blocks of its elements, `code` the G word of each block."""
-    run.arc_element = np.flatnonzero(run.kind == Element.ARC)
-    own = rows[run.arc_element]
+def _arcs(run: Elements, modal: Modal, table: Table, rows: Ints, code: Floats, problems: list[Problem]) -> NcArcs:
+    """Circles of the arcs of a run; `rows` are the blocks of its elements, `code` the G word of each block."""
+    element = np.flatnonzero(run.kind == Element.ARC)
+    own = rows[element]
     part = Table(table.line[own], {name: column[own] for name, column in table.columns.items()})
-    start, end = np.vstack((modal.tip, run.tip))[run.arc_element], run.tip[run.arc_element]
-    found = circles(part, start, end, code[own] == 3, modal.plane, run.problems)
-    run.arc_centre, run.arc_normal, run.arc_sweep = found
+    start, end = np.vstack((modal.tip, run.tip))[element], run.tip[element]
+    return NcArcs(element, *circles(part, start, end, code[own] == 3, modal.plane, problems))
 
 
 class _Held:
@@ -280,7 +258,7 @@ def _curves(
     before: Floats,
     letters: str,
     problems: list[Problem],
-) -> CurveTable:
+) -> Curves:
     """Curves of all kinds in a run."""
     found = []
     if (nurbs := code == NURBS).any():
@@ -291,14 +269,13 @@ def _curves(
     for kind, read in ((POLY, poly_curves), (SPL, spl_curves)):
         if (polynomial := placed & (code == kind)).any():
             found.append(read(table, six, before, polynomial, letters, problems))
-    return CurveTable.joined(found)
+    return Curves.joined(found)
 
 
-def _check_starts(run: Executed, modal: Modal, exact: Bools) -> None:
+def _check_starts(run: Elements, modal: Modal, exact: Bools, problems: list[Problem]) -> None:
     """First control points must be where the tool is, digit for digit (FANUC alarm PS1009)."""
-    element = run.curve_element[exact]
-    points = run.curves.points
-    control = run.curves.control.take((np.cumsum(points) - points)[exact], axis=0)
+    element = run.curves.element[exact]
+    control = run.curves.point.take(run.curves.first_point[exact], axis=0)
     wrong = np.zeros(len(element), np.bool_)
     for ends, start, columns in ((run.tip, modal.tip, (0, 1, 2)), (run.second, modal.second, (3, 4, 5))):
         for k, column in enumerate(columns):
@@ -307,7 +284,7 @@ def _check_starts(run: Executed, modal: Modal, exact: Bools) -> None:
             wrong |= control[:, column] != position
     for k in np.flatnonzero(wrong).tolist():
         text = "first control point is not the current position"
-        run.problems.append(Problem("CS519", 0, int(run.line[element[k]]), text))
+        problems.append(Problem("CS519", 0, int(run.line[element[k]]), text))
 
 
 def _check_straight(table: Table, straight: Bools, problems: list[Problem], *, knots: str) -> None:

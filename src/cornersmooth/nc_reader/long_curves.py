@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.splines import BEZIER_KNOTS, CurveTable
+from cornersmooth.nc_reader.elements import Curves
+from cornersmooth.nc_reader.splines import BEZIER_KNOTS
 
 
-def cut_long(curves: CurveTable) -> tuple[CurveTable, Bools]:
+def cut_long(curves: Curves) -> tuple[Curves, Bools]:
     """Cut curves through several corners at their knots, so that what is measured is near one place of the path.
 
     Cubics with all weights 1, distinct inner knots and a parameter that does not run from 0 to 1 are cut; the curve of
@@ -16,13 +17,12 @@ def cut_long(curves: CurveTable) -> tuple[CurveTable, Bools]:
 
     Returns
     -------
-    CurveTable
+    Curves
         Each part has knots from 0 to 1, and starts where the one before it ends.
     cut : (c,) bool
         Which of the curves are parts.
     """
-    size = curves.points + curves.order
-    first_knot, first_point = np.cumsum(size) - size, np.cumsum(curves.points) - curves.points
+    size, first_knot, first_point = curves.points + curves.order, curves.first_knot, curves.first_point
     plain = np.logical_and.reduceat(curves.weight == 1.0, first_point) & (curves.order == 4)
     rises = np.append(np.diff(curves.knot) > 0, False)
     within = np.arange(len(curves.knot)) - np.repeat(first_knot, size)
@@ -38,34 +38,34 @@ def cut_long(curves: CurveTable) -> tuple[CurveTable, Bools]:
     own, place = owner[mine], k[mine]
     bezier = _intervals_alone(curves, first_knot[own] + place, first_point[own] + place)
     for outer, at in ((place == 0, 0), (place == curves.points[own] - 4, 3)):
-        bezier[outer, at] = curves.control[(first_point[own] + place)[outer] + at]  # digit for digit
+        bezier[outer, at] = curves.point[(first_point[own] + place)[outer] + at]  # digit for digit
     bezier[1:][place[1:] > 0, 0] = bezier[:-1][place[1:] > 0, 3]
-    row, end = curves.row[owner], curves.end[owner]
+    row, end = curves.element[owner], curves.end[owner]
     block = end - curves.points[owner] + 4 + k  # of the control point that ends each part
     end = np.where(mine, block, end)
     row = np.where(mine & (k > 0), block, row)
     count = len(bezier)
-    parts = CurveTable(
-        row=row[mine],
+    parts = Curves(
+        element=row[mine],
         end=end[mine],
         order=np.full(count, 4, np.int64),
         points=np.full(count, 4, np.int64),
-        control=bezier.reshape(-1, 6),
+        point=bezier.reshape(-1, 6),
         weight=np.ones(4 * count),
         knot=np.tile(BEZIER_KNOTS, count),
     )
     others = curves.only(np.flatnonzero(~long))
-    joined = CurveTable.joined([parts, others])
-    return joined, np.isin(joined.row, parts.row)
+    joined = Curves.joined([parts, others])
+    return joined, np.isin(joined.element, parts.element)
 
 
-def _intervals_alone(curves: CurveTable, knot: Ints, point: Ints) -> Floats:
+def _intervals_alone(curves: Curves, knot: Ints, point: Ints) -> Floats:
     """(r, 4, 6) Bézier points of the knot intervals behind knots `knot` + 3, from control points `point` on.
 
     By blossoms: f(b, c, d) is the control point with these inner knots, and f is affine in each argument.
     """
     a, b, c, d, e, f = (curves.knot[knot + shift][:, None] for shift in range(1, 7))
-    p0, p1, p2, p3 = (curves.control[point + shift] for shift in range(4))
+    p0, p1, p2, p3 = (curves.point[point + shift] for shift in range(4))
     second = p1 + (c - b) / (e - b) * (p2 - p1)  # f(c, c, d)
     third = p1 + (d - b) / (e - b) * (p2 - p1)  # f(c, d, d)
     before = p0 + (c - a) / (d - a) * (p1 - p0)  # f(b, c, c)

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from cornersmooth.nc_reader.dialects.base import BY_WORD, CLAMPED, HIGH_SPEED, KINEMATICS, SPLINE_AXES, Dialect
-from cornersmooth.nc_reader.elements import Element, Problem
+from cornersmooth.nc_reader.elements import Element, Elements, Problem
 from cornersmooth.nc_reader.words import BSPLINE, NURBS, Table
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine
-    from cornersmooth.nc_reader.execution import Executed
 
 #: code of words that want another state of the control
 CONTROL_WORDS: Final = "CS506"
@@ -87,13 +86,13 @@ def modulo_problems(table: Table, machine: Machine, words: str, memory: Mapping[
     return problems
 
 
-def limit_problems(table: Table, run: Executed, machine: Machine, step: float) -> list[Problem]:
+def limit_problems(table: Table, run: Elements, machine: Machine, step: float) -> list[Problem]:
     """Return which rotary words of a run lie beyond the limits of their axes.
 
     Parameters
     ----------
     table : Table
-    run : Executed
+    run : Elements
         What becomes of it; of curves, whose control points may lie farther out, the ends.
     machine : Machine
     step : float, degrees
@@ -111,12 +110,12 @@ def limit_problems(table: Table, run: Executed, machine: Machine, step: float) -
     return problems
 
 
-def turn_problems(run: Executed, before: Sequence[float], machine: Machine) -> list[Problem]:
+def turn_problems(run: Elements, before: Sequence[float], machine: Machine) -> list[Problem]:
     """Return which rotary axes turn more than once round in one feed move, which nobody asks for.
 
     Parameters
     ----------
-    run : Executed
+    run : Elements
         With its rotary words.
     before : sequence of float
         Those before it, NaN where they are not known.
@@ -129,7 +128,7 @@ def turn_problems(run: Executed, before: Sequence[float], machine: Machine) -> l
     for column, axis in enumerate(machine.axes):
         turn = np.abs(np.diff(run.second[:, column], prepend=before[column]))
         turn[run.kind != Element.LINE] = 0.0
-        between = np.abs(np.diff(curves.control[:, 3 + column]))
+        between = np.abs(np.diff(curves.point[:, 3 + column]))
         between[next_curve] = 0.0
         for amount, line in ((turn, run.line), (between, of_points[1:])):
             found = np.flatnonzero(amount > MOST_TURN)
@@ -150,7 +149,7 @@ def take_clamp(word: float, machine: Machine, memory: dict[str, Any]) -> bool:
 
 
 def clamp_problems(
-    run: Executed, before: Sequence[float], machine: Machine, memory: Mapping[str, Any]
+    run: Elements, before: Sequence[float], machine: Machine, memory: Mapping[str, Any]
 ) -> list[Problem]:
     """Return which rotary axes turn in a run although they are clamped, or nobody has said that they are not."""
     problems = []
@@ -172,13 +171,13 @@ def unclamped_problems(machine: Machine, memory: Mapping[str, Any]) -> list[Prob
 
 
 def kinematics_problem(
-    run: Executed, machine: Machine, memory: Mapping[str, Any], *, tip_control: bool
+    run: Elements, machine: Machine, memory: Mapping[str, Any], *, tip_control: bool
 ) -> Problem | None:
     """Return what is wrong with a run where the machine's file says what switches tip control of its kinematics.
 
     Parameters
     ----------
-    run : Executed
+    run : Elements
         With its rotary words.
     machine : Machine
     memory : mapping

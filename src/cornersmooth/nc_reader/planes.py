@@ -15,8 +15,8 @@ import numpy as np
 
 from cornersmooth.model import Floats
 from cornersmooth.nc_reader.dialects.base import CLAMPED
-from cornersmooth.nc_reader.elements import Problem
-from cornersmooth.nc_reader.execution import Executed, Modal
+from cornersmooth.nc_reader.elements import Elements, Problem
+from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.rotary import Rotary
 from cornersmooth.nc_reader.words import Table
 
@@ -57,15 +57,14 @@ class TiltedPlane:
         axis: Floats = self.frame[:, 2]
         return axis
 
-    def in_part(self, run: Executed, factor: float) -> Executed:
+    def in_part(self, run: Elements, factor: float) -> Elements:
         """Return a run in the coordinates of the part, both in mm; `factor` mm are a unit of the text."""
         out, origin = self.frame.T, factor * np.array(self.origin)
         return replace(
             run,
             tip=run.tip @ out + origin,
             second=np.tile(self.tool, (len(run.kind), 1)),
-            arc_centre=run.arc_centre @ out + origin,
-            arc_normal=run.arc_normal @ out,
+            arcs=replace(run.arcs, centre=run.arcs.centre @ out + origin, normal=run.arcs.normal @ out),
         )
 
     def left(self, modal: Modal, *, rotary: bool) -> Modal:
@@ -74,13 +73,13 @@ class TiltedPlane:
         second = (math.nan,) * 3 if rotary else tuple(self.tool.tolist())
         return modal.but(tip=tuple(known.tolist()), second=second)
 
-    def problems(self, table: Table, run: Executed, tip_control: str, axis_words: str) -> list[Problem]:
+    def problems(self, table: Table, run: Elements, tip_control: str, axis_words: str) -> list[Problem]:
         """Return what is wrong with a run of motion blocks in it.
 
         Parameters
         ----------
         table : Table
-        run : Executed
+        run : Elements
         tip_control : str
             In force.
         axis_words : str

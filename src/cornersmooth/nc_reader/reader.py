@@ -15,7 +15,7 @@ from cornersmooth.model import MM_PER_UNIT, Floats, Ints, Units
 from cornersmooth.nc_reader.block_tables import Readable, read_lines
 from cornersmooth.nc_reader.dialects.base import INCREMENTAL
 from cornersmooth.nc_reader.elements import Element, Elements, Event, Problem, Second, settle
-from cornersmooth.nc_reader.execution import Executed, Modal, execute
+from cornersmooth.nc_reader.execution import Modal, execute
 from cornersmooth.nc_reader.left_cuts import LeftCuts
 from cornersmooth.nc_reader.needed_states import (
     AxisWords,
@@ -29,7 +29,6 @@ from cornersmooth.nc_reader.needed_states import (
     turn_problems,
     unclamped_problems,
 )
-from cornersmooth.nc_reader.path_elements import in_mm, path_elements
 from cornersmooth.nc_reader.planes import ASIDE, NOT_ABOVE, TiltedPlane, unclamped
 from cornersmooth.nc_reader.reading_options import ReadingOptions, Steps
 from cornersmooth.nc_reader.rotary import MOST_LINES
@@ -79,8 +78,6 @@ class Reader:
         self.problems: list[Problem] = []
         self._axis_words = AxisWords(self.dialect)
         self.lever, self._given_lever = 0.0, lever
-        #: of the shortest tool vector so far
-        self.vector_length = math.inf
         self.elements = self.given_out = self.curves = 0
         #: whether the tool has been fed from a position that was known
         self.placed = False
@@ -172,7 +169,7 @@ class Reader:
                 raise InputError(
                     "CS503", "motion in incremental words (G91)", hint, file=self.name, line=int(table.line[0])
                 )
-            run, self.modal = execute(table, before)
+            run, self.modal = execute(table, before, self.problems)
             if self.rotary is not None:
                 self.problems += clamp_problems(run, before.second, self.rotary.machine, self.memory)
             approach: frozenset[int] = frozenset()
@@ -212,16 +209,24 @@ class Reader:
             self._add(run)
         self.waiting = []
 
-    def _in_mm(self, run: Executed, factor: float, before: Modal) -> Executed:
-        """Return a run in millimetres, and note what is wrong with it."""
-        self.problems.extend(run.problems)
+    def _in_mm(self, run: Elements, factor: float, before: Modal) -> Elements:
+        """Return a run in millimetres."""
         unit = factor * (self.dialect.inch_feed if before.inch and not before.per_revolution else 1.0)
         unit = 1.0 if before.inverse_time else unit
-        run = in_mm(run, factor, unit, points=self.modal.points)
-        run.feed_room += self.dialect.feed_step / 2 * unit
+        points = self.modal.points
+        if factor != 1.0:  # a factor of one leaves the numbers untouched
+            run.curves.point[:, : 6 if points else 3] *= factor
+            run = replace(
+                run,
+                tip=run.tip * factor,
+                second=run.second * factor if points else run.second,
+                feed=run.feed * unit,
+                arcs=replace(run.arcs, centre=run.arcs.centre * factor),
+            )
+        run.feed_room[:] += self.dialect.feed_step / 2 * unit
         return run
 
-    def _in_plane(self, table: Table, run: Executed, plane: TiltedPlane, factor: float, before: Modal) -> None:
+    def _in_plane(self, table: Table, run: Elements, plane: TiltedPlane, factor: float, before: Modal) -> None:
         """Take over a run in a tilted plane."""
         axis_words = self.rotary.names if self.rotary is not None else "IJKUVW"
         found = plane.problems(table, run, self.tip_control, axis_words)
@@ -261,7 +266,7 @@ class Reader:
         self.modal, self.plane = self.plane.left(self.modal, rotary=self.rotary is not None), None
         self._left_turned = True
 
-    def _check_turned(self, run: Executed) -> None:
+    def _check_turned(self, run: Elements) -> None:
         """Complain of motion behind a plane where no word has said since how the rotary axes stand."""
         assert self.rotary is not None
         if self._left_turned:
@@ -302,27 +307,26 @@ class Reader:
         if last and machine.tool_length != before.tool_length:
             self.memory[LEFT_AT] = last[0].tip[-1]
 
-    def _arrive_again(self, run: Executed, step: float) -> None:
+    def _arrive_again(self, run: Elements, step: float) -> None:
         """Put another tool to where the one before has left, if no more than printed digits are between."""
         left_at = self.memory.pop(LEFT_AT, None)
         if left_at is not None and np.linalg.norm(run.tip[0] - left_at) <= step:
             run.tip[0] = left_at
 
-    def _know_points(self, run: Executed) -> None:
+    def _know_points(self, run: Elements) -> None:
         """From here on U V W are a point on the axis: what was said before of the axis is no such point."""
         if self.placed:
             self._refuse_unknown(int(run.line[0]))
         for part in self.ready:
             part.second[:] = np.nan
 
-    def _add(self, run: Executed, plane: TiltedPlane | None = None) -> None:
+    def _add(self, run: Elements, plane: TiltedPlane | None = None) -> None:
         """Take over the elements of a run, in a tilted plane or in none."""
         if not len(run.kind):
             return
         second_is: Second = "point" if self.modal.points else "vector"
         scale = MM_PER_UNIT[self.units]
-        self.vector_length = min(self.vector_length, run.vector_length)
-        length = self.vector_length if math.isfinite(self.vector_length) else 1.0
+        length = self.modal.vector_length if math.isfinite(self.modal.vector_length) else 1.0
         steps = (self.steps.tip * scale, self.steps.second * (scale if second_is == "point" else 1.0 / length))
         if self.rotary is not None:
             lever = self.lever if self._given_lever is None else self._given_lever
@@ -332,7 +336,8 @@ class Reader:
         steps = min(steps[0], widest[0]), min(steps[1], widest[1])
         if self.rotary is not None:
             self._arrive_again(run, steps[0])
-        elements = path_elements(run, second_is, steps, rotary=self.rotary is not None)
+        rotary = self.rotary is not None
+        elements = replace(run, second_is=second_is, tip_step=steps[0], second_step=steps[1], rotary=rotary)
         if plane is not None:
             room = min(plane.room, self._widest("vector")[1] / 2.0)
             elements.second_room[:], elements.tip_room[:] = room, ASIDE * elements.tip_step
@@ -368,6 +373,25 @@ class Reader:
     def _refuse_unknown(self, line: int) -> NoReturn:
         hint = "say X Y Z, and U V W where there are any, before the first feed"
         raise InputError("CS503", "a feed move where not all of the position is known", hint, file=self.name, line=line)
+
+    @property
+    def nothing(self) -> Elements:
+        """No elements at all."""
+        none, rows = np.zeros(0), np.zeros((0, 3))
+        number, flag = np.zeros(0, np.int64), np.zeros(0, np.bool_)
+        kind, steps = np.zeros(0, np.uint8), self.steps
+        whole = Elements(
+            kind=kind,
+            tip=rows,
+            second=rows,
+            line=number,
+            feed=none,
+            per_revolution=flag,
+            feed_room=none,
+            second_room=none,
+            tip_room=none,
+        )
+        return replace(whole, tip_step=steps.tip, second_step=steps.second)
 
     def _collected(self) -> Elements:
         """Give out what is ready."""
@@ -440,14 +464,14 @@ class Reader:
             self.events[place:] = [replace(event, element=event.element - 1) for event in self.events[place:]]
         self.modal = self.way_back.leave(self.modal, "XYZ" if self.plane is not None else axes)
 
-    def _check_kinematics(self, run: Executed) -> None:
+    def _check_kinematics(self, run: Elements) -> None:
         """Complain once for each state of tip control of the kinematics that the words of a run do not go with."""
         assert self.rotary is not None
         found = kinematics_problem(run, self.rotary.machine, self.memory, tip_control=self.rotary.tip_control)
         if found is not None and all(found.text != problem.text for problem in self.problems):
             self.problems.append(found)
 
-    def _check_swings(self, elements: Ints, run: Executed) -> None:
+    def _check_swings(self, elements: Ints, run: Elements) -> None:
         """Complain of rapids in which rotary axes lead the tool far round."""
         text = "rotary axes swing the tilted tool in a rapid that is not above a retract"
         self.problems += [Problem("CS537", 0, int(run.line[element]), text) for element in elements.tolist()]

@@ -9,7 +9,6 @@ import numpy as np
 
 from cornersmooth.nc_reader.dialects import CONTROLS
 from cornersmooth.nc_reader.elements import Elements, Event, NcProgram
-from cornersmooth.nc_reader.path_elements import no_elements
 from cornersmooth.nc_reader.reader import Reader
 from cornersmooth.nc_reader.reading_options import DIGITS_SAMPLE, ReadingOptions
 from cornersmooth.nc_reader.source import Source, readable_twice
@@ -81,7 +80,7 @@ def read_styled(data: bytes | str | os.PathLike[str], options: ReadingOptions, n
 
 def _program(reader: Reader, parts: list[Elements]) -> NcProgram:
     """Put all that was given out together."""
-    elements = Elements.joined(parts) if parts else no_elements(reader.steps)
+    elements = Elements.joined(parts) if parts else reader.nothing
     events = list(reader.events)
     comments = reader.comments or []
     place = np.searchsorted(elements.line, [number for number, _ in comments])

@@ -15,10 +15,9 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import basis, groups
-from cornersmooth.nc_reader.elements import Curves, Element
-from cornersmooth.nc_reader.execution import Executed, Modal
+from cornersmooth.nc_reader.elements import Curves, Element, Elements
+from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.needed_states import MOST_TURN
-from cornersmooth.nc_reader.splines import CurveTable
 
 if TYPE_CHECKING:
     from cornersmooth.kinematics.machine import Machine, RotaryAxis
@@ -173,12 +172,12 @@ class Rotary:
                 found[:, column] = np.unwrap(np.append(start, angles[:, column]), period=360.0)[1:]
         return found
 
-    def resolve(self, run: Executed, before: Modal, *, inverse_time: bool) -> Executed:
+    def resolve(self, run: Elements, before: Modal, *, inverse_time: bool) -> Elements:
         """Return a run in tips and tool vectors, all in mm, the second triple being degrees before.
 
         Parameters
         ----------
-        run : Executed
+        run : Elements
             In mm.
         before : Modal
             In mm; what is not known of the angles is zero.
@@ -204,20 +203,10 @@ class Rotary:
         fine_tip, fine_vector = tip[1:][owner], vector[1:][owner]
         words = [start[own] + at * (start[own + 1] - start[own]) for start in (position, angles)]
         fine_tip[inner], fine_vector[inner] = self.tips(*words), self.directions(words[1])
-        return replace(
-            run,
-            kind=run.kind[owner],
-            tip=fine_tip,
-            second=fine_vector,
-            line=run.line[owner],
-            feed=feed[owner],
-            feed_room=room[owner],
-            per_revolution=run.per_revolution[owner],
-            curves=curves,
-            arc_element=last[run.arc_element],
-        )
+        run = replace(run, feed=feed, feed_room=room, curves=curves)
+        return replace(run.divided(owner, last), tip=fine_tip, second=fine_vector)
 
-    def swung(self, run: Executed, before: Modal) -> Ints:
+    def swung(self, run: Elements, before: Modal) -> Ints:
         """Rapids in which the axes lead the tool a long way round, as when they turn back: (k,) elements.
 
         Parameters are those of `resolve`; what comes from where nobody knows is left out.
@@ -241,7 +230,7 @@ class Rotary:
         """How far a motion may leave the lines that stand for it, mm, of tip and axis point."""
         return max(LINE_SHARE * self.tolerance, LEAST)
 
-    def _counts(self, run: Executed, position: Floats, angles: Floats) -> Ints:
+    def _counts(self, run: Elements, position: Floats, angles: Floats) -> Ints:
         """Number of lines that each element becomes.
 
         A motion leaves its chord by no more than an eighth of its largest second derivative. A tool vector on a chord
@@ -330,23 +319,12 @@ class Rotary:
         room[slowed] = np.nan
         return feed, room
 
-    def _curves(self, curves: CurveTable) -> CurveTable:
+    def _curves(self, curves: Curves) -> Curves:
         """Curves in tip and tool vector."""
         if not len(curves):
             return curves
-        size = curves.points + curves.order
-        table = Curves(
-            element=np.arange(len(curves)),
-            order=curves.order,
-            points=curves.points,
-            first_point=np.cumsum(curves.points) - curves.points,
-            first_knot=np.cumsum(size) - size,
-            point=curves.control,
-            weight=curves.weight,
-            knot=curves.knot,
-        )
         found = []
-        for group in groups(table, np.arange(len(curves))):
+        for group in groups(curves, np.arange(len(curves))):
             breaks, rows = group.spans, np.arange(len(group.index))
             for halving in range(_HALVINGS + 1):
                 if halving:
@@ -361,12 +339,12 @@ class Rotary:
                 chosen = group.index[rows[keep]]
                 count = len(chosen)
                 found.append(
-                    CurveTable(
-                        row=curves.row[chosen],
+                    Curves(
+                        element=curves.element[chosen],
                         end=curves.end[chosen],
                         order=np.full(count, _ORDER, np.int64),
                         points=np.full(count, points, np.int64),
-                        control=control[keep].reshape(-1, 6),
+                        point=control[keep].reshape(-1, 6),
                         weight=weight[keep].ravel(),
                         knot=np.tile(knot, count),
                     )
@@ -374,7 +352,7 @@ class Rotary:
                 rows = rows[~keep]
                 if not len(rows):
                     break
-        return CurveTable.joined(found)
+        return Curves.joined(found)
 
     def _elevated(
         self, knot: Floats, order: int, points: Floats, weight: Floats, breaks: Floats

@@ -5,13 +5,10 @@ FANUC's G06.2, Siemens' BSPLINE and POLY, HEIDENHAIN's SPL.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.nc_reader.elements import Problem
+from cornersmooth.nc_reader.elements import Curves, Problem, slices
 from cornersmooth.nc_reader.words import Table
 
 #: FANUC: order of a curve whose first block has no P (B-63324EN/03 4.17)
@@ -27,70 +24,9 @@ _GAP = 1.1e-3
 BEZIER_KNOTS = np.array([0.0] * 4 + [1.0] * 4)
 
 
-@dataclass
-class CurveTable:
-    """Curves of a run, c of them.
-
-    Parameters
-    ----------
-    row, end : (c,) int64
-        Blocks of the run with which each curve begins and ends.
-    order, points : (c,) int64
-    control : (p, 6) float64
-    weight : (p,) float64
-    knot : (q,) float64
-        All curves one after another.
-    """
-
-    row: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    end: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    order: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    points: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    control: Floats = field(default_factory=lambda: np.zeros((0, 6)))
-    weight: Floats = field(default_factory=lambda: np.zeros(0))
-    knot: Floats = field(default_factory=lambda: np.zeros(0))
-
-    def __len__(self) -> int:
-        return len(self.row)
-
-    def only(self, chosen: Ints) -> CurveTable:
-        """Some of the curves."""
-        place, at = slices(self.points, chosen), slices(self.points + self.order, chosen)
-        return CurveTable(
-            self.row[chosen],
-            self.end[chosen],
-            self.order[chosen],
-            self.points[chosen],
-            self.control[place],
-            self.weight[place],
-            self.knot[at],
-        )
-
-    @classmethod
-    def joined(cls, tables: Sequence[CurveTable]) -> CurveTable:
-        """Return the curves of several tables in the order of their blocks."""
-        tables = [table for table in tables if len(table)]
-        if len(tables) == 1:
-            return tables[0]
-        if not tables:
-            return cls()
-        columns = [np.concatenate([getattr(table, name) for table in tables]) for name in vars(tables[0])]
-        table = cls(*columns)
-        return table.only(np.argsort(table.row, kind="stable"))
-
-
-def slices(size: Ints, chosen: Ints) -> Ints:
-    """Indices of the parts `chosen` of a table that consists of parts of given sizes."""
-    first = np.cumsum(size) - size
-    count = size[chosen]
-    start = np.cumsum(count) - count
-    index: Ints = np.arange(int(count.sum())) + np.repeat(first[chosen] - start, count)
-    return index
-
-
 def knot_curves(
     table: Table, six: Floats, placed: Bools, curve: Bools, starts: Bools, letters: str, problems: list[Problem]
-) -> CurveTable:
+) -> Curves:
     """Curves of FANUC's G06.2 (B-63324EN/03 4.17): a knot K and a weight R in every block.
 
     Parameters
@@ -117,7 +53,7 @@ def knot_curves(
         first = start[0] if len(start) else len(rows)
         rows, start = rows[first:], start - first
     if not len(start):
-        return CurveTable()
+        return Curves()
     size = np.diff(np.append(start, len(rows)))
     is_point = placed[rows]
     points = np.add.reduceat(is_point, start, dtype=np.int64)
@@ -173,12 +109,12 @@ def knot_curves(
     own = _exactly(knot, start, size, points + order)
     if bad.any():
         order, own = _replaced(own, order, points, bad)
-    return CurveTable(
-        row=rows[start],
+    return Curves(
+        element=rows[start],
         end=point_rows[np.cumsum(points) - 1],
         order=order,
         points=points,
-        control=six[point_rows],
+        point=six[point_rows],
         weight=weight,
         knot=own,
     )
@@ -225,7 +161,7 @@ def _exactly(knot: Floats, start: Ints, size: Ints, wanted: Ints) -> Floats:
     return filled
 
 
-def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, problems: list[Problem]) -> CurveTable:
+def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, problems: list[Problem]) -> Curves:
     """Curves of Siemens' BSPLINE (programming manual 12/2019): control points with knot intervals PL and weights PW.
 
     The first control point is where the block before has ended. With the knots u the block of control point j has
@@ -276,12 +212,12 @@ def interval_curves(table: Table, six: Floats, spline: Bools, before: Floats, pr
     bad = (points < SPLINE_ORDER) | (interval[first] != 0) | (interval[first + count - 1] != 0)
     if bad.any():
         order, knot = _replaced(knot, order, points, bad)
-    return CurveTable(
-        row=rows[first],
+    return Curves(
+        element=rows[first],
         end=rows[first + count - 1],
         order=order,
         points=points,
-        control=control,
+        point=control,
         weight=weights,
         knot=knot,
     )
@@ -303,7 +239,7 @@ def _knots_of(interval: Floats, first: Ints, count: Ints) -> Floats:
 
 def poly_curves(
     table: Table, six: Floats, before: Floats, poly: Bools, letters: str, problems: list[Problem]
-) -> CurveTable:
+) -> Curves:
     """Curves of POLY: ``PO[X]=(end, a2, a3)`` of a parameter p from 0 to PL.
 
     The control takes a0 from where the block before ended; a1 follows from the end.
@@ -334,9 +270,7 @@ def poly_curves(
     return _bezier(rows, start, start + slope / 3, start + 2 * slope / 3 + square / 3, end)
 
 
-def spl_curves(
-    table: Table, six: Floats, before: Floats, spl: Bools, letters: str, problems: list[Problem]
-) -> CurveTable:
+def spl_curves(table: Table, six: Floats, before: Floats, spl: Bools, letters: str, problems: list[Problem]) -> Curves:
     """Curves of SPL: X(t) = K3X·t³ + K2X·t² + K1X·t + X with t from 1 to 0.
 
     Parameters
@@ -360,14 +294,14 @@ def _factors(table: Table, rows: Ints, letters: str, name: str) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def _bezier(rows: Ints, *points: Floats) -> CurveTable:
+def _bezier(rows: Ints, *points: Floats) -> Curves:
     count = len(rows)
-    return CurveTable(
-        row=rows,
+    return Curves(
+        element=rows,
         end=rows,
         order=np.full(count, 4, np.int64),
         points=np.full(count, 4, np.int64),
-        control=np.stack(points, axis=1).reshape(-1, 6),
+        point=np.stack(points, axis=1).reshape(-1, 6),
         weight=np.ones(4 * count),
         knot=np.tile(BEZIER_KNOTS, count),
     )

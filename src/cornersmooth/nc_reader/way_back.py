@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from cornersmooth.errors import InputError
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.elements import Element, Elements, Problem
-from cornersmooth.nc_reader.execution import Executed, Modal
+from cornersmooth.nc_reader.execution import Modal
 
 #: how far, mm and rad, a way along the tool may be off it: printed digits
 _ASIDE, _TURN = 1e-3, 1e-3
@@ -88,12 +87,12 @@ class WayBack:
         ready[-1].tip[-1], ready[-1].second[-1] = ends.tip[0], ends.second[0]
         return True
 
-    def arrive(self, run: Executed, aside: Ints, problems: list[Problem]) -> Executed:
+    def arrive(self, run: Elements, aside: Ints, problems: list[Problem]) -> Elements:
         """Leave out the rapids of the way back.
 
         Parameters
         ----------
-        run : Executed
+        run : Elements
         aside : (k,) int64
             Lines with words of X or Y: others only turn the rotary axes.
         problems : list of Problem
@@ -124,12 +123,7 @@ class WayBack:
             _check_approach(above, run, int(np.argmin(unknown)), line, problems)
         if not gone.any():
             return run
-        kept = ~gone
-        rows = {
-            key: getattr(run, key)[kept]
-            for key in ("kind", "tip", "second", "line", "feed", "per_revolution", "feed_room")
-        }
-        return replace(run, **rows, arc_element=(np.cumsum(kept) - 1)[run.arc_element])
+        return run.only(~gone)
 
 
 def is_above(ends: Elements, above: int, below: int) -> bool:
@@ -143,7 +137,7 @@ def is_above(ends: Elements, above: int, below: int) -> bool:
     return height > _LEAST and aside <= _ASIDE + _TURN * height and turned <= _TURN
 
 
-def _check_approach(above: Floats, run: Executed, arrival: int, line: int, problems: list[Problem]) -> None:
+def _check_approach(above: Floats, run: Elements, arrival: int, line: int, problems: list[Problem]) -> None:
     """Complain where the tool does not come straight down: the last rapid of the way back must be over its end."""
     below = np.concatenate((run.tip[arrival], run.second[arrival]))
     unknown = np.isnan(above)
