@@ -167,12 +167,13 @@ def reading_back(form: Form) -> dict[str, Any]:
         "machine": form.machine,
         "tcp": form.orientation != "machine",
         "trusted": nc.own_words(form.table) if known else (),
+        "accepted": form.table.trusted,
     }
 
 
 def read_back(text: bytes | str, form: Form, settings: Settings, name: str | None = None) -> NcProgram:
     """Read a text of the form, or the file that holds it, as its control does; see `nc_reader.read_nc`."""
-    how = {key: value for key, value in reading_back(form).items() if key != "trusted"}
+    how = {key: value for key, value in reading_back(form).items() if key not in ("trusted", "accepted")}
     return read_nc(text, **how, name=name, tolerance=settings.tolerance, axis_length=settings.axis_scale)
 
 

@@ -123,6 +123,7 @@ def command(source: str, text: str, **given: Any) -> int:
         nc,
         **how,
         trusted=(*own, *trusted),
+        accepted=nc_text.control_of(given).trusted,
         weights=head.weights,
         slower=given["slower"],
         skip_cycles=given["skip_cycles"],

@@ -61,7 +61,7 @@ def motion(stretches: Sequence[Stretch], form: Form, spelling: Spelling, setting
         parts += [start, text]
         first = np.full(start.count(b"\n"), -stretch.line, np.int64)
         lines += [first, stretch.line + np.arange(text.count(b"\n"))]
-    back = {name: value for name, value in reading_back(form).items() if name != "trusted"}
+    back = {name: value for name, value in reading_back(form).items() if name not in ("trusted", "accepted")}
     nc = read_nc(b"".join(parts), **back, tolerance=settings.tolerance, axis_length=settings.axis_scale)
     own = np.concatenate(lines)
     nc.line[:] = own[nc.line - 1]

@@ -390,6 +390,9 @@ class Control:
         Digits to choose from by name, such as increment systems.
     own : bool
         Whether the table is the user's own, whose words may mean what nobody else knows.
+    trusted : frozenset of str
+        Machine functions of the shop that move nothing: verification accepts them where the table or the user writes
+        them.
     """
 
     name: str
@@ -405,6 +408,7 @@ class Control:
     cycles: Cycles = Cycles()
     systems: Mapping[str, Digits] = field(default_factory=dict)
     own: bool = False
+    trusted: frozenset[str] = frozenset()
 
     @property
     def dialect(self) -> str:

@@ -33,6 +33,7 @@ from cornersmooth.nc.control import (
     Words,
 )
 from cornersmooth.nc.program_table import STEPS, ProgramTable
+from cornersmooth.nc.trusted_words import trusted_words
 from cornersmooth.settings import BOUNDS, Lines
 from cornersmooth.tables import Shelf, Table, check_pattern, filled, is_file
 
@@ -85,7 +86,7 @@ class _Controls(Shelf):
             raise self.wrong(f"{where} is {value!r}", "give ASCII text without line ends")
         own = {"extras": _EXTRA_BRACES, "cycles": _CYCLE_BRACES}.get(where.partition(".")[0])
         places = _BRACES.get(where.rpartition(".")[2], {}) if own is None else own
-        if not where.endswith("_pattern") and ("{" in value or "}" in value):
+        if not where.endswith("_pattern") and where != "trusted" and ("{" in value or "}" in value):
             try:
                 filled(value, places)
             except ValueError as error:
@@ -110,6 +111,7 @@ _SHELF = _Controls(
         "extras",
         "lines",
         "cycles",
+        "trusted",
     ),
     unknown="CS210",
     unreadable="CS212",
@@ -189,6 +191,7 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
             extras=_extras,
             lines=_lines,
             cycles=partial(_SHELF.record, Cycles),
+            trusted=partial(_trusted, dialect=like),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
@@ -291,6 +294,13 @@ def _form(name: str, entry: Any, motion: Table) -> FormTable:
     rest = {key: value for key, value in entry.items() if key not in (*orientations, "curve")}
     given = {"name": name, "curve": curve, "modes": modes}
     return _SHELF.record(FormTable, rest, where, given=given, upright=mode, plane=mode)
+
+
+def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
+    try:
+        return trusted_words(_SHELF.texts(given, where), dialect)
+    except ValueError as error:
+        raise _SHELF.wrong(f"{where}: {error}", 'give machine functions, as in ["M208"]') from error
 
 
 def _lines(table: Any, where: str) -> LineStyle:

@@ -77,6 +77,8 @@ class Verifier:
     trusted : sequence of str
         Blocks that belong where they stand because the user put them there: what they do is taken on trust. Names of
         states or statements that are his own; `own_words` of a control table says them.
+    accepted : set of str
+        Words of the user's own that move nothing, as he declares: the text is verified with them.
     weights : sequence of float, optional
         Those that curves have, where that is known: any other is a problem, even if the curve stays within ε.
     slower : bool
@@ -107,6 +109,7 @@ class Verifier:
         tcp: bool = True,
         words: bool = True,
         trusted: Sequence[str] = (),
+        accepted: Set[str] = frozenset(),
         weights: Sequence[float] | None = None,
         slower: bool = False,
         skip_cycles: bool = False,
@@ -120,7 +123,8 @@ class Verifier:
         self._program, self._words = program, words
         self._apart = False
         self._processes = processes if can_fork() and len(program) >= _LONG else 1
-        self._trusted, self._weights, self._slower = tuple(trusted), weights, slower
+        self._trusted, self._slower = tuple(trusted), slower
+        self._own = (self._trusted, accepted, weights)
         self._skip_cycles = skip_cycles
         self._machine = machine
         said = () if machine is None else (word for axis in machine.axes for word in axis.clamp or ())
@@ -223,7 +227,7 @@ class Verifier:
             switches=word_list(self._options.control).switches,
             tcp=self._options.tcp,
         )
-        check = WordCheck(options.control, options.dialect.lexer, room, self._trusted, self._weights, positions)
+        check = WordCheck(options.control, options.dialect.lexer, room, *self._own, positions)
         own_rapids = OwnRapids(task)
         reader.way_back.added, reader.left_cuts.asked = own_rapids.added, own_rapids.goes_to
         chunks = reader.chunks(check.watch(lines) if self._words else lines)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Set
 from dataclasses import replace
 from typing import Final
 
@@ -57,6 +57,8 @@ class WordCheck:
     trusted : iterable of str
         Blocks that belong where they stand because the user says so, any number where they have braces; names of states
         that the text leaves to him, and `FRAME` where the blocks around the motion are his.
+    accepted : set of str
+        Words in these that move nothing because the user says so.
     weights : iterable of float, optional
         Those that control points of curves have; None where they may have any.
     positions : MachinePositions, optional
@@ -69,6 +71,7 @@ class WordCheck:
         lexer: Lexer,
         tolerance: float,
         trusted: Iterable[str] = (),
+        accepted: Set[str] = frozenset(),
         weights: Iterable[float] | None = None,
         positions: MachinePositions | None = None,
     ) -> None:
@@ -82,7 +85,7 @@ class WordCheck:
         self.trusted: list[tuple[int, str]] = []
         self.unsure: list[tuple[int, str]] = []
         trusted = tuple(trusted)
-        self._left = set(trusted)
+        self._left, self._accepted = set(trusted), accepted
         plain = [block for block in trusted if "{" not in block]
         self._own = {text_of(words) for words in map(self._words_of, plain) if words}
         templates = [(self._words_of(numbers_in(block))) for block in set(trusted) - set(plain)]
@@ -241,7 +244,7 @@ class WordCheck:
         if line.skipped or len(self.problems) > before or any(rule is not None and rule.compared for rule in rules):
             del self.problems[before:]
             self.trusted.append((line.number, text))
-            if line.skipped or not all(map(_BESIDE_MOTION.fullmatch, words)):
+            if line.skipped or not all(word in self._accepted or _BESIDE_MOTION.fullmatch(word) for word in words):
                 self.unsure.append((line.number, text))
             if whole:
                 kept = [rule is not None and not rule.compared for rule in rules]
