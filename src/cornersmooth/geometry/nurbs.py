@@ -1,10 +1,7 @@
 """The five-point curve: a cubic NURBS on the knots {0, 0, 0, 0, ½, 1, 1, 1, 1} with weights (1, w1, w2, w1, 1).
 
-Paper equations (3), (4) and (9). On each half of the parameter range the curve is a Bézier cubic; with s = 2u on the
-first half the basis is explicit, which is what `basis` uses. On the second half it is mirrored.
-
-Seen from the corner X, with the incoming leg a (from the first control point to X), the outgoing leg b and ratio ρ of
-the inner control points, the curve is
+Paper equations (3), (4) and (9). Each half is a Bézier cubic, and the second one mirrors the first. Seen from the
+corner X, with the legs a from the first control point to X and b from X to the last, and ratio ρ of the inner ones:
 
     first half:   X − σ·a + β·(b − a),    σ = R0 + ρ·R1 − ρ·R3,   β = ρ·R3
     second half:  X + σ·b + β·(b − a),    σ, β at the mirrored parameter
@@ -32,33 +29,13 @@ _BINARY_DIGIT = 2.0**-20
 
 
 def deviation_factor(weights: Floats, ratio: Floats) -> Floats:
-    """The factor c of docs/method.md: deviation at u = ½ over the length of the difference of the legs.
-
-    Parameters
-    ----------
-    weights : (k, 2) float64
-    ratio : (k,) float64
-
-    Returns
-    -------
-    (k,) float64
-    """
+    """(k,) the factor c of weights (k, 2) and ratios (k,)."""
     factor: Floats = ratio * weights[:, 0] / (2.0 * (weights[:, 0] + weights[:, 1]))
     return factor
 
 
 def basis(u: Floats) -> Floats:
-    """Polynomial basis of the five-point curve.
-
-    Parameters
-    ----------
-    u : (m,) float64
-        Parameters in [0, 1].
-
-    Returns
-    -------
-    (m, 5) float64
-    """
+    """Polynomial basis (m, 5) at parameters (m,) in [0, 1]."""
     u = np.asarray(u, np.float64)
     second = u > 0.5
     s = 2.0 * np.where(second, 1.0 - u, u)
@@ -77,36 +54,20 @@ def basis(u: Floats) -> Floats:
 
 
 def rational_basis(u: Floats, weights: Floats) -> Floats:
-    """Rational basis for one or many pairs of weights.
-
-    Parameters
-    ----------
-    u : (..., m) float64
-    weights : (..., 2) float64
-        w1 and w2; leading dimensions broadcast against those of `u` without its last.
-
-    Returns
-    -------
-    (..., m, 5) float64
-    """
+    """Rational basis (..., m, 5) at parameters (..., m), for weights w1, w2 (..., 2)."""
     weighted = basis(u) * full_weights(weights)[..., None, :]
     sums: Floats = weighted.sum(axis=-1, keepdims=True)
     return weighted / sums
 
 
 def leg_coefficients(u: Floats, weights: Floats, ratio: Floats | float) -> Floats:
-    """Coefficients of corner, incoming and outgoing leg in the curve's points, for one or many shapes.
+    """Coefficients (..., m, 3) of corner, incoming and outgoing leg in the points of curves.
 
     Parameters
     ----------
     u : (..., m) float64
     weights : (..., 2) float64
     ratio : (...) float64
-
-    Returns
-    -------
-    (..., m, 3) float64
-        The first column is 1: the basis sums to it.
     """
     shares = rational_basis(u, weights)
     ratio = np.asarray(ratio)[..., None]
@@ -122,20 +83,20 @@ def full_weights(weights: Floats) -> Floats:
     return np.stack((one, w1, w2, w1, one), axis=-1)
 
 
+def trimmed_legs(values: Floats, corners: Corners, rows: Ints) -> tuple[Floats, Floats, Floats]:
+    """Values (n, 3) of a program at some corners, and their legs into and out of them, trimmed: (g, 3) each."""
+    here = values[corners.pose[rows]]
+    leg_in = (here - values[corners.before[rows]]) * corners.trim_in[rows, None]
+    leg_out = (values[corners.after[rows]] - here) * corners.trim_out[rows, None]
+    return here, leg_in, leg_out
+
+
 def control_points(
     program: Program, corners: Corners, rows: Ints | Bools | slice, axis_length: float
 ) -> tuple[Floats, Floats]:
-    """Control points of the tip curve P and of the axis-point curve Q of some corners: equation (9).
+    """Control points (g, 5, 3) of the tip curve P and of the axis-point curve Q of some corners, mm: equation (9).
 
-    Parameters
-    ----------
-    rows : (g,) int64 or (k,) bool or slice
-        Which corners; those not smoothed have all five points at the corner.
-    axis_length : float, mm
-
-    Returns
-    -------
-    P, Q : (g, 5, 3) float64, mm
+    Those of corners that are not smoothed are all at the corner.
     """
     pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
     ratio = corners.ratio[rows]
@@ -158,7 +119,7 @@ def control_points(
 
 
 def five_points(corner: Floats, leg_in: Floats, leg_out: Floats, ratio: Floats) -> Floats:
-    """Control points from the corners (g, 3), the legs into and out of them (g, 3) and the ratios (g,)."""
+    """Control points (g, 5, 3) from the corners (g, 3), the legs into and out of them (g, 3) and the ratios (g,)."""
     points = np.repeat(corner[:, None, :], 5, axis=1)
     points[:, 0] -= leg_in
     points[:, 1] -= ratio[:, None] * leg_in
@@ -168,36 +129,18 @@ def five_points(corner: Floats, leg_in: Floats, leg_out: Floats, ratio: Floats) 
 
 
 def evaluate(points: Floats, weights: Floats, u: Floats) -> Floats:
-    """Points of many curves: equation (3).
+    """Points (g, m, 3) of curves by equation (3): control points (g, 5, 3), weights (g, 2), parameters (m,) or (g, m).
 
-    Parameters
-    ----------
-    points : (g, 5, 3) float64
-    weights : (g, 2) or (2,) float64
-    u : (m,) or (g, m) float64
-
-    Returns
-    -------
-    (g, m, 3) float64
+    Weights (2,) are those of all curves.
     """
     values: Floats = rational_basis(u, weights) @ points
     return values
 
 
 def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
-    """Point, first and second derivative with respect to u, of many curves at common parameters.
+    """Points and first two derivatives by u, (g, m, 3) each, of curves (g, 5, 3) at common parameters (m,).
 
     At the knot u = ½ the left derivatives are returned; the curve is C² there.
-
-    Parameters
-    ----------
-    points : (g, 5, 3) float64
-    weights : (g, 2) float64
-    u : (m,) float64
-
-    Returns
-    -------
-    three (g, m, 3) float64
     """
     second = u > 0.5
     s = 2.0 * np.where(second, 1.0 - u, u)
@@ -221,13 +164,7 @@ def derivatives(points: Floats, weights: Floats, u: Floats) -> tuple[Floats, Flo
 class Refinement:
     """The five-point curve on `spans` equal knot intervals, p = spans + 3 control points.
 
-    Parameters
-    ----------
-    spans : int
-    splines : Splines
-        The one knot vector.
-    from_five : (p, 5) float64
-        Homogeneous control points are this matrix times the five homogeneous ones; rows sum to one.
+    Homogeneous control points are the matrix `from_five` (p, 5) times the five homogeneous ones; its rows sum to one.
     """
 
     spans: int

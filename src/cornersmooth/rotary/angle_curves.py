@@ -1,15 +1,12 @@
 """Smoothed orientation as NURBS in rotary axes: the angles as further axes of the tip curve.
 
-A control such as FANUC's G6.2 runs every axis of a curve on the same knots and weights, rotary axes among them, but
-knows no second curve for the tool axis. So both rotary angles get control points of their own, such that the tool axis
-they give follows the direction of Q(u) − P(u).
+A control such as FANUC's G6.2 runs rotary axes on the knots and weights of the tip curve. So both angles get control
+points of their own, such that the tool axis they give follows the direction of Q(u) − P(u).
 
-Where the angles run evenly on both segments of a corner, the five angle control points follow from the corner as those
-of the tip do, and the angles are as smooth over the tip as the tip curve is: they join the straight motion with their
-curvature. Elsewhere, with large axis steps and near the pole, knots are inserted (which leaves the tip curve as it is),
-value and first two derivatives are kept at both joints, and the points between them are fitted. The derivatives are
-those of the straight lines beside, or, where that would take many knots, those of the ruled motion, which the lines
-follow by steps.
+Where the angles run evenly on both segments of a corner, their five control points follow from the corner as those of
+the tip do. Elsewhere knots are inserted, which leaves the tip curve as it is: value and first two derivatives are kept
+at both joints, and the points between are fitted. The derivatives are those of the straight lines beside, or, where
+that would take many knots, those of the ruled motion.
 """
 
 from __future__ import annotations
@@ -45,14 +42,14 @@ SPANS = (2, 4, 8, 16, 32)
 SPANS_PER_UNIT = 8
 #: Numbers of knot intervals in the order of trial, and whether the rates of the ruled motion hold at the joints.
 TRIALS = tuple((spans, False) for spans in SPANS[:3]) + tuple((spans, True) for spans in SPANS[1:])
-#: Share of the allowance that a curve may take where it is measured; the rest is for what lies between.
+#: Share of the allowance that a curve may take at its samples.
 SHARE = 0.95
 #: An allowance below this share of the tolerance is nothing.
 LEAST_ALLOWANCE = 1e-3
 #: Samples on curves that are worked on at a time: their intermediate arrays fit the processor's cache.
 CHUNK = 1 << 15
-#: A curve on even segments whose angles vary by D (rad, both axes and both legs) errs by less than this times D² away
-#: from the pole. Where that is within the allowance the error has one hump on either half, and needs few samples.
+#: A curve on even segments whose angles vary by D (rad) errs by less than this times D² away from the pole. Within the
+#: allowance such an error has one hump on either half, and needs few samples.
 GENTLE, GENTLE_SAMPLES = 0.8, 4
 
 
@@ -60,20 +57,16 @@ GENTLE, GENTLE_SAMPLES = 0.8, 4
 class CurveGroup:
     """Curves that share a knot vector: g curves with p control points each.
 
-    A writer prints for each of them, in FANUC's form (B-63324EN/03 4.17), p blocks with the knot, X Y Z, both rotary
-    words and the weight of one control point each, ``K<knots[i]> X.. Y.. Z.. <angles> R<weights>``, G6.2 P4 in the
-    first; then the last four knots in blocks of their own. The first control point is the current position digit for
-    digit: the end of the straight remainder before it, or the last control point of the curve before.
+    A block holds the knot, X Y Z, both rotary words and the weight of one control point (FANUC B-63324EN/03 4.17); the
+    last four knots have blocks of their own. The first control point is the current position.
 
     Parameters
     ----------
     smoothed : SmoothProgram
-        What they are of.
     row : (g,) int64
         Rows of `Corners`, ascending.
     knots : (p + 4,) float64
-        As they are to be written: from 0, with three decimals at most. The parameter u of the corner is the knot
-        parameter over the last knot.
+        As they are to be written: from 0, with three decimals at most.
     weights : (g, p) float64
         As they are to be written: with three decimals at most. All of a curve may have a power of two as common factor.
     angles : (g, p, 2) float64, degrees
@@ -81,8 +74,7 @@ class CurveGroup:
     orientation_error : (g,) float64, degrees
         Largest angle between the axis that the angles give and the direction of Q(u) − P(u), as measured.
     ruled : (g,) bool
-        Beside straight remainders that do not run evenly the angles join with the rates of the ruled motion, not with
-        those of the line, which follows it by steps: a kink like those where points are inserted.
+        The angles join with the rates of the ruled motion, not with those of the line beside.
     """
 
     smoothed: SmoothProgram
@@ -136,13 +128,11 @@ class RotaryCurves:
         Angles at the poses that are passed; NaN where nothing is written (`Status.DUPLICATE`, `Move.FROM`). At a
         rounded pose what its axis would need.
     inserted : Insertions
-        Points that the straight remainders need so that even angles keep the tolerance: `segment` is the pose that the
-        straight motion leads to, `fraction` counts on the whole segment from the pose before (`Corners.before`) to it.
-        `unsolved` are poses into which no division helps.
+        Points that the straight remainders need, as in `RotaryMotion`.
     even : (n,) bool
         The segment into the pose runs evenly in its angles, joints included: no points inserted.
     findings : tuple of Finding
-        Those of `rotary_angles`, and what became of corners that no curve meets.
+        Those of `rotary_angles`, and of corners that no curve meets.
     """
 
     groups: tuple[CurveGroup, ...]
@@ -160,13 +150,8 @@ class RotaryCurves:
 def angle_allowance(smoothed: SmoothProgram, angle_resolution: float) -> Floats:
     """What ε leaves for the fit of the orientation at each corner: (k,) degrees, 0 or more.
 
-    An axis that is off by δ moves the axis point by 2H sin(δ/2). Settings whose tolerance for the axis point is reduced
-    (`Settings.axis_point_resolution`) leave something to corners too that are limited by the tolerance.
-
-    Parameters
-    ----------
-    angle_resolution : float, degrees
-        Step of the written angles, half of which is taken off for each of the two.
+    An axis that is off by δ moves the axis point by 2H sin(δ/2). Half of `angle_resolution` (degrees), the step of the
+    written angles, is taken off for each of the two.
     """
     settings = smoothed.settings
     height = settings.axis_scale
@@ -193,15 +178,12 @@ def rotary_curves(
         Made with a method in which one parameter drives P and Q.
     machine : Machine
     tolerance : float, degrees
-        Largest angle between the tool axis and that of the ruled motion on straight motion: ε at H where nothing else
-        deviates, less the rounding of the words.
+        Largest angle between the tool axis and that of the ruled motion on straight motion.
     allowance : (k,) float64, degrees, optional
-        Largest angle between the tool axis and the direction of Q(u) − P(u) for each row of `Corners`, joints included
-        (`angle_allowance`); `tolerance` for all by default. Smoothed corners with nothing left become `lines`.
+        The same on the curve of each row of `Corners` (`angle_allowance`); `tolerance` for all by default. Corners with
+        nothing left become `lines`.
     angle_resolution : float, degrees
         Step of the written angles.
-    file : str, optional
-        For messages.
 
     Raises
     ------
@@ -299,9 +281,9 @@ class _Work:
         return gentle
 
     def curves(self, spans: int, ruled: bool, chosen: Ints, samples: int) -> tuple[Floats, Floats]:
-        """Angle control points (g, p, 2) of some corners, and their errors (g,); infinite outside of the limits.
+        """Angle control points (g, p, 2) of some corners, and their errors (g,) at `samples` in each knot interval.
 
-        These are measured in so many `samples` in each knot interval.
+        The errors are infinite outside of the limits.
         """
         refined, targets = nurbs.refinement(spans), self.targets(chosen, ruled)
         if spans == SPANS[0]:

@@ -1,8 +1,7 @@
 """Control points of rotary angles on given knots and weights: fixed at the ends, least squares between them.
 
-What is made small is the angle between the tool axis that the angles give and the one wanted, not the error of the
-angles: near the pole the first angle may then be far off, where the axis hardly notices. The problem is linearised as
-in Gauss and Newton's method, first at the exact angles, then at the last fit.
+What is made small is the angle between the tool axes, not the error of the angles: near the pole the first angle may be
+far off. Gauss and Newton's method starts from the exact angles.
 """
 
 from __future__ import annotations
@@ -55,11 +54,7 @@ class Targets:
 
 
 def leg_derivatives(weights: Floats, ratio: Floats) -> tuple[Floats, Floats]:
-    """First and second derivative, at its start, of the share of the leg that a curve has behind it: (g,) each.
-
-    The first three control points of the five-point curve stand at the shares 0, 1 − ratio and 1 of the leg, and the
-    others play no part in the two derivatives.
-    """
+    """First and second derivative, at its start, of the share of the leg that a curve has passed: (g,) each."""
     slope, bend = _end_derivatives(np.stack((np.zeros_like(ratio), weights[:, 1] * (1 - ratio), weights[:, 2]), axis=1))
     weight_slope, _ = _end_derivatives(weights[:, :3])
     return slope, bend - 2 * weight_slope * slope
@@ -85,16 +80,9 @@ def end_points(refined: Refinement, targets: Targets) -> tuple[Floats, Floats]:
 
 
 def fit(machine: Machine, refined: Refinement, targets: Targets, exact: Floats, samples: Floats) -> Floats:
-    """Control points of the angles: (g, p, 2) degrees.
+    """Control points of the angles (g, p, 2), degrees, for p > 6.
 
-    Parameters
-    ----------
-    refined : Refinement
-        With more than six control points.
-    exact : (g, m, 2) float64, degrees
-        Angles that give the wanted axes at `samples`, continuous.
-    samples : (m,) float64
-        Parameters, `FIT_SAMPLES` in each knot interval.
+    The angles `exact` (g, m, 2), continuous, give the wanted axes at the parameters `samples` (m,).
     """
     start, end = end_points(refined, targets)
     shares = refined.rational_basis(samples, refined.homogeneous(targets.weights))
@@ -133,19 +121,9 @@ def fit_samples(refined: Refinement) -> Floats:
 def measured(
     machine: Machine, refined: Refinement, targets: Targets, points: Floats, count: int = MEASURE_SAMPLES
 ) -> tuple[Floats, Floats]:
-    """Largest angle between the axis of the angles and the one wanted, and the extremes of the angles.
+    """Largest angle (g,) between the axis of the angles and the one wanted, and extremes of the angles, degrees.
 
-    Parameters
-    ----------
-    points : (g, p, 2) float64, degrees
-    count : int
-        Samples in each knot interval.
-
-    Returns
-    -------
-    error : (g,) float64, degrees
-    extremes : (g, 2, 2) float64, degrees
-        ``[curve, axis, lowest or highest]``
+    The extremes are (g, 2, 2) ``[curve, axis, lowest or highest]``; `count` samples lie in each knot interval.
     """
     samples = np.linspace(0.0, 1.0, count * refined.spans + 1)
     angles = refined.rational_basis(samples, refined.homogeneous(targets.weights)) @ points

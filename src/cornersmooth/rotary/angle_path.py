@@ -34,14 +34,12 @@ class RotaryPath:
     Parameters
     ----------
     angles : (n, 2) float64, degrees
-        In the order of `Machine.axes`, unwrapped: no step by a whole turn but for rewinds in rapids.
+        In the order of `Machine.axes`, unwrapped but for rewinds in rapids.
     deviation : (n,) float64, degrees
-        Angle between the axis that the angles give and the one asked for: 0 but for poses at the pole, where it stays
-        within the tolerance given.
+        Angle between the axis that the angles give and the one asked for: within the tolerance, 0 but at the pole.
     branch : (n,) int8
         Which of `Solutions.angles` they are, -1 at the pole.
     findings : tuple of Finding
-        Passages near the pole, rewinds, changes of solution.
     """
 
     angles: Floats
@@ -73,8 +71,8 @@ def rotary_angles(
     axis : (n, 3) float64
         Unit vectors in part coordinates.
     tolerance : float, degrees
-        By how much the axis may deviate near the pole, where the first angle is then free to turn ahead of time.
-        Also how far outside the reach of the machine an axis may lie (digits of the file) and be taken as on its edge.
+        By how much the axis may deviate near the pole, where the first angle is then free to turn ahead of time, and
+        may lie outside the reach of the machine.
     rapid : (n,) bool
         The move into the pose does not cut, so that solution and turn may change in it; only the first by default.
     left : (n,) bool
@@ -86,9 +84,7 @@ def rotary_angles(
         default.
     still_tolerance : float, degrees
         By how much the axis may deviate there all the same: what the digits of the words account for.
-    line : (n,) int64
-        Source lines for messages.
-    file : str, optional
+    line, file : (n,) int64 and str, optional
         For messages.
 
     Raises
@@ -127,7 +123,7 @@ def rotary_angles(
         angles[:, 0] = np.clip(0.0, *machine.limits[0])
         for here in _chunks(n):
             angles[here, 1] = closest_second(machine, axis[here], angles[here, 0])
-    angles[poses.cone] = _into_limits(angles[poses.cone], machine.limits)
+    angles[poses.cone] = np.clip(angles[poses.cone], *machine.limits.T)  # at the pole the axis hardly notices
     deviation = np.zeros(n)
     for off in (poses.cone, poses.beyond):
         for here in _chunks(len(off)):
@@ -146,8 +142,7 @@ def rotary_angles(
 def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
     """Poses of a program whose move does not cut, so that solution and turn may change in it: (n,) bool.
 
-    Everything but linear feed moves and arcs, and what comes from a start position that is stated, not moved to: the
-    first move, and an arc. A line behind it comes from where the tool is.
+    Neither does the first move, nor an arc, from a start position that is stated and not moved to.
     """
     rapid: Bools = (kind != Move.LINEAR) & (kind != Move.ARC)
     first = np.cumsum(kind != Move.FROM) == 1
@@ -183,10 +178,9 @@ class _Poses:
 def _sorted_poses(
     machine: Machine, axis: Floats, tolerance: float, cones: Floats, line: Ints, file: str | None
 ) -> tuple[_Poses, Floats]:
-    """Poses outside of the cone of the pole, given for each in degrees, and both solutions of those.
+    """Poses by their cones of the pole, degrees, and both solutions of those outside.
 
-    Half of what an axis may deviate is the cone: two axes inside it are within that of each other. Solutions are
-    (s, 2, 2) degrees ``[pose, branch, axis]`` in (-180, 180].
+    Solutions are (s, 2, 2) degrees ``[pose, branch, axis]`` in (-180, 180].
     """
     n, count = len(axis), 0
     angles, steady = np.empty((n, 2, 2)), np.empty(n, np.int64)
@@ -220,7 +214,7 @@ def _steady_angles(
 ) -> tuple[Floats, NDArray[np.int8], Ints]:
     """Angles (s, 2) and branches (s,) of the poses outside the cone, and poses before which a rapid changes branch.
 
-    `unwrapped` are their solutions, which are unwrapped in place.
+    Their solutions `unwrapped` change in place.
     """
     dislike = _dislike(machine, unwrapped[0])
     free, first = [np.ones(1, np.bool_)], [np.zeros(1, np.int64)]
@@ -282,8 +276,7 @@ def _fill_cone(
 ) -> None:
     """Angles of poses inside the cone, in place; `length` is that of the path up to each pose.
 
-    Between two poses outside, the first angle goes evenly with the length of the path from the one's to the other's;
-    towards the end of a cut it stays, and before the start of one it waits already. The second follows the axis.
+    The first angle goes evenly with the length of the path between two poses outside, and waits at the ends of a cut.
     """
     after = np.searchsorted(steady, poses)
     before = np.maximum(after - 1, 0)
@@ -307,12 +300,6 @@ def _fill_cone(
     second = closest_second(machine, axis[poses], first)
     angles[poses, 0] = first
     angles[poses, 1] = second + 360 * np.round((guess - second) / 360)
-
-
-def _into_limits(angles: Floats, limits: Floats) -> Floats:
-    """Angles clipped to the limits: at the pole only, where the axis hardly notices."""
-    clipped: Floats = np.clip(angles, limits[:, 0], limits[:, 1])
-    return clipped
 
 
 def _extremes(members: Ints, unwrapped: Floats, way: WideSteps) -> tuple[Floats, Floats]:

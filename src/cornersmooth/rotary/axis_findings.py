@@ -40,14 +40,8 @@ def limit_error(
 ) -> InputError:
     """Say that a rotary word leaves its limits: with either solution alone, or because the cut began on the other one.
 
-    Parameters
-    ----------
-    both : (2, 2) float64, degrees
-        Both solutions of the pose.
-    words : (2,) float64, degrees, or None
-        The words at which the furthest choice leaves the limits.
-    since : int
-        Line at which the cut starts, 0 where unknown.
+    `both` (2, 2) are the solutions of the pose, `words` (2,) those at which the furthest choice leaves the limits; the
+    cut starts at the line `since`, 0 where unknown.
     """
     turned = both + 360 * np.round((limits.clip(-1e6, 1e6).mean(axis=1) - both) / 360)
     excess = np.maximum(np.maximum(limits[:, 0] - turned, turned - limits[:, 1]), 0.0)

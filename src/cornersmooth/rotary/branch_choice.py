@@ -1,8 +1,7 @@
 """Which of the two solutions, and in which turn, for every stretch of a path: the cheapest choice inside the limits.
 
-On a stretch the solution cannot change without a jump. Between two of them is either a rapid, where everything may
-change, or a passage through the pole, where the two solutions meet. The search looks ahead over the
-whole path (dynamic programming): the start of a stretch is chosen so that its end still lies inside the limits.
+On a stretch the solution cannot change without a jump. Between two of them is a rapid, where everything may change, or
+a passage through the pole, where the two solutions meet. Dynamic programming looks ahead over the whole path.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ START_TURN_COST = 1e-3
 OUTSIDE_COST = 1e12
 #: Words may pass their limits by so much (degrees): rounding of the solution, far below the last digit of a word.
 LIMIT_SLACK = 1e-9
-#: An axis with room for more turns than this is taken as endless first; only where that fails its turns are searched.
+#: An axis with room for more turns is taken as endless first; only where that fails its turns are searched.
 MANY_TURNS = 8
 #: More states than these are not searched: axes with many turns are then kept within `MANY_TURNS` of zero.
 MOST_STATES = 1000
@@ -38,11 +37,11 @@ class Stretches:
     Parameters
     ----------
     first, last : (p, 2, 2) float64
-        ``[stretch, branch, axis]`` at the first pose and at the last, or at the pole where stretches meet there.
+        ``[stretch, branch, axis]`` at the first and at the last pose, or at the pole where stretches meet.
     low, high : (p, 2, 2) float64
         Extremes over the stretch.
     free : (p,) bool
-        A rapid leads into the stretch; false for a passage through the pole. True for the first stretch.
+        A rapid leads into the stretch, not a passage through the pole. True for the first stretch.
     dislike : (2,) float64
         What a start of the path on either branch costs.
     """

@@ -1,8 +1,7 @@
 """Bounds on how far motions leave their chords: what makes a check at some samples hold between them.
 
-A vector function f on [0, 1] with |f″| ≤ M leaves its chord on a stretch of length h by at most M·h²/8. Applied to the
-difference of two motions that is compared at N + 1 even samples: between them it is larger than at them by no more than
-(M₁ + M₂)/(8 N²). All bounds are taken over the whole of an interval on which the words run evenly.
+A vector function on [0, 1] with |f″| ≤ M leaves its chord on a stretch of length h by at most M·h²/8. So the difference
+of two motions is between N + 1 even samples no larger than at them but for (M₁ + M₂)/(8 N²).
 """
 
 from __future__ import annotations
@@ -10,45 +9,62 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.kinematics.machine import Machine
+from cornersmooth.kinematics.poses import tool_axis
 from cornersmooth.model import Floats
-from cornersmooth.vectors import dot, norm
+from cornersmooth.vectors import dot, norm, unit
 
 
 def axis_bend(machine: Machine, turn: Floats, start: Floats, end: Floats, slack: float) -> Floats:
-    """Bound on the second derivative of the tool axis when both rotary axes turn evenly.
+    """Bound (n,) on the second derivative of the tool axis when both rotary axes turn evenly.
 
     Parameters
     ----------
     turn : (n, 2) float64, rad
-        Turns of both axes.
     start, end : (n, 3) float64
         Tool axes at both ends.
     slack : float, rad
         By how much these may be off.
-
-    Returns
-    -------
-    (n,) float64
-        ‖d²k/ds²‖ for k = R₁(q₁) R₂(q₂) k₀. What the first axis turns by counts with the distance of k from that axis.
     """
-    first, second = np.abs(turn).T
-    away = np.maximum(_sine(machine, start), _sine(machine, end)) + slack + second / 2
-    bend: Floats = np.minimum(away, 1.0) * first**2 + 2 * first * second + second**2
+    turn = np.abs(turn)
+    away = np.maximum(_sine(machine, start), _sine(machine, end)) + slack + turn[:, 1] / 2
+    return _turning_bend(away, turn, np.zeros_like(turn))
+
+
+def axis_curve_bend(machine: Machine, words: Floats) -> Floats:
+    """Bound (n,) on the second derivative of the tool axis along cubics of the angles: Bézier points (n, 4, 2), rad."""
+    speed, bend = (np.abs(part).max(axis=1) for part in (3.0 * np.diff(words, axis=1), 6.0 * np.diff(words, 2, axis=1)))
+    away = _sine(machine, tool_axis(machine, np.degrees(words[:, 0]))) + speed[:, 1]
+    return _turning_bend(away, speed, bend)
+
+
+def _turning_bend(away: Floats, speed: Floats, bend: Floats) -> Floats:
+    """‖k″‖ (n,) of k = R₁(q₁) R₂(q₂) k₀ at most, for |q′| and |q″| (n, 2) and the distance of k from the first axis."""
+    away = np.minimum(away, 1.0)
+    total: Floats = away * speed[:, 0] ** 2 + 2 * speed[:, 0] * speed[:, 1] + speed[:, 1] ** 2
+    return total + away * bend[:, 0] + bend[:, 1]
+
+
+def lever_bend(lever: Floats) -> Floats:
+    """Bound (n,) on |u″| of the direction u of cubics with the Bézier points (n, 4, 3); infinite through the origin.
+
+    With l = r u the part of u″ across u is that of (l″ − 2 r′ u′)/r, the part along it |u′|²; both |r′| and r |u′| are
+    at most |l′|.
+    """
+    middle = unit(lever.mean(axis=1))
+    shortest = np.einsum("kid,kd->ki", lever, middle).min(axis=1)
+    fastest, sharpest = (
+        norm(part).max(axis=1) for part in (3.0 * np.diff(lever, axis=1), 6.0 * np.diff(lever, 2, axis=1))
+    )
+    inverse = np.divide(1.0, shortest, out=np.full(len(lever), np.inf), where=shortest > 0)
+    with np.errstate(invalid="ignore"):
+        bend: Floats = np.nan_to_num(sharpest * inverse + 3.0 * (fastest * inverse) ** 2, nan=np.inf, posinf=np.inf)
     return bend
 
 
 def ruled_bend(start: Floats, end: Floats) -> Floats:
-    """Bound on the second derivative of the direction of a point that runs evenly from `start` to `end`.
+    """Bound (n,) on the second derivative of the direction of points that run evenly from `start` to `end` (n, 3).
 
-    Parameters
-    ----------
-    start, end : (n, 3) float64
-        Of any length.
-
-    Returns
-    -------
-    (n,) float64
-        Infinite where the point comes to the origin: the direction jumps there.
+    Infinite where the point comes to the origin: the direction jumps there.
     """
     way = end - start
     square = dot(way, way)
@@ -63,17 +79,9 @@ def ruled_bend(start: Floats, end: Floats) -> Floats:
 
 
 def tip_bend(machine: Machine, start: Floats, end: Floats, turn: Floats) -> Floats:
-    """Bound on the second derivative of the tip in the part when all five axes run evenly.
+    """Bound (n,) on the second derivative of the tip in the part when all five axes run evenly, mm.
 
-    Parameters
-    ----------
-    start, end : (n, 3) float64, mm
-        Words of the linear axes (`machine_position`).
-    turn : (n, 2) float64, rad
-
-    Returns
-    -------
-    (n,) float64, mm
+    `start` and `end` (n, 3), mm, are words of the linear axes (`machine_position`); turns (n, 2) are in rad.
     """
     turn = np.abs(turn)
     size, speed, bend = np.zeros((3, len(turn)))  # of the way of the tip and its derivatives, as `position._swing` goes
@@ -112,10 +120,7 @@ def _turned(size: Floats, speed: Floats, bend: Floats, turn: Floats) -> tuple[Fl
 def _sine(machine: Machine, axis: Floats) -> Floats:
     """Sine of the angle between the tool axis and the first rotary axis."""
     x, y, z = machine.axes[0].unit
-    across = np.array(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)))
-    vectors = axis @ across
-    sine: Floats = norm(vectors)
-    return sine
+    return norm(axis @ np.array(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))))
 
 
 def _along(point: Floats, way: Floats) -> Floats:

@@ -7,18 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.geometry import nurbs
+from cornersmooth.geometry.ragged import starts
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import continued
 from cornersmooth.model import Floats, Ints, SmoothProgram
 from cornersmooth.rotary.remainders import RotaryMotion, lever_points, tip_points
 from cornersmooth.rotary.subdivision import fill, insertions
+from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import lines_of
 from cornersmooth.vectors import unit
 
 
 @dataclass(frozen=True)
 class CornerLines:
-    """Points of some corners, q rows in path order, from the joint where a corner starts to the one where it ends.
+    """Points of some corners from joint to joint, q rows in path order; even angles between them keep the tolerance.
 
     Parameters
     ----------
@@ -26,10 +28,8 @@ class CornerLines:
         Row of `Corners`, ascending.
     tip : (q, 3) float64, mm
     angles : (q, 2) float64, degrees
-        Those of the joints in the first and the last point of a corner. Even angles from point to point keep the
-        tolerance.
     unsolved : (v,) int64
-        Rows of `Corners` in which no division helps: the axis jumps there.
+        Rows of `Corners` in which the axis jumps: no division helps.
     """
 
     row: Ints
@@ -41,25 +41,22 @@ class CornerLines:
 def corner_lines(
     smoothed: SmoothProgram, machine: Machine, motion: RotaryMotion, chosen: Ints, file: str | None
 ) -> CornerLines:
-    """Points of corners with the numbers `chosen` in `RotaryMotion.rows`, ascending.
-
-    The samples are those of dense output (`lines_of`), and what the rotary angles need between them.
+    """Points of corners with the numbers `chosen` in `RotaryMotion.rows`, ascending: those of dense lines and more.
 
     Raises
     ------
     InputError
-        A rotary axis would leave its limits (CS362).
+        CS362: a rotary axis would leave its limits.
     """
     program, corners = smoothed.program, smoothed.corners
     rows = motion.rows[chosen]
     halves = lines_of(smoothed, rows)
     counts = 2 * np.abs(halves) + 1
-    first = np.cumsum(counts) - counts
-    total = int(counts.sum())
+    first, total = starts(counts)[:-1], int(counts.sum())
     tip, lever, angles = np.zeros((total, 3)), np.zeros((total, 3)), np.zeros((total, 2))
     for number in np.unique(halves):
         group = np.flatnonzero(halves == number)
-        u = _nodes(int(number))
+        u = np.concatenate(([0.0], nodes(int(number))))
         where = first[group, None] + np.arange(len(u))
         weights = corners.weights[rows[group]]
         tip[where] = nurbs.evaluate(tip_points(smoothed, rows[group]), weights, u)
@@ -78,10 +75,3 @@ def corner_lines(
     more = insertions(machine, tip, lever, angles, tolerance=2 * motion.cone, rapid=between, line=line, file=file)
     filled = fill(tip, lever, angles, more)
     return CornerLines(owner[filled.pose], filled.tip, filled.angles, np.unique(owner[more.unsolved]))
-
-
-def _nodes(lines: int) -> Floats:
-    """Parameters of the ends of the lines, as `lines_per_half` counts them: graded, or even where it is negative."""
-    number = abs(lines)
-    s = (np.arange(number + 1) / number) ** (2.0 / 3.0 if lines > 0 else 1.0)
-    return np.concatenate((s / 2, 1 - s[-2::-1] / 2))

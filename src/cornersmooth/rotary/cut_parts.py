@@ -9,13 +9,7 @@ from cornersmooth.rotary.branch_choice import LIMIT_SLACK, NoChoiceError, Stretc
 
 
 class CutTooFarError(Exception):
-    """Cuts that no choice keeps inside the limits, unless they are left on the way.
-
-    Parameters
-    ----------
-    poses : (k,) int64
-        Poses behind which a cut is to be left, ascending.
-    """
+    """Cuts that no choice keeps inside the limits, unless they are left after `poses` (k,), ascending."""
 
     def __init__(self, poses: Ints) -> None:
         super().__init__(poses)
@@ -33,22 +27,17 @@ def too_far(stretches: Stretches, limits: Floats) -> Ints:
 def parts_of_cut(
     angles: Floats, low: Floats, high: Floats, limits: Floats, stuck: NoChoiceError | None = None
 ) -> Ints | None:
-    """Rows of a stretch behind which the cut is left, so that all parts of it are inside the limits.
+    """Rows (k,) of a stretch after which the cut is left, so that all parts of it are inside the limits.
+
+    None where a single move, or the way in, leaves the limits.
 
     Parameters
     ----------
-    angles : (m, 2, 2) float64, degrees
-        ``[row, branch, axis]``, unwrapped.
-    low, high : (m, 2, 2) float64, degrees
-        Extremes on the way into each row.
+    angles, low, high : (m, 2, 2) float64, degrees
+        ``[row, branch, axis]``, unwrapped: at each row, and extremes on the way into it.
     limits : (2, 2) float64, degrees
     stuck : NoChoiceError, optional
         Says in which states the stretch can be entered; any that the limits allow otherwise.
-
-    Returns
-    -------
-    (k,) int64 or None
-        None where a single move, or the way in, leaves the limits.
     """
     count, begin = len(angles), 0
     left: list[int] = []

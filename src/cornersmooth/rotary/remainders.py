@@ -1,9 +1,8 @@
 """The smoothed motion in rotary angles outside its curves: poses, joints, and the straight motion between them.
 
-A control that is given rotary words runs them evenly along a straight block. So a segment whose angles may run evenly
-from pose to pose within the tolerance does so here: its joints then stand on that line, and a corner between two such
-segments is rounded in its angles exactly as it is in its tip. On all other segments the joints have the angles of the
-ruled motion, and the straight remainder is divided as `cornersmooth.rotary.subdivision` says.
+A segment whose angles may run evenly from pose to pose within the tolerance does so: a corner between two such segments
+is rounded in its angles exactly as it is in its tip. On all others the joints have the angles of the ruled motion, and
+the straight remainder is divided as `cornersmooth.rotary.subdivision` says.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from cornersmooth.vectors import unit
 
 #: Samples at which each transition is followed, as a rule and where the first rotary axis may turn fast.
 FEW_SAMPLES, MANY_SAMPLES = 3, 17
-#: It may where the pole is nearer than so many times the axis step at the corner (degrees added for corners that rest).
+#: It may where the pole is nearer than so many times the axis step at the corner, and so many degrees.
 NEAR_POLE, NEAR_POLE_DEGREES = 5.0, 1.0
 #: Samples on a segment where even angles are compared with the ruled motion, and the share of the tolerance they keep.
 SEGMENT_SAMPLES, SEGMENT_SHARE = tuple(j / 8 for j in range(1, 8)), 0.8
-#: Axes at the pole and at the edge of reach keep the strictest allowance, but need not keep less of the tolerance.
+#: Least share of the tolerance that axes at the pole and at the edge of reach have to keep.
 STRICTEST_SHARE = 0.1
 #: Step of the derivatives of the ruled angles, in fractions of the segment.
 DIFFERENCE = 1e-3
@@ -38,21 +37,12 @@ CHUNK = 1 << 15
 
 @dataclass(frozen=True)
 class Ends:
-    """Angles at one end of the straight remainder of each segment; n rows, the segment's pose is the one it leads to.
+    """Angles at one end of the straight remainder of the segment into each of n poses, degrees."""
 
-    Parameters
-    ----------
-    fraction : (n,) float64
-        Fraction of the segment.
-    angles : (n, 2) float64, degrees
-    slope, bend : (n, 2) float64, degrees
-        First and second derivative with respect to the fraction of the segment.
-    """
-
-    fraction: Floats
-    angles: Floats
-    slope: Floats
-    bend: Floats
+    fraction: Floats  # of the segment, (n,)
+    angles: Floats  # (n, 2)
+    slope: Floats  # first derivative by the fraction
+    bend: Floats  # second derivative
 
 
 @dataclass(frozen=True)
@@ -95,17 +85,17 @@ class RotaryMotion:
         Rows of `Corners` of the smoothed corners.
     segments : Segments
     pose_angles : (n, 2) float64, degrees
-        At every pose; at a smoothed corner what the axis there would need. NaN where nothing is written.
+        At a smoothed corner what the axis there would need; NaN where nothing is written.
     even : (n,) bool
         The segment into the pose runs evenly in its angles.
     start, end : Ends
-        Of the straight remainder of the segment into each pose, with the rates of its first and last line; NaN where
-        there is no segment.
+        With the rates of the first and last line of the straight remainders; NaN where there is no segment.
     ruled_start, ruled_end : Ends
         The same with the rates of the ruled motion, which differ where points are inserted.
     followed : Followed
     inserted : Insertions
-        Into the straight remainders: `segment` is the pose that the segment leads to, `fraction` that of the segment.
+        Into the straight remainders: `segment` is the pose that each leads to, `fraction` that of the whole segment.
+        `unsolved` are poses into which no division helps.
     cone : float, degrees
         Within this angle of the pole the first rotary angle is free.
     findings : tuple of Finding
@@ -133,24 +123,7 @@ def rotary_motion(
     angle_resolution: float,
     file: str | None,
 ) -> RotaryMotion:
-    """Rotary angles of the smoothed motion outside its curves.
-
-    Parameters
-    ----------
-    tolerance : float, degrees
-        Largest angle between the tool axis and that of the ruled motion on straight motion.
-    allowance : (k,) float64, degrees
-        The same at the joints of each row of `Corners`, not above `tolerance`; 0 for corners that are to be lines.
-    angle_resolution : float, degrees
-        Step of the written angles.
-    file : str or None
-        For messages.
-
-    Raises
-    ------
-    InputError
-        As `rotary_angles` and `insertions`.
-    """
+    """Rotary angles of the smoothed motion outside its curves; parameters and errors are those of `rotary_curves`."""
     segments = segments_of(smoothed, dense=False)
     corners = smoothed.corners
     rows = np.flatnonzero(corners.smoothed)
@@ -170,20 +143,8 @@ def rotary_motion(
     for side in (end, ruled_end, start):  # transitions that meet without a line between share one joint
         for name in ("angles", "slope", "bend"):
             getattr(side, name)[joined] = getattr(ruled_start, name)[joined]
-    return RotaryMotion(
-        rows=rows,
-        segments=segments,
-        pose_angles=pose_angles,
-        even=even,
-        start=start,
-        end=end,
-        ruled_start=ruled_start,
-        ruled_end=ruled_end,
-        followed=followed,
-        inserted=inserted,
-        cone=cone,
-        findings=findings,
-    )
+    ends = start, end, ruled_start, ruled_end
+    return RotaryMotion(rows, segments, pose_angles, even, *ends, followed, inserted, cone, findings)
 
 
 def _follow(
@@ -211,9 +172,7 @@ def _follow(
     path_tip, path_axis = program.tip[owner], axis[owner]
     for number in (FEW_SAMPLES, MANY_SAMPLES):
         of_number = np.flatnonzero(count == number)
-        size = max(1, CHUNK // number)
-        for begin in range(0, len(of_number), size):
-            chosen = of_number[begin : begin + size]
+        for chosen in np.array_split(of_number, max(1, len(of_number) * number // CHUNK)):
             where = first[chosen, None] + np.arange(number)
             weights, u = corners.weights[rows[chosen]], np.linspace(0.0, 1.0, number)
             path_tip[where] = nurbs.evaluate(tip_points(smoothed, rows[chosen]), weights, u)
@@ -349,17 +308,11 @@ def _ruled(smoothed: SmoothProgram, machine: Machine, segments: Segments, even: 
 
 def tip_points(smoothed: SmoothProgram, rows: Ints) -> Floats:
     """Control points of the tip curves of some rows of `Corners`: (g, 5, 3) mm."""
-    return _points(smoothed, rows, smoothed.program.tip)
+    legs = nurbs.trimmed_legs(smoothed.program.tip, smoothed.corners, rows)
+    return nurbs.five_points(*legs, smoothed.corners.ratio[rows])
 
 
 def lever_points(smoothed: SmoothProgram, rows: Ints) -> Floats:
     """Those of (Q − P)/H, where P and Q are trimmed by the same share: (g, 5, 3)."""
-    return _points(smoothed, rows, smoothed.program.axis)
-
-
-def _points(smoothed: SmoothProgram, rows: Ints, values: Floats) -> Floats:
-    corners = smoothed.corners
-    here = values[corners.pose[rows]]
-    leg_in = (here - values[corners.before[rows]]) * corners.trim_in[rows, None]
-    leg_out = (values[corners.after[rows]] - here) * corners.trim_out[rows, None]
-    return nurbs.five_points(here, leg_in, leg_out, corners.ratio[rows])
+    legs = nurbs.trimmed_legs(smoothed.program.axis, smoothed.corners, rows)
+    return nurbs.five_points(*legs, smoothed.corners.ratio[rows])

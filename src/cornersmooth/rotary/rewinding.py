@@ -29,21 +29,16 @@ def rewound_angles(
 ) -> tuple[RotaryPath, Ints, Bools]:
     """Rotary angles of a path in which cuts are left, where nothing else keeps the limits.
 
-    Parameters are those of `rotary_angles`.
+    Parameters and errors are those of `rotary_angles`.
 
     Returns
     -------
     path : RotaryPath
-        Of m rows: where a cut is left its pose is there twice, before and behind the turn of the axes.
+        Of m rows: where a cut is left its pose is there twice, before and after the turn of the axes.
     source : (m,) int64
         Row of the path given.
     left : (m,) bool
         Second rows of such pairs.
-
-    Raises
-    ------
-    InputError
-        As `rotary_angles`: a machine that does not reach an axis (CS361), or limits that a single move leaves (CS362).
     """
     source, left = np.arange(len(tip)), np.zeros(len(tip), np.bool_)
     for number in range(_ROUNDS + 1):

@@ -1,13 +1,11 @@
 """Rotary angles of whole runs as cubic B-splines on the knots of the curves: further axes of the same curve.
 
-The tip of a run is a cubic B-spline, and its tool axis the direction of another one, the lever (docs/global.md). On the
-same knots both angles get control points of their own. Each is the blossom of the cubic that meets the angles at four
-places between the knots it hangs on (T. Lyche, L. L. Schumaker, "Local spline approximation methods", J. Approx. Theory
-15, 1975): cubics stay what they are, the joints of all spans are C², and what the angles do at a pole stays near it.
-What is left over is fitted in the same way twice more.
+On the knots of tip and lever (docs/global.md) both angles get control points of their own: the blossom of the cubic
+that meets the angles at four places between its knots (T. Lyche, L. L. Schumaker, "Local spline approximation methods",
+J. Approx. Theory 15, 1975). What is left over is fitted in the same way twice more.
 
-Where the tool axis that they give leaves the lever by more than the tolerance, knots are put into the middle of spans,
-which leaves tip and lever what they are. What is not within the tolerance then is for lines to follow.
+Where their tool axis leaves the lever by more than the tolerance, spans are halved: tip and lever stay what they are.
+What is not within the tolerance then is for lines to follow.
 """
 
 from __future__ import annotations
@@ -21,7 +19,8 @@ from cornersmooth.geometry.ragged import search, starts
 from cornersmooth.kinematics.machine import Machine
 from cornersmooth.kinematics.poses import angle_between, continued, tool_axis
 from cornersmooth.model import Floats, Ints, Runs
-from cornersmooth.vectors import dot, norm, unit
+from cornersmooth.rotary.chord_bounds import axis_curve_bend, lever_bend
+from cornersmooth.vectors import unit
 
 #: rounds in which spans are halved, and steps below which one is not
 ROUNDS, NARROWEST = 5, 8.0
@@ -88,14 +87,10 @@ class RunAngles:
 
 
 def run_angles(runs: Runs, machine: Machine, guide: Guide, *, tolerance: float, cone: float) -> RunAngles:
-    """Angles of runs within a tolerance, as far as halving spans brings them there.
+    """Angles of runs on a machine with two rotary axes, within a tolerance as far as halving spans brings them there.
 
     Parameters
     ----------
-    runs : Runs
-    machine : Machine
-        With two rotary axes.
-    guide : Guide
     tolerance : float, degrees
         Between the tool axis of the angles and that of the run.
     cone : float, degrees
@@ -108,19 +103,18 @@ def run_angles(runs: Runs, machine: Machine, guide: Guide, *, tolerance: float, 
         halved = np.flatnonzero((error > tolerance) & (splines.width >= NARROWEST))
         if not left or not len(halved):
             break
-        splines, control = _halved(splines, control, halved)
+        at = splines.span_knot[halved]
+        middle = np.floor((splines.knot[at] + splines.knot[at + 1]) / 2.0)
+        more = np.bincount(splines.span_run[halved], minlength=len(splines.count))
+        refined = Splines(np.insert(splines.knot, at + 1, middle), splines.count + more)
+        splines, control = refined, splines.on_knots(refined, control)
     changed = replace(runs, knot=splines.knot, knot_count=splines.count, control=control)
     return RunAngles(changed, angles, error)
 
 
 def lever_at(splines: Splines, control: Floats, run: Ints, s: Floats) -> Floats:
     """(m, 3) mm from the tip to the axis point at places of runs; `control` (c, 6)."""
-    return _at(splines, control[:, 3:] - control[:, :3], run, s)
-
-
-def _at(splines: Splines, control: Floats, run: Ints, s: Floats) -> Floats:
-    """(m, d) points at places of runs, from control points (c, d)."""
-    return splines.points(control, splines.span_at(run, s), s)
+    return splines.points(control[:, 3:] - control[:, :3], splines.span_at(run, s), s)
 
 
 def _fitted(machine: Machine, splines: Splines, control: Floats, guide: Guide, cone: float) -> Floats:
@@ -140,7 +134,7 @@ def _fitted(machine: Machine, splines: Splines, control: Floats, guide: Guide, c
     for _ in range(FITS):
         for part in parts:
             s, of = _places(knots[part], run[part])
-            off = wanted[part] - _at(splines, points, of, s).reshape(-1, len(SHARES), 2)
+            off = wanted[part] - splines.points(points, splines.span_at(of, s), s).reshape(-1, len(SHARES), 2)
             change[part] = _blossoms(knots[part], off)
         points += change
         points[ends] = guide.angles[np.concatenate((at[:-1], at[1:] - 1))]
@@ -164,18 +158,14 @@ def _blossoms(knots: Floats, values: Floats) -> Floats:
 
 
 def _bounds(machine: Machine, splines: Splines, control: Floats, angles: Floats, tolerance: float) -> Floats:
-    """(spans,) degrees: no axis in a span is farther off than this; infinite where too many samples would be asked for.
-
-    Both axes leave the chord of a stretch of 1/N of a span by at most M/(8 N²), where |k″| ≤ M, so the difference is
-    between two samples no larger than at them but for the sum of both.
-    """
+    """(spans,) degrees: no axis in a span is farther off than this; infinite where that takes too many samples."""
     count = len(splines.span_run)
     bounds = np.full(count, np.inf)
     for begin in range(0, count, CHUNK):
         span = np.arange(begin, min(begin + CHUNK, count))
         ends = splines.knot[splines.span_knot[span]], splines.knot[splines.span_knot[span] + 1]
         lever, words = (splines.bezier(points, span, *ends) for points in (control[:, 3:] - control[:, :3], angles))
-        bend = _lever_bend(lever) + _axis_bend(machine, lever, np.radians(words))
+        bend = lever_bend(lever) + axis_curve_bend(machine, np.radians(words))
         least = np.sqrt(bend / (8.0 * PROOF * np.radians(tolerance)))
         number = np.exp2(np.ceil(np.log2(np.clip(least, 2.0, 2.0 * MOST_SAMPLES)))).astype(np.int64)
         for samples in np.unique(number[number <= MOST_SAMPLES]).tolist():
@@ -194,45 +184,3 @@ def _off(machine: Machine, lever: Floats, words: Floats, samples: int) -> Floats
     given = tool_axis(machine, (share @ words).reshape(-1, 2))
     largest: Floats = angle_between(given, unit((share @ lever).reshape(-1, 3))).reshape(-1, samples + 1).max(axis=1)
     return largest
-
-
-def _lever_bend(lever: Floats) -> Floats:
-    """(k,) bound on |u″| of the direction u of levers with the Bézier points (k, 4, 3), over whole spans.
-
-    With l = r u the part of u″ across u is that of (l″ − 2 r′ u′)/r, the part along it |u′|²; both |r′| and r |u′| are
-    at most |l′|.
-    """
-    middle = unit(lever.mean(axis=1))
-    shortest = np.einsum("kid,kd->ki", lever, middle).min(axis=1)
-    first, second = 3.0 * np.diff(lever, axis=1), 6.0 * np.diff(lever, 2, axis=1)
-    inverse = np.divide(1.0, shortest, out=np.full(len(lever), np.inf), where=shortest > 0)
-    fastest, sharpest = norm(first).max(axis=1), norm(second).max(axis=1)
-    with np.errstate(invalid="ignore"):
-        bend: Floats = np.nan_to_num(sharpest * inverse + 3.0 * (fastest * inverse) ** 2, nan=np.inf, posinf=np.inf)
-    return bend
-
-
-def _axis_bend(machine: Machine, lever: Floats, words: Floats) -> Floats:
-    """(k,) bound on |k″| of k = R₁(q₁) R₂(q₂) k₀ for angles with the Bézier points (k, 4, 2), rad, over whole spans.
-
-    What the first axis does counts with the distance of k from that axis.
-    """
-    first, second = 3.0 * np.diff(words, axis=1), 6.0 * np.diff(words, 2, axis=1)
-    speed, bend = np.abs(first).max(axis=1), np.abs(second).max(axis=1)
-    # k is somewhere at a sample within the tolerance, which is far below the turn that is added
-    start = tool_axis(machine, np.degrees(words[:, 0]))
-    about = machine.axes[0].unit
-    sine = norm(start - dot(start, np.broadcast_to(about, start.shape))[:, None] * about)
-    away = np.minimum(sine + speed[:, 1], 1.0)  # only the second axis changes this distance
-    whole: Floats = away * speed[:, 0] ** 2 + 2.0 * speed[:, 0] * speed[:, 1] + speed[:, 1] ** 2
-    whole += away * bend[:, 0] + bend[:, 1]
-    return whole
-
-
-def _halved(splines: Splines, control: Floats, span: Ints) -> tuple[Splines, Floats]:
-    """The same curves with a knot more in the middle of spans, at whole steps: knot insertion by blossoms."""
-    at = splines.span_knot[span]
-    middle = np.floor((splines.knot[at] + splines.knot[at + 1]) / 2.0)
-    more = np.bincount(splines.span_run[span], minlength=len(splines.count))
-    refined = Splines(np.insert(splines.knot, at + 1, middle), splines.count + more)
-    return refined, splines.on_knots(refined, control)

@@ -121,8 +121,7 @@ def insertions(
     rapid : (n,) bool
         Moves that need no points.
     tip_tolerance : float or None, mm
-        Bound on the distance of the tip from its line, for a control without tool centre point control: all five axes
-        run linearly. None where the control keeps the tip on its line.
+        Bound on the distance of the tip from its line; None where the control keeps the tip on its line.
     max_step : float or None, degrees
         Largest turn of a rotary axis in one block.
     line, file : (n,) int64 and str, optional
@@ -131,7 +130,7 @@ def insertions(
     Raises
     ------
     InputError
-        A rotary axis would leave its limits on the way between two poses within them (CS362).
+        CS362: a rotary axis would leave its limits between two poses within them.
     """
     rapid = np.zeros(len(axis), np.bool_) if rapid is None else rapid
     motion = RuledMotion(machine, tip, axis, tolerance, tip_tolerance, max_step)
@@ -364,7 +363,7 @@ class RuledMotion:
     def _swept(self, part: Intervals, axis: Floats, fraction: Floats) -> Floats:
         """Share of each interval where the ruled axis is nearest to another, where the tip stands: else `fraction`.
 
-        About a standing tip nothing says when the axis is where: all that counts is the great circle that it sweeps.
+        About a standing tip all that counts is the great circle that the axis sweeps.
         """
         still = np.flatnonzero((self.tip[part.segment] == self.tip[part.segment + 1]).all(axis=1))
         along = fraction.copy()

@@ -21,8 +21,7 @@ def meet_at_pole(
 ) -> None:
     """Take the second angles to the pole in place, where stretches meet there.
 
-    On the way from a pose to the pole that angle turns by less than 180 degrees, on the way from one pose through the
-    pole to another by up to 360: the nearest turn of the one from the other says nothing.
+    On the way to the pole that angle turns by less than 180 degrees, from pose to pose through the pole by up to 360.
     """
     stretches = np.flatnonzero(through)
     if not len(stretches):

@@ -158,14 +158,9 @@ class Proportional(Construction):
         program, corners = smoothed.program, smoothed.corners
         u = np.concatenate(([0.0], u))
         weights, ratio = corners.weights[rows], corners.ratio[rows]
-        pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
-        trim_in, trim_out = corners.trim_in[rows, None], corners.trim_out[rows, None]
-        tips, levers = np.zeros((2, len(rows), 3, 3))
-        for parts, values in ((tips, program.tip), (levers, program.axis)):
-            at = values[pose]
-            parts[:, 0] = at
-            parts[:, 1] = trim_in * (at - values[before])
-            parts[:, 2] = trim_out * (values[after] - at)
+        tips, levers = (
+            np.stack(nurbs.trimmed_legs(values, corners, rows), axis=1) for values in (program.tip, program.axis)
+        )
         # corners with all weights 1 share one table of coefficients, the others at least its numerators
         plain = (weights == 1.0).all(axis=1) & (ratio == ratio[0])
         coefficients = nurbs.leg_coefficients(u, np.ones(2), ratio[0])
