@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from cornersmooth.geometry import nurbs
 from cornersmooth.settings import BOUNDS, Settings
 from cornersmooth.smoothing import smooth
-from cornersmooth.smoothing.chord_error import PAPER_ERROR, shape_factors
 from cornersmooth.smoothing.sampling import dense_rows
-from cornersmooth.smoothing.segments import lines_per_half
+from cornersmooth.smoothing.segments import PAPER_ERROR, lines_per_half, shape_factors
 from oracle.share import covering_share
 from smoothing.paths import grid_program, random_program, simultaneous_deviation
 

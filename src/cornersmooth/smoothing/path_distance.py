@@ -19,7 +19,7 @@ import numpy as np
 from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Floats, Ints, SmoothProgram
-from cornersmooth.smoothing.legs import legs_at
+from cornersmooth.smoothing.corner_table import legs_at
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import lines_of
 from cornersmooth.vectors import dot, norm

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cornersmooth.geometry import nurbs
 from cornersmooth.geometry.arcs import arc_lines, arc_points, divided
-from cornersmooth.geometry.ragged import ranges
+from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.corner_table import Remainders
@@ -82,77 +82,63 @@ class _Batch:
 
 
 @dataclass(frozen=True)
-class _RunLines:
-    """Lines of whole runs, m in path order, and how many of them each pose of the program has."""
+class _RunRows:
+    """Rows of whole runs, m in path order, and the poses of the program that they stand for."""
 
-    pose: Ints
+    move: Ints
     tip: Floats
-    axis: Floats
-    count: Ints
+    other: Floats
     inside: Bools
+    sections: SectionRows | None = None
 
     @classmethod
-    def of(cls, smoothed: SmoothProgram) -> _RunLines:
-        program, runs, n = smoothed.program, smoothed.runs, len(smoothed.program)
+    def lines(cls, smoothed: SmoothProgram) -> _RunRows:
+        """Ends of lines, with unit axes."""
+        program, runs, height = smoothed.program, smoothed.runs, smoothed.settings.axis_length
+        inside = np.zeros(len(program), np.bool_)
         if runs is None:
-            nothing = np.zeros((0, 3))
-            return cls(np.zeros(0, np.int64), nothing, nothing, np.zeros(n, np.int64), np.zeros(n, np.bool_))
-        height = smoothed.settings.axis_length
-        pose, tip, axis = run_lines(
-            runs, polylines_of(runs, program.tip, program.tip + height * program.axis), program, smoothed.settings
-        )
-        count = np.bincount(pose, minlength=n)
-        return cls(pose, tip, axis, count, count > 0)
-
-    def replace(self, counts: Ints) -> Ints:
-        """Counts of rows with those of the runs in their places."""
-        return np.where(self.inside, self.count, counts)
-
-    def fill(self, batch: _Batch) -> None:
-        """Put the lines of the runs into their rows."""
-        here = np.flatnonzero(self.inside[batch.poses])
-        begin, end = np.searchsorted(self.pose, (batch.poses[0], batch.poses[-1] + 1))
-        rows = ranges(batch.first[here], batch.last[here] - batch.first[here])
-        batch.tip[rows], batch.other[rows] = self.tip[begin:end], self.axis[begin:end]
-
-
-@dataclass(frozen=True)
-class _RunSections:
-    """Control points of whole runs, and how many of them each pose of the program has."""
-
-    rows: SectionRows | None
-    count: Ints
-    inside: Bools
+            return cls(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), inside)
+        original = polylines_of(runs, program.tip, program.tip + height * program.axis)
+        pose, tip, axis = run_lines(runs, original, program, smoothed.settings)
+        inside[pose] = True
+        return cls(pose, tip, axis, inside)
 
     @classmethod
-    def of(cls, smoothed: SmoothProgram) -> _RunSections:
-        runs, n = smoothed.runs, len(smoothed.program)
+    def curves(cls, smoothed: SmoothProgram) -> _RunRows:
+        """Control points of sections."""
+        runs = smoothed.runs
         if runs is None:
-            return cls(None, np.zeros(n, np.int64), np.zeros(n, np.bool_))
+            return cls.lines(smoothed)
         rows = section_rows(runs, smoothed.program)
-        inside = np.zeros(n, np.bool_)
+        inside = np.zeros(len(smoothed.program), np.bool_)
         inside[runs.pose] = True
-        inside[runs.pose[np.cumsum(runs.count) - runs.count]] = False
-        count = np.bincount(rows.move, minlength=n)
-        return cls(rows, count, inside | (count > 0))
+        inside[runs.pose[starts(runs.count)[:-1]]] = False
+        inside[rows.move] = True
+        return cls(rows.move, rows.points[:, :3], rows.points[:, 3:], inside, rows)
 
-    def replace(self, counts: Ints) -> Ints:
+    def replace(self, counts: Ints, segments: Segments) -> Ints:
         """Counts of rows with those of the runs in their places."""
-        return np.where(self.inside, self.count, counts)
+        segments.lines[self.inside] = 1
+        return np.where(self.inside, np.bincount(self.move, minlength=len(counts)), counts)
 
-    def fill(self, batch: _Batch, curve: NDArray[np.int8], joined: Bools) -> Floats | None:
-        """Put the control points of the runs into their rows; returns `Rows.spline` of all curves."""
-        if self.rows is None:
-            return None
+    def fill(self, batch: _Batch) -> tuple[Ints, slice]:
+        """Put tips and axes into their rows; returns these rows of the batch, and which rows of the runs they are."""
         here = np.flatnonzero(self.inside[batch.poses])
-        begin, end = np.searchsorted(self.rows.move, (batch.poses[0], batch.poses[-1] + 1))
+        own = slice(*np.searchsorted(self.move, (batch.poses[0], batch.poses[-1] + 1)))
         at = ranges(batch.first[here], batch.last[here] - batch.first[here])
+        batch.tip[at], batch.other[at] = self.tip[own], self.other[own]
+        return at, own
+
+    def fill_curves(self, batch: _Batch, curve: NDArray[np.int8], joined: Bools) -> Floats | None:
+        """Put the control points into their rows; returns `Rows.spline` of all curves."""
+        if self.sections is None:
+            return None
+        at, own = self.fill(batch)
         spline = np.ones((len(curve), 3))
         spline[:, 0] = np.where(curve == len(KNOTS), KNOTS[-1], 0.0)
         spline[:, 2] = curve == len(KNOTS)
-        batch.tip[at], batch.other[at] = self.rows.points[begin:end, :3], self.rows.points[begin:end, 3:]
-        curve[at], joined[at] = self.rows.number[begin:end], self.rows.number[begin:end] == 1
-        spline[at, 0], spline[at, 2] = self.rows.knot[begin:end], self.rows.last_knot[begin:end]
+        curve[at], joined[at] = self.sections.number[own], self.sections.number[own] == 1
+        spline[at, 0], spline[at, 2] = self.sections.knot[own], self.sections.last_knot[own]
         return spline
 
 
@@ -182,9 +168,8 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
         halves[corners.smoothed]
     )
     arc_counts = _arc_row_counts(smoothed, circles)
-    runs = _RunLines.of(smoothed)
-    counts = runs.replace(counts)
-    segments.lines[runs.inside] = 1
+    runs = _RunRows.lines(smoothed)
+    counts = runs.replace(counts, segments)
     for batch in _batches(smoothed, counts, arc_counts, poses):
         sharp = (segments.row[batch.poses] < 0) & (batch.last > batch.first)
         at = batch.last[sharp] - 1
@@ -214,9 +199,8 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
     counts = np.where(segments.has_line, segments.lines, 0) + np.where(segments.row >= 0, 5, 0)
     counts[segments.skip] = 0
     arc_counts = _arc_row_counts(smoothed)
-    sections = _RunSections.of(smoothed)
-    counts = sections.replace(counts)
-    segments.lines[sections.inside] = 1
+    sections = _RunRows.curves(smoothed)
+    counts = sections.replace(counts, segments)
     for batch in _batches(smoothed, counts, arc_counts, poses):
         row = segments.row[batch.poses]
         if divide:
@@ -240,7 +224,7 @@ def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16
             line = segments.has_line[pose]
             joined[first] = ~line
             batch.tip[first[line] - 1], batch.other[first[line] - 1] = tip_curve[line, 0], axis_curve[line, 0]
-        spline = sections.fill(batch, curve, joined)
+        spline = sections.fill_curves(batch, curve, joined)
         yield Rows(batch.tip, batch.other, batch.move, curve, joined, weights, spline=spline)
 
 

@@ -12,8 +12,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import Construction
-from cornersmooth.smoothing.corner_table import Placed, Remainders, ShapedCorners
-from cornersmooth.smoothing.legs import Legs, divide, half_angle_cosine
+from cornersmooth.smoothing.corner_table import Legs, Placed, Remainders, ShapedCorners, divide, half_angle_cosine
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import Segments, lines_of, segments_of
 from cornersmooth.smoothing.self_check import distances, passing
