@@ -377,7 +377,7 @@ class LimitedBy(IntEnum):
 class Corners:
     """One row for every inner pose of every chain, k rows in path order.
 
-    The five control points of a smoothed row follow from it (`cornersmooth.smoothing.nurbs.control_points`): with X
+    The five control points of a smoothed row follow from it (`cornersmooth.geometry.nurbs.control_points`): with X
     the pose, D⁻ and D⁺ the segments to its neighbours `before` and `after`, the tip curve P has
     ``X − trim_in·D⁻, X − ratio·trim_in·D⁻, X, X + ratio·trim_out·D⁺, X + trim_out·D⁺``, and the axis-point curve Q the
     same with the axis points and `axis_trim_*`.

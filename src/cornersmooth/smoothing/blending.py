@@ -1,12 +1,10 @@
 """How far a control may round the corners of lines by itself so that what it executes keeps ε.
 
-A control that blends (LinuxCNC's G64 P) slows down towards the end of a line and starts the next one meanwhile. Where
-the lines keep less than ε of the original motion, it may round more, and runs faster. What it does is taken from how
-LinuxCNC's planner works (tp.c, parabolic blends), and was compared with what its controller executes
-(docs/linuxcnc.md): the line before has b₁·(1 − τ)² left while the next one has gone b₂·τ², τ from 0 to 1. b₁ is at
-most half of its line, and at most 4·P/|Δt| for a blend tolerance P and a difference Δt of the unit tangents of the
-tip. Both take the same time, so b₂/b₁ is the ratio of their accelerations; b₂ is at most half of its line. Rotary words
-go along evenly: P bounds the tip only, the axis point is what this module looks after.
+LinuxCNC with G64 P slows down towards the end of a line and starts the next one meanwhile (tp.c, parabolic blends;
+compared with its controller in docs/linuxcnc.md): the line before has b₁·(1 − τ)² left while the next one has gone
+b₂·τ², τ from 0 to 1. b₁ is at most half of its line, and at most 4·P/|Δt| for a difference Δt of the unit tangents of
+the tip. b₂/b₁ is the ratio of the accelerations; b₂ is at most half of its line. P bounds the tip only, the axis point
+is what this module looks after.
 """
 
 from __future__ import annotations
@@ -29,8 +27,7 @@ _REACH = 4.8
 #: where a blend is looked at: where both lines are as far from the corner, 0, and before and behind that, -1 and 1
 _PLACES = (-0.35, 0.0, 0.35)
 
-#: Degrees per mm by which rotary axes may speed up while linear ones do by one mm. Lines that turn more are as fast as
-#: the rotary axes allow. What a machine can is not known well; the ratio of two lines is the largest of these.
+#: Degrees by which rotary axes may speed up while linear ones do by one mm: machines differ, the largest ratio counts.
 _TURNS = (0.1, 0.4, 1.0)
 
 #: what stands still has this much of a way, so that nothing is divided by zero
@@ -101,24 +98,20 @@ class _Corners:
 
 
 def largest_blends(rows: Vertices, kept: Ints, limits: LineLimits, most: float, deviation: float) -> Floats:
-    """Blend tolerances with which what the control executes stays near the original motion.
+    """Blend tolerances (k,), mm, with which what the control executes stays near the original motion.
+
+    `LineLimits.blend` is that at both ends and where the tip stands still, and the most where a line ends in any case.
 
     Parameters
     ----------
     rows : Vertices
     kept : (k,) int64
-        Rows at which lines end, from `cornersmooth.smoothing.long_lines.fewest_lines`.
+        Rows at which lines end, from `fewest_lines`.
     limits : LineLimits
     most : float, mm
         Largest blend tolerance.
     deviation : float, mm
         What tip and axis point may be off the original motion while the control blends.
-
-    Returns
-    -------
-    (k,) float64, mm
-        For the corner at each row. `LineLimits.blend` at both ends and where the tip stands still beside it, and not
-        more than that where a line ends in any case.
     """
     blends = np.full(len(kept), limits.blend)
     if len(kept) < 3:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.model import Floats, Ints, Program, Status
+from cornersmooth.model import Corners, Floats, Ints, Program, Status
 from cornersmooth.settings import Settings
 from cornersmooth.vectors import norm
 
@@ -134,3 +134,18 @@ class Placed:
     axis_error: Floats
     orientation_error: Floats
     extra: dict[str, Floats] = field(default_factory=dict)
+
+
+def with_rows(corners: Corners, others: Corners, rows: Ints) -> Corners:
+    """Corners with some rows of others; extra columns that those lack are NaN there."""
+
+    def taken(values: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
+        values = values.copy()
+        values[rows] = other[rows]
+        return values
+
+    missing = np.full(len(corners), np.nan)
+    extra = {name: taken(values, others.extra.get(name, missing)) for name, values in corners.extra.items()}
+    names = (item.name for item in fields(Corners) if item.name != "extra")
+    columns: dict[str, Any] = {name: taken(getattr(corners, name), getattr(others, name)) for name in names}
+    return Corners(**columns, extra=extra)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.errors import Finding
 from cornersmooth.geometry.bsplines import Splines
@@ -16,6 +14,7 @@ from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program,
 from cornersmooth.settings import Settings
 from cornersmooth.slices import some_runs
 from cornersmooth.smoothing.construction import RUN_CURVATURE
+from cornersmooth.smoothing.corner_table import with_rows
 from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.polylines import Polylines
@@ -67,20 +66,11 @@ def corner_by_corner(smoothed: SmoothProgram, runs: Bools) -> SmoothProgram:
     own = place_corners(program, smoothed.settings, CONSTRUCTION)
     run, place = spread(whole.count)
     rows = np.searchsorted(corners.pose, whole.pose[runs[run] & (place > 0) & (place < whole.count[run] - 1)])
-
-    def taken_back(values: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
-        values = values.copy()
-        values[rows] = others[rows]
-        return values
-
-    extra = {**corners.extra, RUN_CURVATURE: taken_back(corners.extra[RUN_CURVATURE], np.full(len(corners), np.nan))}
-    values = {field.name: getattr(own, field.name) for field in fields(own) if field.name != "extra"}
-    values = {name: taken_back(getattr(corners, name), value) for name, value in values.items()}
     text = "corner rounded by itself: the curves of its run would leave the limits of a rotary axis"
     finding = Finding("CS239", "note", int(program.line[corners.pose[rows[0]]]), text, len(rows))
     return replace(
         smoothed,
-        corners=Corners(**values, extra=extra),
+        corners=with_rows(corners, own, rows),
         findings=(*smoothed.findings, finding),
         runs=None if runs.all() else some_runs(whole, ~runs),
     )

@@ -1,12 +1,11 @@
 """The smoothed motion in as few lines as ε allows (`lines="long"`).
 
-Many controls run the faster, the longer lines are: each must be able to stop within those that it has read. From every
-vertex a line goes to the farthest vertex that it can reach within ε. Vertices are points of the smoothed motion.
+From every vertex, a point of the smoothed motion, a line goes to the farthest vertex that it can reach within ε: a
+control must be able to stop within the lines that it has read.
 
-A line is compared with the original motion at a common parameter, as transitions are (docs/method.md): both run evenly
-between two points at which the original is known, so that their tips are farthest apart at one of these. Rotary words
-bend the motion between these points, so they are also compared halfway. The parameter is the length of the original in
-six dimensions. It never runs backwards, so the paths are as near, both ways.
+A line is compared with the original motion at a common parameter, the length of the original in six dimensions. Both
+run evenly between points at which the original is known, so the tips are farthest apart at one of these. Rotary words
+bend the motion, so they are also compared halfway.
 """
 
 from __future__ import annotations
@@ -44,15 +43,14 @@ class Vertices:
     ----------
     tip : (r, 3) float64, mm
     words : (r, d) float64
-        What the control runs evenly along a line besides the tip: tool vectors, or rotary words in degrees.
+        Run evenly along a line: tool vectors, or rotary words in degrees.
     original_tip, original_axis_point : (r, 3) float64, mm
-        Where the original motion is meanwhile.
     parameter : (r,) float64, mm
         Never decreasing.
     fixed : (r,) bool
         A line ends here in any case.
     position : (r, 3) float64 or None, mm
-        Of the linear axes, where the control knows nothing of the tip; else the tip runs straight.
+        Of the linear axes, where these run straight and not the tip.
     """
 
     tip: Floats
@@ -75,15 +73,12 @@ class LineLimits:
     turn : float
         Largest change of any word in one line, in the unit of the words.
     axis_length : float, mm
-    axis_of : callable
-        Unit tool axes (m, 3) of words (m, d).
-    tip_of : callable or None
-        Tips (m, 3) of positions of the linear axes (m, 3) and words (m, d), where rows have such positions.
+    axis_of, tip_of : callable
+        Unit tool axes (m, 3) of words (m, d); tips (m, 3) of positions of the linear axes (m, 3) and words.
     rotary : bool
         Whether words are angles: the tool axis then does not run evenly with them.
     blend, lag : float, mm
-        How far the tip may be off a corner of lines that the control rounds by itself, and how far the axis point may
-        lag behind the tip there by the estimate of `lags`.
+        How far the tip may be off a corner that the control rounds by itself, and the axis point lag there (`lags`).
     """
 
     tip: float
@@ -100,14 +95,7 @@ class LineLimits:
 def segments_of_rows(move: Ints, begin: int, end: int) -> tuple[Ints, Bools]:
     """Pose that the segment of each row starts from, -1 before the first, and whether it is the last row of its move.
 
-    The last row of a move is at its pose, or in the middle of the transition that rounds it.
-
-    Parameters
-    ----------
-    move : (n,) int64
-        Of all rows, as in `Rows`.
-    begin, end : int
-        The rows that are asked for.
+    `move` (n,) is that of all rows; the rows from `begin` to `end` are asked for.
     """
     end = min(end, len(move))
     before = max(int(np.searchsorted(move, move[begin])) - 1, 0)  # last row of the move before
@@ -133,12 +121,10 @@ def vertices(
     ----------
     smoothed : SmoothProgram
     tip, axis : (r, 3) float64
-        Rows in path order, as `dense_rows` gives them, perhaps with more rows on straight lines.
+        In path order, as in `dense_rows`.
     words : (r, d) float64
-    move, start : (r,) int64
+    move, start, at_pose : (r,) int64 and bool
         As in `Rows`, and from `segments_of_rows`.
-    at_pose : (r,) bool
-        Last rows of their moves.
     """
     program, height = smoothed.program, smoothed.settings.axis_length
     known = np.maximum(start, 0)
@@ -186,10 +172,7 @@ def _fixed(smoothed: SmoothProgram, move: Ints, at_pose: Bools) -> Bools:
 def fewest_lines(rows: Vertices, limits: LineLimits) -> Ints:
     """Rows at which lines end, ascending, the first and the last row among them.
 
-    Notes
-    -----
-    From each vertex on, the farthest row is found by doubling and halving: a row is taken because its line was tested,
-    whatever lies between. All parts between fixed rows are worked on at the same time.
+    The farthest row from each vertex is found by doubling and halving, in all parts between fixed rows at once.
     """
     count = len(rows.parameter)
     if count < 3:
@@ -218,23 +201,16 @@ def fewest_lines(rows: Vertices, limits: LineLimits) -> Ints:
 
 
 def lags(tip: Floats, lever: Floats, blend: float) -> Floats:
-    """Estimate of how far the axis point lags behind the tip where a control rounds the corners of lines by itself.
+    """Estimate (v,) of how far the axis point lags at vertices where a control rounds corners by itself, mm.
 
-    It starts with a line before it has ended the one before. Half of the shorter line is the most that both run
-    together, so a change of the axis point's way per way of the tip by κ is worth up to κ·l/4. Where the tip itself
-    turns, by δ (the difference of its unit tangents), the control keeps it within `blend`: then κ·blend/δ is the most.
-    Where the tip runs straight on, nothing else bounds what the rotary axes do.
+    Two lines of length l run together over half of the shorter one, so a change of the axis point's way per way of the
+    tip by κ is worth up to κ·l/4. Where unit tangents of the tip differ by δ, κ·blend/δ is the most.
 
     Parameters
     ----------
     tip, lever : (v, 3) float64, mm
         Vertices; H times the tool axis there.
     blend : float, mm
-
-    Returns
-    -------
-    (v,) float64, mm
-        0 at both ends, and beside lines on which the tip stands still.
     """
     found = np.zeros(len(tip))
     way = np.diff(tip, axis=0)

@@ -1,12 +1,8 @@
-"""How far the written path is from the original at each corner: what a measurement of the text finds.
+"""How far the written path is from the original at each corner: what a measurement of the program finds.
 
-`Corners.tip_error` and `Corners.axis_error` compare both motions at a common parameter, which is what the construction
-promises. The paths themselves are as near or nearer: where the legs of a transition are unequal, the curve passes the
-corner nearest beside u = ½, on the side of the shorter leg.
-
-The corner itself is what decides. The written path runs on the inner side of the corner and turns all the way in one
-sense, from the direction of one leg to that of the other; so a tangent at any of its points, which the corner lies
-beyond, is no nearer to the corner than the point is to the nearer leg.
+`Corners.tip_error` and `Corners.axis_error` compare both motions at a common parameter. The paths are as near or
+nearer: where the legs are unequal, the curve passes the corner nearest beside u = ½. The distance from the corner
+itself decides, as the path runs on the inner side of it and turns in one sense.
 """
 
 from __future__ import annotations
@@ -36,22 +32,11 @@ _SQUARE = 1e-5
 
 @dataclass(frozen=True)
 class _Transitions:
-    """Transitions of g corners, seen from the corners.
+    """Transitions of g corners, seen from the corners."""
 
-    Parameters
-    ----------
-    tip, turn : (g, 2, 3) float64, mm
-        Trimmed legs of the tip, and of the lever H·axis.
-    lever : (g, 3) float64, mm
-        H·axis of the corner.
-    weights : (g, 2) float64
-    ratio : (g,) float64
-    height : float, mm
-    """
-
-    tip: Floats
-    turn: Floats
-    lever: Floats
+    tip: Floats  # trimmed legs of the tip, (g, 2, 3), mm
+    turn: Floats  # those of the lever H·axis
+    lever: Floats  # H·axis of the corner, (g, 3), mm
     weights: Floats
     ratio: Floats
     height: float
@@ -89,7 +74,9 @@ class _Transitions:
 
 
 def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple[Floats, Floats]:
-    """Distances of the written tip path and axis-point path from the original ones at some corners.
+    """Distances (g,) of tip path and axis-point path from the original ones at some corners, mm; 0 where not smoothed.
+
+    For the paper's method they are the errors by its equation (10).
 
     Parameters
     ----------
@@ -98,12 +85,6 @@ def path_distances(smoothed: SmoothProgram, rows: Ints, *, dense: bool) -> tuple
         Rows of `SmoothProgram.corners`.
     dense : bool
         Whether transitions are written as lines, not as curves.
-
-    Returns
-    -------
-    tip, axis_point : (g,) float64, mm
-        As for `Corners.tip_error` and `Corners.axis_error`, zero where the corner is not smoothed. For the paper's
-        method they are the errors by its equation (10), where legs are equal.
     """
     corners = smoothed.corners
     tip, axis_point = corners.tip_error[rows].copy(), corners.axis_error[rows].copy()

@@ -29,22 +29,38 @@ EXACT = 1e-10
 _TILT_PAPER, _TILT_ANY = 1.5, 0.5
 
 
-@dataclass(frozen=True)
-class Bends:
-    """Deviation of proportional transitions from the original motion at constant H, as functions of their length.
+def keep(length: Floats, rows: Ints, measure: Callable[[Floats, Ints], Floats], tolerance: float) -> Floats:
+    """Lengths of the given rows, shortened until the measured deviation keeps the tolerance."""
+    length = length.copy()
+    pending = rows
+    while len(pending):
+        deviation = measure(length[pending], pending)
+        over = deviation > tolerance * (1.0 + EXACT)
+        pending = pending[over]
+        length[pending] *= tolerance / deviation[over] * (1.0 - EXACT)
+    return length[rows]
 
-    Methods take the lengths (mm) of all corners, or of some with their rows.
+
+@dataclass(frozen=True)
+class Wanted:
+    """What g corners ask for, and how far transitions are from the original motion as functions of their length, mm.
+
+    Methods take the lengths of all corners, or of some with their rows.
     """
 
     legs: Legs
-    per_in: Floats  # 1/m(D⁻), (g, 1)
-    per_out: Floats
-    bend_tip: Floats  # (U⁺ − U⁻)_A
-    bend_turn: Floats  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
     weights: Floats
     ratio: Floats
-    factor: Floats
     axis_length: float
+    status: NDArray[np.uint8]  # as far as the geometry of the corner decides it
+    length_in: Floats  # m(D⁻), mm
+    length_out: Floats
+    by_tolerance: Floats  # lengths that the tolerances allow, mm
+    bend_tip: Floats  # (U⁺ − U⁻)_A
+    bend_turn: Floats  # (U⁺ − U⁻)_B − (U⁺ − U⁻)_A
+    factor: Floats
+    half_cosine: Floats
+    per_length: tuple[Floats, Floats, Floats]  # deviation over length: tip, axis point, axis point less tip
 
     def middle(self, length: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """|b′−b| at u = ½, where b is the axis point of the corner itself, mm."""
@@ -74,8 +90,8 @@ class Bends:
         turn_shift = shift * self.bend_turn[rows][:, None, :]
         largest = np.zeros(len(length))
         sides = (
-            (-1.0, self.legs.turn_in[rows] * self.per_in[rows]),
-            (1.0, self.legs.turn_out[rows] * self.per_out[rows]),
+            (-1.0, self.legs.turn_in[rows] * (1.0 / self.length_in[rows, None])),
+            (1.0, self.legs.turn_out[rows] * (1.0 / self.length_out[rows, None])),
         )
         for side, rate in sides:
             original = lever + (side * sigma * reach)[..., None] * rate[:, None, :]  # B − A of the ruled motion
@@ -83,41 +99,6 @@ class Bends:
             away = rounded / norm(rounded)[..., None] - original / norm(original)[..., None]
             largest = np.maximum(largest, norm(tip_shift + self.axis_length * away).max(axis=1))
         return largest
-
-
-def keep(length: Floats, rows: Ints, measure: Callable[[Floats, Ints], Floats], tolerance: float) -> Floats:
-    """Lengths of the given rows, shortened until the measured deviation keeps the tolerance."""
-    length = length.copy()
-    pending = rows
-    while len(pending):
-        deviation = measure(length[pending], pending)
-        over = deviation > tolerance * (1.0 + EXACT)
-        pending = pending[over]
-        length[pending] *= tolerance / deviation[over] * (1.0 - EXACT)
-    return length[rows]
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What g corners ask for.
-
-    Parameters
-    ----------
-    status : (g,) uint8
-        `Status` as far as the geometry of the corner decides it.
-    length_in, length_out : (g,) float64, mm
-        m(D): six-dimensional lengths of the segments.
-    by_tolerance : (g,) float64, mm
-        Transition lengths that the tolerances allow.
-    """
-
-    status: NDArray[np.uint8]
-    length_in: Floats
-    length_out: Floats
-    by_tolerance: Floats
-    bends: Bends
-    half_cosine: Floats
-    per_length: tuple[Floats, Floats, Floats]  # deviation over length: tip, axis point, axis point less tip
 
 
 def wanted(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Wanted:
@@ -147,22 +128,16 @@ def wanted(legs: Legs, weights: Floats, ratio: Floats, settings: Settings) -> Wa
     cosine = (dot(legs.tip_in, legs.tip_out) + dot(axis_in, axis_out)) / (2.0 * length_in * length_out)
     status[cosine < np.cos(np.radians(settings.reversal_angle))] = Status.REVERSAL
     status[half_cosine < np.cos(np.radians(settings.max_axis_step / 2.0)) - 1e-12] = Status.AXIS_STEP
-    bends = Bends(legs, per_in, per_out, bend_tip, bend_turn, weights, ratio, factor, axis_length)
-    return Wanted(
-        status,
-        length_in,
-        length_out,
-        by_tolerance,
-        bends,
-        half_cosine,
-        (per_length_tip, per_length_axis, per_length_turn),
-    )
+    per_length = per_length_tip, per_length_axis, per_length_turn
+    lengths = length_in, length_out, by_tolerance
+    shape = legs, weights, ratio, axis_length
+    return Wanted(*shape, status, *lengths, bend_tip, bend_turn, factor, half_cosine, per_length)
 
 
 def place_proportional(asked: Wanted, settings: Settings) -> Placed:
     """Give g corners the transition lengths they ask for, up to half of the shorter segment."""
     room = np.minimum(asked.length_in, asked.length_out) / 2.0
-    status, bends = asked.status, asked.bends
+    status = asked.status
     per_length_tip, _, per_length_turn = asked.per_length
     limited_by = np.where(asked.by_tolerance <= room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
     length = np.minimum(room, asked.by_tolerance)
@@ -173,11 +148,11 @@ def place_proportional(asked: Wanted, settings: Settings) -> Placed:
     shortest_lever = axis_length * asked.half_cosine - length * per_length_turn  # below |B−A| of both motions
     bound = length * (per_length_tip + divide(axis_length * per_length_turn, np.maximum(shortest_lever, 0.0)))
     doubtful = (status == Status.SMOOTHED) & (bound > settings.axis_point_tolerance * (1.0 + EXACT))
-    peaks = _largest_in_the_middle(bends, length, length * per_length_turn)
+    peaks = _largest_in_the_middle(asked, length, length * per_length_turn)
     probed = np.flatnonzero(doubtful & ~peaks)
     for rows, measure, share in (
-        (np.flatnonzero(doubtful & peaks), bends.middle, 1.0),
-        (probed, bends.probe, 1.0 - BETWEEN_PROBES),
+        (np.flatnonzero(doubtful & peaks), asked.middle, 1.0),
+        (probed, asked.probe, 1.0 - BETWEEN_PROBES),
     ):
         shortened = keep(length, rows, measure, share * settings.axis_point_tolerance)
         limited_by[rows[shortened < length[rows]]] = LimitedBy.TOLERANCE
@@ -188,9 +163,9 @@ def place_proportional(asked: Wanted, settings: Settings) -> Placed:
     smoothed = status == Status.SMOOTHED
     length = np.where(smoothed, length, 0.0)
     limited_by[~smoothed] = LimitedBy.NOTHING
-    axis_error = bends.middle(length)
+    axis_error = asked.middle(length)
     if len(probed):
-        axis_error[probed] = np.maximum(axis_error[probed], bends.probe(length[probed], probed))
+        axis_error[probed] = np.maximum(axis_error[probed], asked.probe(length[probed], probed))
     trim_in, trim_out = length / asked.length_in, length / asked.length_out
     return Placed(
         status=status,
@@ -201,11 +176,11 @@ def place_proportional(asked: Wanted, settings: Settings) -> Placed:
         axis_trim_out=trim_out,
         tip_error=per_length_tip * length,
         axis_error=axis_error,
-        orientation_error=bends.middle_turn(length),
+        orientation_error=asked.middle_turn(length),
     )
 
 
-def _largest_in_the_middle(bends: Bends, length: Floats, turned: Floats) -> NDArray[np.bool_]:
+def _largest_in_the_middle(asked: Wanted, length: Floats, turned: Floats) -> NDArray[np.bool_]:
     """Rows whose deviation at constant H is surely largest at u = ½; `turned` is (Q−P)−(B−A) there, mm.
 
     The deviation where the original motion is at σ, as in `cornersmooth.geometry.nurbs`, is at most f(σ)·(E + G·σ),
@@ -213,12 +188,12 @@ def _largest_in_the_middle(bends: Bends, length: Floats, turned: Floats) -> NDAr
     while f·(1 + σ·G/E) ≤ 1. With all weights 1 at the ratio 2/3, f is (1−σ)³ and G may be up to 3E; with any other
     weights f is convex and falls from 1 to 0, so it is at most 1−σ and G may be up to E.
     """
-    legs = bends.legs
-    turn = np.maximum(norm(legs.turn_in) * bends.per_in[:, 0], norm(legs.turn_out) * bends.per_out[:, 0])
-    turn *= length / bends.axis_length
-    paper = (bends.weights == 1.0).all(axis=1) & (np.abs(bends.ratio - 2.0 / 3.0) < EXACT)
+    legs = asked.legs
+    turn = np.maximum(norm(legs.turn_in) * (1.0 / asked.length_in), norm(legs.turn_out) * (1.0 / asked.length_out))
+    turn *= length / asked.axis_length
+    paper = (asked.weights == 1.0).all(axis=1) & (np.abs(asked.ratio - 2.0 / 3.0) < EXACT)
     tilt = 2.0 * turn * turned
-    largest: NDArray[np.bool_] = (tilt <= np.where(paper, _TILT_PAPER, _TILT_ANY) * bends.middle(length)) & (turn < 0.5)
+    largest: NDArray[np.bool_] = (tilt <= np.where(paper, _TILT_PAPER, _TILT_ANY) * asked.middle(length)) & (turn < 0.5)
     return largest
 
 

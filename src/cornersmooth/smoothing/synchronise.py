@@ -1,10 +1,9 @@
 """Synchronisation of the two curves in the paper's method: equations (20) to (22).
 
-For a parameter u of the tip curve, v is sought on the axis-point curve with |Q(v) − P(u)| = H. The equation is ill
-posed: where the feed is perpendicular to the tool axis its derivative vanishes, and on the paper's own Table 1 there is
-no root at u = 0 of the third position and two over half of the range. So the root is followed on the branch that starts
-nearest to v = u; v never runs backwards; where there is no root the v that comes closest to H is taken, and what is
-missing is reported as the residual.
+For a parameter u of the tip curve, v is sought on the axis-point curve with |Q(v) − P(u)| = H. That is ill posed: on
+the paper's own Table 1 there is no root at u = 0 of the third position and two over half of the range. So the root
+is followed on the branch that starts nearest to v = u, and v never runs backwards. Where there is no root the v that
+comes closest to H is taken, and what is missing is reported as the residual.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ _NO_EXCESS, _NO_STEP, _SECANTS = 1e-13, 4e-13, 12
 def matching_parameters(
     tip_curve: Floats, axis_curve: Floats, weights: Floats, u: Floats, axis_length: float
 ) -> tuple[Floats, Floats]:
-    """Parameters v(u) with |Q(v) − P(u)| = H as nearly as possible, never decreasing.
+    """Parameters v(u) (g, m) with |Q(v) − P(u)| = H as nearly as possible, never decreasing, and what is missing, mm.
 
     Parameters
     ----------
@@ -44,12 +43,6 @@ def matching_parameters(
         Ascending parameters of the tip curve.
     axis_length : float, mm
         H.
-
-    Returns
-    -------
-    v : (g, m) float64
-    residual : (g, m) float64, mm
-        ``| |Q(v) − P(u)| − H |``.
     """
     g, m = len(tip_curve), len(u)
     tips = nurbs.evaluate(tip_curve, weights, u)
@@ -81,12 +74,7 @@ def matching_parameters(
 def _follow(values: Floats, low_limit: Floats, target: Floats, excess_of: Callable[[Ints | slice], Excess]) -> Floats:
     """One step of the branch: the root at or above `low_limit` nearest to `target`, else the smallest excess.
 
-    Parameters
-    ----------
-    values : (g, grid) float64
-        Excess ``|Q(v) − P(u)| − H`` on the grid.
-    excess_of : callable
-        The excess at parameters, one for each of some rows.
+    `values` (g, grid) are the excess on the grid; `excess_of` gives it at parameters of some rows.
     """
     # the cell that holds the limit counts from the limit on
     at_limit = excess_of(slice(None))(low_limit)

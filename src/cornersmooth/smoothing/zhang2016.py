@@ -12,7 +12,15 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, SmoothProgram, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.construction import Construction
-from cornersmooth.smoothing.corner_table import Legs, Placed, Remainders, ShapedCorners, divide, half_angle_cosine
+from cornersmooth.smoothing.corner_table import (
+    Legs,
+    Placed,
+    Remainders,
+    ShapedCorners,
+    divide,
+    half_angle_cosine,
+    with_rows,
+)
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import Segments, lines_of, segments_of
 from cornersmooth.smoothing.self_check import distances, passing
@@ -136,7 +144,7 @@ class Zhang2016(Construction):
         rows = _straying_transitions(smoothed)
         if len(rows):
             smaller = super().smooth(program, settings.but(tolerance=_SMALLER * settings.tolerance), None, processes)
-            smoothed = replace(smoothed, corners=_taken_over(smoothed.corners, smaller.corners, rows))
+            smoothed = replace(smoothed, corners=with_rows(smoothed.corners, smaller.corners, rows))
         for strays in (_straying_transitions, _straying_remainders):
             rows = strays(smoothed)
             if len(rows):
@@ -313,34 +321,12 @@ def _halved(points: Floats) -> Floats:
     return halved
 
 
-def _taken_over(corners: Corners, others: Corners, rows: Ints) -> Corners:
-    """Corners with those of others in some rows."""
-    changed: dict[str, Any] = {}
-    for item in fields(Corners):
-        one, other = getattr(corners, item.name), getattr(others, item.name)
-        if isinstance(one, np.ndarray):
-            changed[item.name] = one.copy()
-            changed[item.name][rows] = other[rows]
-    changed["extra"] = {name: values.copy() for name, values in corners.extra.items()}
-    for name, values in changed["extra"].items():
-        values[rows] = others.extra[name][rows]
-    return replace(corners, **changed)
-
-
 def _left_sharp(corners: Corners, rows: Ints) -> Corners:
     """Corners without the transitions of some rows."""
-    status = corners.status.copy()
-    status[rows] = Status.STRAYS
-    changed: dict[str, Any] = {
-        "status": status,
-        "extra": {name: values.copy() for name, values in corners.extra.items()},
-    }
-    for name in ("limited_by", "tip_error", "axis_error", "orientation_error", *_TRIMS):
-        changed[name] = getattr(corners, name).copy()
-        changed[name][rows] = LimitedBy.NOTHING if name == "limited_by" else 0.0
-    for values in changed["extra"].values():
-        values[rows] = np.nan
-    return replace(corners, **changed)
+    k = len(corners)
+    nothing: dict[str, Any] = dict.fromkeys(("tip_error", "axis_error", "orientation_error", *_TRIMS), np.zeros(k))
+    status, limited_by = np.full(k, Status.STRAYS, np.uint8), np.full(k, LimitedBy.NOTHING, np.uint8)
+    return with_rows(corners, replace(corners, status=status, limited_by=limited_by, extra={}, **nothing), rows)
 
 
 _TRIMS: Final = tuple(item.name for item in fields(Corners) if "trim" in item.name)
