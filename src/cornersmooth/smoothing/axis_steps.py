@@ -16,23 +16,7 @@ _ROUNDING = 1e-9
 
 
 def axis_steps(program: Program, moves: Bools, limit: float) -> tuple[Ints, Floats]:
-    """Moves that turn the tool axis by more than a limit.
-
-    Parameters
-    ----------
-    program : Program
-        n poses.
-    moves : (n,) bool
-        Poses whose moves are asked about. The first pose and a FROM have no move, and nothing moves from a FROM.
-    limit : float, degrees
-
-    Returns
-    -------
-    pose : (k,) int64
-        Poses that those moves end in, ascending.
-    turn : (k,) float64, degrees
-        Angle between the axes at both ends; accurate up to 180 degrees.
-    """
+    """Poses (k,) that `moves` (n,) end in which turn the tool axis by more than a limit, and these turns; degrees."""
     axis, stated = program.axis, program.kind == Move.FROM
     far = moves[1:] & ~stated[1:] & ~stated[:-1]
     far &= dot(axis[1:], axis[:-1]) < math.cos(math.radians(limit)) + _ROUNDING  # a first look: the cosine is coarse

@@ -30,17 +30,7 @@ class Construction(ABC):
         progress: Callable[[int, int], None] | None = None,
         processes: int = 1,
     ) -> SmoothProgram:
-        """Smooth a whole program, corner by corner.
-
-        Parameters
-        ----------
-        program : Program
-        settings : Settings
-        progress : callable, optional
-            Called now and then with (corners done, corners in all).
-        processes : int
-            Processes that a method that takes long may work in; the result does not depend on it.
-        """
+        """Smooth a whole program, corner by corner; parameters are those of `cornersmooth.smooth`."""
         corners = place_corners(program, settings, self, progress)
         return SmoothProgram(program=program, corners=corners, settings=settings, findings=program.findings)
 
@@ -50,15 +40,9 @@ class Construction(ABC):
 
     @abstractmethod
     def points(self, smoothed: SmoothProgram, rows: Ints, u: Floats) -> tuple[Floats, Floats]:
-        """Tips (mm) and vectors along the tool, (g, 1 + m, 3) each, on transitions at u = 0 and at parameters u (m,).
+        """Tips (mm) and vectors along the tool, (g, 1 + m, 3) each, on the transitions of rows (g,) of corners.
 
-        Parameters
-        ----------
-        smoothed : SmoothProgram
-        rows : (g,) int64
-            Rows of `SmoothProgram.corners`.
-        u : (m,) float64
-            Ascending.
+        They are those at u = 0 and at the parameters u (m,), ascending.
         """
 
     @abstractmethod

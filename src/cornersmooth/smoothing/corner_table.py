@@ -18,23 +18,13 @@ BATCH = 16384
 
 
 class Legs(NamedTuple):
-    """The two segments at g corners, in space and seen from the tool axis.
+    """The two segments at g corners, (g, 3) each."""
 
-    Parameters
-    ----------
-    tip_in, tip_out : (g, 3) float64, mm
-        Tip segments into and out of the corner (D⁻, D⁺ of the tip).
-    turn_in, turn_out : (g, 3) float64, mm
-        H times the change of the axis vector along them, so that ``tip + turn`` is the axis-point segment.
-    axis : (g, 3) float64
-        Unit axis at the corner.
-    """
-
-    tip_in: Floats
-    tip_out: Floats
-    turn_in: Floats
+    tip_in: Floats  # D⁻ of the tip, mm
+    tip_out: Floats  # D⁺ of the tip, mm
+    turn_in: Floats  # H times the change of the axis vector, mm: ``tip + turn`` is the axis-point segment
     turn_out: Floats
-    axis: Floats
+    axis: Floats  # unit axis at the corner
 
 
 def legs_at(program: Program, axis_length: float, pose: Ints, before: Ints, after: Ints) -> Legs:
@@ -74,14 +64,7 @@ class ShapedCorners(NamedTuple):
 class CornerTable:
     """All corners of a program, looked at in batches.
 
-    Parameters
-    ----------
-    program : Program
-    settings : Settings
-    pose, before, after : (k,) int64
-        As in `Corners`.
-    status : (k,) uint8
-        `Status` as far as it is known without the geometry of the corner.
+    `status` (k,) is known without the geometry of the corner; `pose`, `before` and `after` are as in `Corners`.
     """
 
     program: Program
@@ -104,20 +87,12 @@ class CornerTable:
 
 
 class Remainders(NamedTuple):
-    """What transitions leave of g segments.
+    """What transitions leave of g segments."""
 
-    Parameters
-    ----------
-    start, end : (g,) int64
-        Poses at the ends of the segments.
-    tip, axis : (g, 2) float64
-        Fractions of the tip segment and of the axis-point segment at which the remainder starts and ends.
-    """
-
-    start: Ints
+    start: Ints  # poses at the ends of the segments, (g,)
     end: Ints
-    tip: Floats
-    axis: Floats
+    tip: Floats  # fractions of the tip segment at which the remainder starts and ends, (g, 2)
+    axis: Floats  # the same of the axis-point segment
 
 
 @dataclass

@@ -13,24 +13,12 @@ from cornersmooth.vectors import norm
 
 @dataclass(frozen=True)
 class Neighbours:
-    """Distinct neighbours of every pose inside its chain.
+    """Distinct neighbours of each of n poses inside its chain."""
 
-    Parameters
-    ----------
-    previous : (n,) int64
-        The pose that the linear move into pose i starts from, -1 where pose i is not reached inside a chain.
-    following : (n,) int64
-        The next distinct pose where pose i is an inner pose of its chain, else -1.
-    inner : (n,) bool
-        Inner poses of chains, repeated ones included: the corners.
-    duplicate : (n,) bool
-        Poses that repeat the one before them in the same chain; none repeats the hole before it.
-    """
-
-    previous: Ints
-    following: Ints
-    inner: Bools
-    duplicate: Bools
+    previous: Ints  # the pose that the linear move into it starts from, -1 where it is not reached inside a chain
+    following: Ints  # the next distinct pose of an inner pose of a chain, else -1
+    inner: Bools  # inner poses of chains, repeated ones included: the corners
+    duplicate: Bools  # repeats the pose before it in the same chain, but for a hole
 
 
 def find_neighbours(program: Program, axis_length: float, distance: float) -> Neighbours:

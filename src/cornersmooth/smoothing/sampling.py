@@ -149,15 +149,7 @@ KNOTS = (0.0, 0.0, 0.0, 0.0, 0.5)
 def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int = 16384) -> Iterator[Rows]:
     """Rows of the smoothed motion as lines with tool vectors, in batches of about `poses` poses.
 
-    Parameters
-    ----------
-    circles : (k,) int64, optional
-        Number of circular arcs that each arc of the program is written as, 0 for lines; all lines by default.
-
-    Yields
-    ------
-    Rows
-        `other` holds unit vectors; every `curve` is 0.
+    `circles` (k,) is the number of circular arcs that each arc of the program is written as, 0 for lines.
     """
     program, corners = smoothed.program, smoothed.corners
     segments = segments_of(smoothed, dense=True)
@@ -182,17 +174,9 @@ def dense_rows(smoothed: SmoothProgram, circles: Ints | None = None, poses: int 
 
 
 def curve_rows(smoothed: SmoothProgram, *, divide: bool = False, poses: int = 16384) -> Iterator[Rows]:
-    """Rows of the smoothed motion as lines and curve pairs, in batches of about `poses` poses.
+    """Rows of the smoothed motion as lines and curve pairs with axis points, in batches of about `poses` poses.
 
-    Parameters
-    ----------
-    divide : bool
-        Whether lines in which the axis turns much are divided: for controls that do not run the axis point straight.
-
-    Yields
-    ------
-    Rows
-        `other` holds axis points; a transition is five rows.
+    `divide` says whether lines in which the axis turns much are divided: not all controls run the axis point straight.
     """
     program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
     segments = segments_of(smoothed, dense=divide)

@@ -1,9 +1,7 @@
 """What every pose contributes to the written motion: straight remainders, transitions, and how many lines each takes.
 
-How many lines a transition takes follows from its geometry. With all weights 1 the first half of the curve
-is, in s = 2u, the straight leg plus s³ times the deviation, so the chord error of a step Δs is proportional to s·Δs²;
-nodes s = (j/n)^(2/3) make it the same in every step and n = sqrt(bend/(18·chord)), 15 % more for the first step, where
-s³ is not yet parabolic.
+With all weights 1 the first half of a transition is, in s = 2u, the straight leg plus s³ times the deviation. So the
+chord error of a step Δs is proportional to s·Δs², and nodes s = (j/n)^(2/3) make it the same in every step.
 """
 
 from __future__ import annotations
@@ -217,18 +215,10 @@ def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
 
 
 def shape_factors(weights: Floats, ratio: Floats) -> tuple[Floats, Floats]:
-    """Factors by which bend and turn of a transition count more for its shape.
+    """Factors (g,) by which bend and turn of transitions count more for their weights (g, 2) and ratios (g,).
 
-    Parameters
-    ----------
-    weights : (g, 2) float64
-    ratio : (g,) float64
-
-    Returns
-    -------
-    bend, turn : (g,) float64
-        The chord error of n lines is at most ``bend·PAPER_ERROR·|b − a|/n²``, 9/4 of it on even nodes; on even nodes σ
-        changes by at most ``turn/n`` in a line.
+    The chord error of n lines is at most ``bend·PAPER_ERROR·|b − a|/n²``, 9/4 of it on even nodes; on even nodes σ (see
+    `cornersmooth.geometry.nurbs`) changes by at most ``turn/n`` in a line.
     """
     # for w1 = 1, w2 ≤ 1 and the ratio 2/3 both are at most 6c, c the deviation factor (tests/smoothing/test_weights.py)
     factor = np.maximum(6.0 * nurbs.deviation_factor(weights, ratio), 1.0)

@@ -34,18 +34,9 @@ class Common(NamedTuple):
 def distances(
     program: Program, axis_length: float, poses: Ints, tip: Floats, axis: Floats, *, own_axis: bool = False
 ) -> tuple[Floats, Floats, Common, Floats]:
-    """How far sampled poses are from the original motion through some poses of a program.
+    """How far sampled poses (g, m) are from the original motion through some poses (g, q) of a program.
 
-    Parameters
-    ----------
-    program : Program
-    axis_length : float, mm
-        H.
-    poses : (g, q) int64
-    tip, axis : (g, m, 3) float64
-        Samples: mm, unit vectors.
-    own_axis : bool
-        Whether the axis point is H times the axis wherever the tip is, as where the axis has a tolerance of its own.
+    With `own_axis` the axis point is H times the axis wherever the tip is.
 
     Returns
     -------
@@ -54,7 +45,7 @@ def distances(
     common : Common
         From the pose that is nearest in six dimensions.
     backwards : (g,) float64, mm
-        By how much that pose is behind the farthest of those before it, at most.
+        By how much that pose goes back along the original, at most.
     """
     own = tip, axis_length * axis if own_axis else tip + axis_length * axis
     legs = [
@@ -118,12 +109,9 @@ class _Leg:
         return (tip, tip + lever), (moving, way + turning)
 
     def nearest(self, own: tuple[Floats, Floats], chosen: tuple[int, ...]) -> tuple[Floats, ...]:
-        """Where those of tip and axis point (g, m, 3) that are `chosen` are nearest together.
+        """Where those of tip and axis point (g, m, 3) that are `chosen` are nearest together, (g, m) each.
 
-        Returns
-        -------
-        square, share, tip, axis_point : (g, m) float64
-            Sum of the chosen squares of distances, where on the segment, and the distances, mm.
+        Returned are the sum of the chosen squares of distances, the share of the segment, and both distances.
         """
         grid = np.linspace(0.0, 1.0, _PARTS + 1)
         points, _ = self.at(np.broadcast_to(grid, (len(self.tip_start), len(grid))))

@@ -39,21 +39,12 @@ def sharp_rows(smoothed: SmoothProgram) -> Ints:
 
 
 class OtherCorners(NamedTuple):
-    """Corners between moves of different kinds, g of them in path order.
-
-    Parameters
-    ----------
-    pose : (g,) int64
-    status : (g,) uint8
-        `Status.ARC` or `Status.RAPID`.
-    tip_turn, axis_turn : (g,) float64, degrees
-        Change of direction of the tip path and of the axis-point path.
-    """
+    """Corners between moves of different kinds, g of them in path order."""
 
     pose: Ints
-    status: NDArray[np.uint8]
-    tip_turn: Floats
-    axis_turn: Floats
+    status: NDArray[np.uint8]  # `Status.ARC` or `Status.RAPID`
+    tip_turn: Floats  # change of direction of the tip path, degrees
+    axis_turn: Floats  # the same of the axis-point path
 
 
 def other_corners(program: Program, axis_length: float) -> OtherCorners:

@@ -34,21 +34,7 @@ def place_corners(
     construction: Construction,
     progress: Callable[[int, int], None] | None = None,
 ) -> Corners:
-    """Round every corner of the program that can be rounded.
-
-    Parameters
-    ----------
-    program : Program
-    settings : Settings
-    construction : Construction
-    progress : callable, optional
-        Called with (corners done, corners in all) after each batch.
-
-    Returns
-    -------
-    Corners
-        One row for every inner pose of every chain.
-    """
+    """Round every corner of the program that can be rounded; `progress` takes (corners done, corners in all)."""
     around = find_neighbours(program, settings.axis_length, settings.duplicate_distance)
     pose = np.flatnonzero(around.inner)
     before, after = around.previous[pose], around.following[pose]

@@ -35,8 +35,7 @@ EXTRA = ("sync_residual", "jump_in", "jump_out")
 _SAMPLES: Final = np.linspace(0.0, 1.0, 17)
 _MEASURED: Final = 1024
 
-#: part of the tolerance for corners that leave it: the bound (10) holds for each curve, not for the synchronised
-#: motion, which leaves it by 0.1 % on the paper's own Table 1
+#: part of the tolerance for corners that leave it: the bound (10) holds for each curve, not for the synchronised motion
 _SMALLER: Final = 0.99
 
 #: for the last digits of sums

@@ -39,16 +39,9 @@ def _rows(first: Ints, tap: Floats, size: int) -> csr_array:
 
 
 class Gather:
-    """Sums over rows (samples or spans) that belong to four neighbouring control points each.
+    """Sums over rows (samples or spans), each with coefficients `tap` (m, 4) at four of `size` control points.
 
-    Parameters
-    ----------
-    first : (m,) int64
-        First of the four control points of each row.
-    tap : (m, 4) float64
-        Coefficient of each row at its control points.
-    size : int
-        Number of control points c.
+    `first` (m,) are the first of these four.
     """
 
     def __init__(self, first: Ints, tap: Floats, size: int) -> None:
@@ -105,17 +98,10 @@ def solve_scalar(bands: Floats, right: Floats, free: Bools) -> Floats:
 
 
 def keep_in_planes(bands: Floats, right: Floats, normal: Floats) -> None:
-    """Change a system so that its solution does not go along the normals; in place.
+    """Change a system so that its solution does not go along the normals (c, 3), 0 where it is free; in place.
 
     With P = I − n·nᵀ the blocks K become P·K·P, and those of the main diagonal get n·nᵀ besides. Control points that
     are coupled have the same normal.
-
-    Parameters
-    ----------
-    bands : (c, 4, 6) float64
-    right : (3, c) float64
-    normal : (c, 3) float64
-        Of length 1, or 0 where the solution is free.
     """
     rows = np.flatnonzero(normal.any(axis=1))
     if not len(rows):

@@ -1,18 +1,12 @@
 """Some windows of runs made smooth: samples, what they may deviate, and the rounds of tip and axis point.
 
-Tip and axis point are solved one after the other: the smoothest tip, then the smoothest lever from tip to axis point,
-for it is the lever that the rotary axes follow. Once a lever is known the tip goes out of its way for it: where both
-deviate to opposite sides the lever has twice the room. At constant H the axis point of a pose is off by what its curve
-is off across the axis O, and by what the tip is off along it; what the axis point's curve does along the axis does not
-show. So the tip leaves along the axis at least what the fit needs across it, and the axis point may use across the axis
-what the tip has left.
+The smoothest tip is solved first, then the smoothest lever from tip to axis point, which the rotary axes follow. Then
+the tip goes out of its way for the lever: where both deviate to opposite sides the lever has twice the room. At
+constant H the axis point is off by what its curve is off across the axis O, and by what the tip is off along it. So the
+tip leaves along the axis what the fit needs across it, and the axis point uses across the axis what the tip has left.
 
-Where poses sample a surface, deviations cost something: one that makes the motion hardly smoother would only treat
-neighbouring passes differently. At sharp corners, and along the segments between them, deviations cost nothing.
-
-Where all axes of a run lie in one plane the lever does not leave it: a machine may have no rotary axis that goes there,
-and another one would tremble. Across the plane the axis point then is off by what the tip is, so there, too, the tip
-leaves the axis point its part.
+Where poses sample a surface deviations cost something, so that neighbouring passes get the same curve. Where all axes
+of a run lie in one plane the lever does not leave it: an axis of the machine would tremble.
 """
 
 from __future__ import annotations
@@ -34,13 +28,13 @@ from cornersmooth.smoothing.runs.windows import Windows
 #: share of the tolerance that the samples may use
 SHARE = 0.97
 
-#: share of the tolerance between the fit and the bounds, so that there is a way to go
+#: share of the tolerance between the fit and the bounds
 ROOM = 0.02
 
 #: how much less the axis point's curve is bound along the axis than across it (the square of it)
 ALONG = 0.1
 
-#: least and largest share of its tolerance that the tip leaves to the axis point across the axis, wherever it is itself
+#: least and largest share of its tolerance that the tip leaves to the axis point across the axis
 LEAST_LEFT, MOST_LEFT = 0.5, 0.9
 
 #: spans on either side that the weight of a span looks at, its power of the mean square of C‴, and the least mean over
@@ -59,8 +53,8 @@ TIP_COUNTS = 0.3
 #: the same where the tip may go out of its way for the lever, and the tip is much faster than the lever
 OWN_WAY = 0.5
 
-#: what a deviation as large as the tolerance costs where poses sample a surface, over the objective at the beginning of
-#: a round; and spans on either side that tell whether they do. Measured: docs/global.md, neighbouring passes.
+#: cost of a deviation as large as the tolerance where poses sample a surface, over the objective at the beginning of a
+#: round; and spans on either side that tell whether they do (docs/global.md, neighbouring passes)
 PENALTY, SURROUNDINGS = 6.0, 12
 
 #: squared ratio of the lever's speed to the tip's beyond which the tip stands
@@ -69,28 +63,14 @@ _LARGEST_RATIO = 1e100
 
 @dataclass(frozen=True)
 class Problem:
-    """What is the same for all windows of a program.
-
-    Parameters
-    ----------
-    lines : Polylines
-    splines : Splines
-    pieces : Pieces
-        All of them.
-    rough : (controls, 6) float64, mm
-        Control points of the fit, which is well within the tolerances.
-    tolerances : (float, float), mm
-        Of tip and axis point.
-    axis_length : float, mm
-        H.
-    """
+    """What is the same for all windows of a program."""
 
     lines: Polylines
     splines: Splines
     pieces: Pieces
-    rough: Floats
-    tolerances: tuple[float, float]
-    axis_length: float
+    rough: Floats  # control points of the fit, (controls, 6), mm
+    tolerances: tuple[float, float]  # of tip and axis point, mm
+    axis_length: float  # H, mm
 
     @cached_property
     def first_piece(self) -> Ints:
@@ -117,8 +97,7 @@ class Problem:
     def room(self) -> Floats:
         """(poses,) share of its tolerance that the axis point may use in the segment from each pose.
 
-        The axis may have a larger tolerance than the tip. Then it may be off by what it turns in the segment, or by
-        what the tip may be: where it does not turn, a swing only takes time.
+        Where it has a larger tolerance than the tip it may be off by what it turns in the segment, or as the tip.
         """
         turned = np.sqrt(_squares(np.diff(self.lever, axis=0, append=self.lever[-1:])))
         room: Floats = np.minimum(np.maximum(turned, self.tolerances[0]) / self.tolerances[1], 1.0)
@@ -160,7 +139,7 @@ def solve_windows(
     tight : (pieces, 2) float64
         Share of what they may use that tip and axis point of each piece are left.
     gaps : tuple of float
-        What may be left to gain, over the objective, in each round; weights are those of the curve before the round.
+        What may be left to gain, over the objective, in each round.
     near : bool
         Whether `control` is near the solution.
     """
@@ -214,7 +193,7 @@ class _Places:
         splines, pieces = problem.splines, problem.pieces
         number = problem.first_piece[windows.span + 1] - problem.first_piece[windows.span]
         rows = ranges(problem.first_piece[windows.span], number)
-        own = Pieces(pieces.span[rows], pieces.segment[rows], pieces.low[rows], pieces.high[rows])
+        own = pieces.only(rows)
         samples = Samples.of(splines, problem.lines, own)
         span = np.repeat(np.arange(len(windows.span)), number)[samples.piece]
         begins = np.concatenate(([True], samples.piece[1:] != samples.piece[:-1]))
@@ -297,8 +276,7 @@ def across(normal: Floats, vectors: Floats) -> Floats:
 def followed(splines: Splines, windows: Windows, control: Floats) -> Floats:
     """(spans,) share t of the axis point that the tip follows: |A‴ − t·B‴|² is what the tip makes least.
 
-    With the axis point held that is the quadratic model of (r·|A‴|)³ + |(B − A)‴|³ at the curve known so far: whichever
-    is larger counts more. r is larger where the tip is slow beside the lever, for there its direction turns most.
+    That is the quadratic model of (r·|A‴|)³ + |(B − A)‴|³ at the curve known so far; r grows where the tip is slow.
     """
     tip, lever = control[:, :3], control[:, 3:] - control[:, :3]
     ahead, behind = windows.local + TAPS - 1, windows.local
@@ -311,10 +289,9 @@ def followed(splines: Splines, windows: Windows, control: Floats) -> Floats:
 
 
 def even_weights(splines: Splines, windows: Windows, control: Floats) -> Floats:
-    """(spans,) weights of |C‴|² that give calm and sharp places of the windows their say.
+    """(spans,) weights of |C‴|²: |C‴|^(-5/3) at the curve known so far, with the mean over neighbouring spans.
 
-    Where the jerk limits it, a machine passes with v ~ |C‴|^(-1/3), so its time is ∫|C‴|^(1/3): the weights are those
-    of its quadratic model at the curve known so far, |C‴|^(-5/3), with the mean over neighbouring spans.
+    That is the quadratic model of ∫|C‴|^(1/3), the time of a machine that is limited by its jerk.
     """
     curve = np.hstack((TIP_COUNTS * control[:, :3], control[:, 3:] - control[:, :3]))
     mean = _third_squares(splines, windows, curve)

@@ -13,8 +13,8 @@ from cornersmooth.smoothing.runs.banded import Gather, applied, solve_scalar
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
 from cornersmooth.smoothing.runs.windows import Windows
 
-#: share of the tolerances that the fit may use: the rest is for smoothness. Less in spans that hold poses: neighbouring
-#: passes get nearly the same curve only where their knots do not show.
+#: share of the tolerances that the fit may use. Less in spans that hold poses: the knots of neighbouring passes differ,
+#: and must not show.
 CLOSE, CLOSE_TO_POSES = 0.5, 0.3
 
 #: poses between the first knots
@@ -38,29 +38,17 @@ _RIDGE = 1e-6
 
 @dataclass(frozen=True)
 class Fit:
-    """Splines near the runs: knots, control points, and the largest deviation in every span over the tolerances.
-
-    Parameters
-    ----------
-    splines : Splines
-    control : (c, 6) float64, mm
-    off : (spans,) float64
-    """
+    """Splines near the runs."""
 
     splines: Splines
-    control: Floats
-    off: Floats
+    control: Floats  # (c, 6), mm
+    off: Floats  # largest deviation in every span over the tolerances
 
 
 def fit(lines: Polylines, tolerances: tuple[float, float]) -> Fit:
-    """Fit splines to runs that keep position, tangent and curvature zero at their ends.
+    """Fit splines to runs of 3 poses or more; position, tangent and curvature zero are kept at their ends.
 
-    Parameters
-    ----------
-    lines : Polylines
-        Every run has 3 poses or more.
-    tolerances : (float, float), mm
-        Of tip and axis point; spans are refined until `CLOSE` of them is kept, or they are too short.
+    Spans are refined until `CLOSE` of the tolerances of tip and axis point (mm) is kept, or they are too short.
     """
     splines = first_knots(lines)
     control = lines_to_control(lines, splines)
@@ -71,8 +59,7 @@ def fit(lines: Polylines, tolerances: tuple[float, float]) -> Fit:
         windows = Windows.where(splines, active)
         pieces = Pieces.of(splines, lines)
         rows = np.flatnonzero(active[pieces.span])
-        pieces = Pieces(pieces.span[rows], pieces.segment[rows], pieces.low[rows], pieces.high[rows])
-        samples = Samples.of(splines, lines, pieces)
+        samples = Samples.of(splines, lines, pieces.only(rows))
         control = _least_squares(splines, windows, samples, control)
         off[active] = _largest(splines, samples, control, tolerances)[active]
         close = np.where(holding_poses(splines, lines), CLOSE_TO_POSES, CLOSE)

@@ -34,42 +34,21 @@ _LEAST_SLACK = 0.02
 
 @dataclass(frozen=True)
 class Task:
-    """Tip or axis point of some windows, in units of the tolerance: c control points, m samples.
+    """Tip or axis point of some windows, in units of the tolerance: c control points, m samples."""
 
-    Parameters
-    ----------
-    near, smooth : Gather
-        Samples and spans at the control points.
-    weight : (spans,) float64
-        Of the squared third derivatives, times the widths.
-    axis : (m, 3) float64
-        O at the samples.
-    stretch : (m,) float64
-        k > -1.
-    radius : (m,) float64
-        r.
-    penalty : (m,) float64
-        p, over the first part of the objective at the beginning.
-    free : (c,) bool
-    sample_window, span_window, control_window : int64
-    windows : int
-    normal : (c, 3) float64, optional
-        Control points do not move along it; 0 where they move as they like.
-    """
-
-    near: Gather
-    smooth: Gather
-    weight: Floats
-    axis: Floats
-    stretch: Floats
-    radius: Floats
-    penalty: Floats
-    free: Bools
+    near: Gather  # samples at the control points
+    smooth: Gather  # spans at the control points
+    weight: Floats  # of the squared third derivatives, times the widths, (spans,)
+    axis: Floats  # O at the samples, (m, 3)
+    stretch: Floats  # k > -1, (m,)
+    radius: Floats  # r, (m,)
+    penalty: Floats  # p over the first part of the objective at the beginning, (m,)
+    free: Bools  # (c,)
     sample_window: Ints
     span_window: Ints
     control_window: Ints
     windows: int
-    normal: Floats | None = None
+    normal: Floats | None = None  # control points do not move along it, (c, 3); 0 where they move as they like
 
     @cached_property
     def columns(self) -> Floats:

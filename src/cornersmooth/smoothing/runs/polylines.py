@@ -36,11 +36,9 @@ class Polylines:
     count : (r,) int64
         Poses of each run, at least 2.
     s : (n,) float64
-        Length from the start of the run in steps of `step`, whole numbers, by m(D) = √((|D_A|² + |D_B|²)/2): pure
-        rotations count (docs/method.md).
+        Length from the start of the run in steps of `step`, whole numbers, by m(D) (docs/method.md).
     step : float, mm
-        Poses and knots stand at whole steps, so that knots can be written with few digits. It is small beside ε, so
-        the parameter is the length but for what nobody can see.
+        Small beside ε. Poses and knots stand at whole steps, so that knots can be written with few digits.
     """
 
     point: Floats
@@ -98,20 +96,17 @@ def _floors(along: Floats, first: Ints, count: Ints) -> Floats:
 class Pieces:
     """Stretches between neighbouring knots and poses, in order of the runs.
 
-    Parameters
-    ----------
-    span : (p,) int64
-        Span of the spline that the piece lies in.
-    segment : (p,) int64
-        Pose that the segment of the original motion starts from.
-    low, high : (p,) float64, steps
-        Lengths s at both ends.
+    The place s of their ends is in steps.
     """
 
     span: Ints
-    segment: Ints
+    segment: Ints  # pose that the segment of the original motion starts from
     low: Floats
     high: Floats
+
+    def only(self, rows: Ints) -> Pieces:
+        """Some of the pieces."""
+        return Pieces(self.span[rows], self.segment[rows], self.low[rows], self.high[rows])
 
     @classmethod
     def of(cls, splines: Splines, lines: Polylines) -> Pieces:
@@ -137,22 +132,13 @@ class Pieces:
 
 @dataclass(frozen=True)
 class Samples:
-    """Places (m,) where the deviation is looked at: the start of every piece and places evenly behind it.
-
-    Parameters
-    ----------
-    piece, span : (m,) int64
-    s : (m,) float64, steps
-    basis : (m, 4) float64
-    target : (m, 6) float64, mm
-        Point of the original motion.
-    """
+    """Places (m,) where the deviation is looked at: the start of every piece and places evenly after it."""
 
     piece: Ints
     span: Ints
-    s: Floats
-    basis: Floats
-    target: Floats
+    s: Floats  # steps
+    basis: Floats  # (m, 4)
+    target: Floats  # points of the original motion, (m, 6), mm
 
     @classmethod
     def of(cls, splines: Splines, lines: Polylines, pieces: Pieces) -> Samples:

@@ -1,12 +1,10 @@
 """Curves of runs as what is written: lines, or sections of control points.
 
-A line between two points of the curve that belong to one segment of the original motion is no farther from it than its
-ends: the deviation at the common parameter is linear in between. So a point for every pose keeps the promise, and more
-are put only where lines would cut the curve.
+A line between two points of the curve in one segment of the original motion is no farther from it than its ends. So a
+point for every pose keeps the tolerance, and more are put only where lines would cut the curve.
 
-A section is clamped at both ends, so that a control that takes so many control points in a curve and no more can run
-it, and a reader finds a position on the path every so often. Sections are C² where they meet. Their control points are
-the blossoms of the run's spline at the knots of the section: knot insertion, which changes nothing.
+Sections are clamped at both ends, as controls take so many control points in a curve, and C² where they meet. Their
+control points are the blossoms of the run's spline at the knots of the section.
 """
 
 from __future__ import annotations
@@ -35,8 +33,7 @@ _TOGETHER = 8192
 #: most lines for one segment
 _MOST_LINES = 20_000
 
-#: knot intervals of a section, whose control points `Rows.curve` counts to 127, and its parameter in steps beyond which
-#: it ends as soon as it can
+#: knot intervals of a section, whose control points `Rows.curve` counts to 127, and its longest parameter in steps
 SPANS, LONGEST = 120, 5e6
 
 #: knot intervals among which the widest is looked for where a section is to end
@@ -81,35 +78,16 @@ def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Fl
 
 @dataclass(frozen=True)
 class LinePlaces:
-    """Where the lines that runs are written as end: m places in path order.
+    """Where the lines that runs are written as end: m places in path order."""
 
-    Parameters
-    ----------
-    pose : (m,) int64
-        Pose that the segment of each line ends in.
-    span : (m,) int64
-        Of the curves of all runs.
-    s : (m,) float64, steps
-    end : (m,) int64
-        Row of the polylines that a place at the end of a run is, -1 for the others.
-    """
-
-    pose: Ints
+    pose: Ints  # pose that the segment of each line ends in
     span: Ints
-    s: Floats
-    end: Ints
+    s: Floats  # steps
+    end: Ints  # row of the polylines that a place at the end of a run is, -1 for the others
 
 
 def run_lines(runs: Runs, lines: Polylines, program: Program, settings: Settings) -> tuple[Ints, Floats, Floats]:
-    """Ends of the lines that runs are written as.
-
-    Returns
-    -------
-    pose : (m,) int64
-        Pose that the segment of each line ends in.
-    tip, axis : (m, 3) float64
-        mm, and unit vectors. The last of a run are its last pose.
-    """
+    """Ends of the lines that runs are written as: poses that their segments end in (m,), tips and unit axes (m, 3)."""
     found = line_places(runs, lines, program, settings)
     tip, axis = points_at(runs.control, Splines(runs.knot, runs.knot_count), found.span, found.s)
     at = np.flatnonzero(found.end >= 0)
@@ -173,27 +151,13 @@ def _effort(
 
 @dataclass(frozen=True)
 class SectionRows:
-    """Control points of all sections in path order, m rows.
+    """Control points of all sections in path order, m rows."""
 
-    Parameters
-    ----------
-    move : (m,) int64
-        Pose in whose segment the section ends.
-    number : (m,) int64
-        1 for the first control point of a section.
-    points : (m, 6) float64, mm
-        Tip and axis point.
-    knot : (m,) float64
-        Knot that goes with each control point, from 0.
-    last_knot : (m,) float64
-        The last knot of the section in its last row, else 0.
-    """
-
-    move: Ints
-    number: Ints
-    points: Floats
-    knot: Floats
-    last_knot: Floats
+    move: Ints  # pose in whose segment the section ends
+    number: Ints  # 1 for the first control point of a section
+    points: Floats  # tip and axis point, (m, 6), mm
+    knot: Floats  # that goes with each control point, from 0
+    last_knot: Floats  # of the section in its last row, else 0
 
 
 def section_rows(runs: Runs, program: Program) -> SectionRows:
@@ -229,8 +193,7 @@ def section_rows(runs: Runs, program: Program) -> SectionRows:
 def _cuts(runs: Runs, splines: Splines, program: Program) -> tuple[Ints, Floats, Floats]:
     """Run, start and end of every section.
 
-    Sections end in the middle of wide knot intervals: beside a sharp corner, where knots are close together, a place on
-    the path may belong to either segment, and whoever reads the text would have to guess.
+    Sections end in the middle of wide knot intervals, away from sharp corners: there a place belongs to one segment.
     """
     row, place = spread(splines.count)
     outermost = (place == 0) | (place == splines.count[row] - 1)

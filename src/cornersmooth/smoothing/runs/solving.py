@@ -1,16 +1,17 @@
 """Runs solved and proved: knots by fitting, control points by the interior-point method, bounds for every piece.
 
-A whole program is solved in groups of runs: each group is fitted, solved, proved and measured for itself. A group is
-as large as keeps the arrays small, whatever the length of the program. Several processes work on groups side by side.
-A run that is a group of its own is shared window by window instead.
+A whole program is solved in groups of runs, so that arrays stay small. Several processes work on groups side by side,
+or on the windows of one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import spread, starts
@@ -53,27 +54,14 @@ GROUP = 2500
 
 @dataclass(frozen=True)
 class RunCurves:
-    """Pairs of cubic B-splines for runs.
-
-    Parameters
-    ----------
-    lines : Polylines
-        The original motion of the runs.
-    splines : Splines
-    control : (c, 6) float64, mm
-        Control points of tip and axis point.
-    tip_bound, axis_bound : (r,) float64, mm
-        Proven bounds of the deviation at common parameters, of the tip and of the axis point at constant H.
-    kept : (r,) bool
-        Whether the run keeps its tolerances; the others are not to be used.
-    """
+    """Pairs of cubic B-splines for r runs."""
 
     lines: Polylines
     splines: Splines
-    control: Floats
-    tip_bound: Floats
-    axis_bound: Floats
-    kept: Bools
+    control: Floats  # control points of tip and axis point, (c, 6), mm
+    tip_bound: Floats  # proven bounds of the deviation at common parameters, mm
+    axis_bound: Floats  # the same of the axis point at constant H
+    kept: Bools  # whether the run keeps its tolerances; the others are not to be used
 
 
 def solve_runs(
@@ -84,21 +72,7 @@ def solve_runs(
     *,
     processes: int = 1,
 ) -> RunCurves:
-    """Find the smoothest pair of splines for every run.
-
-    Parameters
-    ----------
-    lines : Polylines
-        Runs of 3 distinct poses or more.
-    tolerances : (float, float), mm
-        Of the tip and of the axis point at constant H.
-    axis_length : float, mm
-        H.
-    progress : callable, optional
-        Called with (spans done, spans in all).
-    processes : int
-        Processes that solve batches of windows; the result does not depend on it.
-    """
+    """Find the smoothest pair of splines for every run; parameters are those of `solve_groups`."""
     rough = fit(lines, tolerances)
     splines = rough.splines
     pieces = Pieces.of(splines, lines)
@@ -110,7 +84,7 @@ def solve_runs(
     changed = np.arange(len(pieces.span))
     limits = np.array(tolerances)
     for number in range(MENDINGS + 1):
-        proven[changed] = bounds(splines, control, lines, _some(pieces, changed), axis_length, tolerances)
+        proven[changed] = bounds(splines, control, lines, pieces.only(changed), axis_length, tolerances)
         failed = np.flatnonzero((proven > limits).any(axis=1))
         if not len(failed) or number == MENDINGS:
             break
@@ -130,7 +104,7 @@ def solve_runs(
         share = _fade(splines, pieces.span[failed], part)[:, None]
         control = rough.control + share * (control - rough.control)
         changed = _touched(splines, pieces, np.flatnonzero(share[:, 0] < 1.0))
-        proven[changed] = bounds(splines, control, lines, _some(pieces, changed), axis_length, tolerances)
+        proven[changed] = bounds(splines, control, lines, pieces.only(changed), axis_length, tolerances)
     worst = np.zeros((len(lines.count), 2))
     np.maximum.at(worst, run, proven)
     tip, axis = worst[:, 0], worst[:, 1]
@@ -226,28 +200,14 @@ def _touched(splines: Splines, pieces: Pieces, control: Ints) -> Ints:
     return np.flatnonzero(moved[splines.taps(pieces.span)].any(axis=1))
 
 
-def _some(pieces: Pieces, rows: Ints) -> Pieces:
-    return Pieces(pieces.span[rows], pieces.segment[rows], pieces.low[rows], pieces.high[rows])
-
-
 @dataclass(frozen=True)
 class AtPoses:
-    """Curves at the n poses of their runs.
+    """Curves at the n poses of their runs."""
 
-    Parameters
-    ----------
-    tip, axis : (n,) float64, mm
-        Deviation of tip and axis point at common parameters.
-    turn : (n,) float64, rad
-        Deviation of the axis.
-    curvature : (n,) float64, 1/mm
-        Largest curvature of the tip's curve in the halves of the segments beside the pose.
-    """
-
-    tip: Floats
-    axis: Floats
-    turn: Floats
-    curvature: Floats
+    tip: Floats  # deviation at common parameters, mm
+    axis: Floats  # the same of the axis point
+    turn: Floats  # deviation of the axis, rad
+    curvature: Floats  # largest of the tip's curve in the halves of the segments beside the pose, 1/mm
 
 
 def solve_groups(
@@ -294,20 +254,14 @@ def solve_groups(
         found.append(solved)
         if progress is not None:
             progress(int(lines.first[first[number + 1]]), len(lines.s))
-    curves = [part for part, _ in found]
-    whole = RunCurves(
-        lines=lines,
-        splines=Splines(
-            np.concatenate([part.splines.knot for part in curves]),
-            np.concatenate([part.splines.count for part in curves]),
-        ),
-        control=np.concatenate([part.control for part in curves]),
-        tip_bound=np.concatenate([part.tip_bound for part in curves]),
-        axis_bound=np.concatenate([part.axis_bound for part in curves]),
-        kept=np.concatenate([part.kept for part in curves]),
-    )
-    names = ("tip", "axis", "turn", "curvature")
-    return whole, AtPoses(*(np.concatenate([getattr(part, name) for _, part in found]) for name in names))
+    curves, at_poses = zip(*found, strict=True)
+
+    def joined(parts: Sequence[Any], *names: str) -> list[NDArray[Any]]:
+        return [np.concatenate([getattr(part, name) for part in parts]) for name in names]
+
+    splines = Splines(*joined([part.splines for part in curves], "knot", "count"))
+    rest = joined(curves, "control", "tip_bound", "axis_bound", "kept")
+    return RunCurves(lines, splines, *rest), AtPoses(*joined(at_poses, "tip", "axis", "turn", "curvature"))
 
 
 def _measured(curves: RunCurves) -> AtPoses:

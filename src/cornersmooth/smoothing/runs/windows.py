@@ -16,31 +16,15 @@ HELD = 3
 
 @dataclass(frozen=True)
 class Windows:
-    """Windows of neighbouring spans of one run each, one behind the other.
+    """Windows of neighbouring spans of one run each, one after the other; neighbours may share control points."""
 
-    Parameters
-    ----------
-    begin, count : (w,) int64
-        First span of each window, and its number of spans.
-    span : (spans,) int64
-        The spans of the splines that belong to the windows.
-    control : (c,) int64
-        Control points of the splines that belong to the windows; neighbouring windows may share some.
-    local : (spans,) int64
-        Index into `control` of the first control point of each span.
-    window : (c,) int64
-        Window of each control point.
-    free : (c,) bool
-        False for the outer control points, which stay.
-    """
-
-    begin: Ints
-    count: Ints
-    span: Ints
-    control: Ints
-    local: Ints
-    window: Ints
-    free: Bools
+    begin: Ints  # first span of each window
+    count: Ints  # its number of spans
+    span: Ints  # spans of the splines that belong to the windows
+    control: Ints  # control points of the splines that belong to the windows, (c,)
+    local: Ints  # index into `control` of the first control point of each span
+    window: Ints  # window of each control point
+    free: Bools  # false for the outer control points, which stay
 
     @classmethod
     def of(cls, splines: Splines, begin: Ints, count: Ints) -> Windows:
