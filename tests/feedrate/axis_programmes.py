@@ -18,7 +18,8 @@ from scipy.sparse import csr_array, diags_array, vstack
 
 from cornersmooth.feedrate.intervals import path_limits
 from cornersmooth.feedrate.limits import Limits
-from cornersmooth.feedrate.timelaw import TimeLaw, shares_at
+from cornersmooth.feedrate.motion import shares_at
+from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.model import Floats
 
 #: how far beside a border of elements derivatives are taken, mm, and elements that have no length

@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cornersmooth.feedrate import Limits, plan, taylor
-from cornersmooth.feedrate.motion import derivatives
-from cornersmooth.feedrate.path import build_path
-from cornersmooth.feedrate.timelaw import TimeLaw, poses
+from cornersmooth.feedrate import Limits, curves, plan, taylor
+from cornersmooth.feedrate.motion import derivatives, poses
+from cornersmooth.feedrate.path import Path, build_path
+from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.model import Arcs, Floats, Move, Program
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing import smooth
@@ -79,18 +79,10 @@ def test_derivatives_of_a_path(chain: Callable[[int], Program], weights: tuple[f
         assert third == pytest.approx(np.hypot(second**2, slope), rel=1e-4)
 
 
-def halves_way(path: object, element: int, t: Floats, h: float) -> Floats:
+def halves_way(path: Path, element: int, t: Floats, h: float) -> Floats:
     """Way between the parameters t − h and t + h of a half."""
-    from cornersmooth.feedrate import bezier_halves
-    from cornersmooth.feedrate.path import Path
-
-    assert isinstance(path, Path)
-    assert path.corners is not None
-    half = np.array([int(path.span[element, 0] > 0)])
-    tip, _ = bezier_halves.corner_halves(
-        path.program, path.corners, path.corner[[element]], half, path.settings.axis_length
-    )
-    ends = bezier_halves.evaluate(np.repeat(tip, len(t), axis=0), np.stack((t - h, t + h), axis=1))
+    tip = np.repeat(path.curves.tip[path.row[[element]]], len(t), axis=0)
+    ends = curves.evaluate(tip, np.stack((t - h, t + h), axis=1))
     return np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1)
 
 

@@ -14,8 +14,9 @@ from cornersmooth.cl import read
 from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.feedrate import Limits, direct, plan, planner, signed_limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
+from cornersmooth.feedrate.motion import poses, shares_at
 from cornersmooth.feedrate.path import Path, build_path
-from cornersmooth.feedrate.timelaw import TimeLaw, poses, shares_at
+from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics import Dynamics, Machine, load_machine, machine_position, solutions, tool_axis
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.settings import Settings

@@ -13,11 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.feedrate import arcs, bezier_halves
-from cornersmooth.feedrate.cubics import cubics, curved, stalling
+from cornersmooth.feedrate import arcs, curves
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
-from cornersmooth.feedrate.motion import derivatives
+from cornersmooth.feedrate.motion import curvature, derivatives
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.vectors import norm
@@ -138,20 +137,15 @@ def path_limits(path: Path, limits: Limits) -> tuple[Intervals, Ints]:
     cap = path.speed**2
     arc = np.flatnonzero((path.kind == Kind.ARC) & ~path.turning)
     if len(arc):
-        bound = limits.centripetal_accel / arcs.curvature(path.program, path.move[arc])
+        bound = limits.centripetal_accel / curvature(arcs.series(path.program, path.move[arc], 0.0))
         cap[arc] = np.minimum(cap[arc], bound)
-    curve = np.flatnonzero(curved(path) & ~path.turning)
-
-    def tips(some: Ints) -> tuple[Floats, Ints]:
-        found = cubics(path, curve[some])
-        return found.tip, found.half
-
-    which, share, interval_cap = bezier_halves.curvature_limits(tips, path.speed[curve], limits)
-    which = curve[which]
+    bent = np.flatnonzero(path.bent)
+    which, share, interval_cap = curves.curvature_limits(path.curves, path.row[bent], path.speed[bent], limits)
+    which = bent[which]
 
     # one slot for the junction before each element, then its intervals
     count = np.ones(m, np.int64)
-    count[which] = bezier_halves.INTERVALS
+    count[which] = curves.INTERVALS
     joined = np.isfinite(path.junction_speed[:-1]) & (path.junction_speed[:-1] > 0.0)
     begin = np.concatenate(([0], np.cumsum(count + joined)))
     total = int(begin[-1])
@@ -160,7 +154,7 @@ def path_limits(path: Path, limits: Limits) -> tuple[Intervals, Ints]:
     single = count == 1
     width[first[single]] = path.length[single]
     bounds[first[single]] = cap[single]
-    inside = first[which][:, None] + np.arange(bezier_halves.INTERVALS)
+    inside = first[which][:, None] + np.arange(curves.INTERVALS)
     width[inside] = share * (path.length[which] / share.sum(axis=1))[:, None]
     bounds[inside] = interval_cap
     bounds[begin[:-1][joined]] = path.junction_speed[:-1][joined] ** 2
@@ -231,9 +225,9 @@ def axis_limits(path: Path, limits: Limits, run: Ints, machine_axes: MachineAxes
     vectors = np.flatnonzero(np.isfinite(bounds).any(axis=0))
     if not len(path) or (machine_axes is None and not len(vectors)):
         return None
-    steady = ~_stalling(path)
+    steady = ~path.of_curves(path.curves.resting)
     counts = np.stack((~path.turning, ~path.turning & steady), axis=1)[:, vectors]
-    bounds, slow = bounds[:, vectors], stalling(path)
+    bounds, slow = bounds[:, vectors], path.of_curves(path.curves.slow) & ~path.turning
     close, own = slow.copy(), len(vectors)
     if machine_axes is not None:
         machine_axes = replace(machine_axes, cone=WITHIN * machine_axes.cone)
@@ -241,8 +235,8 @@ def axis_limits(path: Path, limits: Limits, run: Ints, machine_axes: MachineAxes
         counts = np.concatenate((counts, np.repeat(steady[:, None], bounds.shape[1] - own, axis=1)), axis=1)
         close |= machine_axes.near_pole() & steady
     quantities = _Quantities(path, vectors, machine_axes, bounds, counts)
-    bent, asked = curved(path) & ~path.turning, counts.any(axis=1)
-    count = np.where(asked, np.where(close, 2 * POLE_INTERVALS, np.where(bent, bezier_halves.INTERVALS, INTERVALS)), 1)
+    bent, asked = path.bent, counts.any(axis=1)
+    count = np.where(asked, np.where(close, 2 * POLE_INTERVALS, np.where(bent, curves.INTERVALS, INTERVALS)), 1)
     begin = np.concatenate(([0], np.cumsum(count)))
     total = int(begin[-1])
     width = np.repeat(path.length, count)
@@ -284,24 +278,6 @@ def axis_limits(path: Path, limits: Limits, run: Ints, machine_axes: MachineAxes
     return AxisLimits(both[0], both[1], AxisSamples(value, missed, middle, known, *machine_axes.limits[1:]))
 
 
-def _stalling(path: Path) -> Bools:
-    """(m,) bool: halves of transitions between a motion of the tip and a turn on the spot."""
-    stalling = np.zeros(len(path), np.bool_)
-    corners = path.corners
-    if corners is None:
-        return stalling
-    curves = np.flatnonzero((path.kind == Kind.CURVE) & ~path.turning)
-    row = path.corner[curves]
-    tip = path.program.tip
-    legs = (
-        (corners.trim_in[row], tip[corners.pose[row]] - tip[corners.before[row]]),
-        (corners.trim_out[row], tip[corners.after[row]] - tip[corners.pose[row]]),
-    )
-    for trim, step in legs:
-        stalling[curves] |= trim * norm(step) <= bezier_halves.STANDSTILL
-    return stalling
-
-
 def _graded(path: Path, element: Ints, slow: Bools, machine_axes: MachineAxes | None) -> Floats:
     """Borders (g, p + 1) of intervals that are small where the axis is nearest to the pole, or the tip slowest."""
     borders = np.zeros((len(element), 2 * POLE_INTERVALS + 1))
@@ -309,7 +285,7 @@ def _graded(path: Path, element: Ints, slow: Bools, machine_axes: MachineAxes | 
     if len(swift) and machine_axes is not None:
         borders[swift] = _around(*machine_axes.closest(element[swift]), POLE_INTERVALS)
     if slow.any():
-        places, _, felt = bezier_halves.slowest(cubics(path, element[slow]).tip)
+        places, _, felt = curves.slowest(path.curves.tip[path.row[element[slow]]])
         both = [_around(places[:, k], felt[:, k], POLE_INTERVALS // 2) for k in range(2)]
         borders[slow] = np.sort(np.concatenate(both, axis=1), axis=1)[:, :-1]  # two of them are the end
     return borders
@@ -330,9 +306,9 @@ def _borders(path: Path, element: Ints, curve: bool, given: Floats | None) -> tu
     if not curve:
         borders = np.tile(np.linspace(0.0, 1.0, INTERVALS + 1), (len(element), 1)) if given is None else given
         return borders, np.diff(borders, axis=1)
-    found = cubics(path, element)
-    borders = bezier_halves.interval_borders(found.half) if given is None else given
-    before = np.maximum.accumulate(bezier_halves.lengths_before(found.tip, found.half, borders), axis=1)
+    tip, half = path.curves.tip[path.row[element]], path.curves.half[path.row[element]]
+    borders = curves.interval_borders(half) if given is None else given
+    before = np.maximum.accumulate(curves.lengths_before(tip, half, borders), axis=1)
     lengths = np.diff(before, axis=1)
     return borders, lengths / lengths.sum(axis=1, keepdims=True)
 
@@ -358,8 +334,9 @@ def _quarters(path: Path, element: Ints, borders: Floats, curve: bool) -> Floats
     fine = np.repeat(borders, 4, axis=1)[:, :-3]
     for number, part in enumerate(parts):
         fine[:, number + 1 :: 4] = borders[:, :-1] + part * (borders[:, 1:] - borders[:, :-1])
-    found = cubics(path, element)
-    before = np.maximum.accumulate(bezier_halves.lengths_before(found.tip, found.half, fine), axis=1)
+    row = path.row[element]
+    before = curves.lengths_before(path.curves.tip[row], path.curves.half[row], fine)
+    before = np.maximum.accumulate(before, axis=1)
     along = before[:, 1:].reshape(len(borders), -1, 4) - before[:, :-1:4, None]
     whole = along[..., 3:]
     shares: Floats = np.where(whole > 0.0, along[..., :3] / np.maximum(whole, 1e-300), parts).transpose(2, 0, 1)

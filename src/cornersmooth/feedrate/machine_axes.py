@@ -18,8 +18,9 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import taylor
+from cornersmooth.feedrate.curves import WHOLE
 from cornersmooth.feedrate.motion import known_by_way, taylor_along
-from cornersmooth.feedrate.path import NO_TURN, Kind, Path
+from cornersmooth.feedrate.path import NO_TURN, Path
 from cornersmooth.kinematics import Machine, solutions
 from cornersmooth.kinematics.machine import PARALLEL
 from cornersmooth.kinematics.poses import angle_between, continued
@@ -83,7 +84,8 @@ class MachineAxes:
         """Taylor series (4, m, 5) of the axes from those of tip and tool axis, (4, m, 3) each."""
         path = self.path
         start, end = path.start[element], path.move[element]
-        part = _fractions(path, element, share)[:, None]
+        span = path.span[element]
+        part = span[:, :1] + share[:, None] * (span[:, 1:] - span[:, :1])  # as good as a guess of angles needs it
         whole = self.angles[end] - self.angles[start]
         guess = self.angles[start] + part * whole
         value, _ = continued(self.machine, axis[0], guess, self.branch[end], self.cone)
@@ -153,7 +155,8 @@ class MachineAxes:
             with np.errstate(invalid="ignore", divide="ignore"):
                 allowed = accel * accel_time / np.abs(sides[1][1] - sides[0][1])
                 steady = np.sqrt(jerk * accel_time / np.abs(sides[1][2] - sides[0][2]))
-            joint = (path.kind[sharp] == Kind.PIECE) | (path.kind[sharp - 1] == Kind.PIECE)
+            piece = path.of_curves(path.curves.half == WHOLE)
+            joint = piece[sharp] | piece[sharp - 1]
             allowed[joint] = np.fmin(allowed, steady)[joint]
             found[sharp] = np.where(np.isnan(allowed), np.inf, allowed).min(axis=1)
         return found
@@ -221,21 +224,6 @@ def follow(machine: Machine, path: Path) -> MachineAxes:
     one, other = own[start], own[end]
     branch[end] = np.where(one == other, one, np.where(one < 0, other, np.where(other < 0, one, -1)))
     return MachineAxes(machine, path, found.angles, branch, cone)
-
-
-def _fractions(path: Path, element: Ints, share: Floats) -> Floats:
-    """Part of its move (m,) at which each point of an element lies, as good as a guess of angles needs it."""
-    span = path.span[element]
-    part = span[:, 0] + share * (span[:, 1] - span[:, 0])
-    curve = path.kind[element] == Kind.CURVE
-    corners = path.corners
-    if corners is not None and curve.any():
-        row = path.corner[element[curve]]
-        leaving = span[curve, 0] > 0.0
-        t = share[curve]
-        out, into = corners.axis_trim_out[row] * t, 1.0 - corners.axis_trim_in[row] * (1.0 - t)
-        part[curve] = np.where(leaving, out, into)
-    return part
 
 
 def _waves(angle: Floats) -> tuple[Floats, Floats]:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from math import comb
-
 import numpy as np
 
 from cornersmooth.feedrate import arcs, taylor
-from cornersmooth.feedrate.cubics import cubics, curved
+from cornersmooth.feedrate.curves import parameters_at, taylor_series
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Floats, Ints
+from cornersmooth.smoothing.construction import construction_of
+from cornersmooth.vectors import norm
 
 _NO_SPEED = np.finfo(np.float64).tiny
+
+#: turn over a way in which a curve is straight up to rounding, over that way
+_STRAIGHT = 1e-12
 
 
 def derivatives(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
@@ -40,71 +43,93 @@ def known_by_way(series: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]
     return one, two, three
 
 
-def taylor_along(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
-    """Taylor series of tip and unit tool axis, (4, m, 3) each, and of the speed of the coordinate, (3, m).
+def taylor_along(
+    path: Path, element: Ints, share: Floats, orders: int = taylor.ORDERS
+) -> tuple[Floats, Floats, Floats]:
+    """Taylor series of tip and unit tool axis, (orders, m, 3) each, and of the coordinate's speed, (orders - 1, m).
 
     By where it is on each element, which is `share` as in `derivatives`.
     """
     count = len(element)
-    tip, lever, speed = np.zeros((taylor.ORDERS, count, 3)), np.zeros((taylor.ORDERS, count, 3)), np.zeros((3, count))
-    curve = curved(path)[element]
-    rows = np.flatnonzero(curve)
-    if len(rows):
-        tip[:, rows], lever[:, rows], speed[:, rows] = _curves(path, element[rows], share[rows])
-    rows = np.flatnonzero(~curve)
-    if len(rows):
-        tip[:, rows], lever[:, rows], speed[:, rows] = _lines(path, element[rows], share[rows])
+    tip, lever = np.zeros((2, orders, count, 3))
+    speed = np.zeros((orders - 1, count))
+    row = path.row[element]
+    curve, line = np.flatnonzero(row >= 0), np.flatnonzero(row < 0)
+    speed[0] = path.length[element]
+    if len(curve):
+        own, t = row[curve], share[curve]
+        around, axis_point = (
+            taylor_series(powers[own], t, orders) for powers in (path.curves.tip, path.curves.axis_point)
+        )
+        lever[:, curve] = axis_point - around
+        around[0] += path.curves.origin[own]
+        tip[:, curve] = around
+        moving = np.flatnonzero(~path.turning[element[curve]])
+        speed[:, curve[moving]] = _speed(around[:, moving])
+    if len(line):
+        tip[:, line], lever[:, line] = _lines(path, element[line], share[line], orders)
     return tip, taylor.normalised(lever), speed
 
 
-def _curves(path: Path, element: Ints, t: Floats) -> tuple[Floats, Floats, Floats]:
-    """Taylor series in t of tip and lever on halves of transitions, and of the speed of the coordinate."""
-    found = cubics(path, element)
-    powers = found.tip.shape[1]
-    shifts = np.stack([t**k for k in range(powers)])
-    curves = []
-    for curve in (found.tip, found.axis_point):
-        around = np.zeros((taylor.ORDERS, len(t), 4))
-        for k in range(taylor.ORDERS):
-            for power in range(k, powers):
-                around[k] += comb(power, k) * shifts[power - k][:, None] * curve[:, power]
-        curves.append(taylor.divide(around[..., :3], around[..., 3:]))
-    tip, axis_point = curves
-    lever = axis_point - tip
-    tip[0] += found.origin
+def _speed(tip: Floats) -> Floats:
+    """Taylor series of the speed of a tip by its parameter; next to nothing where it stands."""
     gone = taylor.derivative(tip)
     squared = taylor.dot(gone, gone)
-    turning = path.turning[element]
     moving = squared[0] > 0.0
     squared[0] = np.where(moving, squared[0], 1.0)
     speed = taylor.root(squared)
     speed[:, ~moving] = 0.0
     speed[0, ~moving] = _NO_SPEED
-    speed[:, turning] = 0.0
-    speed[0, turning] = path.length[element[turning]]
-    return tip, lever, speed
+    return speed
 
 
-def _lines(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
-    """Taylor series, in the share of the length, of tip and lever on lines and arcs, and of the coordinate's speed."""
-    program = path.program
+def _lines(path: Path, element: Ints, share: Floats, orders: int) -> tuple[Floats, Floats]:
+    """Taylor series, in the share of the length, of tip and lever on lines and arcs."""
+    program, height = path.program, path.settings.axis_length
     start, end = path.start[element], path.move[element]
     span, axis_span = path.span[element], path.axis_span[element]
-    step = program.tip[end] - program.tip[start]
-    turn = path.settings.axis_length * (program.axis[end] - program.axis[start])
+    step, turn = (values[end] - values[start] for values in (program.tip, height * program.axis))
     part, axis_part = (np.diff(limits, axis=1) for limits in (span, axis_span))
     fraction, axis_fraction = span[:, :1] + share[:, None] * part, axis_span[:, :1] + share[:, None] * axis_part
-    tip = np.zeros((taylor.ORDERS, len(element), 3))
-    lever = tip.copy()
+    tip, lever = np.zeros((2, orders, len(element), 3))
     tip[0] = program.tip[start] + fraction * step
     tip[1] = part * step
-    lever[0] = (
-        path.settings.axis_length * program.axis[start] + axis_fraction * turn + (axis_fraction - fraction) * step
-    )
+    lever[0] = height * program.axis[start] + axis_fraction * turn + (axis_fraction - fraction) * step
     lever[1] = axis_part * turn + (axis_part - part) * step
     bow = np.flatnonzero(path.kind[element] == Kind.ARC)
     if len(bow):
-        tip[:, bow] = arcs.series(program, end[bow], share[bow])
-    speed = np.zeros((3, len(element)))
-    speed[0] = path.length[element]
-    return tip, lever, speed
+        tip[:, bow] = arcs.series(program, end[bow], share[bow])[:orders]
+    return tip, lever
+
+
+def shares_at(path: Path, element: Ints, local: Floats) -> Floats:
+    """Where (m,) a coordinate `local` from each element's start lies: share of the length, or parameter t on curves."""
+    share: Floats = local / np.maximum(path.length[element], _NO_SPEED)
+    rows = np.flatnonzero(path.bent[element])
+    if len(rows):
+        row, which = np.unique(path.row[element[rows]], return_inverse=True)
+        share[rows] = parameters_at(path.curves.tip[row], path.curves.half[row], which, local[rows])
+    return share
+
+
+def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats, Floats]:
+    """Tip and axis (m, 3) and curvature of the tip path (m,) at a coordinate `local` (m,) from each element's start."""
+    share = shares_at(path, element, local)
+    tip, axis, _ = taylor_along(path, element, share, 3)
+    kappa = curvature(tip)
+    corner = np.append(path.curves.corner, -1)[path.row[element]]
+    own = np.flatnonzero(corner >= 0)
+    if len(own) and path.corners is not None:
+        u = (path.curves.half[path.row[element[own]]] + share[own]) / 2.0
+        method = construction_of(path.settings.method)
+        found = method.axes(path.program, path.corners, path.settings, corner[own], u)
+        axis[0, own] = axis[0, own] if found is None else found
+    return tip[0], axis[0], kappa
+
+
+def curvature(tip: Floats) -> Floats:
+    """Curvature (m,), 1/mm, from three Taylor coefficients of the tip; 0 where it is straight up to rounding."""
+    speed, bend, across = norm(tip[1]), 2.0 * norm(tip[2]), 2.0 * norm(np.cross(tip[1], tip[2]))
+    straight = across <= _STRAIGHT * speed * bend
+    kappa: Floats = np.where(straight, 0.0, across / np.where(straight, 1.0, speed**3))
+    return kappa

@@ -1,9 +1,9 @@
 """The motion of a program as a row of elements: lines, halves of transitions, arcs and pure rotations.
 
 The order is that of the motion. A move gives up to three elements: the second half of the transition that it leaves,
-what is left of its segment, and the first half of the transition that it runs into; so an element belongs to one move,
-with one feed and one CL line. Every element is measured along its own coordinate: the path length of the tip in mm, or
-the angle of the axis in rad where the tip stands still.
+what is left of its segment, and the first half of the transition that it runs into; curves of runs and of NC programs
+replace it. So an element belongs to one move, with one feed and one CL line. Every element is measured along its own
+coordinate: the path length of the tip in mm, or the angle of the axis in rad where the tip stands still.
 """
 
 from __future__ import annotations
@@ -15,20 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.feedrate import arcs, bezier_halves
-from cornersmooth.feedrate.bezier_halves import STANDSTILL
-from cornersmooth.feedrate.cubics import RunPieces, along_runs
+from cornersmooth.feedrate import arcs
+from cornersmooth.feedrate.curves import STANDSTILL, WHOLE, Curves, end_tangents
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.neighbours import find_neighbours
-from cornersmooth.vectors import angle_between, norm
+from cornersmooth.vectors import angle_between, norm, unit
 
 #: angles below this are no motion of the axis, rad
 NO_TURN = 1e-9
-
-#: elements of a move: out of the corner behind, straight on, into the corner ahead
-_SLOTS = 3
 
 
 class Kind(IntEnum):
@@ -37,7 +33,6 @@ class Kind(IntEnum):
     LINE = 0
     CURVE = 1
     ARC = 2
-    PIECE = 3  #: of the curve of a whole run, or of a text
 
 
 @dataclass(frozen=True)
@@ -48,8 +43,9 @@ class Path:
     ----------
     program : Program
     corners : Corners or None
-        The transitions that the curves are halves of; None for the direct path.
+        The transitions that some curves are halves of; None for the direct path.
     settings : Settings
+    curves : Curves
     kind : (m,) uint8
         `Kind`.
     turning : (m,) bool
@@ -58,10 +54,10 @@ class Path:
         Pose that the move starts from.
     move : (m,) int64
         Pose that the move ends in; with it go feed and CL line.
-    corner : (m,) int64
-        Row of `corners` for curves, of `run_pieces` for pieces of runs, else -1.
+    row : (m,) int64
+        Row of `curves`, else -1.
     span : (m, 2) float64
-        Part of the segment (fractions of the move) or of the curve (parameter u).
+        Part of the move.
     axis_span : (m, 2) float64
         The same for the axis-point segment of a line.
     length : (m,) float64, mm or rad
@@ -70,46 +66,41 @@ class Path:
     rapid : (m,) bool
     junction_speed : (m + 1,) float64
         Largest speed at the start of element i, and at the end of the last: 0 for a stop, inf for none.
-    run_pieces : RunPieces or None
-        The curves of whole runs, or of a text.
     """
 
     program: Program
     corners: Corners | None
     settings: Settings
+    curves: Curves
     kind: NDArray[np.uint8]
     turning: Bools
     start: Ints
     move: Ints
-    corner: Ints
+    row: Ints
     span: Floats
     axis_span: Floats
     length: Floats
     speed: Floats
     rapid: Bools
     junction_speed: Floats
-    run_pieces: RunPieces | None = None
 
     def __len__(self) -> int:
         return len(self.length)
 
+    @property
+    def bent(self) -> Bools:
+        """(m,) bool: curves on which the tip moves."""
+        return (self.row >= 0) & ~self.turning
+
+    def of_curves(self, values: Bools) -> Bools:
+        """(m,) bool of what holds for curves (k,); False for other elements."""
+        return np.append(values, False)[self.row]
+
     def part(self, begin: int, end: int) -> Path:
         """Elements `begin` to before `end` on their own."""
-        own = slice(begin, end)
-        return replace(
-            self,
-            kind=self.kind[own],
-            turning=self.turning[own],
-            start=self.start[own],
-            move=self.move[own],
-            corner=self.corner[own],
-            span=self.span[own],
-            axis_span=self.axis_span[own],
-            length=self.length[own],
-            speed=self.speed[own],
-            rapid=self.rapid[own],
-            junction_speed=self.junction_speed[begin : end + 1],
-        )
+        names = ("kind", "turning", "start", "move", "row", "span", "axis_span", "length", "speed", "rapid")
+        own = {name: getattr(self, name)[begin:end] for name in names}
+        return replace(self, **own, junction_speed=self.junction_speed[begin : end + 1])
 
 
 def build_path(
@@ -119,14 +110,14 @@ def build_path(
     limits: Limits,
     *,
     runs: Runs | None = None,
-    pieces: RunPieces | None = None,
+    curves: Curves | None = None,
     stop_everywhere: bool = False,
 ) -> Path:
     """Elements of the direct path (`corners` None) or of the smoothed one.
 
     Corners that stay sharp are passed with a change of velocity of at most ``accel · period``, reversals with a stop;
     with `stop_everywhere` every move ends with a stop. The curves of `runs` replace the segments that they belong to.
-    A direct path may have `pieces`, each a whole move.
+    A direct path may have `curves`, each a whole move.
 
     Raises
     ------
@@ -134,70 +125,80 @@ def build_path(
         A feed move has no usable feed.
     """
     moves, start = _moves(program, settings)
-    rests = _rests(program, corners, settings, moves, start, pieces)
-    lengths, angles = _lengths(program, corners, settings, rests)
-    m = len(lengths)
-    present = (lengths > STANDSTILL) | (angles > NO_TURN)
-    turning = lengths <= STANDSTILL
-    corner = np.stack((rests.leaving, rests.piece, rests.reaching), axis=1)
-    span, axis_span = _spans(rests.trims)
+    number = np.full(len(program), -1)
+    number[moves] = np.arange(len(moves))
+    trims, parts = np.zeros((4, len(moves))), [] if curves is None else [curves]
+    if corners is not None:
+        trims, parts = _transitions(program, corners, moves, start, settings.axis_length)
+    if runs is not None and len(runs):
+        parts.append(Curves.of_runs(program, runs, settings.axis_length))
+    bent = Curves.joined(parts)
+    whole = np.ones(len(moves), np.bool_)  # moves that no curve replaces
+    whole[number[bent.move[bent.half == WHOLE]]] = False
+    rest = np.flatnonzero(whole)
+    length, angle, tangents = _rests(program, settings, moves, start, trims)
 
-    rapid = (program.kind[moves] == Move.RAPID) | (program.kind[moves] == Move.HOLE)
-    speed = np.repeat(np.where(rapid, limits.rapid_limits[0], 0.0), _SLOTS)
-    cutting = np.repeat(~rapid, _SLOTS) & present & ~turning
-    owners = np.repeat(moves, _SLOTS)
-    speed[cutting] = _feeds(program, owners[cutting], limits)
+    # rests and curves in the order of the motion
+    owner = np.concatenate((rest, number[bent.move]))
+    place = np.concatenate((np.ones(len(rest), np.int64), np.array([2, 0, 1])[bent.half]))
+    row = np.concatenate((np.full(len(rest), -1), np.arange(len(bent))))
+    spans = np.stack((trims[:2], trims[2:]))[..., rest]
+    spans[:, 1] = 1.0 - spans[:, 1]
+    span, axis_span = (np.concatenate((own.T, bent.span)) for own in spans)
+    length, angle = np.concatenate((length[rest], bent.length)), np.concatenate((angle[rest], bent.angle))
+    order = np.lexsort((place, owner))
+    order = order[owner[order] >= 0]
+    owner, row, length, angle = owner[order], row[order], length[order], angle[order]
+    begins = np.diff(owner, prepend=-1) > 0
+    turning = length <= STANDSTILL
+    present = (length > STANDSTILL) | (angle > NO_TURN)
+
+    piece = np.append(bent.half, -1)[row] == WHOLE
+    of_curve = np.flatnonzero(piece)
+    sides = np.diff(owner[of_curve], prepend=-1), np.diff(owner[of_curve], append=len(moves))
+    for side, ends in enumerate(sides):
+        chosen = of_curve[ends > 0]
+        tangents[side, owner[chosen]] = end_tangents(bent.tip[row[chosen]], side)
+    speeds = _junction_speeds(program, corners, moves, start, tangents, limits, stop_everywhere)
+    inner = np.append(bent.inner, False)[row]
+    junction = np.where(begins & ~inner, speeds[owner], np.inf)
+    # from turn to turn on the spot the axis may change its rate: the machine says how fast that may be passed
+    turns = turning & np.concatenate(([False], turning[:-1])) & inner & piece
+    junction[turns] = limits.angular_limits[0]
+
+    rapid = np.isin(program.kind[moves], (Move.RAPID, Move.HOLE))[owner]
+    speed = np.where(rapid, limits.rapid_limits[0], 0.0)
+    cutting = ~rapid & present & ~turning
+    speed[cutting] = _feeds(program, moves[owner[cutting]], limits)
     speed[turning] = limits.angular_limits[0]
-
-    junction = np.full((len(moves), _SLOTS), np.inf)
-    junction[:, 0] = _junction_speeds(program, corners, moves, start, rests, limits, stop_everywhere)
-    junction_before = junction.reshape(m)
 
     keep = np.flatnonzero(present)
     # the junction before an element that is kept is the slowest of those since the element kept before it
-    begin = np.concatenate(([0], keep[:-1] + 1)) if len(keep) else keep
-    slowest = np.minimum.reduceat(junction_before[: keep[-1] + 1], begin) if len(keep) else np.zeros(0)
+    slowest = np.zeros(0)
+    if len(keep):
+        slowest = np.minimum.reduceat(junction[: keep[-1] + 1], np.concatenate(([0], keep[:-1] + 1)))
     changes = turning[keep]
     slowest[1:][changes[1:] != changes[:-1]] = 0.0
     slowest[:1] = 0.0
-    path = Path(
+    owner, row = owner[keep], row[keep]
+    kind = np.where(program.kind[moves] == Move.ARC, Kind.ARC, Kind.LINE)[owner]
+    return Path(
         program=program,
         corners=corners,
         settings=settings,
-        kind=_kinds(program, moves, rests)[keep],
+        curves=bent,
+        kind=np.where(row >= 0, Kind.CURVE, kind).astype(np.uint8),
         turning=changes,
-        start=np.repeat(start, _SLOTS)[keep],
-        move=owners[keep],
-        corner=corner.reshape(m)[keep],
-        span=span[keep],
-        axis_span=axis_span[keep],
-        length=np.where(turning, angles, lengths)[keep],
+        start=start[owner],
+        move=moves[owner],
+        row=row,
+        span=span[order][keep],
+        axis_span=axis_span[order][keep],
+        length=np.where(turning, angle, length)[keep],
         speed=speed[keep],
-        rapid=np.repeat(rapid, _SLOTS)[keep],
+        rapid=rapid[keep],
         junction_speed=np.concatenate((slowest, [0.0])),
-        run_pieces=pieces,
     )
-    if runs is None or not len(runs):
-        return path
-    feeds = np.zeros(len(program))
-    inside = moves[np.isin(moves, np.delete(runs.pose, np.cumsum(runs.count) - runs.count))]
-    feeds[inside] = _feeds(program, inside, limits)
-    return along_runs(path, runs, feeds, limits.angular_limits[0])
-
-
-def line_axes(
-    program: Program, axis_length: float, start: Ints, end: Ints, fraction: Floats, axis_fraction: Floats
-) -> Floats:
-    """Axis (m, 3) on the ruled motion: from a point of the tip segment to a point of the axis-point segment.
-
-    The fractions differ on lines between transitions of the paper's method, which trims the two segments differently.
-    """
-    axis, tip = program.axis, program.tip
-    turned = (1.0 - axis_fraction)[:, None] * axis[start] + axis_fraction[:, None] * axis[end]
-    ahead = (axis_fraction - fraction)[:, None] * (tip[end] - tip[start])
-    lever = axis_length * turned + ahead
-    unit: Floats = lever / norm(lever)[:, None]
-    return unit
 
 
 def _moves(program: Program, settings: Settings) -> tuple[Ints, Ints]:
@@ -215,111 +216,51 @@ def _moves(program: Program, settings: Settings) -> tuple[Ints, Ints]:
     return moves, start[moves]
 
 
-@dataclass(frozen=True)
-class _Rests:
-    """What is left of k moves between the transitions at their ends.
+def _transitions(
+    program: Program, corners: Corners, moves: Ints, start: Ints, height: float
+) -> tuple[Floats, list[Curves]]:
+    """Fractions (4, k) of the moves that transitions take, and their halves.
 
-    Parameters
-    ----------
-    leaving, reaching : (k,) int64
-        Rows of the corners at their ends that are smoothed, or -1.
-    piece : (k,) int64
-        Rows of the curves that stand for whole moves, or -1.
-    trims : (4, k) float64
-        Fractions of the move that the transitions take: of the tip out and in, of the axis point out and in.
-    length : (k,) float64, mm
-    angle : (k,) float64, rad
-    tangents : (2, k, 3) float64
-        At the start and at the end.
+    Fractions are of the tip segment at its start and at its end, then those of the axis-point segment.
     """
-
-    leaving: Ints
-    reaching: Ints
-    piece: Ints
-    trims: Floats
-    length: Floats
-    angle: Floats
-    tangents: Floats
+    entry = np.full(len(program), -1)  # smoothed corner at a pose
+    entry[corners.pose[corners.smoothed]] = np.flatnonzero(corners.smoothed)
+    trims, halves = np.zeros((4, len(moves))), []
+    cut = program.kind[moves] == Move.LINEAR
+    for side, pose, own in (
+        (0, start, (corners.trim_out, corners.axis_trim_out)),
+        (1, moves, (corners.trim_in, corners.axis_trim_in)),
+    ):
+        has = np.flatnonzero(cut & (entry[pose] >= 0))
+        rows = entry[pose[has]]
+        trims[side, has], trims[2 + side, has] = (trim[rows] for trim in own)
+        halves.append(Curves.of_corners(program, corners, rows, 1 - side, moves[has], height))
+    return trims, halves
 
 
 def _rests(
-    program: Program,
-    corners: Corners | None,
-    settings: Settings,
-    moves: Ints,
-    start: Ints,
-    pieces: RunPieces | None,
-) -> _Rests:
-    """What transitions and pieces leave of the moves."""
-    n = len(program)
-    entry = np.full(n, -1, np.int64)  # smoothed corner at a pose
-    trims = np.zeros((4, len(moves)))
-    if corners is not None:
-        rows = np.flatnonzero(corners.smoothed)
-        entry[corners.pose[rows]] = rows
-    leaving = np.where(program.kind[moves] == Move.LINEAR, entry[start], -1)
-    reaching = np.where(program.kind[moves] == Move.LINEAR, entry[moves], -1)
-    if corners is not None:
-        out, into = leaving >= 0, reaching >= 0
-        trims[0, out], trims[1, into] = corners.trim_out[leaving[out]], corners.trim_in[reaching[into]]
-        trims[2, out], trims[3, into] = corners.axis_trim_out[leaving[out]], corners.axis_trim_in[reaching[into]]
-
-    tip_step = program.tip[moves] - program.tip[start]
-    chord = norm(tip_step)
-    arc = program.kind[moves] == Move.ARC
-    along = chord * np.maximum(1.0 - trims[0] - trims[1], 0.0)
-    ends = (
-        line_axes(program, settings.axis_length, start, moves, tip, axis)
-        for tip, axis in ((trims[0], trims[2]), (1.0 - trims[1], 1.0 - trims[3]))
-    )
-    turned = np.where(trims[2] + trims[3] < 1.0, angle_between(*ends), 0.0)
-    tangents = np.zeros((2, len(moves), 3))
-    tangents[:] = tip_step / np.maximum(chord, STANDSTILL)[:, None]
-    if arc.any():
-        along[arc], tangents[0, arc], tangents[1, arc] = arcs.shape(program, moves[arc])
-    piece = np.full(n, -1, np.int64)
-    if pieces is not None:
-        piece[pieces.move] = np.arange(len(pieces.move))
-    piece = piece[moves]
-    bent = piece >= 0
-    if pieces is not None and bent.any():
-        own = piece[bent]
-        along[bent], turned[bent] = pieces.length[own], pieces.angle[own]
-        tangents[:, bent] = bezier_halves.end_tangents(pieces.tip[own])
-    return _Rests(leaving, reaching, piece, trims, along, turned, tangents)
-
-
-def _lengths(program: Program, corners: Corners | None, settings: Settings, rests: _Rests) -> tuple[Floats, Floats]:
-    """(m,) lengths of the tip, mm, and angles of the axis, rad, of all slots."""
-    half_length, half_turn = np.zeros((2, 0)), np.zeros((2, 0))
-    if corners is not None:
-        half_length, half_turn = bezier_halves.half_lengths(program, corners, settings.axis_length)
-    tip_length, axis_angle = np.zeros((2, len(rests.length), _SLOTS))
-    tip_length[:, 1], axis_angle[:, 1] = rests.length, rests.angle
-    for slot, at, half in ((0, rests.leaving, 1), (2, rests.reaching, 0)):
-        has = at >= 0
-        tip_length[has, slot] = half_length[half, at[has]]
-        axis_angle[has, slot] = half_turn[half, at[has]]
-    return tip_length.reshape(-1), axis_angle.reshape(-1)
-
-
-def _spans(trims: Floats) -> tuple[Floats, Floats]:
-    """(m, 2) parts of curves and segments of all slots: of the tip, and of the axis point."""
-    span = np.zeros((trims.shape[1], _SLOTS, 2))
-    span[:, 0] = (0.5, 1.0)
-    span[:, 2] = (0.0, 0.5)
-    axis_span = span.copy()
-    span[:, 1] = np.stack((trims[0], 1.0 - trims[1]), axis=-1)
-    axis_span[:, 1] = np.stack((trims[2], 1.0 - trims[3]), axis=-1)
-    return span.reshape(-1, 2), axis_span.reshape(-1, 2)
-
-
-def _kinds(program: Program, moves: Ints, rests: _Rests) -> NDArray[np.uint8]:
-    """(m,) kinds of all slots."""
-    kind = np.tile(np.array([Kind.CURVE, Kind.LINE, Kind.CURVE], np.uint8), len(moves))
-    kind[1::_SLOTS][program.kind[moves] == Move.ARC] = Kind.ARC
-    kind[1::_SLOTS][rests.piece >= 0] = Kind.PIECE
-    return kind
+    program: Program, settings: Settings, moves: Ints, start: Ints, trims: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """What transitions leave of k moves: lengths, angles where the tip stands, tangents (2, k, 3) at the ends."""
+    step = program.tip[moves] - program.tip[start]
+    chord = norm(step)
+    length = chord * np.maximum(1.0 - trims[0] - trims[1], 0.0)
+    tangents = np.tile(step / np.maximum(chord, STANDSTILL)[:, None], (2, 1, 1))
+    arc = np.flatnonzero(program.kind[moves] == Move.ARC)
+    for side in range(2):
+        along = arcs.series(program, moves[arc], float(side))[1]
+        length[arc], tangents[side, arc] = norm(along), unit(along)
+    angle = np.zeros(len(moves))
+    still = np.flatnonzero((length <= STANDSTILL) & (trims[2] + trims[3] < 1.0))
+    own = trims[:, still]
+    levers = [
+        settings.axis_length
+        * ((1.0 - axis)[:, None] * program.axis[start[still]] + axis[:, None] * program.axis[moves[still]])
+        + (axis - tip)[:, None] * step[still]
+        for tip, axis in ((own[0], own[2]), (1.0 - own[1], 1.0 - own[3]))
+    ]
+    angle[still] = angle_between(*levers)
+    return length, angle, tangents
 
 
 def _feeds(program: Program, moves: Ints, limits: Limits) -> Floats:
@@ -347,7 +288,7 @@ def _junction_speeds(
     corners: Corners | None,
     moves: Ints,
     start: Ints,
-    rests: _Rests,
+    tangents: Floats,
     limits: Limits,
     stop_everywhere: bool,
 ) -> Floats:
@@ -364,9 +305,8 @@ def _junction_speeds(
         reversal = np.zeros(len(program), np.bool_)
         reversal[corners.pose[corners.status == Status.REVERSAL]] = True
         joined &= ~reversal[start[1:]]
-    turn = norm(rests.tangents[0, 1:] - rests.tangents[1, :-1])  # 2·sin(α/2)
+    turn = norm(tangents[0, 1:] - tangents[1, :-1])  # 2·sin(α/2)
     with np.errstate(divide="ignore"):
         jump = limits.accel * limits.period / turn
     speeds[1:] = np.where(joined, jump, 0.0)
-    speeds[rests.leaving >= 0] = np.inf
     return speeds

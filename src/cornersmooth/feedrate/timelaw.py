@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.feedrate import arcs, bezier_halves
-from cornersmooth.feedrate.cubics import cubics, curved
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
-from cornersmooth.feedrate.path import Kind, Path, line_axes
+from cornersmooth.feedrate.motion import poses, shares_at
+from cornersmooth.feedrate.path import Path
 from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.smoothing.construction import construction_of
 
 _HALVINGS = 60
 
@@ -228,57 +226,3 @@ def crossing_time(width: Floats, speeds: Floats, rate: Floats) -> Floats:
     factor = np.where(small, 1.0 + y / 3.0 + y * y / 5.0, np.where(y > 0.0, up, np.arctan(root) / safe))
     time: Floats = 2.0 * half * factor
     return time
-
-
-def poses(path: Path, element: Ints, local: Floats) -> tuple[Floats, Floats, Floats]:
-    """Tip and axis (m, 3) and curvature of the tip path (m,) at a coordinate `local` (m,) from each element's start."""
-    program = path.program
-    tip, axis, kappa = np.empty((len(element), 3)), np.empty((len(element), 3)), np.zeros(len(element))
-    kind = path.kind[element]
-    share = local / np.maximum(path.length[element], np.finfo(np.float64).tiny)
-    curve = curved(path)[element]
-    rows = np.flatnonzero(curve)
-    if len(rows):
-        tip[rows], axis[rows], kappa[rows] = _curve_poses(path, element[rows], local[rows], share[rows])
-    rows = np.flatnonzero(~curve)
-    which, share = element[rows], share[rows]
-    start, end = path.start[which], path.move[which]
-    span, axis_span = path.span[which], path.axis_span[which]
-    fraction, axis_fraction = (limit[:, 0] + (limit[:, 1] - limit[:, 0]) * share for limit in (span, axis_span))
-    step = program.tip[end] - program.tip[start]
-    tip[rows] = program.tip[start] + fraction[:, None] * step
-    bow = np.flatnonzero(kind[rows] == Kind.ARC)
-    if len(bow):
-        tip[rows[bow]] = arcs.points(program, end[bow], share[bow])
-        kappa[rows[bow]] = arcs.curvature(program, end[bow])
-    axis[rows] = line_axes(program, path.settings.axis_length, start, end, fraction, axis_fraction)
-    return tip, axis, kappa
-
-
-def shares_at(path: Path, element: Ints, local: Floats) -> Floats:
-    """Where (m,) a coordinate `local` from each element's start lies: share of the length, or parameter t on curves."""
-    share = local / np.maximum(path.length[element], np.finfo(np.float64).tiny)
-    rows = np.flatnonzero(curved(path)[element] & ~path.turning[element])
-    if len(rows):
-        distinct, which = np.unique(element[rows], return_inverse=True)
-        found = cubics(path, distinct)
-        share[rows] = bezier_halves.parameters_at(found.tip, found.half, which, local[rows])
-    return share
-
-
-def _curve_poses(path: Path, element: Ints, local: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
-    corners = path.corners
-    distinct, which = np.unique(element, return_inverse=True)
-    tip_half, axis_half, half, origin = cubics(path, distinct)
-    t = np.where(path.turning[element], share, 0.0)
-    moving = np.flatnonzero(~path.turning[element])
-    t[moving] = bezier_halves.parameters_at(tip_half, half, which[moving], local[moving])
-    tip = bezier_halves.evaluate(tip_half[which], t[:, None])[:, 0]
-    axis = bezier_halves.axis_vectors(tip_half[which], axis_half[which], t[:, None])[:, 0]
-    kappa = bezier_halves.curvature(tip_half[which], t[:, None])[:, 0]
-    if corners is None:
-        return tip + origin[which], axis, kappa
-    row, half = path.corner[element], half[which]
-    own = construction_of(path.settings.method).axes(path.program, corners, path.settings, row, (half + t) / 2.0)
-    axis = axis if own is None else own
-    return tip + origin[which], axis, kappa

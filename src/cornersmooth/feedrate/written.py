@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import scurve
-from cornersmooth.feedrate.cubics import RunPieces
+from cornersmooth.feedrate.curves import Curves, polynomial
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.planner import Progress, plan_path
 from cornersmooth.feedrate.timelaw import TimeLaw
-from cornersmooth.feedrate.written_curves import WrittenCurves
 from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Program, Source, Statement
+from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Element, Event, NcProgram
 from cornersmooth.settings import Settings
-from cornersmooth.vectors import unit
+from cornersmooth.vectors import norm, unit
 
 #: what a motion block does, as a move
 _MOVES = {Element.RAPID: Move.RAPID, Element.LINE: Move.LINEAR, Element.ARC: Move.ARC, Element.CURVE: Move.LINEAR}
@@ -67,8 +68,8 @@ class WrittenMotion:
     ----------
     program : Program
         A pose at the end of every element, and at every knot inside of a curve; statements where the motion stops.
-    pieces : RunPieces or None
-        The curves.
+    curves : Curves or None
+        Pieces of the curves between neighbouring knots, each a whole move.
     blocks : (n,) float64
         Blocks of the text that the move into each pose takes: a part of one where a block is several moves.
     element : (n,) int64
@@ -78,7 +79,7 @@ class WrittenMotion:
     """
 
     program: Program
-    pieces: RunPieces | None
+    curves: Curves | None
     blocks: Floats
     element: Ints
     within: Bools
@@ -95,18 +96,16 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
         File name for messages.
     axis_length : float, mm
     """
-    curves = WrittenCurves.of(nc, axis_length) if len(nc.curves) else None
-    count = np.ones(len(nc), np.int64)
-    if curves is not None:
-        count += np.bincount(curves.element, minlength=len(nc)) - (nc.kind == Element.CURVE)
+    of_curve, *numbers = _curve_pieces(nc, axis_length)
+    count = 1 + np.bincount(of_curve, minlength=len(nc)) - (nc.kind == Element.CURVE)
     owner = np.repeat(np.arange(len(nc)), count)
     last = np.cumsum(count) - 1
     tip, lever = nc.tip[owner], (nc.second if nc.second_is == "vector" else nc.second - nc.tip)[owner]
-    pieces = None
-    if curves is not None:
+    curves = None
+    if len(of_curve):
         bent = np.flatnonzero(nc.kind[owner] == Element.CURVE)
-        tip[bent], lever[bent] = curves.end_tip, curves.end_lever
-        pieces = curves.pieces(bent, len(owner))
+        powers, axis_powers, origin, tip[bent], lever[bent] = numbers
+        curves = Curves.measured(powers, axis_powers, origin, bent)
     move = np.array([_MOVES[Element(kind)] for kind in sorted(Element)], np.uint8)[nc.kind]
     arcs = nc.arcs
     proper = arcs.element > 0
@@ -137,7 +136,35 @@ def written_motion(nc: NcProgram, name: str, axis_length: float = 10.0) -> Writt
         source=Source(name, "nc"),
     )
     same = np.concatenate(([False], (nc.line[owner[1:]] == nc.line[owner[:-1]]) & nc.rotary))
-    return WrittenMotion(program, pieces, (_blocks(nc) / count)[owner], owner, same & (nc.kind[owner] != Element.RAPID))
+    return WrittenMotion(program, curves, (_blocks(nc) / count)[owner], owner, same & (nc.kind[owner] != Element.RAPID))
+
+
+def _curve_pieces(nc: NcProgram, axis_length: float) -> tuple[Any, ...]:
+    """Pieces of all curves between neighbouring knots: element, powers of tip and axis point, origin, end, lever there.
+
+    The axis point is brought to `axis_length`, mm, from the tip where a piece begins: a second point may be written at
+    any distance, only its direction from the tip counts.
+    """
+    curves = nc.curves
+    if not len(curves):
+        return (np.zeros(0, np.int64),)
+    degree = int(curves.order.max()) - 1
+    parts = []
+    for group in groups(curves, np.arange(len(curves))):
+        element = curves.element[group.index]
+        for k in range(len(group.spans) - 1):
+            points, weights = group.bezier(k)
+            tip, lever = points[..., :3], points[..., 3:]
+            if nc.second_is == "point":
+                lever = lever - tip
+            lever = lever * (axis_length / norm(lever[:, 0]))[:, None, None]
+            local = tip - tip[:, :1]
+            powers = np.zeros((2, len(element), degree + 1, 4))
+            powers[:, :, : points.shape[1]] = [polynomial(curve, weights) for curve in (local, local + lever)]
+            parts.append((element, np.full(len(element), k), *powers, tip[:, 0], tip[:, -1], lever[:, -1]))
+    element, number, *others = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    order = np.lexsort((number, element))
+    return (element[order], *(column[order] for column in others))
 
 
 def _said(nc: NcProgram) -> Floats:
@@ -277,7 +304,7 @@ def plan_text(
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings
     motion = written_motion(nc, name, settings.axis_length)
-    path = build_path(motion.program, None, settings, limits, pieces=motion.pieces)
+    path = build_path(motion.program, None, settings, limits, curves=motion.curves)
     inside = motion.within[path.move] & ~path.turning & ~np.concatenate(([True], path.turning[:-1]))
     path = replace(path, junction_speed=np.where(np.append(inside, False), np.inf, path.junction_speed))
     path = within_blocks(path, limits, BlockLimits() if blocks is None else blocks, motion.blocks)

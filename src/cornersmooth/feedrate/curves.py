@@ -1,13 +1,15 @@
-"""Halves of five-point curves as rational cubics: points, arc length, curvature, and the way back from arc length.
+"""Curved elements of a path as rational polynomials over t ∈ [0, 1]: points, arc length and its inverse, curvature.
 
-On each half of its parameter range the curve is one rational Bézier cubic (Boehm's knot insertion at u = ½). Written in
-powers of t ∈ [0, 1] it is evaluated by Horner's rule, every curve at parameters of its own. Coordinates are relative to
-the corner, so that short transitions far from the origin keep their digits.
+Halves of transitions (Boehm's knot insertion at u = ½ makes each a Bézier cubic) and pieces of the curves of runs are
+cubics; those of an NC program may be of a higher degree. Written in powers of t they are evaluated by Horner's rule,
+every curve at parameters of its own. Coordinates are relative to an origin of each, so that short curves far from that
+of the program keep their digits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from functools import cache
 from math import comb
 
@@ -15,11 +17,23 @@ import numpy as np
 
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.geometry import nurbs
-from cornersmooth.model import Bools, Corners, Floats, Ints, Program
-from cornersmooth.vectors import norm
+from cornersmooth.geometry.bsplines import Splines
+from cornersmooth.model import Bools, Corners, Floats, Ints, Program, Runs
+from cornersmooth.smoothing.runs.polylines import Pieces
+from cornersmooth.smoothing.runs.rows import polylines_of
+from cornersmooth.vectors import norm, unit
 
 #: tip lengths up to this are no motion of the tip, mm
 STANDSTILL = 1e-7
+
+#: what stands for the half where a curve is no half of a transition
+WHOLE = 2
+
+#: part of its mean speed below which the tip of a curve is slow
+_SLOW = 0.8
+
+#: speed of the tip over that of the axis point below which the tip stands
+_STANDING = 3e-4
 
 #: curves worked on at once: their intermediate arrays fit the processor's cache
 TOGETHER = 512
@@ -48,6 +62,150 @@ SMALLEST_RADIUS = 1e-6
 #: samples of the curvature per interval, and rounds of closer sampling where it is largest
 _SAMPLES = 4
 _CLOSER = 3
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Curved elements, k rows.
+
+    Parameters
+    ----------
+    tip, axis_point : (k, d + 1, 4) float64
+        Powers of t of w·P and w, as in `half_curves`, relative to `origin`.
+    origin : (k, 3) float64, mm
+    half : (k,) int64
+        0 and 1 for the halves of a transition, `WHOLE` for a piece of a run or of a curve of an NC program.
+    move : (k,) int64
+        Pose that the move of each ends in.
+    span : (k, 2) float64
+        Part of the move.
+    inner : (k,) bool
+        It goes on where another element ends, with the same tangent and curvature.
+    corner : (k,) int64
+        Row of the corners for halves of transitions, else -1.
+    resting : (k,) bool
+        Halves of transitions between a motion of the tip and a turn on the spot.
+    length, angle : (k,) float64
+        Of the tip, mm; that the axis turns, rad, where the tip stands still.
+    slow : (k,) bool
+        Pieces on which the tip gets much slower, by their parameter, than it is.
+    """
+
+    tip: Floats
+    axis_point: Floats
+    origin: Floats
+    half: Ints
+    move: Ints
+    span: Floats
+    inner: Bools
+    corner: Ints
+    resting: Bools
+    length: Floats
+    angle: Floats
+    slow: Bools
+
+    def __len__(self) -> int:
+        return len(self.half)
+
+    @classmethod
+    def measured(
+        cls,
+        tip: Floats,
+        axis_point: Floats,
+        origin: Floats,
+        move: Ints,
+        *,
+        half: Ints | None = None,
+        span: Floats | None = None,
+        inner: Bools | None = None,
+        corner: Ints | None = None,
+        resting: Bools | None = None,
+    ) -> Curves:
+        """Measure curves; by default they are whole moves.
+
+        Where the tip comes all but to a stand beside the turning axis, its way says nothing: the piece is a turn on the
+        spot, of length 0.
+        """
+        count = len(tip)
+        half = np.full(count, WHOLE) if half is None else half
+        length, angle, slow = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
+        for rows in _groups(np.arange(count)):
+            length[rows] = interval_lengths(tip[rows], interval_borders(half[rows])).sum(axis=1)
+            whole = rows[half[rows] == WHOLE]
+            if len(whole):
+                least = slowest(tip[whole])[1].min(axis=1)
+                ends = np.tile([0.0, 1.0], (len(whole), 1))
+                lever = evaluate(axis_point[whole], ends) - evaluate(tip[whole], ends)
+                length[whole[least < _STANDING * norm(lever[:, 1] - lever[:, 0])]] = 0.0
+                slow[whole] = least < _SLOW * length[whole]
+            still = rows[length[rows] <= STANDSTILL]
+            angle[still] = turned_angle(tip[still], axis_point[still], half[still])
+        nothing = np.zeros(count, np.bool_)
+        return cls(
+            tip,
+            axis_point,
+            origin,
+            half,
+            move,
+            np.tile([0.0, 1.0], (count, 1)) if span is None else span,
+            nothing if inner is None else inner,
+            np.full(count, -1) if corner is None else corner,
+            nothing if resting is None else resting,
+            length,
+            angle,
+            slow,
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Curves]) -> Curves:
+        """All rows of parts of one degree."""
+        if not parts:
+            nothing = np.zeros((0, 4, 4))
+            return cls.measured(nothing, nothing, np.zeros((0, 3)), np.zeros(0, np.int64))
+        return cls(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(cls)))
+
+    @classmethod
+    def of_corners(cls, program: Program, corners: Corners, rows: Ints, half: int, move: Ints, height: float) -> Curves:
+        """First (0) or second (1) halves of the transitions of some corners, at the ends of the moves into poses."""
+        tip, axis_point = nurbs.control_points(program, corners, rows, height)
+        pose, halves = corners.pose[rows], np.full(len(rows), half)
+        origin, weights = program.tip[pose], corners.weights[rows]
+        trim = (corners.axis_trim_in, corners.axis_trim_out)[half][rows]
+        zero, one = np.zeros(len(rows)), np.ones(len(rows))
+        legs = (
+            corners.trim_in[rows] * norm(program.tip[pose] - program.tip[corners.before[rows]]),
+            corners.trim_out[rows] * norm(program.tip[corners.after[rows]] - program.tip[pose]),
+        )
+        return cls.measured(
+            half_curves(tip - origin[:, None], weights, halves),
+            half_curves(axis_point - origin[:, None], weights, halves),
+            origin,
+            move,
+            half=halves,
+            span=np.stack((zero, trim) if half else (one - trim, one), axis=1),
+            inner=np.ones(len(rows), np.bool_),
+            corner=rows,
+            resting=np.minimum(legs[0], legs[1]) <= STANDSTILL,
+        )
+
+    @classmethod
+    def of_runs(cls, program: Program, runs: Runs, height: float) -> Curves:
+        """Curves of whole runs, cut at all knots and poses."""
+        lines = polylines_of(runs, program.tip, program.tip + height * program.axis)
+        splines = Splines(runs.knot, runs.knot_count)
+        pieces = Pieces.of(splines, lines)
+        origin = lines.point[pieces.segment, :3]
+        hull = splines.bezier(runs.control, pieces.span, pieces.low, pieces.high) - np.tile(origin, 2)[:, None]
+        s0, s1 = lines.s[pieces.segment], lines.s[pieces.segment + 1]
+        first = np.isin(pieces.segment, np.cumsum(runs.count) - runs.count) & (pieces.low == s0)
+        return cls.measured(
+            polynomial(hull[..., :3]),
+            polynomial(hull[..., 3:]),
+            origin,
+            runs.pose[pieces.segment + 1],
+            span=np.stack((pieces.low - s0, pieces.high - s0), axis=1) / (s1 - s0)[:, None],
+            inner=~first,
+        )
 
 
 def half_curves(points: Floats, weights: Floats, half: Ints) -> Floats:
@@ -104,37 +262,25 @@ def _to_powers(degree: int) -> Floats:
     )
 
 
-def corner_halves(
-    program: Program, corners: Corners, rows: Ints, half: Ints, axis_length: float
-) -> tuple[Floats, Floats]:
-    """`half_curves` of the tip and of the axis point of some corners, relative to the corner's tip."""
-    tip_curve, axis_curve = nurbs.control_points(program, corners, rows, axis_length)
-    origin = program.tip[corners.pose[rows]][:, None, :]
-    weights = corners.weights[rows]
-    return half_curves(tip_curve - origin, weights, half), half_curves(axis_curve - origin, weights, half)
-
-
 def evaluate(powers: Floats, t: Floats) -> Floats:
     """(g, m, 3) points at the parameters t (g, m)."""
     return np.moveaxis(_derivatives(powers, t, 0)[0], 0, -1)
 
 
-def end_tangents(powers: Floats) -> Floats:
-    """Unit tangents (2, g, 3) at t = 0 and t = 1; where the curve comes to a stand there, a little inside of it."""
-    found = np.zeros((2, len(powers), 3))
-    for side, places in enumerate(((0.0, _BESIDE), (1.0, 1.0 - _BESIDE))):
-        slopes = [np.moveaxis(_derivatives(powers, np.full((len(powers), 1), t), 1)[1], 0, -1)[:, 0] for t in places]
-        own, inside = (norm(slope)[:, None] for slope in slopes)
-        found[side] = np.where(own > _BESIDE * inside, slopes[0], slopes[1])
-        found[side] /= np.maximum(norm(found[side]), np.finfo(np.float64).tiny)[:, None]
-    return found
+def end_tangents(powers: Floats, side: int) -> Floats:
+    """Unit tangents (g, 3) at the start (0) or end (1); where the curve comes to a stand there, a little inside."""
+    places = (0.0, _BESIDE) if side == 0 else (1.0, 1.0 - _BESIDE)
+    slopes = [np.moveaxis(_derivatives(powers, np.full((len(powers), 1), t), 1)[1], 0, -1)[:, 0] for t in places]
+    own, inside = (norm(slope)[:, None] for slope in slopes)
+    return unit(np.where(own > _BESIDE * inside, slopes[0], slopes[1]))
 
 
 def _derivatives(powers: Floats, t: Floats, order: int) -> list[Floats]:
     """Point and derivatives by t up to `order`, (3, g, m) each: coordinates first, so that arrays run along t."""
     by_coordinate = powers.transpose(2, 1, 0)[..., None]  # (4, power, g, 1)
     factor = np.ones(powers.shape[1])
-    plain = []
+    found: list[Floats] = []
+    weights: list[Floats] = []
     rational = bool(by_coordinate[3, 1:].any())
     if not rational:  # w is 1 throughout
         by_coordinate = by_coordinate[:3]
@@ -145,17 +291,22 @@ def _derivatives(powers: Floats, t: Floats, order: int) -> list[Floats]:
         value = by_coordinate[:, -1] * factor[-1]
         for k in range(len(factor) - 2, -1, -1):
             value = value * t + by_coordinate[:, k] * factor[k]
-        plain.append(np.broadcast_to(value, (len(value), *t.shape)))
-    if not rational:
-        return plain
-    w = plain[0][3]
-    point = plain[0][:3] / w
-    found = [point]
-    if order > 0:
-        found.append((plain[1][:3] - plain[1][3] * point) / w)
-    if order > 1:
-        found.append((plain[2][:3] - 2.0 * plain[1][3] * found[1] - plain[2][3] * point) / w)
+        if not rational:
+            found.append(np.broadcast_to(value, (3, *t.shape)))
+            continue
+        weights.append(value[3])
+        rest = value[:3]
+        for k in range(1, derivative + 1):  # Leibniz' rule for w·P
+            rest = rest - comb(derivative, k) * weights[k] * found[derivative - k]
+        found.append(rest / weights[0])
     return found
+
+
+def taylor_series(powers: Floats, t: Floats, orders: int) -> Floats:
+    """Taylor coefficients (orders, g, 3) at one parameter (g,) of each curve."""
+    found = _derivatives(powers, t[:, None], orders - 1)
+    factorial = np.cumprod(np.maximum(np.arange(orders), 1))
+    return np.stack([order[..., 0].T / size for order, size in zip(found, factorial, strict=True)])
 
 
 def _size(vectors: Floats) -> Floats:
@@ -167,7 +318,7 @@ def _size(vectors: Floats) -> Floats:
 def interval_borders(half: Ints) -> Floats:
     """(g, INTERVALS + 1) parameters t that divide the halves, dense towards u = ½."""
     borders: Floats = np.where(half[:, None] == 0, _PROGRESS, 1.0 - _PROGRESS[::-1])
-    borders[half > 1] = np.linspace(0.0, 1.0, INTERVALS + 1)  # a cubic that is no half of a transition
+    borders[half == WHOLE] = np.linspace(0.0, 1.0, INTERVALS + 1)
     return borders
 
 
@@ -291,54 +442,30 @@ def parameters_at(powers: Floats, half: Ints, which: Ints, distance: Floats) -> 
     return found
 
 
-def half_lengths(program: Program, corners: Corners, axis_length: float) -> tuple[Floats, Floats]:
-    """Tip lengths (2, k) of the two halves of every smoothed corner, mm, and angles of the axis over them, rad.
-
-    The angle is only worked out where the tip stands still.
-    """
-    lengths, angles = np.zeros((2, len(corners))), np.zeros((2, len(corners)))
-    for rows in _groups(np.flatnonzero(corners.smoothed)):
-        for side in range(2):
-            half = np.full(len(rows), side)
-            tip, axis_point = corner_halves(program, corners, rows, half, axis_length)
-            lengths[side, rows] = interval_lengths(tip, interval_borders(half)).sum(axis=1)
-            still = np.flatnonzero(
-                ~(corners.trim_in[rows] + corners.trim_out[rows] > 0.0) | (lengths[side, rows] <= STANDSTILL)
-            )
-            angles[side, rows[still]] = turned_angle(tip[still], axis_point[still], half[still])
-    return lengths, angles
-
-
 def turned_angle(tip: Floats, axis_point: Floats, half: Ints) -> Floats:
     """Angle (g,) that the axis sweeps over each half, rad."""
-    axis = axis_vectors(tip, axis_point, interval_borders(half))
+    borders = interval_borders(half)
+    lever = evaluate(axis_point, borders) - evaluate(tip, borders)
+    axis = lever / norm(lever)[..., None]
     step = norm(np.diff(axis, axis=1))
     swept: Floats = (2.0 * np.arcsin(np.minimum(0.5 * step, 1.0))).sum(axis=1)
     return swept
 
 
-def axis_vectors(tip: Floats, axis_point: Floats, t: Floats) -> Floats:
-    """Unit vectors (g, m, 3) from the tip curves to the axis-point curves at equal parameters t (g, m)."""
-    lever = evaluate(axis_point, t) - evaluate(tip, t)
-    unit: Floats = lever / norm(lever)[..., None]
-    return unit
-
-
-def curvature_limits(
-    curves: Callable[[Ints], tuple[Floats, Ints]], speed: Floats, limits: Limits
-) -> tuple[Ints, Floats, Floats]:
+def curvature_limits(curves: Curves, row: Ints, speed: Floats, limits: Limits) -> tuple[Ints, Floats, Floats]:
     """Where curvature asks for less than the feed.
 
     Parameters
     ----------
-    curves : callable
-        Powers of the tip's curves and which halves they are, for some of g curves.
+    curves : Curves
+    row : (g,) int64
+        Which of them.
     speed : (g,) float64, mm/s
 
     Returns
     -------
     which : (b,) int64
-        The curves that are slowed down, ascending.
+        Those of the g that are slowed down, ascending.
     share : (b, INTERVALS) float64
         Parts of their length.
     cap : (b, INTERVALS) float64, (mm/s)²
@@ -346,8 +473,8 @@ def curvature_limits(
     """
     which, shares, bounds = [], [], []
     for group in _groups(np.arange(len(speed))):
-        tip, half = curves(group)
-        borders = interval_borders(half)
+        tip = curves.tip[row[group]]
+        borders = interval_borders(curves.half[row[group]])
         # a look at the borders alone leaves few curves that need the careful one
         rough = curvature(tip, borders).max(axis=1)
         turning_back = _turns_back(tip, borders)

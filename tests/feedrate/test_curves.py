@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cornersmooth.feedrate import bezier_halves
+from cornersmooth.feedrate import curves
 from cornersmooth.geometry import nurbs
 
 SIDES = np.array([0, 1])
@@ -33,9 +33,9 @@ CORNERS = [
 @pytest.mark.parametrize("given", CORNERS)
 def test_halves_are_the_curve(given: tuple[float, float, float, tuple[float, float]]) -> None:
     points, weights = corner(*given)
-    powers = bezier_halves.half_curves(points, weights, SIDES)
+    powers = curves.half_curves(points, weights, SIDES)
     t = np.linspace(0.0, 1.0, 11)
-    found = bezier_halves.evaluate(powers, np.tile(t, (2, 1)))
+    found = curves.evaluate(powers, np.tile(t, (2, 1)))
     for side in SIDES:
         expected = nurbs.evaluate(points[:1], weights[:1], 0.5 * (side + t))[0]
         assert found[side] == pytest.approx(expected, abs=1e-14)
@@ -44,14 +44,14 @@ def test_halves_are_the_curve(given: tuple[float, float, float, tuple[float, flo
 @pytest.mark.parametrize("given", CORNERS)
 def test_arc_length_and_back(given: tuple[float, float, float, tuple[float, float]]) -> None:
     points, weights = corner(*given)
-    powers = bezier_halves.half_curves(points, weights, SIDES)
-    lengths = bezier_halves.interval_lengths(powers, bezier_halves.interval_borders(SIDES)).sum(axis=1)
-    dense = bezier_halves.evaluate(powers, np.tile(np.linspace(0.0, 1.0, 100_001), (2, 1)))
+    powers = curves.half_curves(points, weights, SIDES)
+    lengths = curves.interval_lengths(powers, curves.interval_borders(SIDES)).sum(axis=1)
+    dense = curves.evaluate(powers, np.tile(np.linspace(0.0, 1.0, 100_001), (2, 1)))
     chords = np.linalg.norm(np.diff(dense, axis=1), axis=2)
     assert lengths == pytest.approx(chords.sum(axis=1), rel=1e-6)
     which = np.repeat(SIDES, 9)
     share = np.tile(np.linspace(0.0, 1.0, 9), 2)
-    t = bezier_halves.parameters_at(powers, SIDES, which, share * lengths[which])
+    t = curves.parameters_at(powers, SIDES, which, share * lengths[which])
     way = np.cumsum(chords, axis=1)
     for side, part, parameter in zip(which, share, t, strict=True):
         gone = np.interp(parameter, np.linspace(0.0, 1.0, 100_001), np.concatenate(([0.0], way[side])))
@@ -62,29 +62,27 @@ def test_arc_length_and_back(given: tuple[float, float, float, tuple[float, floa
 def test_curvature_closed_form(turn: float) -> None:
     points, weights = corner(turn, 0.4, 0.4, (1.0, 1.0))
     beta = np.radians(turn) / 2
-    powers = bezier_halves.half_curves(points, weights, SIDES)
-    largest = bezier_halves.interval_curvatures(powers, bezier_halves.interval_borders(SIDES)).max(axis=1)
+    powers = curves.half_curves(points, weights, SIDES)
+    largest = curves.interval_curvatures(powers, curves.interval_borders(SIDES)).max(axis=1)
     assert largest == pytest.approx(2 * np.sin(beta) / (0.4 * np.cos(beta) ** 2), rel=1e-9)
-    assert bezier_halves.curvature(powers, np.array([[0.0], [1.0]])) == pytest.approx(0.0, abs=1e-9)
+    assert curves.curvature(powers, np.array([[0.0], [1.0]])) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("given", CORNERS)
 def test_piece_curvature_is_an_upper_bound(given: tuple[float, float, float, tuple[float, float]]) -> None:
     points, weights = corner(*given)
-    powers = bezier_halves.half_curves(points, weights, SIDES)
-    borders = bezier_halves.interval_borders(SIDES)
-    bound = bezier_halves.interval_curvatures(powers, borders)
-    for piece in range(bezier_halves.INTERVALS):
+    powers = curves.half_curves(points, weights, SIDES)
+    borders = curves.interval_borders(SIDES)
+    bound = curves.interval_curvatures(powers, borders)
+    for piece in range(curves.INTERVALS):
         inside = borders[:, piece : piece + 1] + (borders[:, piece + 1 : piece + 2] - borders[:, piece : piece + 1]) * (
             np.linspace(0.0, 1.0, 301)
         )
-        assert (bezier_halves.curvature(powers, inside).max(axis=1) <= bound[:, piece] * (1 + 1e-3)).all()
+        assert (curves.curvature(powers, inside).max(axis=1) <= bound[:, piece] * (1 + 1e-3)).all()
 
 
 def test_a_leg_of_length_zero_is_straight() -> None:
     points, weights = corner(60.0, 0.4, 0.0, (1.0, 1.0))
-    powers = bezier_halves.half_curves(points, weights, SIDES)
-    assert bezier_halves.interval_curvatures(powers, bezier_halves.interval_borders(SIDES)).max() == 0.0
-    assert bezier_halves.interval_lengths(powers, bezier_halves.interval_borders(SIDES)).sum() == pytest.approx(
-        0.4, rel=1e-12
-    )
+    powers = curves.half_curves(points, weights, SIDES)
+    assert curves.interval_curvatures(powers, curves.interval_borders(SIDES)).max() == 0.0
+    assert curves.interval_lengths(powers, curves.interval_borders(SIDES)).sum() == pytest.approx(0.4, rel=1e-12)
