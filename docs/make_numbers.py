@@ -1,59 +1,172 @@
-"""Writes the table of numbers in README.md: what one sample gains in each program of a control.
+"""Writes the figures, outputs and tables of README.md, and draws docs/speeds.svg.
 
-python docs/make_numbers.py
+python docs/make_numbers.py FOLDER
 
-The rows are those of ``cornersmooth compare samples/impeller.cls --control fanuc --limits table-ac`` with tool vectors.
+Rows are those that ``cornersmooth compare FILE --control fanuc --limits table-ac --feed 1800`` prints for tool vectors.
+The folder holds the parts that are not among the samples; the picture shows the first poses of one of them.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
 import re
+import sys
+import tempfile
 from pathlib import Path
 
+import numpy as np
+
 import cornersmooth
-from cornersmooth import Settings
+from cornersmooth import Program, Settings
+from cornersmooth.cli import run
 from cornersmooth.comparing import Row, Table, candidates, compare_programs
-from cornersmooth.nc import load_control
+from cornersmooth.feedrate import BlockLimits, Limits, direct, plan_text
+from cornersmooth.kinematics import load_machine
+from cornersmooth.model import Floats
+from cornersmooth.nc import choose_form, fit_settings, load_control
+from cornersmooth.pipeline import read_back
+from cornersmooth.saving import with_feed, written_text
+from cornersmooth.slices import some_poses
 
 ROOT = Path(__file__).resolve().parent.parent
-PART = ROOT / "samples" / "impeller.cls"
-CONTROL, MACHINE = "fanuc", "table-ac"
+SAMPLES = ROOT / "samples"
+CONTROL, MACHINE, FEED = "fanuc", "table-ac", 1800.0
+PARTS = {
+    "impeller.cls": "flank of an impeller, `samples/impeller.cls`",
+    "hecc_point_zigzag.csv": "NASA compressor blade (HECC), zigzag",
+    "hecc_flank_nx.cls": "the same blade, flank",
+    "hust_5x_impeller_yelun.cls": "impeller pass (HUST)",
+}
+PICTURE, FIRST = "hecc_point_zigzag.csv", 120
 HEAD = """\
-| form | method | lines | blocks | kB | most at the tip, mm | at the axis point, mm | planned time |
-|---|---|---|---|---|---|---|---|
+| part | poses | not smoothed | lines: time | blocks | curves (G6.2): time | blocks |
+|---|---|---|---|---|---|---|
 """
-PLACE = re.compile(r"(?<=<!-- numbers -->\n).*?(?=<!-- end of numbers -->)", re.DOTALL)
+#: what is changed in the program of the sample, and how
+WRONG = {
+    "X of a pose by 0.5 mm": ("X22.4505", "X22.9505"),
+    "another work offset": ("G54", "G55"),
+    "the coolant lost": ("M8\n", ""),
+    "the first feed of the cut": ("F800.", "F900."),
+    "a rapid lost": ("G0 X26.8571 Y-3.2016 Z32.0383 I0.9992004 J0.0399813 K0.0000000\n", ""),
+}
+WRONG_HEAD = "| changed in `part.nc` | the first line of `verify` |\n|---|---|\n"
 
 
-def compared(*forms: str) -> Table:
-    """The rows in tool vectors, of all forms or of some."""
+#: what README.md shows of the first program: lines of its output, of the CL file, blocks
+OUTPUT, CL_LINES, BLOCKS = 5, slice(16, 20), slice(19, 23)
+
+
+def place(name: str) -> re.Pattern[str]:
+    """Where a table of README.md is."""
+    return re.compile(rf"(?<=<!-- {name} -->\n).*?(?=<!-- end of {name} -->)", re.DOTALL)
+
+
+def compared(part: Path) -> tuple[int, Table]:
+    """Poses of a part, and its programs as they are written by default: short lines corner by corner, global curves."""
+    program = with_feed(cornersmooth.read(part), FEED)
+    default = {("g1", "proportional", "fine"), ("g6.2", "global", "")}
     tried = candidates(load_control(CONTROL), Settings(), None)
-    tried = [one for one in tried if not forms or one.form.name in forms]
-    return compare_programs(cornersmooth.read(PART), tried, cornersmooth.load_machine(MACHINE))
+    tried = [one for one in tried if (one.form.name, one.settings.method, one.lines) in default]
+    return len(program), compare_programs(program, tried, load_machine(MACHINE))
 
 
-def line_of(row: Row, before: float) -> str:
+def line_of(what: str, poses: int, found: Table) -> str:
     """One row, in Markdown."""
+    rows = " | ".join(_cells(row, found.unsmoothed) for row in found.rows)
+    return f"| {what} | {poses:,} | {found.unsmoothed:.1f} s | {rows} |\n"
+
+
+def _cells(row: Row, before: float) -> str:
     assert row.usable
     assert row.seconds is not None
-    saved = f"{row.seconds:.1f} s ({100 * (row.seconds / before - 1):+.0f} %)"
-    size = f"{row.blocks:,} | {row.bytes / 1000:.0f}"
-    return f"| {row.form} | {row.method} | {row.lines} | {size} | {row.tip:.4f} | {row.axis_point:.4f} | {saved} |\n"
+    return f"{row.seconds:.1f} s (\N{MINUS SIGN}{100 * (1 - row.seconds / before):.0f} %) | {row.blocks:,}"
 
 
-def table() -> str:
-    """The table, in Markdown."""
-    found = compared()
-    poses = len(cornersmooth.read(PART))
-    first = f"| unsmoothed | | | {poses:,} poses | | | | {found.unsmoothed:.1f} s |\n"
-    return HEAD + first + "".join(line_of(row, found.unsmoothed) for row in found.rows)
+def first_program() -> tuple[str, str, str]:
+    """What the first command of README.md prints, and lines of the CL file and of the program; and the program."""
+    source = (SAMPLES / "impeller.cls").read_text()
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        Path("part.cls").write_text(source)
+        said = io.StringIO()
+        with contextlib.redirect_stderr(said):
+            assert run(["smooth", "part.cls", "-e", "0.01", "--limits", MACHINE, "-o", "part.nc"]) == 0
+        text = Path("part.nc").read_text()
+    shown = (said.getvalue().splitlines()[:OUTPUT], [*source.splitlines()[CL_LINES], "", *text.splitlines()[BLOCKS]])
+    output, lines = ("```text\n" + "\n".join(one) + "\n...\n```\n" for one in shown)
+    return output, lines, text
 
 
-def main() -> None:
-    """Bring the table up to date."""
+def wrong_programs(text: str) -> str:
+    """What verification finds in the program of the sample with one change each, in Markdown."""
+    program = cornersmooth.read(SAMPLES / "impeller.cls")
+    lines = ""
+    for what, (old, new) in WRONG.items():
+        assert old in text
+        found = cornersmooth.verify(program, text.replace(old, new, 1).encode(), tolerance=0.01, axis_length=10)
+        first = found.problems[0]
+        cl_line = f" (CL line {first.cl_line})" if first.cl_line else ""
+        lines += f"| {what} | `part.nc:{first.nc_line}`: {first.text}{cl_line} |\n"
+    return lines
+
+
+def speeds(program: Program) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+    """Times, s, and speeds of the last rotary axis, deg/s: of the lines of the CL file, and of the written curves."""
+    machine, limits = load_machine(MACHINE), Limits()
+    form = choose_form(CONTROL, "g6.2")
+    settings = fit_settings(Settings(method="global"), form, program.units)
+    before = direct(program, limits, "velocity_jump", settings=settings, machine=machine)
+    read = read_back(written_text(program, settings, form), form, settings)
+    after = plan_text(read, limits, settings=settings, machine=machine, blocks=BlockLimits())
+    times = [np.linspace(0.0, law.total, 1200) for law in (before, after)]
+    found = [(t, law.axes_at(t)[1][:, 4]) for t, law in zip(times, (before, after), strict=True)]
+    return found[0], found[1]
+
+
+def draw(before: tuple[Floats, Floats], after: tuple[Floats, Floats], axis: str = "C") -> str:
+    """Two charts over one another with the same scales, as SVG."""
+    width, height, left, most = 760.0, 150.0, 56.0, float(before[0][-1])
+    top = float(max(np.abs(before[1]).max(), np.abs(after[1]).max())) * 1.1
+    parts = [
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 840 430" font-family="sans-serif" font-size="15">',
+        '<rect width="840" height="430" fill="#ffffff"/>',
+    ]
+    charts = (("lines of the CL file", before, "#9a4a00"), ("written by cornersmooth, G6.2", after, "#1463b8"))
+    for number, (name, (t, speed), colour) in enumerate(charts):
+        base = 40.0 + number * (height + 40.0)
+        x, y = left + width * t / most, base + height / 2 * (1.0 - speed / top)
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+        parts += [
+            f'<text x="{left}" y="{base - 10}" fill="{colour}">{name}: {t[-1]:.1f} s</text>',
+            f'<rect x="{left}" y="{base}" width="{width}" height="{height}" fill="none" stroke="#c8ced4"/>',
+            f'<path d="M{left} {base + height / 2}h{width}" stroke="#c8ced4"/>',
+            f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5"/>',
+            f'<text x="{left - 6}" y="{base + 12}" text-anchor="end" fill="#555555">{top:.0f}</text>',
+            f'<text x="{left - 6}" y="{base + height}" text-anchor="end" fill="#555555">\N{MINUS SIGN}{top:.0f}</text>',
+        ]
+    parts += [
+        f'<text x="{left}" y="416" fill="#555555">Speed of the axis {axis}, deg/s, over {most:.1f} s</text>',
+        "</svg>",
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def main(folder: Path) -> None:
+    """Bring the table and the picture up to date."""
+    gains = ""
+    for name, what in PARTS.items():
+        gains += line_of(what, *compared(SAMPLES / name if (SAMPLES / name).exists() else folder / name))
     readme = ROOT / "README.md"
-    readme.write_text(PLACE.sub(lambda found: table(), readme.read_text(encoding="utf-8")), encoding="utf-8")
+    text = readme.read_text(encoding="utf-8")
+    output, lines, part = first_program()
+    made = {"output": output, "lines": lines, "numbers": HEAD + gains, "wrong": WRONG_HEAD + wrong_programs(part)}
+    for name, what in made.items():
+        text = place(name).sub(lambda found, what=what: what, text)
+    readme.write_text(text, encoding="utf-8")
+    program = with_feed(cornersmooth.read(folder / PICTURE), FEED)
+    (ROOT / "docs" / "speeds.svg").write_text(draw(*speeds(some_poses(program, 0, FIRST))), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]))

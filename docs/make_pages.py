@@ -4,11 +4,13 @@ python docs/make_pages.py [FOLDER]
 
 Figures 10 and 11 show the deviation of Table 1 at two tolerances, 14 and 15 speed and acceleration on an impeller blade
 with direct and smoothed motion, 16 the errors of the machined surface.
+docs/page.png shows the page of the first program of README.md, as Chromium draws it.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -79,12 +81,29 @@ def make(figure: Figure, folder: Path) -> Path:
     return page
 
 
+def picture(folder: Path, target: Path) -> None:
+    """Let Chromium draw the page of the first program of README.md."""
+    page, program = folder / "part.html", shutil.which("chromium") or "chromium-browser"
+    made = ("-e", "0.01", "--limits", "table-ac", "-o", str(folder / "part.nc"), "--report", str(page), "--force", "-q")
+    subprocess.run([*COMMAND, "smooth", str(ROOT / "samples" / "impeller.cls"), *made], check=True)
+    drawing = (
+        "--headless",
+        "--no-sandbox",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+        "--hide-scrollbars",
+    )
+    size = ("--virtual-time-budget=20000", "--window-size=1100,700", f"--screenshot={target}")
+    subprocess.run([program, *drawing, *size, page.as_uri()], check=True, capture_output=True)
+
+
 def main(folder: Path) -> int:
     """Make all pages and say where they are."""
     folder.mkdir(parents=True, exist_ok=True)
     for figure in FIGURES:
         page = make(figure, folder)
         sys.stdout.write(f"{os.path.relpath(page)}: {page.stat().st_size / 1e6:.2f} MB\n")
+    picture(folder, ROOT / "docs" / "page.png")
     return 0
 
 

@@ -16,6 +16,7 @@ from types import ModuleType
 
 import pytest
 
+from cornersmooth import read
 from cornersmooth.cli.group import COMMANDS
 from cornersmooth.kinematics import parse_machine
 from cornersmooth.nc import parse_control
@@ -185,20 +186,41 @@ def test_the_job_of_an_array_does_its_share(shop: Path) -> None:
     assert [str(path.relative_to(shop)) for path in (shop / "nc").rglob("*.nc")] == ["nc/deep/two.nc"]
 
 
-def test_the_numbers_of_the_readme_are_those_that_come_out() -> None:
-    """Rows of one form, and a twentieth for what changes: `python docs/make_numbers.py` makes all of it."""
+def test_the_figures_of_the_readme_are_those_that_come_out() -> None:
+    """The sample alone, and a twentieth for what changes: `python docs/make_numbers.py FOLDER` makes all of it."""
+    numbers, text = load("make_numbers"), (ROOT / "README.md").read_text()
+    shown = {name: numbers.place(name).search(text)[0] for name in ("output", "lines", "numbers", "wrong")}
+    output, lines, program = numbers.first_program()
+    assert figures_left_out(shown["output"]) == figures_left_out(output)
+    assert shown["lines"] == lines
+    assert figures_left_out(shown["wrong"].partition("|---|---|\n")[2]) == figures_left_out(
+        numbers.wrong_programs(program)
+    )
+    part = "impeller.cls"
+    made = numbers.line_of(numbers.PARTS[part], *numbers.compared(ROOT / "samples" / part))
+    (row,) = (line for line in shown["numbers"].split("\n") if numbers.PARTS[part] in line)
+    pairs = zip(*(re.findall(r"[\d.]*\d", line.replace(",", "")) for line in (row, made)), strict=True)
+    assert all(float(old) == pytest.approx(float(new), rel=0.05) for old, new in pairs)
+
+
+def figures_left_out(text: str) -> str:
+    return re.sub(r"\d+", "#", text)
+
+
+def test_the_readme_is_short_and_its_pictures_are_light() -> None:
+    text = (ROOT / "README.md").read_text()
+    assert len(text.split("\n")) <= 131
+    pictures = re.findall(r"!\[[^]]+\]\(([^)]+)\)", text)
+    assert len(pictures) == 2
+    assert sum((ROOT / name).stat().st_size for name in pictures) < 300_000
+
+
+def test_the_picture_of_speeds_is_drawn_from_a_part() -> None:
     numbers = load("make_numbers")
-    told = numbers.PLACE.search((ROOT / "README.md").read_text())[0]
-    found = numbers.compared("g6.2")
-    before = re.search(r"([\d.]+) s", told.split("\n")[2])
-    assert before
-    assert float(before[1]) == pytest.approx(found.unsmoothed, rel=0.01)
-    assert len(found.rows) == 2
-    for row in found.rows:
-        made = numbers.line_of(row, found.unsmoothed)
-        (line,) = (one for one in told.split("\n") if one.startswith(made[: made.index("|", 10)]))
-        pairs = zip(*(re.findall(r"[\d.,]*\d", text.replace(",", "")) for text in (line, made)), strict=True)
-        assert all(float(old) == pytest.approx(float(new), rel=0.05) for old, new in pairs)
+    program = numbers.some_poses(numbers.with_feed(read(ROOT / "samples" / "impeller.cls"), numbers.FEED), 4, 30)
+    before, after = numbers.speeds(program)
+    assert after[0][-1] < before[0][-1]
+    assert numbers.draw(before, after).count("<polyline") == 2
 
 
 def parts_of(source: Path) -> set[str]:

@@ -42,7 +42,6 @@ RUN_BY = {
     "make controller": "test_make_controller_prints_its_table",
     "pip install .": ".ci/packages",
     "pip install 'cornersmooth[plot]'": "test_extras_that_are_named_exist",
-    "python docs/make_numbers.py": "tests/test_docs.py",
     "python docs/make_codes.py": "tests/test_codes.py",
     "python docs/run_examples.py docs/gallery.md docs": "tests/test_docs.py",
     "python docs/make_savings.py FOLDER": "test_savings_are_printed_as_a_table",

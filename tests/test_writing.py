@@ -13,7 +13,7 @@ from writing import FORBIDDEN, MEAN, MOST, faults, paragraphs, plain, sentences,
 
 ROOT = Path(__file__).resolve().parent.parent
 #: being rewritten
-LATER = """README CHANGELOG architecture batch controls example1 feedrate global library linuxcnc machines method page
+LATER = """CHANGELOG architecture batch controls example1 feedrate global library linuxcnc machines method page
 planes settings smooth speed verify words""".split()
 PAGES = [
     path for name in ("*.md", "docs/*.md", "samples/*.md") for path in sorted(ROOT.glob(name)) if path.stem not in LATER

@@ -46,7 +46,7 @@ _MUTANTS: dict[str, tuple[str, Callable[[str], str] | None, str]] = {
     "another work offset": (
         r"G54|CYCL DEF 247.*",
         lambda block: block.replace("G54", "G55").replace("+1", "+2"),
-        "where the text was made for|holds for the whole program",
+        "where the program was made for|holds for the whole program",
     ),
     "axes not turned": (
         r"(G0|L) [AB]\S+ C\S+( FMAX)?",

@@ -258,7 +258,7 @@ class OwnFrame:
         said = match[1] if match and match.re.groups else word
         wanted = self._offset or rule.preset
         if wanted and said.replace(" ", "_") != wanted:
-            yield f"{word}, where the text was made for {wanted.replace('_', ' ')}"
+            yield f"{word}, where the program was made for {wanted.replace('_', ' ')}"
 
     def end(self) -> Iterator[str]:
         """Look at what holds where the program ends."""

@@ -54,7 +54,7 @@ json_reports = click.option(
     "reports",
     type=PATH,
     multiple=True,
-    help="Write what was done: .json. May be repeated; {stem} stands for the input's name.",
+    help="Write what was done: .json. May be repeated; {stem} is the input's name.",
 )
 found_reports = click.option(
     "--report",
