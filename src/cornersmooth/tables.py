@@ -12,13 +12,13 @@ import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import lru_cache, partial
 from importlib import resources
 from itertools import accumulate
 from pathlib import Path
 from string import Formatter
-from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from cornersmooth.errors import SettingsError
 
@@ -44,6 +44,14 @@ class TableText(NamedTuple):
     text: str
     file: str
     name: str
+
+
+class Bound(NamedTuple):
+    """What a number must keep, as ``Annotated`` says it of a field; `hint` says what to give instead."""
+
+    low: float = 0
+    high: float = _MOST
+    hint: str = ""
 
 
 class Parsed(NamedTuple):
@@ -209,18 +217,70 @@ class Shelf:
                 raise self.wrong(f"{dot}{key} is missing", f"add {key} = ...")
         types = _types(kind)  # type: ignore[arg-type]
         values = {key: (checks.get(key) or self._by_type(types[key]))(value, dot + key) for key, value in table.items()}
+        for key, item in keys.items():
+            if isinstance(values.get(key), dict) and item.default_factory is not MISSING:
+                values[key] = item.default_factory() | values[key]
         return kind(**given, **values)
 
     def _by_type(self, hint: Any) -> Check:
         """How a value of a field of this type is read."""
-        parts = [part for part in get_args(hint) if part not in (type(None), ...)]
-        if get_origin(hint) is tuple:
-            count = None if ... in get_args(hint) else len(parts)
-            return partial(self.texts, count=count) if parts[0] is str else partial(self.numbers, count=count)
+        origin, args = get_origin(hint), get_args(hint)
+        if origin is Annotated:
+            return partial(self._annotated, hint=args[0], rule=args[1])
         plain: dict[Any, Check] = {bool: self.flag, int: self.whole, float: self.number}
         if hint in plain:
             return plain[hint]
-        return self._by_type(parts[0]) if type(None) in get_args(hint) else self.text
+        if _is_record(hint):
+            return partial(self.record, hint)
+        if origin is Literal:
+            return partial(self._choice, choices=args)
+        if origin is Mapping:
+            return partial(self._mapping, keys=get_args(args[0]), kind=args[1])
+        parts = [part for part in args if part not in (type(None), ...)]
+        if origin is tuple:
+            count = None if ... in args else len(parts)
+            return partial(self.texts, count=count) if parts[0] is str else partial(self.numbers, count=count)
+        return self._by_type(parts[0]) if type(None) in args else self.text
+
+    def _annotated(self, value: Any, where: str, hint: Any, rule: Any) -> Any:
+        """Value of a type with a rule: `Bound`, function that raises ValueError, keys for names, hint for a list."""
+        if isinstance(rule, Mapping):
+            named = self._mapping(value, where, tuple(rule), get_args(hint)[1])
+            return {rule[key]: entry for key, entry in named.items()}
+        if isinstance(rule, str):
+            parts = get_args(hint)
+            count = None if ... in parts else len(parts)
+            return (self.texts if parts[0] is str else self.numbers)(value, where, count, rule)
+        if hint is int:
+            return self.whole(value, where, rule.low, rule.high)
+        read = self._by_type(hint)(value, where)
+        if isinstance(rule, Bound):
+            if not rule.low <= read <= rule.high:
+                raise self.wrong(f"{where} is {read}", rule.hint)
+            return read
+        try:
+            rule(read)
+        except ValueError as error:
+            raise self.wrong(f"{where} is {read!r}: {error}", "give a plain regular expression") from error
+        return read
+
+    def _choice(self, value: Any, where: str, choices: tuple[str, ...]) -> str:
+        """Refuse what is none of the choices; the empty one is where the key is left out."""
+        if value in choices:
+            return str(value)
+        named = [choice for choice in choices if choice]
+        several = f"one of {', '.join(named)}" if len(named) > 2 else " or ".join(named)
+        raise self.wrong(f"{where} is {value!r}", f"use {several}{', or leave it out' * (len(named) < 2)}")
+
+    def _mapping(self, value: Any, where: str, keys: tuple[str, ...], kind: Any) -> dict[str, Any]:
+        """Table of entries of one type, by any keys, or by those that are known; dataclasses get theirs as a name."""
+        table = self.table(value, where)
+        if keys:
+            self.check_keys(table, keys, f"{where}.")
+        if _is_record(kind):
+            return {key: self.record(kind, entry, f"{where}.{key}", {"name": key}) for key, entry in table.items()}
+        read = self._by_type(kind)
+        return {key: read(entry, f"{where}.{key}") for key, entry in table.items()}
 
     def table(self, value: Any, where: str) -> Table:
         """Refuse what is no table."""
@@ -271,10 +331,14 @@ class Shelf:
         return SettingsError(self.wrong_value, what, hint)
 
 
+def _is_record(hint: Any) -> bool:
+    return isinstance(hint, type) and is_dataclass(hint)
+
+
 @lru_cache(maxsize=64)
 def _types(kind: type) -> dict[str, Any]:
     """Types of the fields of a dataclass."""
-    return get_type_hints(kind)
+    return get_type_hints(kind, include_extras=True)
 
 
 @lru_cache(maxsize=64)
@@ -340,6 +404,10 @@ def check_pattern(pattern: str) -> None:
             "a choice in a group, a group that is repeated, "
             f"more than {_MOST_REPEATS} repeats, or more than {_LONGEST_PATTERN} characters"
         )
+
+
+#: a regular expression of a table
+Pattern = Annotated[str, check_pattern]
 
 
 def _merged(base: Table, changes: Table) -> Table:

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
@@ -51,9 +51,9 @@ class RotaryAxis:
     carrier: Literal["table", "head", "none"]
     point: Vector = (0.0, 0.0, 0.0)
     positive: Literal["tool", "table"] = "tool"
-    limits: tuple[float, float] | None = None
+    limits: Annotated[tuple[float, float], "write limits = [lowest, highest] in degrees"] | None = None
     modulo: bool = False
-    clamp: tuple[str, str] | None = None
+    clamp: Annotated[tuple[str, str], 'give two M words, as in ["M10", "M11"]'] | None = None
 
     def __post_init__(self) -> None:
         where = f"rotary axis {self.name}"
@@ -157,7 +157,7 @@ class Machine:
     tool_lengths: tuple[tuple[int, float], ...] = ()
     home: tuple[tuple[str, float], ...] = ()
     tool_change: tuple[tuple[str, float], ...] = ()
-    tip_control: tuple[str, ...] | None = None
+    tip_control: Annotated[tuple[str, ...], 'give two blocks, as in ["M428", "M429"], or [] for none'] | None = None
 
     def __post_init__(self) -> None:
         where = f"machine {self.name}"

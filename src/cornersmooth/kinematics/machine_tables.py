@@ -16,19 +16,8 @@ _SHELF = Shelf(
     __package__,
     "machines",
     keys=(
-        "name",
-        "description",
-        "preferred",
-        "tool_direction",
-        "tool_length",
-        "tool_lengths",
-        "part_zero",
-        "travel",
-        "home",
-        "tool_change",
-        "tip_control",
-        "axis",
-        "dynamics",
+        *("name", "description", "preferred", "tool_direction", "tool_length", "tool_lengths", "part_zero", "travel"),
+        *("home", "tool_change", "tip_control", "axis", "dynamics"),
     ),
     unknown="CS250",
     unreadable="CS251",
@@ -113,7 +102,6 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
             tool_lengths=_tool_lengths,
             home=position,
             tool_change=position,
-            tip_control=partial(_SHELF.texts, hint='give two blocks, as in ["M428", "M429"], or [] for none'),
         )
     except SettingsError as error:
         raise SettingsError(error.code, error.what, error.hint, file=file) from error
@@ -122,13 +110,7 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
 def _axis(entry: Table, where: str) -> RotaryAxis:
     if entry.get("carrier") == "none":  # which stands for axes that are not there
         raise _SHELF.wrong(f"{where}.carrier is 'none'", "use table or head")
-    return _SHELF.record(
-        RotaryAxis,
-        entry,
-        where,
-        limits=partial(_SHELF.numbers, count=2, hint="write limits = [lowest, highest] in degrees"),
-        clamp=partial(_SHELF.texts, count=2, hint='give two M words, as in ["M10", "M11"]'),
-    )
+    return _SHELF.record(RotaryAxis, entry, where, carrier=_SHELF.text, positive=_SHELF.text)
 
 
 def _tool_lengths(given: Any, where: str) -> tuple[tuple[int, float], ...]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.model import Units
+from cornersmooth.model import FeedMode, Units
 from cornersmooth.nc.program_table import Blocks, ProgramTable
+from cornersmooth.settings import BOUNDS, Lines
+from cornersmooth.tables import Bound, Pattern
 
 #: what stands beside the tip in a motion block: the tool vector, a second point on the tool axis, the words of two
 #: rotary axes with the tip (tool tip control) or with the linear axes of the machine, or nothing
@@ -17,14 +20,20 @@ Orientation = Literal["vector", "point", "angles", "machine", "fixed"]
 #: what lines may end with
 LINE_ENDS: Mapping[str, bytes] = {"lf": b"\n", "crlf": b"\r\n"}
 
-#: laws by which a control plans lines, that of `cornersmooth.feedrate` first
-PLANNERS = ("", "linuxcnc-2.9")
-
 #: how curves are written; empty for lines
 CurveStyle = Literal["", "g6.2", "bspline", "poly", "spl"]
 
 #: feed modes of the words: those of `model.FeedMode`, and inverse time
 INVERSE_TIME = 2
+
+_FEED_MODES = {
+    "per_minute": int(FeedMode.PER_MINUTE),
+    "per_revolution": int(FeedMode.PER_REVOLUTION),
+    "inverse_time": INVERSE_TIME,
+}
+
+Decimals = Annotated[int, Bound(high=9)]
+Share = Annotated[float, Bound(math.ulp(0.0), 1.0, "give a part of 1")]
 
 
 @dataclass(frozen=True)
@@ -76,8 +85,8 @@ class Words:
     compensation_right: Blocks = ()
     compensation_off: Blocks = ()
     compensation_entry: bool = False
-    plane: Mapping[int, str] = field(default_factory=dict)
-    feed_mode: Mapping[int, str] = field(default_factory=dict)
+    plane: Annotated[Mapping[int, str], {"xy": 17, "zx": 18, "yz": 19}] = field(default_factory=dict)
+    feed_mode: Annotated[Mapping[int, str], _FEED_MODES] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -165,17 +174,17 @@ class Digits:
         lengths, a longer one keeps more of it.
     """
 
-    mm: int = 4
-    inch: int = 5
-    vector: int = 7
-    angle: int = 5
-    feed: int = 4
-    weight: int = 3
-    coefficient: int = 7
-    speed: int = 0
-    most: int = 6
+    mm: Decimals = 4
+    inch: Decimals = 5
+    vector: Decimals = 7
+    angle: Decimals = 5
+    feed: Decimals = 4
+    weight: Decimals = 3
+    coefficient: Decimals = 7
+    speed: Decimals = 0
+    most: Decimals = 6
+    vector_length: Annotated[int, Bound(1)] = 1
     lever: int = 100
-    vector_length: int = 1
 
 
 @dataclass(frozen=True)
@@ -249,17 +258,17 @@ class TextStyle:
         What the names of its files end in.
     """
 
-    units: Mapping[Units, str] = field(default_factory=dict)
-    comment: tuple[str, str] = ("(", ")")
+    units: Mapping[Units, str] = field(default_factory=lambda: {"mm": "", "inch": ""})
+    comment: Annotated[tuple[str, str], "give what stands before and behind"] = ("(", ")")
     comment_orders: Blocks = ()
     block_number: str = ""
-    unnumbered: str = ""
+    unnumbered: Pattern = ""
     number_start: int = 10
     number_step: int = 10
     number_last: int = 0
     longest_block: int = 0
     continuation: str = ""
-    line_ends: str = "lf"
+    line_ends: Literal["lf", "crlf"] = "lf"
     suffix: str = ".nc"
 
 
@@ -273,8 +282,8 @@ class FormTable:
     """
 
     name: str
-    curve: CurveStyle
     modes: Mapping[Orientation, Mode]
+    curve: CurveStyle = ""
     description: str = ""
     upright: Mode | None = None
     plane: Mode | None = None
@@ -367,15 +376,15 @@ class LineStyle:
         `Settings.block_time`. By default that of Haas, whose makers state it.
     """
 
-    lines: str = "dense"
-    curve_share: float = 0.5
-    line_share: float = 1.0
-    blend_share: float = 0.1
-    lag: float = 0.0
+    lines: Lines = "dense"
+    curve_share: Share = 0.5
+    line_share: Share = 1.0
+    blend_share: Share = 0.1
+    lag: Annotated[float, Bound(0.0, 100.0, "give a number up to 100")] = 0.0
     rounding: str = ""
-    executed_share: float = 0.85
-    planner: str = ""
-    block_time: float = 0.001
+    executed_share: Share = 0.85
+    planner: Literal["", "linuxcnc-2.9"] = ""
+    block_time: Annotated[float, Bound(0.0, BOUNDS["block_time"][1], "give seconds, up to 1")] = 0.001
 
 
 @dataclass(frozen=True)

@@ -7,46 +7,19 @@ keys are those of the tables in the folder ``controls``.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
 from cornersmooth.errors import SettingsError
-from cornersmooth.model import FeedMode
-from cornersmooth.nc.control import (
-    INVERSE_TIME,
-    LINE_ENDS,
-    PLANNERS,
-    Control,
-    CurveStyle,
-    Cycles,
-    Digits,
-    Extra,
-    FormTable,
-    LineStyle,
-    Mode,
-    Motion,
-    Orientation,
-    TextStyle,
-    Words,
-)
-from cornersmooth.nc.program_table import STEPS, ProgramTable
+from cornersmooth.nc.control import Control, Digits, FormTable, Mode, Motion, Orientation, Words
+from cornersmooth.nc.program_table import STEPS, Blocks
 from cornersmooth.nc.trusted_words import trusted_words
-from cornersmooth.settings import BOUNDS, Lines
-from cornersmooth.tables import Shelf, Table, check_pattern, filled, is_file
+from cornersmooth.tables import Shelf, Table, filled, is_file
 
 _FORM_KEYS = ("description", "curve", "upright", "plane", *get_args(Orientation))
-_MOTION_KEYS = frozenset(item.name for item in fields(Motion))
-_PLANES = {"xy": 17, "zx": 18, "yz": 19}
-_FEED_MODES = {
-    "per_minute": int(FeedMode.PER_MINUTE),
-    "per_revolution": int(FeedMode.PER_REVOLUTION),
-    "inverse_time": INVERSE_TIME,
-}
-_MOST_DIGITS = 9
-_MOST_LAG = 100.0
+_MOTION_KEYS = tuple(item.name for item in fields(Motion))
 #: what stands in braces in blocks of the program, names of steps among it
 _PROGRAM_BRACES: Table = {"program": "O1", "units": "G21", "blend": "0.001"} | dict.fromkeys(STEPS, "")
 #: what stands in braces in blocks
@@ -92,6 +65,8 @@ class _Controls(Shelf):
             except ValueError as error:
                 known = ", ".join(f"{{{place}}}" for place in places) or "no braces"
                 raise self.wrong(f"{where}: {value!r} has unknown braces", f"use {known}") from error
+            if places is _PROGRAM_BRACES and any(f"{{{step}}}" in value and value != f"{{{step}}}" for step in STEPS):
+                raise self.wrong(f"{where}: {value!r} holds more than a step", "give the step alone")
         return value
 
 
@@ -99,20 +74,7 @@ _SHELF = _Controls(
     "control",
     __package__,
     "controls",
-    keys=(
-        "name",
-        "description",
-        "digits",
-        "program",
-        "layout",
-        "words",
-        "motion",
-        "forms",
-        "extras",
-        "lines",
-        "cycles",
-        "trusted",
-    ),
+    keys=tuple("name description digits program layout words motion forms extras lines cycles trusted".split()),
     unknown="CS210",
     unreadable="CS212",
     unknown_key="CS214",
@@ -184,13 +146,8 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
             "",
             given={"like": like, "systems": _systems(digits), "own": True},
             digits=lambda _, where: _digits({key: value for key, value in digits.items() if key != "systems"}, where),
-            program=_program,
-            layout=_layout,
             words=_words,
             forms=lambda forms, where: _forms(forms, where, motion),
-            extras=_extras,
-            lines=_lines,
-            cycles=partial(_SHELF.record, Cycles),
             trusted=partial(_trusted, dialect=like),
         )
     except SettingsError as error:
@@ -209,11 +166,9 @@ def control_table(name: str) -> str:
 
 
 def _digits(table: Any, where: str) -> Digits:
-    digits = partial(_SHELF.whole, most=_MOST_DIGITS)
-    checks: dict[str, Any] = {item.name: digits for item in fields(Digits) if item.name != "lever"}
     if isinstance(table, dict):
-        _SHELF.check_keys(table, (*checks, "lever", "systems"), f"{where}.")
-    return _SHELF.record(Digits, table, where, **checks | {"vector_length": partial(_SHELF.whole, least=1)})
+        _SHELF.check_keys(table, (*(item.name for item in fields(Digits)), "systems"), f"{where}.")
+    return _SHELF.record(Digits, table, where)
 
 
 def _systems(digits: Table) -> dict[str, Digits]:
@@ -224,51 +179,12 @@ def _systems(digits: Table) -> dict[str, Digits]:
     return {name: _digits(plain | _SHELF.table(entry, where[name]), where[name]) for name, entry in systems.items()}
 
 
-def _program(table: Any, where: str) -> ProgramTable:
-    program = _SHELF.record(ProgramTable, table, where)
-    for key in ("name_pattern", "work_offset_pattern"):
-        pattern = getattr(program, key)
-        try:
-            check_pattern(pattern)
-        except ValueError as error:
-            raise _SHELF.wrong(f"program.{key} is {pattern!r}: {error}", "give a plain regular expression") from error
-    for key in ("start", "begin", "tool_end", "between_tools", "end", "retract"):
-        for block in getattr(program, key):
-            if any(f"{{{step}}}" in block and block != f"{{{step}}}" for step in STEPS):
-                raise _SHELF.wrong(f"program.{key}: {block!r} holds more than a step", "give the step alone")
-    return program
-
-
-def _layout(table: Any, where: str) -> TextStyle:
-    layout = _SHELF.record(
-        TextStyle,
-        table,
-        where,
-        units=lambda given, place: {"mm": "", "inch": ""} | _strings(given, place, ("mm", "inch")),
-        comment=partial(_SHELF.texts, count=2, hint="give what stands before and behind"),
-    )
-    if layout.line_ends not in LINE_ENDS:
-        raise _SHELF.wrong(f"layout.line_ends is {layout.line_ends!r}", f"use {' or '.join(LINE_ENDS)}")
-    return layout
-
-
 def _words(table: Any, where: str) -> Words:
-    def coolant(given: Any, place: str) -> dict[str, tuple[str, ...]]:
-        given = _SHELF.table(given, place)
-        return {word.upper(): _SHELF.texts(blocks, f"{place}.{word}") for word, blocks in given.items()}
+    def coolant(given: Any, place: str) -> dict[str, Blocks]:
+        blocks = _SHELF.table(given, place).items()
+        return {word.upper(): _SHELF.texts(entry, f"{place}.{word}") for word, entry in blocks}
 
-    def by_number(given: Any, place: str, numbers: Mapping[str, int]) -> dict[int, str]:
-        return {numbers[key]: block for key, block in _strings(given, place, tuple(numbers)).items()}
-
-    return _SHELF.record(
-        Words,
-        table,
-        where,
-        coolant=coolant,
-        coolant_off=coolant,
-        plane=partial(by_number, numbers=_PLANES),
-        feed_mode=partial(by_number, numbers=_FEED_MODES),
-    )
+    return _SHELF.record(Words, table, where, coolant=coolant, coolant_off=coolant)
 
 
 def _forms(forms: Any, where: str, motion: Table) -> dict[str, FormTable]:
@@ -280,20 +196,17 @@ def _forms(forms: Any, where: str, motion: Table) -> dict[str, FormTable]:
 def _form(name: str, entry: Any, motion: Table) -> FormTable:
     where, orientations = f"forms.{name}", get_args(Orientation)
     _SHELF.check_keys(_SHELF.table(entry, where), _FORM_KEYS, f"{where}.")
-    curve = entry.get("curve", "")
-    if curve not in get_args(CurveStyle):
-        raise _SHELF.wrong(f"{where}.curve is {curve!r}", f"use one of {', '.join(get_args(CurveStyle)[1:])}")
     mode = partial(_mode, motion=motion)
     modes = {key: mode(entry[key], f"{where}.{key}") for key in orientations if key in entry}
     for orientation, found in modes.items():
         wanted = {"vector": 3, "point": 3}.get(orientation, 0)
         if len(found.words) != wanted:
             raise _SHELF.wrong(f"{where}.{orientation} has {len(found.words)} words", f"give {wanted}")
+    rest = {key: value for key, value in entry.items() if key not in orientations}
+    form = _SHELF.record(FormTable, rest, where, given={"name": name, "modes": modes}, upright=mode, plane=mode)
     if not modes:
         raise _SHELF.wrong(f"{where} says no orientation", f"use one of {', '.join(orientations)}")
-    rest = {key: value for key, value in entry.items() if key not in (*orientations, "curve")}
-    given = {"name": name, "curve": curve, "modes": modes}
-    return _SHELF.record(FormTable, rest, where, given=given, upright=mode, plane=mode)
+    return form
 
 
 def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
@@ -301,27 +214,6 @@ def _trusted(given: Any, where: str, dialect: str) -> frozenset[str]:
         return trusted_words(_SHELF.texts(given, where), dialect)
     except ValueError as error:
         raise _SHELF.wrong(f"{where}: {error}", 'give machine functions, as in ["M208"]') from error
-
-
-def _lines(table: Any, where: str) -> LineStyle:
-    lines = _SHELF.record(LineStyle, table, where)
-    if lines.lines not in get_args(Lines):
-        raise _SHELF.wrong(f"lines.lines is {lines.lines!r}", f"use {' or '.join(get_args(Lines))}")
-    for name in ("curve_share", "line_share", "blend_share", "executed_share"):
-        if not 0.0 < getattr(lines, name) <= 1.0:
-            raise _SHELF.wrong(f"lines.{name} is {getattr(lines, name)}", "give a part of 1")
-    if not 0.0 <= lines.block_time <= BOUNDS["block_time"][1]:
-        raise _SHELF.wrong(f"lines.block_time is {lines.block_time}", "give seconds, up to 1")
-    if lines.planner not in PLANNERS:
-        raise _SHELF.wrong(f"lines.planner is {lines.planner!r}", f"use {PLANNERS[1]}, or leave it out")
-    if not 0.0 <= lines.lag <= _MOST_LAG:
-        raise _SHELF.wrong(f"lines.lag is {lines.lag}", f"give a number up to {_MOST_LAG:g}")
-    return lines
-
-
-def _extras(table: Any, where: str) -> dict[str, Extra]:
-    entries = _SHELF.table(table, where).items()
-    return {name: _SHELF.record(Extra, entry, f"{where}.{name}", given={"name": name}) for name, entry in entries}
 
 
 def _mode(entry: Any, where: str, motion: Table) -> Mode:
@@ -334,8 +226,3 @@ def _mode(entry: Any, where: str, motion: Table) -> Mode:
         what = f"{where}.rotations is {mode.rotations!r}"
         raise _SHELF.wrong(what, "give three axes, as in zxz; the second is not z")
     return mode
-
-
-def _strings(table: Any, where: str, keys: tuple[str, ...]) -> dict[str, str]:
-    _SHELF.check_keys(_SHELF.table(table, where), keys, f"{where}.")
-    return {key: _SHELF.text(value, f"{where}.{key}") for key, value in table.items()}

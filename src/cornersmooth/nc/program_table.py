@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from cornersmooth.tables import Pattern
+
 #: lines of a program, with places in braces
 Blocks = tuple[str, ...]
 
@@ -48,9 +50,9 @@ class ProgramTable:
 
     name: str = "O0001"
     file_name: str = ""
-    name_pattern: str = ""
+    name_pattern: Pattern = ""
     work_offset: str = ""
-    work_offset_pattern: str = ""
+    work_offset_pattern: Pattern = ""
     work_offset_block: Blocks = ()
     retract: Blocks = ()
     position: str = ""
