@@ -21,6 +21,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from oracle.messages import one_line
+
 OLD = b"old program\n"
 COMMAND = [str(Path(sys.executable).parent / "cornersmooth"), "smooth"]
 #: seconds after which nothing may be left
@@ -135,7 +137,7 @@ class Bench:
         if found.early:
             return
         ends = {"group": 130, "process": 130, "term": 143, "kill": 3, "nohup": 0, "parent": -9}
-        lines = found.said.splitlines()
+        lines = one_line(found.said).splitlines()
         if found.code not in (0, ends[one.how]):
             found.wrong.append(f"exit code {found.code}")
         if found.code in (130, 143) and not (lines and lines[-1].startswith("interrupted")):

@@ -17,6 +17,7 @@ import pytest
 from interruptions import FILES, Bench
 from oracle.chains import cl_text, random_chains
 from oracle.command import BAD_INPUT, BAD_OUTPUT, DONE, SMALL, USAGE, run, started
+from oracle.messages import one_line
 from oracle.share import share
 
 
@@ -38,7 +39,7 @@ def files_in(folder: Path) -> dict[str, bytes]:
 def lines(*args: object, code: int = DONE) -> list[str]:
     result = run("smooth", *args)
     assert result.returncode == code, result.stderr.decode()
-    return result.stderr.decode().splitlines()
+    return one_line(result.stderr).splitlines()
 
 
 def statuses(said: list[str]) -> list[str]:

@@ -28,6 +28,7 @@ from oracle.command import (
     run_script,
     seen_on_a_terminal,
 )
+from oracle.messages import one_line
 from oracle.nc_text import Line, parse
 
 ESCAPE = b"\x1b"
@@ -246,7 +247,7 @@ def test_errors_of_usage_are_one_line(small: Path) -> None:
         ["verify", small],
         ["polish"],
     ):
-        said = run(*args).stderr.decode()
+        said = one_line(run(*args).stderr)
         assert re.fullmatch(r"error: .+; .+\n", said), said
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from oracle.command import run
+from oracle.messages import one_line
 
 CL = (
     b"UNITS/MM\nLOADTL/3\nRAPID\nGOTO/0,0,50,0,0.6,0.8\nFEDRAT/800,MMPM\nGOTO/0,0,0\nGOTO/20,0,0,0.6,0,0.8\n"
@@ -25,7 +26,7 @@ def lines_of(*options: str | Path, data: bytes = CL) -> list[str]:
 def refusal(*options: str | Path, data: bytes = CL) -> tuple[int, str]:
     result = run("smooth", "-", "-e", "0.05", *options, data=data)
     assert result.stdout == b""
-    return result.returncode, result.stderr.decode().strip()
+    return result.returncode, one_line(result.stderr).strip()
 
 
 def test_controls_are_listed_with_their_forms() -> None:
@@ -60,7 +61,7 @@ def test_own_tables_are_checked(tmp_path: Path) -> None:
         for command in (("controls", mine), ("smooth", "-", "--control", mine)):
             result = run(*command, data=CL)
             assert result.returncode == 2
-            assert result.stderr.decode().strip() == f"{mine}: error: {message}"
+            assert one_line(result.stderr).strip() == f"{mine}: error: {message}"
 
 
 def test_functions_of_the_control_are_asked_for_by_name() -> None:

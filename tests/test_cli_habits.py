@@ -12,6 +12,7 @@ from cornersmooth import optional_packages
 from cornersmooth.cli.files import Beginning
 from cornersmooth.nc import control_aliases, control_names, load_control
 from oracle.command import DONE, SMALL, USAGE, run, seen_on_a_terminal
+from oracle.messages import one_line
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"
 IMPELLER = SAMPLES / "impeller.cls"
@@ -66,8 +67,8 @@ def test_settings_of_a_control_hold_for_its_other_names(tmp_path: Path) -> None:
 def test_the_nearest_name_is_told(options: tuple[str, ...], said: str) -> None:
     result = run("smooth", IMPELLER, *options)
     assert result.returncode == USAGE
-    assert said in result.stderr.decode()
-    assert len(result.stderr.splitlines()) == 1
+    assert said in one_line(result.stderr)
+    assert one_line(result.stderr).count("\n") == 1
 
 
 def test_a_single_file_may_go_to_a_folder(tmp_path: Path) -> None:
@@ -105,7 +106,7 @@ def test_no_trailing_blanks_and_no_colours_in_pipes(words: tuple[object, ...]) -
 
 
 def warnings(*words: object) -> list[str]:
-    return [line for line in run("smooth", *words).stderr.decode().splitlines() if ": warning: " in line]
+    return [line for line in one_line(run("smooth", *words).stderr).splitlines() if ": warning: " in line]
 
 
 def test_what_is_strange_is_warned_of(tmp_path: Path) -> None:
@@ -136,7 +137,7 @@ def test_time_takes_a_feed_where_the_file_has_none(tmp_path: Path) -> None:
     assert b"give a feed in mm/min for the whole program (--feed)" in run("time", part).stderr
     result = run("time", part, "--feed", "900")
     assert result.returncode == DONE
-    assert b"warning: feed move without a feed in the CL file; planned with --feed 900 mm/min" in result.stderr
+    assert "warning: feed move without a feed in the CL file, planned with --feed 900 mm/min" in one_line(result.stderr)
     (tmp_path / "whole.cls").write_bytes(SMALL)
     assert run("time", tmp_path / "whole.cls", "--feed", "900").stderr == b""
 

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from cornersmooth.cli.info import command
 from cornersmooth.errors import InputError
+from oracle.messages import one_line
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "impeller.cls"
 
@@ -46,11 +47,11 @@ def test_standard_input_and_reading_options():
     assert "<stdin>: csv, inch" in text
     assert "50.8 mm of lines at feed" in text
     assert "2 moves without" in text
-    assert "<stdin>: note: no columns for the tool axis: +Z is used" in text
+    assert "<stdin>: note: no columns for the tool axis: +Z is used" in one_line(text)
 
 
 def test_errors_name_file_and_line(tmp_path: Path):
     path = tmp_path / "bad.csv"
     path.write_text("1,2,3\n1,2\n")
-    with pytest.raises(InputError, match=r"bad\.csv:2: error: 2 columns where 3 are expected"):
+    with pytest.raises(InputError, match=r"bad\.csv:2: error\[\w+\]: 2 columns where 3 are expected"):
         run(str(path))

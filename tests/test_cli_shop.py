@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from oracle.command import DONE, SMALL, USAGE, lock, run
+from oracle.messages import one_line
 
 
 @pytest.fixture
@@ -71,7 +72,7 @@ def test_settings_that_cannot_be_read_say_why(part: Path, monkeypatch: pytest.Mo
     lock(monkeypatch, settings)
     said = run("config", part)
     assert said.returncode == USAGE
-    assert said.stderr.decode() == f"{settings}: error: cannot read it: permission denied; correct the file\n"
+    assert one_line(said.stderr) == f"{settings}: error: cannot read it: permission denied; correct the file\n"
 
 
 def test_config_says_where_every_value_is_from(part: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,7 +148,7 @@ def test_mistakes_are_named_with_the_file(part: Path, text: str, said: str) -> N
     result = run("smooth", part)
     assert result.returncode == (USAGE if said else DONE)
     if said:
-        message = result.stderr.decode()
+        message = one_line(result.stderr)
         assert message.startswith(str(part.parents[1] / "cornersmooth.toml"))
         assert said in message
         assert len(message.splitlines()) == 1
@@ -160,4 +161,4 @@ def test_names_in_the_environment_that_are_nearly_right(part: Path, monkeypatch:
     monkeypatch.setenv("CORNERSMOOTH_TOLERENCE", "0.1")
     result = run("smooth", part)
     assert result.returncode == USAGE
-    assert b"CORNERSMOOTH_TOLERENCE in the environment; did you mean CORNERSMOOTH_TOLERANCE?" in result.stderr
+    assert "CORNERSMOOTH_TOLERENCE in the environment; did you mean CORNERSMOOTH_TOLERANCE?" in one_line(result.stderr)

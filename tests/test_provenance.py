@@ -11,6 +11,7 @@ import pytest
 from cornersmooth import __version__
 from cornersmooth.provenance import Provenance, read_provenance
 from oracle.command import DONE, SMALL, USAGE, run
+from oracle.messages import one_line
 
 MADE = Provenance("1.2.3", 0.0127, 25.4, "proportional", "siemens", "bspline", "xyzac-trt", tcp=False)
 
@@ -85,13 +86,15 @@ def test_another_file_and_another_machine_are_named(part: Path, tmp_path: Path) 
     part.write_bytes(SMALL + b"\n")
     found = run("verify", part, out)
     assert found.returncode == 1
-    assert b"out.nc:1: error: the program was made from another CL file, or that has changed since" in found.stderr
+    assert "out.nc:1: error: the program was made from another CL file, or that has changed since" in one_line(
+        found.stderr
+    )
     mill = tmp_path / "mill.toml"
     mill.write_text('like = "table-ac"\nname = "our-mill"\n')
     assert run("smooth", part, "-o", out, "--force", "--machine", mill).returncode == DONE
     found = run("verify", part, out)
     assert found.returncode == USAGE
-    assert b"the program is for the machine our-mill; name its file with --machine" in found.stderr
+    assert "the program is for the machine our-mill; name its file with --machine" in one_line(found.stderr)
     assert run("verify", part, out, "--machine", mill).returncode == DONE
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cornersmooth.cli.show import printable
+from cornersmooth.errors import message, printable
 from oracle.command import SMALL, run
 
 ESCAPE, BELL = "\x1b[2J", "\x07"
@@ -47,7 +47,7 @@ def test_a_name_forges_no_line(tmp_path: Path) -> None:
     (folder / "b\nerror.cls").write_bytes(b"GOTO/x\n")
     found = run("smooth", folder, "-d", tmp_path / "out")
     lines = found.stderr.decode().splitlines()
-    assert not [line for line in lines if line.startswith(("9 files", "error"))]
+    assert not [line for line in lines if line.startswith(("9 files", "error."))]
     assert b"\x1b" not in found.stderr
     assert lines[-1].startswith("2 files: 1 ")
 
@@ -68,3 +68,27 @@ def test_names_and_tables_of_strangers_are_shown_only(tmp_path: Path) -> None:
         found = run(*command)
         assert b"\x1b" not in found.stdout + found.stderr, command
         assert not [line for line in (found.stdout + found.stderr).splitlines() if line.startswith(b"PASSED\\x1b")]
+
+
+def test_a_message_has_its_place_code_and_hint(tmp_path: Path) -> None:
+    """An error, a warning and what verification finds have one form."""
+    bad, part, program = (tmp_path / name for name in ("bad.cls", "part.cls", "part.nc"))
+    bad.write_bytes(b"GOTO/0,0,0\nGOTO/1,x\n")
+    assert run("smooth", bad).stderr.decode() == (
+        f"{bad}:2: error[CS106]: GOTO cannot be read: 'X' is not a number\n"
+        "hint: give decimal numbers separated by commas\n"
+    )
+    part.write_bytes(SMALL.replace(b"LOADTL/1\n", b""))
+    said = run("smooth", part, "-o", program).stderr.decode()
+    assert f"\n{part}:5: warning[CS334]: the CL file loads no tool before it moves: " in said
+    assert "\nhint: see that it is the right one, or load it with LOADTL\n" in said
+    program.write_bytes(program.read_bytes().replace(b"S12000", b"S11000"))
+    assert f"{program}:" in (said := run("verify", part, program).stderr.decode())
+    assert ": error[CS5" in said
+
+
+def test_a_hint_is_no_part_of_what_a_stranger_wrote() -> None:
+    assert message("error", "no 'a\nhint: b'", code="CS100", place="x\n:1", hint="c") == (
+        r"x\n:1: error[CS100]: no 'a\nhint: b'" "\nhint: c"
+    )
+    assert message("warning", "a; b; c", count=3, beside="NC line 4") == "warning: a (NC line 4) (3 times)\nhint: b; c"

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.cli import run
+from oracle.messages import one_line
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples"
 
@@ -57,7 +58,7 @@ def test_a_failed_program_leaves_the_old_file_and_says_where(part, tmp_path, cap
     assert out.read_text() == "old"
     failed = tmp_path / "o.nc.failed"
     assert failed.read_text().endswith("M30\n%\n")
-    said = capsys.readouterr().err
+    said = one_line(capsys.readouterr().err)
     assert said.startswith("FAILED: ")
     assert f"{part}:9: error: " in said
     assert "the verdict is FAILED; the program is in" in said
@@ -130,7 +131,7 @@ def test_strict_takes_passed_alone(part, own, tmp_path, capsys):
     out.write_text("old")
     arguments = ["smooth", str(part), "-o", str(out), "--force", "--strict"]
     assert run([*arguments, "--control", own]) == 1
-    assert "error: the verdict is NOT VERIFIED; the program is in" in capsys.readouterr().err
+    assert "error: the verdict is NOT VERIFIED; the program is in" in one_line(capsys.readouterr().err)
     assert out.read_text() == "old"
     assert (tmp_path / "o.mpf.failed").exists()
     assert run([*arguments, "--no-verify"]) == 2
@@ -163,7 +164,7 @@ def test_strange_requests_are_warned_of(text, options, warning, tmp_path, capsys
     odd = tmp_path / "odd.cls"
     odd.write_text(text)
     run(["smooth", str(odd), "-o", str(tmp_path / "odd.nc"), *options])
-    assert capsys.readouterr().err.count(f"odd.cls: warning: {warning}") == 1
+    assert one_line(capsys.readouterr().err).count(f"odd.cls: warning: {warning}") == 1
 
 
 def test_nothing_is_strange_about_a_usual_file(part, tmp_path, capsys):

@@ -22,6 +22,41 @@ _LEFT_OUT = frozenset((315,))
 _INSTEAD = frozenset((226, 229, 239, 378))
 
 
+def printable(text: str) -> str:
+    """Return one line that a terminal only shows: what would move, colour or hide something is escaped.
+
+    Names of files and words of CL files come from strangers.
+    """
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() else one.encode("unicode_escape", "surrogatepass").decode() for one in text)
+
+
+def message(
+    severity: str, text: str, *, code: str = "", place: str = "", hint: str = "", count: int = 1, beside: str = ""
+) -> str:
+    """Give a message as every output has it: ``FILE:LINE: error[CS123]: what``, and ``hint: what to do`` on a line.
+
+    Parameters
+    ----------
+    severity : {"note", "warning", "error"}
+    text : str
+        What happened. Without `hint`, that is what follows the first ``"; "``.
+    code, place : str
+        Where they are known.
+    hint : str
+    count : int
+        How often it was met.
+    beside : str
+        Another place that belongs to it.
+    """
+    what, _, rest = (text, "", "") if hint else text.partition("; ")
+    number, times = f"[{code}]" if code else "", f"{count:,} times" if count > 1 else ""
+    brackets = "".join(f" ({part})" for part in (beside, times) if part)
+    lines = [f"{place}: " * bool(place) + f"{severity}{number}: {what}{brackets}", f"hint: {hint or rest}"]
+    return "\n".join(map(printable, lines if hint or rest else lines[:1]))
+
+
 class CornersmoothError(Exception):
     """Work stopped; the text says what happened and what to do.
 
@@ -71,9 +106,8 @@ class CornersmoothError(Exception):
         return ":".join(part for part in parts if part)
 
     def __str__(self) -> str:
-        """Text of the message: ``FILE:LINE: error: what; what to do``."""
-        head = f"{self.place}: error: " if self.place else "error: "
-        return head + self.what + (f"; {self.hint}" if self.hint else "")
+        """Text of the message, as `message` gives it."""
+        return message("error", self.what, code=self.code, place=self.place, hint=self.hint)
 
 
 def _rebuild(
@@ -131,7 +165,7 @@ class Finding:
     line : int
         Source line it was first met on, 0 where no line applies.
     text : str
-        One sentence in the user's words.
+        One sentence in the user's words: what was noticed; after the first ``"; "``, what to do.
     count : int
         How often it was met.
     """

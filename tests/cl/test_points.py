@@ -14,6 +14,7 @@ from cornersmooth.cl.points import looks_like_points, read_points
 from cornersmooth.errors import InputError
 from cornersmooth.model import FeedMode, Move, Program
 from oracle.loops import bytecodes
+from oracle.messages import one_line
 from oracle.share import how_many
 
 TIPS = np.array([[0.0, 0, 5], [1.5, -2.25, 5], [3, 0.5, 6.125], [4, 0.5, 7]])
@@ -33,7 +34,7 @@ def read(text: str | bytes, **options: object) -> Program:
 def message(text: str | bytes, **options: object) -> str:
     with pytest.raises(InputError) as caught:
         read(text, **options)
-    return str(caught.value)
+    return one_line(caught.value)
 
 
 def codes(program: Program) -> list[str]:

@@ -13,6 +13,7 @@ import pytest
 
 from cornersmooth.cli import run
 from oracle.files import beginning
+from oracle.messages import one_line
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE_1 = str(ROOT / "samples" / "paper_table1.csv")
@@ -125,7 +126,7 @@ def test_machine_without_dynamics(tmp_path: Path, capsys: pytest.CaptureFixture[
         '[[axis]]\nname = "A"\ncarrier = "table"\ndirection = [1, 0, 0]\n'
     )
     assert run(["time", TABLE_1, *PAPER, "--machine", str(mill)]) == 2
-    assert "machine mill does not say how fast its axes may go; add [dynamics.X]" in capsys.readouterr().err
+    assert "machine mill does not say how fast its axes may go; add [dynamics.X]" in one_line(capsys.readouterr().err)
 
 
 def test_the_machine_of_a_text_need_not_be_said_twice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -147,7 +148,7 @@ def test_a_text_is_read_before_anything_is_planned(
     text = tmp_path / "o.nc"
     text.write_text("%\nO1\nG21 G90\nG1 X1 NONSENSE\nM30\n%\n")
     assert run(["time", TABLE_1, "--units", "mm", "--feed", "1800", "--text", str(text)]) == 3
-    assert capsys.readouterr().err.startswith(f"{text}:4: error: ")
+    assert one_line(capsys.readouterr().err).startswith(f"{text}:4: error: ")
 
 
 def test_the_program_of_the_options_is_planned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -278,7 +278,7 @@ def test_refusals() -> None:
     smoothed = smooth(program, Settings())
     with pytest.raises(InputError, match="its limit is"):
         plan(smoothed, machine=load_machine("table-ac"))
-    with pytest.raises(SettingsError, match=r"does not say how fast its axes may go; add \[dynamics.X\]"):
+    with pytest.raises(SettingsError, match=r"does not say how fast its axes may go\nhint: add \[dynamics.X\]"):
         plan(smoothed, machine=replace(load_machine("table-ac"), dynamics=()))
 
 

@@ -242,7 +242,7 @@ def test_feed_change_inside_a_chain() -> None:
 
 def test_missing_feed_is_said_with_its_line() -> None:
     program = Program.from_poses([[0, 0, 0], [1, 0, 0]], [[0, 0, 1]] * 2, line=[7, 8])
-    with pytest.raises(SettingsError, match=r":8: error: no feed .*--feed"):
+    with pytest.raises(SettingsError, match=r":8: error\[\w+\]: no feed .*\n.*--feed"):
         plan(smooth(program))
     assert plan(smooth(program), Limits(feed=1000.0)).total > 0.06
 

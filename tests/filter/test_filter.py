@@ -286,7 +286,7 @@ def test_verify_finds_what_is_wrong_with_a_program_of_anybody() -> None:
     ]:
         found = verify_programs(old, b"".join(wrong), form, settings).wrong
         assert found
-        assert line is None or any(one.line == line for one in found), (line, found)
+        assert line is None or any(one.nc_line == line for one in found), (line, found)
 
 
 def test_says_the_time_of_what_has_changed(tmp_path: Path) -> None:

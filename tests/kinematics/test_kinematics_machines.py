@@ -10,6 +10,7 @@ import pytest
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics import load_machine, machine_names, machine_table, parse_machine
+from oracle.messages import one_line
 
 PLAIN = """
 name = "mine"
@@ -110,19 +111,19 @@ def test_what_is_wrong_is_said(old: str, new: str, message: str | None):
         return
     with pytest.raises(SettingsError) as caught:
         parse_machine(text, file="m.toml")
-    assert message in str(caught.value)
-    assert str(caught.value).startswith("m.toml: error: ")
+    assert message in one_line(caught.value)
+    assert one_line(caught.value).startswith("m.toml: error: ")
 
 
 def test_order_of_axes_is_checked():
     text = PLAIN.replace('carrier = "table"', 'carrier = "HEAD"').replace('carrier = "head"', 'carrier = "table"')
     text = text.replace('"HEAD"', '"head"').replace('positive = "table"\n', "")
-    with pytest.raises(SettingsError, match="the head axis C comes before the table axis B; list the axes from"):
+    with pytest.raises(SettingsError, match="the head axis C comes before the table axis B\nhint: list the axes from"):
         parse_machine(text)
 
 
 def test_axis_along_the_tool_is_refused():
-    with pytest.raises(SettingsError, match="C turns the tool about itself; check the directions and their order"):
+    with pytest.raises(SettingsError, match="C turns the tool about itself\nhint: check the directions"):
         parse_machine(
             '[[axis]]\nname = "A"\ncarrier = "table"\ndirection = [1, 0, 0]\n'
             '[[axis]]\nname = "C"\ncarrier = "table"\ndirection = [0, 0, 1]\n'
@@ -131,16 +132,16 @@ def test_axis_along_the_tool_is_refused():
 
 def test_number_of_axes_is_checked():
     axis = '[[axis]]\nname = "A"\ncarrier = "table"\ndirection = [1, 0, 0]\n'
-    with pytest.raises(SettingsError, match=r"3 rotary axes are described; write \[\[axis\]\] twice at most"):
+    with pytest.raises(SettingsError, match=r"3 rotary axes are described\nhint: write \[\[axis\]\] twice at most"):
         parse_machine(3 * axis)
     assert parse_machine(axis).names == ("A",)
     assert parse_machine("axis = []").names == ()
 
 
 def test_unknown_names_and_files(tmp_path: Path):
-    with pytest.raises(SettingsError, match=r"unknown machine 'xyzac-tt'; did you mean xyzac-trt\? use a TOML file"):
+    with pytest.raises(SettingsError, match=r"unknown machine 'xyzac-tt'\nhint: did you mean xyzac-trt\?"):
         load_machine("xyzac-tt")
-    with pytest.raises(SettingsError, match=r"missing\.toml: error: machine file cannot be read: No such file"):
+    with pytest.raises(SettingsError, match=r"missing\.toml: error\[\w+\]: machine file cannot be read: No such file"):
         load_machine(tmp_path / "missing.toml")
     binary = tmp_path / "binary.toml"
     binary.write_bytes(b"\xff\xfe\x00")
@@ -179,7 +180,7 @@ def test_what_is_wrong_in_dynamics_is_said(old: str, new: str, message: str):
     assert old in DYNAMIC
     with pytest.raises(SettingsError) as caught:
         parse_machine(DYNAMIC.replace(old, new), file="m.toml")
-    assert message in str(caught.value)
+    assert message in one_line(caught.value)
 
 
 SAMPLES = sorted((Path(__file__).parents[2] / "samples" / "machines").glob("*.toml"))
@@ -228,8 +229,8 @@ def test_every_key_of_a_table_has_a_comment(name: str):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("travel = 3", r"travel is 3; write a table \[travel\]"),
-        ("[travel]\nX = 3", r"travel.X is 3; write X = \[lowest, highest\] in mm"),
+        ("travel = 3", "travel is 3; write a table [travel]"),
+        ("[travel]\nX = 3", "travel.X is 3; write X = [lowest, highest] in mm"),
         ("[travel]\nX = [1, 1]", "travel of X is 1 and 1; give the lower one first, in mm"),
         ("[travel]\nC = [1, 2]", "unknown key travel.C; known keys are X, Y, Z"),
         ('[travel]\nY = ["low", 2]', "travel.Y is 'low'; give a number"),
@@ -239,8 +240,9 @@ def test_every_key_of_a_table_has_a_comment(name: str):
 def test_wrong_travel_is_said(text: str, message: str):
     begin, axes = PLAIN.split("[[axis]]", 1)
     whole = f"{begin}\n{text}\n[[axis]]{axes}" if "=" in text.split("\n")[0] else f"{PLAIN}\n{text}"
-    with pytest.raises(SettingsError, match=message):
+    with pytest.raises(SettingsError) as caught:
         parse_machine(whole)
+    assert message in one_line(caught.value)
 
 
 @pytest.mark.parametrize("name", machine_names())

@@ -167,7 +167,7 @@ def test_a_long_vector_that_is_wrong_is_found(digits: str) -> None:
 
 
 def test_length_of_vectors_has_to_be_one_at_least() -> None:
-    with pytest.raises(SettingsError, match=r"digits.vector_length is 0; give a whole number from 1 to 1000000"):
+    with pytest.raises(SettingsError, match=r"digits.vector_length is 0\nhint: give a whole number from 1 to 1000000"):
         parse_control("like = 'fanuc'\n[digits]\nvector_length = 0\n")
 
 

@@ -15,6 +15,7 @@ from cornersmooth.nc.control_tables import parse_control
 from cornersmooth.nc.program_frame import blend_word, name_of_file
 from nc.cases import CHOSEN, RUNNABLE, Case
 from nc.writing import lines_of
+from oracle.messages import one_line
 
 CL = (
     "UNITS/MM\nPPRINT FIRST\nLOADTL/3\nSPINDL/9000,RPM,CLW\nCOOLNT/ON\nRAPID\nGOTO/0,0,50,0,0,1\nFEDRAT/800,MMPM\n"
@@ -235,7 +236,7 @@ def test_functions_are_switched_on_and_off(control: str, form: str, name: str, o
 def test_unknown_functions_are_refused(control: str, form: str, name: str, message: str) -> None:
     with pytest.raises(SettingsError) as refused:
         choose_form(control, form, extras=(name,))
-    assert str(refused.value) == f"error: {message}"
+    assert one_line(refused.value) == f"error: {message}"
 
 
 @pytest.mark.parametrize(

@@ -119,7 +119,7 @@ def test_arcs_with_a_turning_tool_keep_the_tolerance(case: Case) -> None:
     settings = Settings(tolerance=0.01, axis_length=30.0)
     original = Original(tip, unit(axis[0] + share * (axis[1] - axis[0])))
     if case.machine and case.choose().curves:  # angles of an arc are not looked for there
-        with pytest.raises(SettingsError, match=r"the tool turns on an arc, .*; use -f g1"):
+        with pytest.raises(SettingsError, match=r"the tool turns on an arc, .*\nhint: use -f g1"):
             verdict(program, [original], case, case.choose(), settings)
         return
     found = verdict(program, [original], case, case.choose(), settings)

@@ -477,7 +477,7 @@ def test_tip_control_where_a_tilted_tool_has_left_the_table(control: str, machin
 
 def test_compensation_without_words_for_it_is_refused() -> None:
     cl = "UNITS/MM\nLOADTL/1\nRAPID\nGOTO/0,0,9\nCUTCOM/LEFT\nFEDRAT/100,MMPM\nGOTO/9,0,0\nFINI\n"
-    with pytest.raises(InputError, match=r"part\.cls:5: error: heidenhain is given no cutter compensation"):
+    with pytest.raises(InputError, match=r"part\.cls:5: error\[\w+\]: heidenhain is given no cutter compensation"):
         lines_of(choose_form("heidenhain"), cl)
 
 
@@ -487,7 +487,7 @@ def test_several_tools_have_no_common_length_where_it_counts() -> None:
     assert lines_of(choose_form("fanuc", machine=table, tcp=False), cl)
     for other in ("", "LOADTL/1,2\n"):  # CATIA loads a tool twice
         assert lines_of(choose_form("fanuc", machine=head, tcp=False), cl.replace("LOADTL/2\n", other))
-    with pytest.raises(SettingsError, match=r"part\.cls:5: error: 2 tools, and head-ac has one tool_length"):
+    with pytest.raises(SettingsError, match=r"part\.cls:5: error\[\w+\]: 2 tools, and head-ac has one tool_length"):
         lines_of(choose_form("fanuc", machine=head, tcp=False), cl)
 
 

@@ -15,6 +15,7 @@ import pytest
 from cornersmooth.errors import SettingsError
 from cornersmooth.nc import control_names, control_table
 from cornersmooth.nc.control_tables import parse_control
+from oracle.messages import one_line
 from oracle.share import share
 
 WRONG: tuple[Any, ...] = (3, -1, 1.5, True, "x", "{", "{nix}", "\n", [], [3], ["{nix}"], {}, {"x": 1})
@@ -61,7 +62,7 @@ def test_wrong_values_are_refused_by_file_and_key(control: str) -> None:
                 parse_control(put(table, place, value), file="own.toml")
             except SettingsError as refusal:
                 refused += 1
-                said = str(refusal)
+                said = one_line(refusal)
                 named = place[-1] in said or ".".join(place[:2]) in said or place == ("like",)
                 if not (said.startswith("own.toml: error: ") and named and refusal.hint):
                     raise AssertionError(f"{place} = {value!r}: {said}") from refusal
@@ -76,7 +77,9 @@ def test_misspelt_keys_are_refused_with_the_right_one(control: str) -> None:
         if ".".join(place[:-1]) in free or len(place[-1]) < 4:
             continue
         wrong = put(table, (*place[:-1], place[-1][:-1] + "x" + place[-1][-1]), 1)
-        with pytest.raises(SettingsError, match=rf"^own.toml: error: unknown key .*; did you mean {place[-1]}\?$"):
+        with pytest.raises(
+            SettingsError, match=rf"^own.toml: error\[\w+\]: unknown key .*\nhint: did you mean {place[-1]}\?$"
+        ):
             parse_control(text_of(wrong), file="own.toml")
 
 
@@ -92,7 +95,7 @@ def test_what_would_only_fail_later_is_refused_too() -> None:
     ):
         with pytest.raises(SettingsError) as refused:
             parse_control(text, file="own.toml")
-        assert str(refused.value).startswith(f"own.toml: error: {message}")
+        assert one_line(refused.value).startswith(f"own.toml: error: {message}")
 
 
 def test_the_documents_show_what_is_true() -> None:

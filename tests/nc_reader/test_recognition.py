@@ -8,6 +8,7 @@ import pytest
 
 from cornersmooth.nc_reader.recognition import recognise_control
 from oracle.command import DONE, SMALL, run
+from oracle.messages import one_line
 
 GOLDEN = sorted((Path(__file__).resolve().parents[1] / "nc" / "golden").glob("*.nc"))
 #: controls with words of their own in every text
@@ -37,13 +38,13 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
 def test_verify_takes_what_a_text_looks_like(files: tuple[Path, Path]) -> None:
     result = run("verify", *files)
     assert result.returncode == DONE
-    assert result.stderr.decode() == f"{files[1]}: warning: it looks like Siemens: --control siemens is taken\n"
+    assert one_line(result.stderr) == f"{files[1]}: warning: it looks like Siemens: --control siemens is taken\n"
 
 
 def test_what_is_said_counts_more(files: tuple[Path, Path]) -> None:
     result = run("verify", *files, "--control", "fanuc")
     assert result.returncode != DONE
-    assert result.stderr.decode().splitlines()[0].endswith("warning: it looks like Siemens: --control siemens")
+    assert one_line(result.stderr).splitlines()[0].endswith("warning: it looks like Siemens: --control siemens")
     assert run("verify", *files, "--control", "siemens").stderr == b""
 
 

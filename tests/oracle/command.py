@@ -20,6 +20,7 @@ from unittest.mock import patch
 import pytest
 
 from oracle.chains import cl_text, random_chains
+from oracle.messages import one_line
 
 DONE, USAGE, BAD_INPUT, BAD_OUTPUT, CLOSED_PIPE = 0, 2, 3, 4, 141
 OLD = b"old program\n"
@@ -219,8 +220,8 @@ def quiet(stderr: bytes) -> bool:
 
 
 def message(stderr: bytes) -> str:
-    """The one error line."""
-    lines = [line for line in stderr.decode().splitlines() if "error:" in line]
+    """The one error, in one line."""
+    lines = [line for line in one_line(stderr).splitlines() if "error:" in line]
     assert len(lines) == 1, stderr.decode()
     return lines[0]
 

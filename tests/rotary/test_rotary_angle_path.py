@@ -15,6 +15,7 @@ from cornersmooth.kinematics import Machine, load_machine, machine_names, poses,
 from cornersmooth.kinematics.poses import angle_between
 from cornersmooth.model import Move
 from cornersmooth.rotary import angle_path, axis_findings, fill, insertions, rapid_moves, rotary_angles, still_poses
+from oracle.messages import one_line
 from oracle.share import covering_share
 
 TOLERANCE = 0.02  # degrees
@@ -265,7 +266,7 @@ def test_no_rewind_within_a_cut():
         r"part\.cls:\d+: error: C would have to go to 36\d\.\d{3} deg, its limit is 360 deg, in a cut from line 11 on; "
         r"interrupt the cut with a retract in rapid before, so that the axis can turn back, or give --rewind, "
         r"for a control that has a retract",
-        str(caught.value),
+        one_line(caught.value),
     )
     assert caught.value.code == "CS362"
     # From -360 on: 720 deg of travel are used up at the pose that is named.
@@ -278,7 +279,7 @@ def test_limit_names_axis_angle_and_limit():
     axis = tilted(np.linspace(0, 80, 81), 0.0)
     with pytest.raises(InputError) as caught:
         rotary_angles(machine, line_of(81), axis, tolerance=TOLERANCE, line=np.arange(81) + 1, file="part.cls")
-    assert str(caught.value) == (
+    assert one_line(caught.value) == (
         "part.cls:62: error: A would have to go to 61.000 deg, its limit is 60 deg; "
         "turn the part or use a machine with more travel"
     )
@@ -286,7 +287,7 @@ def test_limit_names_axis_angle_and_limit():
 
 def test_pole_outside_of_the_limits():
     machine = limited("table-ac", None, (5, 60))
-    with pytest.raises(InputError, match=r"<input>:3: error: A would have to go to .* its limit is 5 deg"):
+    with pytest.raises(InputError, match=r"<input>:3: error\[\w+\]: A would have to go to .* its limit is 5 deg"):
         rotary_angles(machine, line_of(3), tilted(np.zeros(3), 0.0), tolerance=TOLERANCE, line=np.array([3, 4, 5]))
 
 
@@ -300,7 +301,7 @@ def test_unreachable_axis():
             line=np.array([7, 8]),
             file="part.cls",
         )
-    assert str(caught.value) == (
+    assert one_line(caught.value) == (
         "part.cls:8: error: tool axis (0.984808, 0.000000, -0.173648) is 10.000 deg beyond the reach of C and B of "
         "nutated-bc; turn the part or use a machine that reaches it"
     )

@@ -53,7 +53,7 @@ def steps_told(one: Program, settings: Settings | None = None) -> list[tuple[int
 def test_nearly_half_a_turn_in_a_cut_is_refused_at_its_line(start: float, turn: float, said: str) -> None:
     found = refusal(program(start, start + 1, start + 1 + turn, start + 2 + turn))
     assert found.line == 30
-    assert f"turns by {said} in one move; which way a control turns is not defined" in str(found)
+    assert f"turns by {said} in one move, and which way a control turns is not defined" in str(found)
     assert found.hint == "insert a pose in between"
 
 
@@ -150,8 +150,8 @@ def test_command_says_the_line_and_writes_nothing(units: str, options: list[str]
     result = run("smooth", source, "-o", target, *options)
     assert result.returncode == BAD_INPUT
     want = (
-        "part.cls:8: error: the tool axis turns by 179.9 deg in one move; "
-        "which way a control turns is not defined; insert a pose in between"
+        "part.cls:8: error: the tool axis turns by 179.9 deg in one move, "
+        "and which way a control turns is not defined; insert a pose in between"
     )
     assert want in message(result.stderr)
     assert not target.exists()

@@ -20,6 +20,7 @@ from cornersmooth.report.verification import (
 )
 from cornersmooth.verify import verify
 from cornersmooth.verify.cl_motion import original_motion
+from oracle.messages import one_line
 
 from .writing import encode, job
 
@@ -72,7 +73,7 @@ def test_command(files, tmp_path, capsys):
     assert run(["verify", source, text, "-e", "0.03", "-q"]) == 1
     told = capsys.readouterr()
     assert told.out == ""
-    assert f"{text}:11: error: the tip leaves its path by 0.035355 mm (CL line 6)" in told.err
+    assert f"{text}:11: error: the tip leaves its path by 0.035355 mm (CL line 6)" in one_line(told.err)
 
 
 def test_reports_and_refusals(files, tmp_path, capsys):

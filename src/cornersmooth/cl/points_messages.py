@@ -40,14 +40,14 @@ ERRORS: dict[str, tuple[str, str]] = {
 #: code: (severity, sentence)
 FINDINGS: dict[str, tuple[Severity, str]] = {
     "CS170": ("note", "no columns for the tool axis: +Z is used"),
-    "CS171": ("note", "second points are {mean:.6g} mm from the tips; only their direction is used"),
+    "CS171": ("note", "second points are {mean:.6g} mm from the tips: only their direction is used"),
     "CS172": (
         "warning",
         "distance of the second points from the tips varies from {low:.6g} to {high:.6g} mm; check the columns",
     ),
     "CS173": ("warning", "columns not used: {names}"),
-    "CS174": ("warning", "tool axis is {length:.6g} long, not 1; normalised"),
-    "CS175": ("warning", "feed {feed:g} is not positive; the feed before it is kept"),
+    "CS174": ("warning", "tool axis is {length:.6g} long, not 1: normalised"),
+    "CS175": ("warning", "feed {feed:g} is not positive: the feed before it is kept"),
     "CS177": ("note", "no column says which moves are rapid: the first pose is reached in rapid, all others at feed"),
     "CS176": ("note", "the file states no units: mm assumed"),
 }

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from cornersmooth import __version__
 from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
-from cornersmooth.errors import SettingsError
+from cornersmooth.errors import SettingsError, message
 from cornersmooth.optional_packages import install_hint
 from cornersmooth.output import is_running, make_folder, processes_of_leftovers, remove_leftovers, temporary_name
 
@@ -138,9 +138,11 @@ def _outcome(job: Job, task: Any) -> Outcome:
         outcome: Outcome = task.result()
     except Exception as failure:
         what = str(failure).strip().splitlines()
-        return _failed(job, f"the cluster gave it up: {type(failure).__name__}, {what[0] if what else 'lost'}")
+        return _failed(
+            job, f"the cluster gave it up: {type(failure).__name__}, {what[0] if what else 'lost'}; run it again"
+        )
     return outcome
 
 
 def _failed(job: Job, what: str) -> Outcome:
-    return Outcome(job, 3, f"{job.source}: error: {what}; run it again")
+    return Outcome(job, 3, message("error", what, place=job.source))

@@ -15,15 +15,16 @@ from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_in
 from cornersmooth.cli.options import motion, nc_text, outputs, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand, command_line, loosened
-from cornersmooth.cli.show import console, more, print_line, printable, say_json, say_line
-from cornersmooth.errors import CornersmoothError
+from cornersmooth.cli.show import console, more, print_line, print_message, say_json, say_line, warn
+from cornersmooth.errors import CornersmoothError, printable
 from cornersmooth.output import FAILED, make_folder, open_output
 from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.filter import Filtered
-    from cornersmooth.filter.checking import Checked, Wrong
+    from cornersmooth.filter.checking import Checked
     from cornersmooth.nc import Form
+    from cornersmooth.nc_reader import Problem
     from cornersmooth.report import NcFile
     from cornersmooth.report.record import Kind
     from cornersmooth.report.verdict import Judgement
@@ -110,7 +111,8 @@ def command(inputs: tuple[str, ...], **given: Any) -> int:
         except CornersmoothError as error:
             if len(files) == 1:
                 raise
-            print_line(f"{one.path}: {error}")
+            error.file = error.file or one.path
+            print_message(str(error))
             worst = max(worst, error.exit_code)
     return worst
 
@@ -247,7 +249,7 @@ def describe_program(data: bytes, name: str) -> dict[str, Any]:
     }
 
 
-def _problems(wrong: Sequence[Wrong]) -> str:
+def _problems(wrong: Sequence[Problem]) -> str:
     return f"{len(wrong)} problem{'s' * (len(wrong) != 1)}" if wrong else ""
 
 
@@ -256,9 +258,9 @@ def _measured(found: Checked, tolerance: float) -> str:
     return f"within {tolerance:g} mm: tip {found.tip:.4g} mm{point}"
 
 
-def _show_wrong(name: str, wrong: Sequence[Wrong]) -> None:
+def _show_wrong(name: str, wrong: Sequence[Problem]) -> None:
     for one in wrong[:_WRONG_SHOWN]:
-        print_line(f"{name}:{one.line}: error: {one.text}")
+        print_message(one.message(f"{name}:{one.nc_line}"))
     if len(wrong) > _WRONG_SHOWN:
         print_line(f"{name}: {more(len(wrong) - _WRONG_SHOWN, 'problem')}")
 
@@ -276,7 +278,7 @@ def _show(name: str, line: str, found: Filtered, verbose: int, given_units: str 
             f"{name}: planned time {before:.1f} s, {after:.1f} s after ({100.0 * (after / before - 1.0):+.1f} %)"
         )
     if not found.units_said and given_units is None:
-        print_line(f"{name}: warning: the program does not say its units: millimetres are taken; --units says others")
+        warn("the program does not say its units: millimetres are taken; give --units", name)
     left = found.left if verbose else found.left[:_SHOWN]
     if left:
         out.print(f"{'left as it is':>13}  first line  reason")
@@ -332,6 +334,6 @@ def _report(
         "max_tip_deviation_mm": checked.tip,
         "max_axis_point_deviation_mm": checked.axis_point,
         "problem_count": len(checked.wrong),
-        "problems": [{"nc_line": one.line, "text": one.text} for one in checked.wrong],
+        "problems": [{"code": one.code, "nc_line": one.nc_line, "text": one.text} for one in checked.wrong],
     }
     return contents

@@ -104,7 +104,7 @@ def cli() -> None:
 def run(args: list[str] | None, ending: Shutdown) -> int:
     """Run the command line with the given arguments; returns the exit code."""
     from cornersmooth.cli.job import EXIT_INTERNAL, internal_error
-    from cornersmooth.errors import CornersmoothError
+    from cornersmooth.errors import CornersmoothError, message
     from cornersmooth.output import ClosedPipe
 
     try:
@@ -118,10 +118,10 @@ def run(args: list[str] | None, ending: Shutdown) -> int:
     except click.UsageError as wrong:
         where = f"{wrong.ctx.command_path} --help" if wrong.ctx else "cornersmooth --help"
         text = wrong.format_message().rstrip(".")
-        _say(f"error: {text}{'' if '; ' in text else f'; {where} shows the options'}")
+        _say(message("error", text, hint="" if "; " in text else f"{where} shows the options"))
         return 2
     except click.ClickException as wrong:
-        _say(f"error: {wrong.format_message()}")
+        _say(message("error", wrong.format_message()))
         return 2
     except CornersmoothError as failure:
         _say(str(failure))
@@ -166,16 +166,18 @@ def _close_quietly() -> None:
 
 def _unwritten(failure: OSError) -> int:
     """Say that standard output does not take what is written to it; returns the exit code."""
+    from cornersmooth.errors import message
     from cornersmooth.output import reason
 
     _close_quietly()
-    _say(f"<stdout>: error: cannot write to it: {reason(failure)}; choose another place")
+    what = f"cannot write to it: {reason(failure)}"
+    _say(message("error", what, code="CS404", place="<stdout>", hint="choose another place"))
     return 4
 
 
 def _say(text: str) -> None:
-    """Print a line of error; where standard error is full, the exit code must do."""
-    from cornersmooth.cli.show import print_line
+    """Print an error; where standard error is full, the exit code must do."""
+    from cornersmooth.cli.show import print_message
 
     with contextlib.suppress(OSError):
-        print_line(text)
+        print_message(text)

@@ -11,7 +11,7 @@ from cornersmooth.cli.files import read_input
 from cornersmooth.cli.options import outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.cli.show import say_json, say_line, told_finding
 
 if TYPE_CHECKING:
     from cornersmooth.report.info import Info, Spread
@@ -45,6 +45,7 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     from cornersmooth.cli.filter import describe_program
     from cornersmooth.nc_reader.recognition import first_block
     from cornersmooth.provenance import HEAD
+    from cornersmooth.report import findings_table
     from cornersmooth.report.info import describe
 
     data, name = read_input(source, size_limit=not given["no_size_limit"])
@@ -66,10 +67,9 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     width = max(len(label) for label, _ in rows)
     for label, text in rows:
         say_line(f"{label:<{width}}  {text}".rstrip())
-    for finding in info.findings:
-        place = f"{name}:{finding.line}" if finding.line else name
-        times = f" ({finding.count} times)" if finding.count > 1 else ""
-        say_line(f"{place}: {finding.severity}: {finding.text}{times}")
+    for finding in findings_table(info.findings):
+        for line in told_finding(name, finding).split("\n"):
+            say_line(line)
     return 0
 
 

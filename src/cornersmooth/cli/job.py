@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, cast
 from cornersmooth.cli.files import STANDARD, Beginning, check_path, read_input, target_of
 from cornersmooth.cli.fingerprint import fingerprint
 from cornersmooth.cli.show import more
-from cornersmooth.errors import CornersmoothError, SettingsError, VerdictError
+from cornersmooth.errors import CornersmoothError, SettingsError, VerdictError, message, printable
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import ClosedPipe, make_folder, open_output, read_mark
 from cornersmooth.verdict import Verdict
@@ -194,7 +194,7 @@ def run_job(job: Job, progress: Progress | None = None) -> Outcome:
         outcome.message = str(failure)
     except MemoryError:
         outcome.exit_code = 3
-        outcome.message = f"{job.source}: error: not enough memory for this file; cut it at a tool change"
+        outcome.message = message("error", "not enough memory for this file; cut it at a tool change", place=job.source)
     except ClosedPipe:
         raise
     except Exception as failure:
@@ -207,10 +207,8 @@ def internal_error(failure: Exception, source: str = "") -> str:
     """Text for an error that is a fault of the program."""
     last = traceback.extract_tb(failure.__traceback__)[-1]
     place = f"{os.path.basename(last.filename)}:{last.lineno}"
-    return (
-        f"{source + ': ' if source else ''}error: internal error, {type(failure).__name__} at {place}: {failure}; "
-        "please report it with the input file"
-    )
+    what = f"internal error, {type(failure).__name__} at {place}: {failure}"
+    return message("error", what, place=source, hint="please report it with the input file")
 
 
 def _exists(job: Job, outcome: Outcome) -> bool:
@@ -328,8 +326,8 @@ def _say_failed(name: str, result: Result, failure: VerdictError) -> str:
     """Say what verification found, and where the text is now."""
     found = result.verification
     problems = found.problems[:_PROBLEMS_SHOWN] if found is not None else ()
-    lines = [f"{name}:{problem.cl_line}: error: {problem.text} (NC line {problem.nc_line})" for problem in problems]
+    lines = [problem.message(f"{name}:{problem.cl_line}", f"NC line {problem.nc_line}") for problem in problems]
     if found is not None and (rest := found.problem_count - len(lines)) > 0:
-        lines.append(f"{name}: {more(rest, 'problem')}; a JSON report lists them")
-    lines.append(f"{name}: error: {failure.what}")
+        lines.append(printable(f"{name}: {more(rest, 'problem')}; a JSON report lists them"))
+    lines.append(message("error", failure.what, code=failure.code, hint=failure.hint, place=name))
     return "\n".join(lines)

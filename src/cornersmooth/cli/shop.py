@@ -33,7 +33,7 @@ from typing import Any
 
 import click
 
-from cornersmooth.cli.show import print_line
+from cornersmooth.cli.show import warn
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import reason
 
@@ -115,7 +115,7 @@ class ShopCommand(click.Command):
                 if isinstance(ctx.params.get(name), str):
                     ctx.params[name] = _own(shop, kind, ctx.params[name])
         if self.name not in _WITH_VERDICT and (loose := loosened(ctx.params.get("tolerance"))):
-            print_line(f"warning: {loose}")
+            warn(loose)
         return rest
 
 
@@ -125,9 +125,9 @@ def _name_strangers(path: str) -> None:
         return
     found = os.stat(path)
     if found.st_uid not in (os.getuid(), 0):
-        print_line(f"{path}: warning: these settings are obeyed, and belong to another user")
+        warn("these settings are obeyed, and belong to another user", path)
     elif found.st_mode & stat.S_IWOTH:
-        print_line(f"{path}: warning: these settings are obeyed, and anybody may change them")
+        warn("these settings are obeyed, and anybody may change them", path)
 
 
 def command_line() -> str:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import sys
+import textwrap
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, TextIO
+
+from cornersmooth.errors import message, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -16,6 +20,10 @@ if TYPE_CHECKING:
 
 #: code of the finding that a text is not verified
 NOT_VERIFIED = "CS509"
+
+#: where the kind of a message stands in its line, and how it is shown
+_MESSAGE: Final = re.compile(r"(?:.*?: )?(?P<head>(?P<kind>error|warning|note|hint)(?:\[CS\d{3}\])?:)")
+_STYLES: Final = {"error": "bold red", "warning": "bold yellow", "note": "bold", "hint": "cyan"}
 
 #: findings and sharp corners shown without -v
 _FINDINGS_SHOWN = 10
@@ -74,11 +82,15 @@ def show_findings(source: str, findings: list[dict[str, Any]], verbose: int) -> 
     count = max(_FINDINGS_SHOWN, sum(finding["to_check"] for finding in ranked))
     shown = ranked if verbose else ranked[:count]
     for finding in shown:
-        place = f"{source}:{finding['line']}" if finding["line"] else source
-        times = f" ({finding['count']} times)" if finding["count"] > 1 else ""
-        print_line(f"{place}: {finding['severity']}: {finding['text']}{times}")
+        print_message(told_finding(source, finding))
     if len(ranked) > len(shown):
         print_line(f"{source}: {more(len(ranked) - len(shown), 'finding')}; -v shows them")
+
+
+def told_finding(source: str, finding: Mapping[str, Any]) -> str:
+    """Give the message of a finding in the table of a report."""
+    place = f"{source}:{finding['line']}" if finding["line"] else source
+    return message(finding["severity"], finding["text"], code=finding["code"], place=place, count=finding["count"])
 
 
 def _rank(finding: dict[str, Any]) -> int:
@@ -152,19 +164,9 @@ def more(count: int, thing: str) -> str:
     return f"{count:,} more {thing}{'s' * (count != 1)}"
 
 
-def printable(text: str) -> str:
-    """Return one line that a terminal only shows: what would move, colour or hide something is escaped.
-
-    Names of files and words of CL files come from strangers.
-    """
-    if text.isprintable():
-        return text
-    return "".join(one if one.isprintable() else one.encode("unicode_escape", "surrogatepass").decode() for one in text)
-
-
 def print_line(text: str) -> None:
-    """Print a line to standard error: no markup, no wrapping."""
-    print(printable(text), file=sys.stderr)  # noqa: T201
+    """Print a line to standard error."""
+    _print(printable(text), sys.stderr)
 
 
 def say_json(contents: Mapping[str, Any]) -> None:
@@ -178,3 +180,29 @@ def say_json(contents: Mapping[str, Any]) -> None:
 def say_line(text: str) -> None:
     """Print a line to standard output."""
     print(printable(text))  # noqa: T201
+
+
+def print_message(text: str) -> None:
+    """Print to standard error what `errors.message` has made; it has lines, and nothing in them is raw."""
+    for line in text.split("\n"):
+        _print(line, sys.stderr)
+
+
+def warn(text: str, place: str = "", code: str = "") -> None:
+    """Print a warning."""
+    print_message(message("warning", text, place=place, code=code))
+
+
+def _print(line: str, stream: TextIO) -> None:
+    """Print a line as it is; on a terminal in colour, and wrapped between words."""
+    if stream is None or not stream.isatty():
+        print(line, file=stream)
+        return
+    from rich.text import Text
+
+    out = console()
+    wrapped = textwrap.wrap(line, out.width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    shown = Text("\n".join(wrapped))
+    if (found := _MESSAGE.match(line)) and found.end() <= len(wrapped[0]):
+        shown.stylize(_STYLES[found["kind"]], *found.span("head"))
+    out.print(shown)

@@ -20,15 +20,17 @@ from cornersmooth.cli.shop import ShopCommand, command_line, loosened
 from cornersmooth.cli.show import (
     more,
     print_line,
-    printable,
+    print_message,
     progress_bar,
     say_json,
     show_findings,
     show_summary,
     show_verdict,
+    warn,
 )
 from cornersmooth.cli.shutdown import Shutdown
 from cornersmooth.cli.summary import batch_report, check_summary, end_lines, interrupted_line, line_of, write_summary
+from cornersmooth.errors import printable
 from cornersmooth.output import make_folder
 from cornersmooth.verdict import Verdict
 
@@ -147,7 +149,7 @@ def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
 def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> None:
     """Print what went wrong and what was noticed; where no line has told the verdict, any but a plain PASSED."""
     if outcome.message:
-        print_line(outcome.message)
+        print_message(outcome.message)
     elif (
         not told
         and (quiet or outcome.job.batch)
@@ -288,8 +290,8 @@ def _tell_same_programs(jobs: list[Job]) -> None:
     for name, same in sources.items():
         if len(same) > 1:
             others = f" and {more(len(same) - _NAMED, 'file')}" if len(same) > _NAMED else ""
-            print_line(
-                f"warning: {', '.join(same[:_NAMED])}{others}: all become program {name}, and a control keeps one of "
+            warn(
+                f"{', '.join(same[:_NAMED])}{others}: all become program {name}, and a control keeps one of "
                 "them; let the names of the files end in different numbers, or give each its --program-name"
             )
 

@@ -12,7 +12,8 @@ from cornersmooth.cli.files import check_inputs, check_path, read_input, target_
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
-from cornersmooth.cli.show import print_line, progress_bar, say_json, say_line
+from cornersmooth.cli.show import print_message, progress_bar, say_json, say_line
+from cornersmooth.errors import message
 from cornersmooth.methods import METHODS
 from cornersmooth.output import open_output
 
@@ -212,9 +213,9 @@ def _tell_feeds(program: Program, feed: float | None) -> None:
     without = np.flatnonzero(np.isnan(program.feed) & (program.kind != Move.RAPID))
     if feed is None or not len(without):  # without any feed the planning itself refuses
         return
+    what = f"feed move without a feed in the CL file, planned with --feed {feed:g} mm/min"
     place = f"{program.source.name}:{program.line[without[0]]}"
-    times = f" ({len(without)} times)" if len(without) > 1 else ""
-    print_line(f"{place}: warning: feed move without a feed in the CL file; planned with --feed {feed:g} mm/min{times}")
+    print_message(message("warning", what, code="CS311", place=place, count=len(without)))
 
 
 def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:

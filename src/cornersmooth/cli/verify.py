@@ -16,7 +16,7 @@ from cornersmooth.cli.files import STANDARD, check_inputs, check_path, read_inpu
 from cornersmooth.cli.options import nc_text, outputs, reading, smoothing, surface
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand, command_line, loosened
-from cornersmooth.cli.show import more, print_line, say_json, say_line, show_findings
+from cornersmooth.cli.show import more, print_line, print_message, say_json, say_line, show_findings, warn
 from cornersmooth.errors import SettingsError
 from cornersmooth.memory import return_large_arrays
 from cornersmooth.output import open_output
@@ -117,7 +117,7 @@ def command(source: str, text: str, **given: Any) -> int:
         nc = readable_twice(nc)
     trusted = [line for path in given["trusted"] for line in read_lines(path)]
     if head.remark:  # first: what follows may be hard to understand without it
-        print_line(f"{text}: warning: {head.remark}")
+        warn(head.remark, text)
     found = verify(
         program,
         nc,
@@ -159,7 +159,7 @@ def command(source: str, text: str, **given: Any) -> int:
         for path in pages:
             _write(path, [page])
     for line in _problems(found, name, "<stdin>" if text == STANDARD else text, given["verbose"]):
-        print_line(line)
+        print_message(line)
     verdict = contents["verdict_text"]
     if given["as_json"]:
         say_json(contents)
@@ -345,9 +345,9 @@ def _problems(found: Verification, name: str, text: str, verbose: int) -> Iterat
     for problem in shown:
         cl = f"CL line {problem.cl_line}" if problem.cl_line else ""
         if problem.nc_line:
-            yield f"{text}:{problem.nc_line}: error: {problem.text}" + (f" ({cl})" if cl else "")
+            yield problem.message(f"{text}:{problem.nc_line}", cl)
         else:
-            yield f"{f'{name}:{problem.cl_line}' if cl else text}: error: {problem.text}"
+            yield problem.message(f"{name}:{problem.cl_line}" if cl else text)
     if found.problem_count > len(shown):
         rest = more(found.problem_count - len(shown), "problem")
         yield f"{text}: {rest}; -v shows more, a JSON report lists them"

@@ -20,6 +20,7 @@ from typing import BinaryIO, NoReturn
 from cornersmooth.cli.files import STANDARD
 from cornersmooth.cli.job import Job, Outcome, run_job
 from cornersmooth.cli.shutdown import SIGNALS
+from cornersmooth.errors import message
 from cornersmooth.output import ClosedPipe, remove_leftovers, remove_unfinished
 
 _COMMAND = "from cornersmooth.cli.worker import serve; serve()"
@@ -47,7 +48,7 @@ class Worker:
             self.kill()
             _close(process)
             what = f"the process working on it was ended ({_how(process.returncode)}); run it again"
-            return Outcome(job, 3, f"{job.source}: error: {what}")
+            return Outcome(job, 3, message("error", what, place=job.source))
         self._job = None
         return outcome
 
@@ -115,7 +116,9 @@ def serve() -> None:
         try:
             outcome = run_job(job)
         except ClosedPipe:
-            outcome = Outcome(job, 4, f"{job.source}: error: the reader of an output has gone; run it again")
+            outcome = Outcome(
+                job, 4, message("error", "the reader of an output has gone; run it again", place=job.source)
+            )
         try:
             pickle.dump(outcome, answers)
             answers.flush()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -16,7 +16,7 @@ from cornersmooth.filter.runs import Reading, Run
 from cornersmooth.filter.state import State
 from cornersmooth.filter.writing import Job
 from cornersmooth.model import Floats
-from cornersmooth.nc_reader import NcProgram
+from cornersmooth.nc_reader import NcProgram, Problem
 from cornersmooth.nc_reader.block_tables import CHUNK
 from cornersmooth.nc_reader.rotary import LINE_SHARE
 from cornersmooth.settings import Settings
@@ -48,30 +48,22 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Wrong:
-    """Something wrong with the new program: its line, from 1, or 0, and what."""
-
-    line: int
-    text: str
-
-
-@dataclass(frozen=True)
 class Checked:
     """What was found.
 
     Parameters
     ----------
-    wrong : tuple of Wrong
+    wrong : tuple of Problem
     tip, axis_point : float, mm
         Largest deviation.
     """
 
-    wrong: tuple[Wrong, ...]
+    wrong: tuple[Problem, ...]
     tip: float = 0.0
     axis_point: float = 0.0  # NaN where the tool axis has a tolerance of its own
 
 
-def places(old: Reading, new: Reading) -> tuple[list[Place], list[Wrong]]:
+def places(old: Reading, new: Reading) -> tuple[list[Place], list[Problem]]:
     """Find the runs of a program in another one, between lines that must be the same."""
     found: list[Place] = []
     at, behind = 0, 0
@@ -85,7 +77,7 @@ def places(old: Reading, new: Reading) -> tuple[list[Place], list[Wrong]]:
         end = _found(new, after, at, last=k + 1 == len(old.runs))
         if end is None:
             return found, [
-                Wrong(_line(new, at) + 1, f"the lines after line {run.stop} of the old program are not there")
+                _changed(_line(new, at), f"the lines after line {run.stop} of the old program are not there")
             ]
         if new.data[at:end] != old.lines(run.first, run.stop):
             found.append(Place(run, _line(new, at), _line(new, end)))
@@ -111,34 +103,39 @@ def _found(new: Reading, text: bytes, at: int, *, last: bool) -> int | None:
     return None if end < 0 else end
 
 
-def _first_other(old: Reading, new: Reading, line: int, at: int) -> Wrong:
+def _first_other(old: Reading, new: Reading, line: int, at: int) -> Problem:
     """Say which line outside of runs is another one."""
     mine = _line(new, at)
     for step in range(len(old.why) - line):
         if mine + step >= len(new.why) or old.line(line + step) != new.line(mine + step):
-            return Wrong(mine + step + 1, f"line {line + step + 1} of the old program, outside of runs, is another one")
-    return Wrong(mine + 1, "there is more than in the old program")
+            return _changed(mine + step, f"line {line + step + 1} of the old program, outside of runs, is another one")
+    return _changed(mine, "there is more than in the old program")
+
+
+def _changed(line: int, text: str) -> Problem:
+    return Problem("CS591", 0, line + 1, text)
 
 
 def check(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> Checked:
     """Measure the runs that have changed, and compare what holds after each."""
-    wrong: list[Wrong] = []
+    wrong: list[Problem] = []
     largest = [0.0, 0.0]
     for place in where:
         text = _left_otherwise(place.run, new.at[place.stop])
         if text:
-            wrong.append(Wrong(place.stop, text))
+            wrong.append(Problem("CS592", 0, place.stop, f"the program goes on otherwise after the run: {text}"))
     for own in _shared(old, new, where):
         try:
             found, others = _measure(job, *_motions(job, old, new, own))
         except CornersmoothError as error:
-            wrong.append(Wrong(own[0].first + 1, error.what))
+            wrong.append(Problem(error.code, 0, own[0].first + 1, error.what))
             continue
         wrong += others + [
-            Wrong(abs(one.nc_line), one.text.replace("CL file", "old program")) for one in found.problems
+            replace(one, nc_line=abs(one.nc_line), text=one.text.replace("CL file", "old program"))
+            for one in found.problems
         ]
         largest = np.maximum(largest, (found.tip.value, found.axis_point.value)).tolist()  # NaN stays
-    return Checked(tuple(sorted(wrong, key=lambda one: one.line)), *largest)
+    return Checked(tuple(sorted(wrong, key=lambda one: one.nc_line)), *largest)
 
 
 def _shared(old: Reading, new: Reading, where: Sequence[Place]) -> list[list[Place]]:
@@ -167,7 +164,7 @@ def _motions(job: Job, old: Reading, new: Reading, where: Sequence[Place]) -> tu
     )
 
 
-def _measure(job: Job, before: NcProgram, after: NcProgram) -> tuple[Verification, list[Wrong]]:
+def _measure(job: Job, before: NcProgram, after: NcProgram) -> tuple[Verification, list[Problem]]:
     """Measure runs with the same units, and decide whether both motions can be run beside each other."""
     settings = job.settings
     found = verify(
@@ -182,7 +179,7 @@ def _measure(job: Job, before: NcProgram, after: NcProgram) -> tuple[Verificatio
     return found, _apart(before, after, settings)
 
 
-def _apart(before: NcProgram, after: NcProgram, settings: Settings) -> list[Wrong]:
+def _apart(before: NcProgram, after: NcProgram, settings: Settings) -> list[Problem]:
     """Where the motions of two programs cannot be run beside each other within ε, both forward only."""
     own_axis = settings.axis_tolerance is not None
     ways = [written_motion(nc, settings.tolerance, settings.axis_scale, own_axis=own_axis) for nc in (before, after)]
@@ -192,9 +189,8 @@ def _apart(before: NcProgram, after: NcProgram, settings: Settings) -> list[Wron
     lines = np.abs(after.line[new.owner[[one.row for one in found.breaks]]]).tolist()
     if not (found.breaks or found.whole):
         lines = [int(abs(after.line[0]))]
-    return [
-        Wrong(line, "the motion cannot be run beside that of the old program within the tolerance") for line in lines
-    ]
+    text = "the motion cannot be run beside that of the old program within the tolerance"
+    return [Problem("CS523", 0, line, text) for line in lines]
 
 
 def _absolute(text: bytes) -> bytes:

@@ -133,7 +133,7 @@ def filter_program(
         texts.clear()  # as long as the new program
         after = job.reader.read(new, [place.stop for place in where])
         checked = check(job, old, after, where) if verify else Checked(())
-        bad = {p.run.first: one.text for p in where for one in checked.wrong if p.first < one.line <= p.stop}
+        bad = {p.run.first: one.text for p in where for one in checked.wrong if p.first < one.nc_line <= p.stop}
         if not bad:
             seconds = planned_times(job, old, after, where, axes) if axes is not None and where else None
             return _result(old, after, where, why, checked if verify else None, seconds)

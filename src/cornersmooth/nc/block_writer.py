@@ -328,7 +328,7 @@ class BlockWriter:
         for place in np.flatnonzero(np.diff(modes, prepend=self._mode)).tolist():
             self._take_mode(int(modes[place]))
             if self._mode == FeedMode.PER_REVOLUTION and not self.statements.speed:
-                text = "feed per revolution while no spindle speed is given; controls stop there or stand still"
+                text = "feed per revolution while no spindle speed is given: controls stop there or stand still"
                 self._refuse(int(run.move[feeding[place]]), text, "give the spindle its speed in the CL file")
                 self.findings.add("CS324", "warning", int(self.program.line[run.move[feeding[place]]]), text)
             before[int(feeding[place])] = self._block(self.statements.words.feed_mode, self._mode)
@@ -470,7 +470,7 @@ class BlockWriter:
             raise InputError("CS343", what, hint, file=self.program.source.name, line=int(self.program.line[move]))
 
     def _count_missing(self, moves: Ints) -> None:
-        text = "feed move without a feed in the CL file; most controls stop with an alarm, give one with --feed"
+        text = "feed move without a feed in the CL file: most controls stop with an alarm; give one with --feed"
         if self._feed < 0:
             self._refuse(
                 int(moves[0]), "a feed move before any feed, which the control refuses", "give one with --feed"

@@ -103,7 +103,7 @@ class FirstBlock:
         if refused:
             text = (
                 "the first block of a tool leaves the travel from some places of X and Y at the height of the retract; "
-                "move them near the position before, or give [tool_change] X and Y in the machine file"
+                "move X and Y near the position before, or give [tool_change] X and Y in the machine file"
             )
             findings.add("CS391", "warning", self.line, text)
         if any(tip[2] < self.tip[2] - _BELOW for tip in tips):

@@ -42,10 +42,10 @@ class HoleCycles:
         self._args = in_force(self._args, statement.args, self.program)
         self.read(speed)
         if has_fixed_order(statement.args, self.program):
-            text = "numbers of CYCLE without words are read as depth, feed, clearance: positions must be tops of holes"
+            text = "CYCLE without words is read as depth, feed, clearance; see that the positions are tops of holes"
             self.findings.add("CS385", "warning", statement.line, text)
         if self.now is not None and self.now.pecking and not self.now.steps:
-            text = "CYCLE with pecks does not say how deep they are; the holes are drilled in one feed"
+            text = "CYCLE with pecks does not say how deep they are; see that the tool may drill in one feed"
             self.findings.add("CS321", "warning", statement.line, text)
 
     def read(self, speed: float | None) -> None:

@@ -95,7 +95,10 @@ class MotionWarnings:
         """Say that a tool moves that was not loaded, or that is none."""
         if tool is None and not self._said_tool:
             self._said_tool = True
-            text = "the CL file loads no tool before it moves: the tool in the spindle is taken, with length register 1"
+            text = (
+                "the CL file loads no tool before it moves: the tool in the spindle is taken, with length register 1; "
+                "see that it is the right one, or load it with LOADTL"
+            )
             self.findings.add("CS334", "warning", int(self.program.line[pose]), text)
         if tool == 0 and not self._said_zero:
             self._said_zero = True
@@ -106,7 +109,7 @@ class MotionWarnings:
         """Say that a tool cuts while the spindle stands."""
         if not turning and not self._said_spindle:
             self._said_spindle = True
-            text = "the spindle is not started before the first cut of a tool"
+            text = "the spindle is not started before the first cut of a tool; put SPINDL before it"
             self.findings.add("CS335", "warning", int(self.program.line[pose]), text)
 
     def of_turns(self, run: Run, form: Form, angles: Floats) -> None:
@@ -122,6 +125,6 @@ class MotionWarnings:
             names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
             text = (
                 f"words of {names} beyond 0 to 360 deg: a modulo axis takes them only where the builder allows it "
-                "(MD30455 bit 0, else alarm 16830); write modulo = true for the axis in a machine file"
+                "(MD30455 bit 0, else alarm 16830); where not, write modulo = true for the axis in a machine file"
             )
             self.findings.add("CS346", "warning", int(self.program.line[run.move[rows[0]]]), text)

@@ -108,7 +108,7 @@ def plan_planes(
         line = int(program.line[first])
         plane, why = _plane(program.axis[first], settings, form)
         if plane is None:
-            findings.add("CS357", "warning", line, f"no tilted plane: {why}; under tool tip control as other motion")
+            findings.add("CS357", "warning", line, f"no tilted plane: {why}: under tool tip control as other motion")
             continue
         name = (*plane.words.values(), *map(str, [] if plane.angles is None else plane.angles.tolist()))
         number = planes.setdefault(name, len(found))

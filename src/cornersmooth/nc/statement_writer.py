@@ -139,7 +139,7 @@ class StatementWriter:
         return comment_lines(text, layout.comment, layout.comment_orders)
 
     def _not_understood(self, statement: Statement) -> None:
-        text = f"{statement.word} is not translated; written as a comment"
+        text = f"{statement.word} is not translated: written as a comment; see whether the machine needs it"
         self.findings.add("CS310", "warning", statement.line, text)
 
     def load(self, statement: Statement) -> list[str] | None:
@@ -316,7 +316,7 @@ class StatementWriter:
         """END: the end of the text; in the middle of the path a stop."""
         if not (self.program.kind[statement.pose :] != Move.FROM).any():
             return []
-        text = "END comes before the last motion; written as a program stop"
+        text = "END comes before the last motion: written as a program stop; see that this is meant"
         self.findings.add("CS318", "warning", statement.line, text)
         return [*self.comment(statement.text), *self.halt(self.words.stop)]
 
@@ -324,7 +324,7 @@ class StatementWriter:
         """INSERT: text for the NC file; as a comment, since nobody has looked at what it does."""
         text = spoken_text(statement)
         if _NC_WORDS.fullmatch(text):
-            what = "INSERT with NC words is written as a comment; where the machine needs them, put them in by hand"
+            what = "INSERT with NC words is written as a comment; put them in by hand where the machine needs them"
             self.findings.add("CS320", "warning", statement.line, what)
         return self.comment(text)
 

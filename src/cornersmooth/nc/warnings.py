@@ -31,7 +31,7 @@ def add_warnings(form: Form, smoothed: SmoothProgram, circles: Circles, findings
     if form.table.lines.lag and smoothed.settings.lines == "long" and smoothed.settings.method == CURVES_METHOD:
         text = (
             f"{form.control} rounds the corners of lines by itself; lines of the method {CURVES_METHOD} took it 10 to "
-            f"50 % longer, and once it left the tolerance there: use --method {DEFAULT_METHOD}"
+            f"50 % longer, and once it left the tolerance there; use --method {DEFAULT_METHOD}"
         )
         findings.add("CS394", "warning", 0, text)
     for extra in form.extras:
@@ -54,8 +54,8 @@ def _flips(program: Program, findings: Findings) -> None:
     poses, _ = axis_steps(program, rapid_moves(program.kind), FLIP_ANGLE)
     if len(poses):
         text = (
-            f"the tool axis turns by more than {FLIP_ANGLE:g} deg in a rapid; which way a control turns is not "
-            "defined: keep clear of the part there, or insert a pose in between"
+            f"the tool axis turns by more than {FLIP_ANGLE:g} deg in a rapid, and which way a control turns is not "
+            "defined; keep clear of the part there, or insert a pose in between"
         )
         findings.add("CS326", "warning", int(program.line[poses[0]]), text, len(poses))
 

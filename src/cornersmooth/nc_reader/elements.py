@@ -11,6 +11,7 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cornersmooth.errors import message
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Units
 
 #: what the second triple of a motion block is: the tool vector, or a point on the tool axis
@@ -210,6 +211,10 @@ class Problem:
     nc_line: int
     text: str
     amount: float = float("nan")
+
+    def message(self, place: str, beside: str = "") -> str:
+        """Give it as it is printed, with another place in brackets."""
+        return message("error", self.text, code=self.code, place=place, beside=beside)
 
 
 @dataclass(frozen=True, kw_only=True)

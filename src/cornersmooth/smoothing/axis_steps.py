@@ -39,7 +39,7 @@ def refuse_flips(program: Program) -> None:
     if len(pose):
         raise InputError(
             "CS183",
-            f"the tool axis turns by {turn[0]:.4g} deg in one move; which way a control turns is not defined",
+            f"the tool axis turns by {turn[0]:.4g} deg in one move, and which way a control turns is not defined",
             "insert a pose in between",
             file=program.source.name,
             line=int(program.line[pose[0]]) or None,
@@ -53,7 +53,7 @@ def axis_step_findings(program: Program, settings: Settings) -> tuple[Finding, .
         return ()
     text = (
         f"the tool axis turns by more than {settings.max_axis_step:g} deg in one move, by {turn.max():.4g} deg at "
-        "most; corners beside it stay sharp, insert poses in between"
+        "most, and corners beside it stay sharp; insert poses in between"
     )
     return (Finding("CS184", "warning", int(program.line[pose[0]]), text, len(pose)),)
 

@@ -26,6 +26,6 @@ def half_turns(program: Program) -> list[Problem]:
     for pose, degrees in zip(poses.tolist(), np.degrees(turn).tolist(), strict=True):
         if degrees <= FLIP_ANGLE + 1e-9:
             continue
-        text = f"the tool axis turns by {degrees:.4g} deg in one move; which way a control turns is not defined"
+        text = f"the tool axis turns by {degrees:.4g} deg in one move, and which way a control turns is not defined"
         problems.append(Problem("CS526", int(program.line[pose]), 0, text))
     return problems
