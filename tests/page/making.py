@@ -66,7 +66,7 @@ def values_of(page: str) -> tuple[dict[str, object], dict[str, np.ndarray]]:
     meta = json.loads(re.search(r'<script type="application/json" id="values">(.*?)</script>', page, re.S)[1])
     packed = re.search(r'<script type="application/octet-stream" id="arrays">(.*?)</script>', page, re.S)[1]
     data = gzip.decompress(base64.b64decode(packed))
-    kinds = {"f4": "<f4", "i4": "<i4", "i2": "<i2", "u1": "u1"}
+    kinds = {"f4": "<f4", "i4": "<i4", "u1": "u1"}
     arrays = {}
     for key, entry in meta["arrays"].items():
         count = entry["count"] * entry["width"]

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from page.making import HOSTILE, page_of, smoothed
+from oracle.command import run
+from page.making import HOSTILE, PATH, page_of, smoothed
 
 pytestmark = pytest.mark.browser
 
@@ -157,11 +158,15 @@ def test_a_page_is_drawn_and_can_be_driven(looked):
     first = looked.canvas()
     assert colours(first) > 8
     looked.keep("path")
-    assert page.inner_text("#verdict").startswith("PASSED, 2 to check: within 0.02 mm everywhere; 1 corner stays sharp")
-    assert page.inner_text("#badge") == "PASSED"
+    # word and sentence are those of the terminal, once
+    said = f"{page.inner_text('#badge')}: {page.inner_text('#verdict')}"
+    assert said == page.evaluate("() => cornersmooth.meta.verdict")
+    assert said.startswith("PASSED, 2 to check: within 0.02 mm everywhere; 1 corner stays sharp")
+    head = page.inner_text("header .line >> nth=0").split()
+    assert {"part.cls", "fanuc", "g1", "0.02", "10"} <= set(head)
     # the first corner of the list is the sharp one: a click goes there and fills the panel
     before = looked.camera()
-    row = page.locator("#rows .row").first
+    row = page.locator("#list .row").first
     assert row.inner_text().startswith("sharp: reversal")
     row.click()
     looked.settle()
@@ -171,7 +176,7 @@ def test_a_page_is_drawn_and_can_be_driven(looked):
     corner = np.array(page.evaluate("() => Array.from(cornersmooth.arrays.c_tip.subarray(0, 3))"))
     assert np.linalg.norm(target - corner) < 1e-6
     panel = page.inner_text("#panel")
-    for word in ("sharp: reversal", "CL line", "12", "NC line", "turn", "176"):
+    for word in ("worst corner, sharp: reversal", "CL 12, NC ", "turn", "176"):
         assert word in panel
     # the tool is at the corner, too; the slider takes it away
     assert np.linalg.norm(looked.tool() - corner) < 0.2
@@ -289,15 +294,28 @@ def test_narrow_and_dark_are_usable(phone):
     assert pixels[5, 5].max() < 60  # a dark ground
     assert colours(pixels) > 8
     assert page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(20, 23, 27)"
-    for name in ("#stage", "#drive", "#charts", "#side"):
+    for name in ("#problems", "#stage", "#drive", "#panel", "#charts", "#corners"):
         page.locator(name).scroll_into_view_if_needed()
         box = page.locator(name).bounding_box()
         assert box["width"] > 350
         assert box["height"] > 35
-    page.locator("#rows .row").first.tap()
+    page.locator("#list .row").first.tap()
     looked.settle()
     assert "sharp: reversal" in page.inner_text("#panel")
     page.evaluate("() => scrollTo(0, 0)")
+    looked.settle()
+    # half of the height is left to scroll by, and fingers need 44 pixels
+    assert page.locator("#stage").bounding_box()["height"] <= 0.5 * 844
+    page.locator("#tools summary").tap()
+    page.locator("#list .row.group").first.tap()
+    sizes = page.evaluate(
+        """() => Array.from(document.querySelectorAll("button, select, summary, #slider, #tools label"), node =>
+        [node.outerHTML.slice(0, 60), node.offsetWidth || 99, node.offsetHeight || 99])"""
+    )
+    assert len(sizes) > 20
+    assert [size for size in sizes if min(size[1:]) < 44] == []
+    page.locator("#list .row.group").first.tap()
+    page.locator("#tools summary").tap()
     looked.settle()
     looked.keep("narrow-dark")
     page.emulate_media(color_scheme="light")
@@ -400,7 +418,7 @@ def test_slow_pictures_make_the_view_coarser(looked):
 
 def test_lines_near_a_place_of_a_long_path_are_wide(looked):
     page = looked.page
-    page.locator("#rows .row").first.click()
+    page.locator("#list .row").first.click()
     looked.settle()
     page.evaluate("() => cornersmooth.view.lookNear()")
     near, far = page.evaluate(
@@ -416,31 +434,137 @@ def test_lines_near_a_place_of_a_long_path_are_wide(looked):
     assert page.evaluate("() => cornersmooth.view.near.original.geometry.type") == "LineSegmentsGeometry"
 
 
-def test_the_list_of_corners_is_filtered_and_stepped_through(looked):
+def test_corners_are_grouped_by_kind_and_amount(look):
+    """18 right angles that are alike and a reversal: the sharp one first, and one row for the others."""
+    points = [(2.0 * k, 2.0 * (k % 2)) for k in range(20)] + [(36.0, 0.1)]
+    path = "TOOL PATH/{name},TOOL,T\n$$ {comment}\nFEDRAT/MMPM,1500.0\n"
+    path += "".join(f"GOTO/{x},{y},0.0,0.0,0.0,1.0\n" for x, y in points) + "END-OF-PATH\n"
+    looked = look(page_of(smoothed(path)))
     page = looked.page
-    every = page.evaluate("() => cornersmooth.corners.shown.length")
-    page.locator("#filters button", has_text="sharp").click()
-    assert page.evaluate("() => cornersmooth.corners.shown.length") == 1
-    assert page.locator("#rows .row").count() == 1
-    page.locator("#filters button", has_text="all").click()
-    assert page.evaluate("() => cornersmooth.corners.shown.length") == every
-    chosen = "() => cornersmooth.corners.shown.indexOf(cornersmooth.corners.selected)"
+    rows = page.locator("#list .row")
+    assert rows.count() == 2
+    assert rows.first.inner_text().startswith("sharp: reversal")
+    groups = page.locator("#list .row.group")
+    name, count, turn, off = groups.first.locator("> span").all_inner_texts()
+    assert (name.split(":")[0], count, turn) == ("rounded", "18 ×", "90°")
+    largest = page.evaluate(
+        "() => Math.max(...cornersmooth.arrays.c_off.slice(1), ...cornersmooth.arrays.c_axis_off.slice(1))"
+    )
+    assert off == f"≤ {largest:.4f}"
+    assert page.inner_text("#corners h2") == "19 corners"
+    # an open group has its corners, and keys step through all of them in order
+    groups.first.click()
+    assert groups.first.get_attribute("aria-expanded") == "true"
+    assert page.locator("#list .row:not(.group)").count() == 1 + 18
+    groups.first.click()
+    assert rows.count() == 2
+    chosen = "() => cornersmooth.corners.selected"
     page.locator("#list").focus()
-    for key, place in (
-        ("ArrowDown", 0),
-        ("ArrowDown", 1),
-        ("ArrowDown", 2),
-        ("ArrowUp", 1),
-        ("n", 2),
-        ("p", 1),
-        ("PageDown", every - 1),
-    ):
+    for key, place in (("ArrowDown", 1), ("ArrowDown", 2), ("ArrowUp", 1), ("n", 2), ("p", 1), ("PageDown", 11)):
         page.keyboard.press(key)
         assert page.evaluate(chosen) == place, key
-    assert page.locator("#rows .row[aria-selected=true]").count() == 1
+    assert page.locator("#list .row[aria-pressed=true]").count() == 1
     # settings, versions and notes are behind a fold
     page.locator("#about summary").click()
     assert "cornersmooth" in page.inner_text("#facts")
+
+
+@pytest.fixture(scope="module")
+def wrong(tmp_path_factory) -> tuple[str, int, int]:
+    """Page of a program with a vertex moved by 0.3 mm and, later, another feed; the lines of both."""
+    folder = tmp_path_factory.mktemp("wrong")
+    source, nc, page = folder / "part.cls", folder / "part.nc", folder / "wrong.html"
+    source.write_text(PATH.format(name="PART", comment="none"))
+    assert run("smooth", source, "-e", "0.02", "-o", nc, "-q").returncode == 0
+    lines = nc.read_text().splitlines()
+    moved = next(k for k, line in enumerate(lines) if "Y15.0000" in line)
+    lines[moved] = lines[moved].replace("Y15.0000", "Y15.3000")
+    last = max(k for k, line in enumerate(lines) if line.startswith("G1"))
+    lines[last] += " F1900."
+    nc.write_text("\n".join(lines) + "\n")
+    assert run("verify", source, nc, "-e", "0.02", "--report", page).returncode == 1
+    return page.read_text(), moved + 1, last + 1
+
+
+def test_the_first_problem_is_open_and_looked_at(look, wrong):
+    text, moved, last = wrong
+    looked = look(text, width=1400, height=900)
+    page = looked.page
+    assert page.inner_text("#badge") == "FAILED"
+    assert page.inner_text("#title") == "part.nc"
+    problems = page.evaluate("() => cornersmooth.meta.problems")
+    wrong_ones = [problem["nc_line"] for problem in problems if problem["severity"] == "error"]
+    assert wrong_ones[0] == moved
+    assert last in wrong_ones
+    assert wrong_ones == sorted(wrong_ones)
+    assert [problem["severity"] for problem in problems] == ["error"] * len(wrong_ones) + ["warning"] * (
+        len(problems) - len(wrong_ones)
+    )
+    # they are in sight, above the corners, and the first is chosen
+    buttons = page.locator("#problems button")
+    assert f"NC line {moved}" in buttons.first.inner_text()
+    assert [node.get_attribute("aria-pressed") for node in buttons.all()] == ["true"] + ["false"] * (len(problems) - 1)
+    first, corners = page.locator("#problems").bounding_box(), page.locator("#corners").bounding_box()
+    assert 0 <= first["y"] < corners["y"]
+    # the view is there, so is the tool; both paths are drawn enlarged, what is off in its own colour
+    target = np.array(page.evaluate("() => cornersmooth.view.eye.controls.target.toArray()"))
+    centre = np.array(page.evaluate("() => cornersmooth.meta.centre"))
+    assert abs((target + centre)[1] - 15.3) < 0.02
+    assert np.linalg.norm(looked.tool() - target) < 1e-3
+    assert np.linalg.norm(looked.camera() - target) < 5.0
+    assert "L" in page.get_attribute("#panel .out", "d")
+    assert page.locator("#chart option:checked").inner_text() == "deviation"
+    looked.keep("wrong")
+    # another one is a click away
+    buttons.nth(wrong_ones.index(last)).click()
+    looked.settle()
+    assert f"NC line {last}" in page.inner_text("#panel h2")
+    assert np.linalg.norm(page.evaluate("() => cornersmooth.view.eye.controls.target.toArray()") - target) > 1.0
+
+
+def test_the_view_is_most_of_a_wide_window_and_the_part_fills_it(look, text):
+    looked = look(text, width=1400, height=900)
+    box = looked.page.locator("#stage").bounding_box()
+    assert box["width"] * box["height"] > 0.5 * 1400 * 900
+    assert looked.page.evaluate("() => document.documentElement.scrollHeight") <= 900
+    pixels = looked.canvas().astype(int)
+    drawn = np.abs(pixels - pixels[-3, -3]).max(axis=2) > 24
+    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    shares = (np.ptp(rows) / pixels.shape[0], np.ptp(columns) / pixels.shape[1])
+    assert max(shares) > 0.75
+    # nothing is wrong: the worst corner is marked in the whole and enlarged beside it
+    corner = np.array(looked.page.evaluate("() => Array.from(cornersmooth.arrays.c_tip.subarray(0, 3))"))
+    ring = "() => Array.from(cornersmooth.view.ring.geometry.getAttribute('position').array)"
+    np.testing.assert_allclose(looked.page.evaluate(ring), corner, atol=1e-6)
+    assert "worst corner" in looked.page.inner_text("#panel")
+    assert looked.page.get_attribute("#panel .before", "d").count("L") >= 1
+
+
+def test_paper_has_everything_in_sight_and_a_photograph_of_the_view(look, wrong):
+    looked = look(wrong[0], scheme="dark")
+    page = looked.page
+    looked.settle()
+    printed = page.pdf(format="A4")
+    assert 1 <= printed.count(b"/Type /Page\n") + printed.count(b"/Type /Page ") + printed.count(b"/Type /Page/") <= 4
+    photo = page.evaluate(
+        """() => { const photo = document.getElementById("photo"); const { width, height } = photo;
+        const pixels = photo.getContext("2d").getImageData(0, 0, width, height).data;
+        return [width, height, pixels[0], new Set(pixels).size]; }"""
+    )
+    assert photo[0] > 300
+    assert photo[2] > 200  # paper is white, though the screen is dark
+    assert photo[3] > 20
+    assert page.evaluate("() => document.documentElement.className") == ""
+    page.emulate_media(media="print")
+    shown = page.evaluate(
+        """() => Object.fromEntries(["problems", "photo", "panel", "list", "tools", "drive", "canvas"].map(id =>
+        [id, document.getElementById(id).offsetHeight > 0]))"""
+    )
+    assert [name for name, there in shown.items() if there] == ["problems", "photo", "panel", "list"]
+    charts = page.evaluate("() => cornersmooth.charts.plots.map(plot => plot.root.offsetHeight)")
+    assert len(charts) == 3
+    assert min(charts) > 80
+    assert page.evaluate("() => getComputedStyle(document.querySelector('.problem')).breakInside") == "avoid"
 
 
 def test_pace_of_the_drive(looked):

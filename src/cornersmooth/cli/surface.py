@@ -90,7 +90,7 @@ def command(source: str, text: str, **given: Any) -> int:
     )
     for path in given["reports"]:
         with open_output(target_of(path)) as output:
-            for part in _report(path, program, data, nc, found, given):
+            for part in _report(path, program, data, text, nc, found, given):
                 output.stream.write(part)
     if given["as_json"]:
         say_json(found.as_dict())
@@ -118,7 +118,9 @@ def _tool(program: Program, asked: Tool | None) -> Tool:
     raise SettingsError("CS272", what, "say the tool's shape, as in --tool 10,5", file=program.source.name)
 
 
-def _report(path: str, program: Program, source: bytes, nc: Any, found: SurfaceMap, given: dict[str, Any]) -> Any:
+def _report(
+    path: str, program: Program, source: bytes, text: str, nc: Any, found: SurfaceMap, given: dict[str, Any]
+) -> Any:
     """Parts of a report, as bytes."""
     from cornersmooth.report import report_json
     from cornersmooth.report.surface import draw_surface, surface_csv
@@ -134,6 +136,8 @@ def _report(path: str, program: Program, source: bytes, nc: Any, found: SurfaceM
         from cornersmooth.verify import verify
 
         checked = verify(program, nc, tolerance=given["tolerance"], axis_length=given["axis_length"])
-        yield verified_page(program, nc, checked, source=source, surface=found).encode("utf-8")
+        name, control = "" if text == STANDARD else text, nc_text.control_of(given).name
+        page = verified_page(program, nc, checked, name=name, control=control, source=source, surface=found)
+        yield page.encode("utf-8")
     else:
         yield draw_surface(found, suffix[1:])

@@ -152,9 +152,18 @@ def command(source: str, text: str, **given: Any) -> int:
     if pages:
         from cornersmooth.page import verified_page
 
-        text_read, planner = _read_for_page(nc, given, reader), nc_text.control_of(given).lines.planner
+        text_read, control = _read_for_page(nc, given, reader), nc_text.control_of(given)
         page = verified_page(
-            program, text_read, found, source=data, machine=how["machine"], planner=planner, tool=given["tool"]
+            program,
+            text_read,
+            found,
+            name=text if text != STANDARD else "",
+            control=control.name,
+            form=head.form or "",
+            source=data,
+            machine=how["machine"],
+            planner=control.lines.planner,
+            tool=given["tool"],
         )
         for path in pages:
             _write(path, [page])

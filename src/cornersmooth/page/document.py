@@ -26,6 +26,8 @@ _SCRIPTS = (
     "metal.js",
     "view.js",
     "charts.js",
+    "places.js",
+    "problems.js",
     "corners.js",
     "drive.js",
     "wiring.js",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: types that a browser has arrays of, by the name of the page
-_TYPES = {"f4": np.float32, "i4": np.int32, "i2": np.int16, "u1": np.uint8}
+_TYPES = {"f4": np.float32, "i4": np.int32, "u1": np.uint8}
 
 #: starts of arrays are multiples of this: typed arrays want to be aligned
 _ALIGNED = 4
@@ -25,9 +25,7 @@ class Pack:
         self.table: dict[str, dict[str, Any]] = {}
 
     def add(self, name: str, values: NDArray[Any], kind: str) -> None:
-        """Add an array (n,) or (n, w) as ``"f4"``, ``"i4"``, ``"i2"`` (unit vectors times 32767) or ``"u1"``."""
-        if kind == "i2":
-            values = np.round(np.clip(values, -1.0, 1.0) * 32767.0)
+        """Add an array (n,) or (n, w) as ``"f4"``, ``"i4"`` or ``"u1"``."""
         data = np.ascontiguousarray(values, dtype=np.dtype(_TYPES[kind]).newbyteorder("<")).tobytes()
         width = 1 if values.ndim == 1 else values.shape[1]
         self.table[name] = {"type": kind, "at": self._length, "count": len(values), "width": width}

@@ -6,19 +6,20 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from cornersmooth.errors import Finding
 from cornersmooth.feedrate import Comparison, Limits
 from cornersmooth.kinematics import Machine, with_dynamics
-from cornersmooth.model import Move, Program
+from cornersmooth.model import Program
 from cornersmooth.nc import Frame, choose_form, write
 from cornersmooth.nc_reader import NcProgram, read_nc
-from cornersmooth.page.document import document
-from cornersmooth.page.scene import Story, Subject, scene
+from cornersmooth.page.document import page
+from cornersmooth.page.scene import Story, Subject
 from cornersmooth.report.surface import passes_text
-from cornersmooth.report.verdict import Saving, first_line, judge, saving_text, times_text, trusted_blocks
+from cornersmooth.report.verdict import Saving, first_line, judge, times_text, trusted_blocks
 from cornersmooth.saving import planned_saving
 from cornersmooth.settings import Settings
 from cornersmooth.surface.tool import Tool
@@ -62,11 +63,10 @@ def page_and_saving(
         Instead of that of the file.
     """
     smoothed, form, settings = result.smoothed, result.form, result.smoothed.settings
-    nc = read_written(result, frame)
     limits, axes = limits or Limits(), form.machine if axes is None else axes
     subject = Subject(
         program=result.program,
-        nc=nc,
+        nc=read_written(result, frame),
         settings=settings,
         verification=result.verification,
         smoothed=smoothed,
@@ -76,22 +76,19 @@ def page_and_saving(
         planner=form.table.lines.planner,
         tool=tool,
     )
-    contents = result.report()
-    facts = [
-        *_input_facts(result.program, source),
-        ("control and form", f"{form.table.name}, {form.name}" + (f", {form.machine.name}" if form.machine else "")),
-        *_settings_facts(settings),
-        *_limit_facts(limits, axes),
-    ]
-    badge = result.verdict
-    notes = [f"{finding.severity}, line {finding.line}: {finding.text}" for finding in result.findings[:_MOST_NOTES]]
-
-    meta, pack = scene(subject, Story(result.program.source.name, "", badge, facts, notes))
-    saving = None
+    badge, saving = result.verdict, None
     if timed and badge not in (Verdict.FAILED, Verdict.NOT_VERIFIED):
         saving = planned_saving(result.program, settings, form, limits, axes)
-    meta["verdict"] = first_line(contents, saving)
-    return document(meta, pack), saving
+    story = Story(
+        _name(result.path) or result.program.source.name,
+        first_line(result.report(), saving),
+        badge,
+        _head(subject, form.table.name, form.name, form.machine),
+        _problems(result.verification, result.findings),
+        [*_input_facts(result.program, source), *_settings_facts(settings), *_limit_facts(limits, axes)],
+        _notes(result.findings),
+    )
+    return page(subject, story), saving
 
 
 def read_written(result: Result, frame: Frame | None = None) -> NcProgram:
@@ -113,6 +110,9 @@ def verified_page(
     nc: NcProgram,
     found: Verification,
     *,
+    name: str = "",
+    control: str = "",
+    form: str = "",
     source: bytes = b"",
     limits: Limits | None = None,
     machine: Machine | None = None,
@@ -120,7 +120,10 @@ def verified_page(
     tool: Tool | None = None,
     surface: SurfaceMap | None = None,
 ) -> str:
-    """Page of a text that somebody wrote, measured against its CL file; with a map of the surface if there is one."""
+    """Page of a program that somebody wrote, measured against its CL file; with a map of the surface if there is one.
+
+    `name`, `control` and `form` are those of the program, as far as they are known.
+    """
     settings = Settings(tolerance=found.tolerance, **_second_of(found))
     limits = Limits() if limits is None else limits
     subject = Subject(
@@ -134,25 +137,16 @@ def verified_page(
         tool=tool if surface is None else surface.tool,
         surface=surface,
     )
-    facts = [
-        *_input_facts(program, source),
-        ("tolerance ε", f"{found.tolerance:g} mm"),
-        _second_fact(found.axis_length, found.axis_tolerance),
-        *_measured_facts(found),
-        *_limit_facts(limits, machine),
-    ]
-    judgement = judge(found, (*program.findings, *trusted_blocks(found)))
+    findings = (*program.findings, *trusted_blocks(found))
+    judgement = judge(found, findings)
+    facts = [*_input_facts(program, source), *_measured_facts(found), *_limit_facts(limits, machine)]
     text = judgement.text
     if surface is not None:
         text += "; " + surface_text(surface)
         facts[-1:-1] = [("tool", surface.tool.describe()), ("cutting edge", f"{surface.edge:g} mm")]
-    notes = [f"CL line {item.cl_line}, NC line {item.nc_line}: {item.text}" for item in found.problems[:_MOST_NOTES]]
-
-    def sentence(seconds: Mapping[str, float]) -> str:
-        saving = _saving(seconds, program) if surface is None else None
-        return text if saving is None else f"{text}; {saving_text(saving)}"
-
-    return _page(subject, Story(program.source.name, "", judgement.verdict, facts, notes), sentence)
+    head = _head(subject, control, form, machine)
+    told = _problems(found, findings), facts, _notes(findings)
+    return page(subject, Story(_name(name) or program.source.name, text, judgement.verdict, head, *told))
 
 
 def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None = None) -> str:
@@ -168,15 +162,13 @@ def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None =
     written = stream.getvalue()
     nc = read_nc(written, tolerance=tolerance, axis_length=settings.axis_scale)
     found = verify(program, written, tolerance=tolerance, axis_length=settings.axis_length, axis_tolerance=own)
-    method = settings.method
-    laws = {"direct": compared.laws["direct_velocity_jump"], "local": compared.laws[method]}
     subject = Subject(
         program=program,
         nc=nc,
         settings=settings,
         verification=found,
         smoothed=smoothed,
-        laws=laws,
+        laws={"direct": compared.laws["direct_velocity_jump"]},
         limits=compared.limits,
         machine=compared.machine,
         tool=tool,
@@ -187,13 +179,14 @@ def times_page(compared: Comparison, *, source: bytes = b"", tool: Tool | None =
         *((f"time, {name.replace('_', ' ')}", f"{law.total:.3f} s") for name, law in compared.laws.items()),
         *_limit_facts(compared.limits, compared.machine),
     ]
-    methods = [name for name in compared.laws if not name.startswith("direct")]
-    text = times_text(compared.seconds, methods)
-    return _page(subject, Story(program.source.name, text, found.verdict, facts), lambda seconds: text)
+    text = times_text(compared.seconds, [name for name in compared.laws if not name.startswith("direct")])
+    head = _head(subject, form.table.name, form.name, compared.machine)
+    told = _problems(found, program.findings), facts, _notes(program.findings)
+    return page(subject, Story(program.source.name, text, found.verdict, head, *told))
 
 
-#: findings or problems that are told as notes
-_MOST_NOTES = 50
+#: problems and findings that a page lists
+_MOST_PROBLEMS = 100
 
 
 def surface_text(surface: SurfaceMap) -> str:
@@ -206,17 +199,43 @@ def surface_text(surface: SurfaceMap) -> str:
     return f"the surface is overcut by up to {over:.4f} mm and undercut by up to {under:.4f} mm{share}{rows}"
 
 
-def _saving(seconds: Mapping[str, float], program: Program) -> Saving | None:
-    """Both times, where they are of the same: the text drills its holes, which the CL file only names."""
-    if not {"direct", "written"} <= set(seconds) or (program.kind == Move.HOLE).any():
-        return None
-    return Saving(seconds["direct"], seconds["written"])
+def _name(path: str | None) -> str:
+    return os.path.basename(path or "")
 
 
-def _page(subject: Subject, story: Story, sentence: Any) -> str:
-    meta, pack = scene(subject, story)
-    meta["verdict"] = sentence(meta["totals"])
-    return document(meta, pack)
+def _head(subject: Subject, control: str, form: str, machine: Machine | None) -> list[tuple[str, str]]:
+    """Labels and values of what is always in sight; what is not known is left out."""
+    settings, own = subject.settings, subject.settings.axis_tolerance
+    facts = [
+        ("CL file", subject.program.source.name),
+        ("control", control),
+        ("form", form),
+        ("machine", machine.name if machine else ""),
+        ("tolerance", f"{settings.tolerance:g} mm"),
+        ("axis length", f"{settings.axis_length:g} mm") if own is None else ("axis tolerance", f"{own:g}°"),
+    ]
+    return [(label, value) for label, value in facts if value]
+
+
+def _problems(found: Verification | None, findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """Problems in the order of the program, then warnings: those to check first."""
+    rows = [] if found is None else [("error", one.nc_line, one.cl_line, one.text, one.code) for one in found.problems]
+    told = sorted((one for one in findings if one.severity != "note"), key=lambda one: not one.to_check)
+    rows += [(one.severity, 0, one.line, _text(one), one.code) for one in told]
+    count = len(told) + (0 if found is None else found.problem_count)
+    if count > _MOST_PROBLEMS:
+        rows[_MOST_PROBLEMS:] = [("note", 0, 0, f"{count - _MOST_PROBLEMS:,} more; a JSON report lists them", "")]
+    keys = ("severity", "nc_line", "cl_line", "text", "code")
+    return [dict(zip(keys, row, strict=True)) for row in rows]
+
+
+def _notes(findings: Iterable[Finding]) -> list[str]:
+    notes = (one for one in findings if one.severity == "note")
+    return [f"{f'CL line {one.line}: ' if one.line else ''}{_text(one)}" for one in notes]
+
+
+def _text(finding: Finding) -> str:
+    return finding.text + (f" ({finding.count:,} times)" if finding.count > 1 else "")
 
 
 def _input_facts(program: Program, source: bytes) -> list[tuple[str, str]]:
@@ -227,8 +246,6 @@ def _input_facts(program: Program, source: bytes) -> list[tuple[str, str]]:
 
 def _settings_facts(settings: Settings) -> list[tuple[str, str]]:
     return [
-        ("tolerance ε", f"{settings.tolerance:g} mm"),
-        _second_fact(settings.axis_length, settings.axis_tolerance),
         ("method", settings.method),
         ("reversals", f"sharp above {settings.reversal_angle:g}°"),
     ]
@@ -238,13 +255,6 @@ def _second_of(found: Verification) -> dict[str, Any]:
     """What the axis had to keep, as `Settings` take it."""
     own = found.axis_tolerance
     return {"axis_length": found.axis_length} if own is None else {"axis_tolerance": own}
-
-
-def _second_fact(axis_length: float, axis_tolerance: float | None) -> tuple[str, str]:
-    """What is kept besides the tip."""
-    if axis_tolerance is None:
-        return "axis length H", f"{axis_length:g} mm"
-    return "axis tolerance", f"{axis_tolerance:g}°, drawn in mm so that it is ε"
 
 
 def _measured_facts(found: Verification) -> list[tuple[str, str]]:

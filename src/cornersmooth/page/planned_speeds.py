@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.errors import InputError, SettingsError
-from cornersmooth.feedrate import Limits, TimeLaw, direct, plan, plan_text
+from cornersmooth.feedrate import Limits, TimeLaw, direct, plan_text
 from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine, endless, with_dynamics
-from cornersmooth.model import Floats, Program, SmoothProgram
+from cornersmooth.model import Floats, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.report.paths import OriginalPath, WrittenPath
 from cornersmooth.rotary import rapid_moves, rotary_angles
@@ -34,7 +34,7 @@ class Planned:
     Parameters
     ----------
     laws : mapping of str to TimeLaw
-        ``"direct"``, ``"local"`` (the ideal curves), ``"written"`` (the text); those that were planned.
+        ``"direct"`` (the original path), ``"written"`` (the program); those that were planned.
     ways : mapping of str to ((k,) float64, (k,) float64)
         For each law path coordinates, ascending, and the way along the original path there, mm.
     seconds : (m,) float64 or None
@@ -53,7 +53,6 @@ def plan_all(
     program: Program,
     original: OriginalPath,
     *,
-    smoothed: SmoothProgram | None,
     written: WrittenPath | None,
     nc: NcProgram | None,
     limits: Limits,
@@ -68,20 +67,14 @@ def plan_all(
     seconds = None
     machine = with_dynamics(machine)
     try:
-        for name, moves in (
-            ("direct", len(program)),
-            ("local", len(program)),
-            ("written", 0 if nc is None else len(nc)),
-        ):
-            if name in laws or (name == "local" and smoothed is None) or (name == "written" and nc is None):
+        for name, moves in (("direct", len(program)), ("written", 0 if nc is None else len(nc))):
+            if name in laws or (name == "written" and nc is None):
                 continue
             if moves > MOST_MOVES:
                 left_out.append(f"The {name} path has {moves:,} moves; its speed is planned up to {MOST_MOVES:,}.")
             elif name == "direct":
                 machine = _that_follows(machine, program, settings)
                 laws[name] = direct(program, limits, "velocity_jump", settings=settings, machine=machine)
-            elif name == "local" and smoothed is not None:
-                laws[name] = plan(smoothed, limits, machine=machine)
             elif nc is not None:
                 laws[name] = plan_text(nc, limits, settings=settings, machine=machine)
     except SettingsError as refused:
@@ -118,50 +111,61 @@ def feed_seconds(written: WrittenPath, rapid: float) -> Floats:
     return np.cumsum(60.0 * step / feed)
 
 
-def speeds_along(planned: Planned, name: str, steps: Floats, order: int = 1) -> Floats:
-    """Lowest and highest speed, mm/min, between neighbouring places (k + 1,) on the original: (2 k,); NaN in rapids.
-
-    With `order` 2 acceleration along the path, mm/s².
-    """
+def clock(planned: Planned, name: str, ways: Floats) -> Floats:
+    """When a motion passes places (k,) of the original path, s."""
     law, (coordinate, way) = planned.laws[name], planned.ways[name]
-    count = len(steps) - 1
     # the map may be vertical where the original is only turned: a little slope keeps it one to one
-    looks = np.interp(np.linspace(0.0, count, count * _LOOKS, endpoint=False), np.arange(count + 1), steps)
-    at = np.interp(looks, way + 1e-9 * np.arange(len(way)), coordinate)
-    speed = _path_speed(law, at, law.times_at(at), order).reshape(count, _LOOKS)
-    found = np.empty((count, 2))
-    low, high = np.nan_to_num(speed, nan=np.inf), np.nan_to_num(speed, nan=-np.inf)
-    early = low.argmin(axis=1) < high.argmax(axis=1)
-    bottom, top = low.min(axis=1), high.max(axis=1)
-    found[:, 0], found[:, 1] = np.where(early, bottom, top), np.where(early, top, bottom)
-    return np.where(np.isfinite(found), found, np.nan).ravel()
+    return law.times_at(np.interp(ways, way + 1e-9 * np.arange(len(way)), coordinate))
 
 
-def speeds_over(law: TimeLaw, times: Floats, order: int = 1) -> Floats:
-    """Speed, mm/min, at times (k,) s; NaN in rapids and after the end. With `order` 2 acceleration, mm/s²."""
-    speed = _path_speed(law, law.kinematics(times)[0], times, order)
-    return np.where(times <= law.total, speed, np.nan)
+def speeds_along(planned: Planned, name: str, steps: Floats) -> Floats:
+    """Lowest and highest speed, mm/min, between neighbouring places (k + 1,) on the original: (2 k,); NaN in rapids."""
+    return _ends(speeds_over(planned.laws[name], clock(planned, name, _looks(steps))))
 
 
-def axis_loads(law: TimeLaw, times: Floats) -> tuple[tuple[str, ...], Floats]:
-    """Names of a machine's axes, and their speeds (5, k) in per cent of their limits; axes without one are left out."""
-    if law.machine_axes is None:
-        return (), np.zeros((0, len(times)))
-    limit = law.machine_axes.limits[0]
-    own = np.flatnonzero(np.isfinite(limit))
-    speed = np.abs(law.axes_at(times)[1]).T
-    load = 100.0 * speed[own] / limit[own, None]
-    feeding = np.isfinite(speeds_over(law, times))
-    return tuple(law.machine_axes.names[index] for index in own), np.where(feeding, load, np.nan)
-
-
-def _path_speed(law: TimeLaw, at: Floats, times: Floats, order: int) -> Floats:
-    speed = (60.0 if order == 1 else 1.0) * law.kinematics(times)[order]
+def speeds_over(law: TimeLaw, times: Floats) -> Floats:
+    """Speed, mm/min, at times (k,) s; NaN in rapids and after the end."""
+    at, speed = law.kinematics(times)[:2]
     path = law.path
-    if not len(path):
-        return speed
-    element = np.clip(np.searchsorted(law.edge, at, side="right") - 1, 0, len(path) - 1)
-    return np.where(path.rapid[element], np.nan, np.where(path.turning[element], 0.0, speed))
+    if len(path):
+        element = np.clip(np.searchsorted(law.edge, at, side="right") - 1, 0, len(path) - 1)
+        speed = np.where(path.rapid[element], np.nan, np.where(path.turning[element], 0.0, speed))
+    return np.where(times <= law.total, 60.0 * speed, np.nan)
+
+
+def loads_along(planned: Planned, name: str, steps: Floats) -> dict[str, Floats]:
+    """As `axis_loads`, lowest and highest between neighbouring places (k + 1,) on the original: (2 k,) each."""
+    loads = axis_loads(planned.laws[name], clock(planned, name, _looks(steps)))
+    return {axis: _ends(load) for axis, load in loads.items()}
+
+
+def axis_loads(law: TimeLaw, times: Floats) -> dict[str, Floats]:
+    """Speeds (k,) of a machine's axes in per cent of their limits; axes without one are left out."""
+    if law.machine_axes is None:
+        return {}
+    limit = law.machine_axes.limits[0]
+    speed = np.abs(law.axes_at(times)[1]).T
+    feeding = np.isfinite(speeds_over(law, times))
+    return {
+        law.machine_axes.names[index]: np.where(feeding, 100.0 * speed[index] / limit[index], np.nan)
+        for index in np.flatnonzero(np.isfinite(limit)).tolist()
+    }
+
+
+def _looks(steps: Floats) -> Floats:
+    """Places where each step between (k + 1,) places is looked at: (`_LOOKS` k,)."""
+    count = len(steps) - 1
+    return np.interp(np.linspace(0.0, count, count * _LOOKS, endpoint=False), np.arange(count + 1), steps)
+
+
+def _ends(values: Floats) -> Floats:
+    """Lowest and highest value of each step in the order in which they come: (2 k,)."""
+    looks = values.reshape(-1, _LOOKS)
+    low, high = np.nan_to_num(looks, nan=np.inf), np.nan_to_num(looks, nan=-np.inf)
+    early = (low.argmin(axis=1) < high.argmax(axis=1))[:, None]
+    found = np.stack((low.min(axis=1), high.max(axis=1)), axis=1)
+    found = np.where(early, found, found[:, ::-1]).ravel()
+    return np.where(np.isfinite(found), found, np.nan)
 
 
 def _places(law: TimeLaw, way: Floats) -> tuple[Floats, Floats]:

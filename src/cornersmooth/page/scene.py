@@ -18,7 +18,9 @@ from cornersmooth.page.planned_speeds import (
     NOT_PLANNED,
     Planned,
     axis_loads,
+    clock,
     feed_seconds,
+    loads_along,
     plan_all,
     speeds_along,
     speeds_over,
@@ -55,19 +57,25 @@ class Story:
     Parameters
     ----------
     title : str
-        Name of the part.
+        Name of the program, else of the CL file.
     verdict : str
-        One sentence.
+        One sentence; the words of the terminal.
     badge : Verdict
+    head : sequence of (str, str)
+        Labels and values that are always in sight.
+    problems : sequence of dict
+        What is wrong or to check, in the order in which it is looked at: severity, lines, text, code.
     facts : sequence of (str, str)
         Labels and values: settings, versions, hash.
     notes : sequence of str
-        Sentences about what is missing.
+        Sentences of what was noticed that nobody has to check.
     """
 
     title: str
     verdict: str
     badge: Verdict
+    head: Sequence[tuple[str, str]] = ()
+    problems: Sequence[Mapping[str, Any]] = ()
     facts: Sequence[tuple[str, str]] = ()
     notes: Sequence[str] = ()
 
@@ -89,7 +97,7 @@ class Subject:
     dense : bool
         Whether transitions are written as lines.
     laws : mapping of str to TimeLaw
-        Laws that are planned already: ``"direct"``, ``"local"``.
+        Laws that are planned already: ``"direct"``.
     limits : Limits
     machine : Machine or None
     planner : str
@@ -131,7 +139,6 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         else plan_all(
             program,
             original,
-            smoothed=subject.smoothed,
             written=written,
             nc=subject.nc,
             limits=subject.limits,
@@ -164,6 +171,8 @@ def scene(subject: Subject, story: Story) -> tuple[dict[str, Any], Pack]:
         "title": story.title,
         "verdict": story.verdict,
         "badge": str(story.badge),
+        "head": [list(fact) for fact in story.head],
+        "problems": [dict(problem) for problem in story.problems],
         "facts": [list(fact) for fact in story.facts],
         "notes": [*story.notes, *planned.left_out, *_thinning_note(len(written), original)],
         "tolerance": settings.tolerance,
@@ -208,7 +217,7 @@ def _add_original(
         must |= _seen(corners, np.arange(len(program)), len(program))[original.pose]
     rows = thinned(original.tip, np.zeros(len(must)), must, MOST_POINTS)
     pack.add("o_tip", original.tip[rows] - centre, "f4")
-    pack.add("o_axis", original.axis[rows], "i2")
+    pack.add("o_axis", original.axis[rows], "f4")
     pack.add("o_way", original.way[original.pose[rows]], "f4")
     pack.add("o_line", program.line[original.pose[rows]], "i4")
     pack.add("o_move", np.where(original.breaks, 0, np.where(original.rapid, 1, 2))[rows], "u1")
@@ -241,7 +250,7 @@ def _add_written(
     if planned.seconds is not None:
         speed = speeds_over(planned.laws["written"], planned.seconds)
     pack.add("w_tip", written.tip[rows] - centre, "f4")
-    pack.add("w_axis", written.axis[rows], "i2")
+    pack.add("w_axis", written.axis[rows], "f4")
     pack.add("w_kind", kind[rows], "u1")
     pack.add("w_rapid", written.rapid[rows], "u1")
     for name, values in (
@@ -295,7 +304,7 @@ def _add_corners(
     pack: Pack, corners: CornerList, program: Program, original: OriginalPath, places: Ints, centre: Floats
 ) -> None:
     pack.add("c_tip", program.tip[corners.pose] - centre, "f4")
-    pack.add("c_axis", program.axis[corners.pose], "i2")
+    pack.add("c_axis", program.axis[corners.pose], "f4")
     pack.add("c_kind", corners.kind, "u1")
     pack.add("c_reason", corners.reason, "u1")
     pack.add("c_way", original.way[corners.pose], "f4")
@@ -320,32 +329,35 @@ def _add_charts(
     end = max(float(original.way[-1]) if len(original.way) else 0.0, _NO_WAY)
     longest = max((law.total for law in planned.laws.values()), default=0.0)
     longest = max(longest, float(seconds[-1]) if len(seconds) else 0.0, _NO_WAY)
-    written_law = planned.laws.get("written")
     for scale, last, where in (("way", end, written.way), ("time", longest, seconds)):
         steps = np.linspace(0.0, last, count + 1)
         pack.add(f"{scale}_x", np.linspace(0.0, last, 2 * count, endpoint=False), "f4")
         for name, values in (("off", written.tip_off), ("axis_off", written.axis_off)):
             pack.add(f"{scale}_{name}", np.repeat(_highest(values, where, steps), 2), "f4")
         times = np.linspace(0.0, last, 2 * count, endpoint=False)
-        for name in planned.laws:
-            for key, order in (("speed", 1), ("accel", 2)):
-                if scale == "way":
-                    values = speeds_along(planned, name, steps, order)
-                else:
-                    values = speeds_over(planned.laws[name], times, order)
-                pack.add(f"{scale}_{key}_{name}", values, "f4")
-        # the machine follows the text; its axes along the way are taken when the text is there
-        law = written_law if written_law is not None else planned.laws.get("local", planned.laws.get("direct"))
-        if law is not None and law.machine_axes is not None:
-            if scale == "way":
-                way, first = np.unique(where, return_index=True)
-                times = np.interp(times, way, seconds[first])
-            names, loads = axis_loads(law, times)
-            for name, load in zip(names, loads, strict=True):
-                pack.add(f"{scale}_axis_{name}", load, "f4")
-            charts["axes"] = list(names)
+        along, loads = scale == "way", {}
+        for name, law in planned.laws.items():
+            speed = speeds_along(planned, name, steps) if along else speeds_over(law, times)
+            pack.add(f"{scale}_speed_{name}", np.round(speed, 1), "f4")
+            own = loads_along(planned, name, steps) if along else axis_loads(law, times)
+            loads[name] = {axis: np.round(load, 1) for axis, load in own.items()}
+            for axis, load in loads[name].items():
+                pack.add(f"{scale}_{axis}_{name}", load, "f4")
+        if {"direct", "written"} <= set(loads):
+            ways = times if along else np.interp(times, seconds, written.way, right=np.nan)
+            saved = clock(planned, "direct", ways) - clock(planned, "written", ways)
+            pack.add(f"{scale}_saved", np.round(saved, 3), "f4")
+        if along:
+            changes = {axis: _change(loads, axis) for axis in loads.get("written", ())}
+            charts["axes"] = sorted(filter(changes.get, changes), key=lambda axis: -changes[axis])
     charts["speeds"] = list(planned.laws)
     return charts
+
+
+def _change(loads: Mapping[str, Mapping[str, Floats]], axis: str) -> float:
+    """How much an axis runs otherwise than before, on the average."""
+    before, after = (np.nan_to_num(laws.get(axis, 0.0)) for laws in (loads.get("direct", {}), loads["written"]))
+    return float(np.abs(after - before).mean())
 
 
 def _highest(values: Floats, where: Floats, steps: Floats) -> Floats:
@@ -393,7 +405,6 @@ def _add_surface(pack: Pack, surface: SurfaceMap, centre: Floats) -> dict[str, A
     keep = thinned(points.point[known], np.abs(surface.off[known]), np.zeros(len(known), np.bool_), MOST_POINTS)
     rows = known[keep]
     pack.add("s_tip", points.point[rows] - centre, "f4")
-    pack.add("s_normal", points.normal[rows], "i2")
     pack.add("s_off", surface.off[rows], "f4")
     pack.add("s_line", points.line[rows], "i4")
     pack.add("s_station", points.station[rows], "i4")

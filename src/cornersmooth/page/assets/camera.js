@@ -2,6 +2,8 @@
 
 /** Milliseconds of a flight to a corner. */
 const FLIGHT = 450;
+/** Headings from which the whole is tried. */
+const HEADINGS = 16;
 /** Points by which the path is fitted into the view. */
 const MOST_FITTED = 6000;
 
@@ -21,7 +23,7 @@ class Eye {
     this.sphere.radius = Math.max(this.sphere.radius, 1e-3);
     this.flight = 0;
     this.flown = false;
-    this.size = { width: 1, height: 1, left: 0, top: 0, bottom: 0 };
+    this.size = { width: 1, height: 1, top: 0, bottom: 0 };
   }
 
   get distance() {
@@ -30,13 +32,13 @@ class Eye {
 
   /**
    * Size of the view and what covers it, pixels: the middle of what is free is looked at.
-   * @param {{width: number, height: number, left: number, top: number, bottom: number}} size
+   * @param {{width: number, height: number, top: number, bottom: number}} size
    */
   setSize(size) {
     this.size = size;
-    const { width, height, left, top, bottom } = size;
+    const { width, height, top, bottom } = size;
     this.camera.aspect = width / height;
-    this.camera.setViewOffset(width, height, -0.5 * left, 0.5 * (bottom - top), width, height);
+    this.camera.setViewOffset(width, height, 0, 0.5 * (bottom - top), width, height);
   }
 
   /** Planes near and far enough. */
@@ -47,29 +49,43 @@ class Eye {
     this.camera.updateProjectionMatrix();
   }
 
-  /** Everything into the view, from a corner of the room. */
+  /** Everything into the view, from the heading from which it fills most of it. */
   fit() {
-    const from = new THREE.Vector3(0.55, -0.72, 0.5).normalize();
+    let best = this.framing(-0.92);
+    for (let k = 1; k < HEADINGS; k++) {
+      const other = this.framing(-0.92 + (2 * Math.PI * k) / HEADINGS);
+      if (other.distance < best.distance) best = other;
+    }
+    this.flyTo(best.target, best.distance, best.from);
+  }
+
+  /** How all of it is seen from a heading. @param {number} heading radians */
+  framing(heading) {
+    const from = new THREE.Vector3(0.91 * Math.cos(heading), 0.91 * Math.sin(heading), 0.5).normalize();
     const right = new THREE.Vector3().crossVectors(this.camera.up, from).normalize();
     const up = new THREE.Vector3().crossVectors(from, right);
-    const { width, height, left, top, bottom } = this.size;
+    const { width, height, top, bottom } = this.size;
     const pixel = Math.tan((Math.PI / 360) * this.camera.fov) / height;
     const high = pixel * Math.max(height - top - bottom, 0.3 * height);
-    const broad = pixel * Math.max(width - left, 0.3 * width);
+    const broad = pixel * width;
     const target = this.sphere.center.clone();
+    const arm = new THREE.Vector3();
     let distance = 0;
     for (let round = 0; round < 3; round++) {
       // sides of the cone of sight that touch the cloud; the middle between them is looked at
       const reach = [-Infinity, -Infinity, -Infinity, -Infinity];
       for (const point of this.cloud) {
-        const arm = point.clone().sub(target);
-        const [x, y, z] = [arm.dot(right), arm.dot(up), arm.dot(from)];
-        [x / broad, -x / broad, y / high, -y / high].forEach((side, k) => (reach[k] = Math.max(reach[k], side + z)));
+        arm.copy(point).sub(target);
+        const [x, y, z] = [arm.dot(right) / broad, arm.dot(up) / high, arm.dot(from)];
+        reach[0] = Math.max(reach[0], x + z);
+        reach[1] = Math.max(reach[1], z - x);
+        reach[2] = Math.max(reach[2], y + z);
+        reach[3] = Math.max(reach[3], z - y);
       }
       target.addScaledVector(right, 0.5 * broad * (reach[0] - reach[1])).addScaledVector(up, 0.5 * high * (reach[2] - reach[3]));
-      distance = 1.14 * Math.max(0.5 * (reach[0] + reach[1]), 0.5 * (reach[2] + reach[3]), 1e-3);
+      distance = 1.08 * Math.max(0.5 * (reach[0] + reach[1]), 0.5 * (reach[2] + reach[3]), 1e-3);
     }
-    this.flyTo(target, distance, from);
+    return { target, distance, from };
   }
 
   /**
@@ -140,7 +156,7 @@ function cloudOf(arrays, height) {
   for (let i = 0; i < rapid.length; i += step) {
     if (rapid[i]) continue;
     const foot = vectorAt(tip, i);
-    cloud.push(foot, foot.clone().addScaledVector(vectorAt(axis, i), height / 32767));
+    cloud.push(foot, foot.clone().addScaledVector(vectorAt(axis, i), height));
   }
   return cloud.length ? cloud : [new THREE.Vector3()];
 }

@@ -2,7 +2,7 @@
 
 const CHART_HEIGHT = 112;
 
-/** @typedef {{title: string, unit: string, series: {name: string, key: string, colour: string}[], limit?: number, top?: number}} Chart */
+/** @typedef {{title: string, unit: string, digits: number, series: {name: string, key: string, colour: string}[], limit?: number, top?: number}} Chart */
 
 class Charts {
   /**
@@ -21,40 +21,32 @@ class Charts {
     this.moving = false;
     /** @type {Plot | null} */
     this.pointed = null;
+    this.select = element("chart");
+    this.kinds().forEach(({ title }, k) => {
+      const option = /** @type {HTMLOptionElement} */ (made("option", title));
+      option.value = String(k);
+      this.select.append(option);
+    });
+    this.select.addEventListener("change", () => this.choose());
     this.build();
     new ResizeObserver(() => this.resize()).observe(box);
   }
 
-  /** @returns {Chart[]} */
+  /** What smoothing changes most comes first; the deviation does where something is wrong. @returns {Chart[]} */
   kinds() {
-    const charts = /** @type {Chart[]} */ ([
-      {
-        title: "deviation",
-        unit: "mm",
-        series: [
-          { name: "axis point", key: "axis_off", colour: "#cc79a7" },
-          { name: "tip", key: "off", colour: "#0072b2" },
-        ],
-        limit: this.meta.tolerance,
-        top: 1.15 * this.meta.tolerance,
-      },
-    ]);
+    const { tolerance, totals, badge } = this.meta;
+    const { speeds, axes } = this.meta.charts;
     /** @param {string} key */
-    const laws = (key) => this.meta.charts.speeds.map((name) => ({
-      name: `${name} ${told(this.meta.totals[name], "s", 4)}`,
-      key: `${key}_${name}`,
-      colour: LAW_COLOURS[name] ?? PLAIN,
-    }));
-    if (this.meta.charts.speeds.length) {
-      charts.push({ title: "planned speed", unit: "mm/min", series: laws("speed") });
-      charts.push({ title: "acceleration along the path", unit: "mm/s²", series: laws("accel") });
-    }
-    const axes = this.meta.charts.axes ?? [];
-    if (axes.length) {
-      const series = axes.map((name, i) => ({ name, key: `axis_${name}`, colour: AXIS_COLOURS[i] }));
-      charts.push({ title: "speed of the axes", unit: "% of the limit", series, limit: 100, top: 110 });
-    }
-    return charts;
+    const laws = (key) => speeds.map((law) => ({ name: `${LAWS[law][0]}, ${told(totals[law], "s", 4)}`, key: `${key}_${law}`, colour: LAWS[law][1] }));
+    /** @type {Chart[]} */
+    const charts = axes.map((axis) => (
+      { title: `speed of ${axis}`, unit: "% of its limit", digits: 1, series: laws(axis), limit: 100 }
+    ));
+    if (speeds.length) charts.push({ title: "speed of the tip", unit: "mm/min", digits: 0, series: laws("speed") });
+    if (speeds.length > 1) charts.push({ title: "time saved so far", unit: "s", digits: 2, series: [{ name: "saved", key: "saved", colour: LAWS.written[1] }] });
+    const offs = [{ name: "axis point", key: "axis_off", colour: "#cc79a7" }, { name: "tip", key: "off", colour: "#0072b2" }];
+    charts.push({ title: "deviation", unit: "mm", digits: 4, series: offs, limit: tolerance, top: 1.15 * tolerance });
+    return badge === "FAILED" ? [...charts.splice(-1), ...charts] : charts;
   }
 
   build() {
@@ -63,6 +55,7 @@ class Charts {
     const style = getComputedStyle(document.documentElement);
     const text = style.getPropertyValue("--soft").trim();
     const line = style.getPropertyValue("--line").trim();
+    const wash = style.getPropertyValue("--wash").trim();
     const bad = style.getPropertyValue("--bad").trim();
     const x = this.arrays[`${this.scale}_x`];
     this.plots = this.kinds().map((chart) => {
@@ -71,11 +64,12 @@ class Charts {
       const unit = this.scale === "way" ? "mm" : "s";
       const series = chart.series.map(({ name, colour }) => ({
         label: name, stroke: colour, width: 1.4, points: { show: false }, spanGaps: false,
-        value: (/** @type {any} */ _, /** @type {number | null} */ value) => (value === null ? "–" : chart.unit === "mm" ? offset(value) : told(value)),
+        value: (/** @type {any} */ _, /** @type {number | null} */ value) => (value === null ? "–" : value.toFixed(chart.digits)),
       }));
       /** @type {any} */
       const options = {
         title: `${chart.title}, ${chart.unit}`,
+        bands: chart.series.length > 1 ? [{ series: [1, 2], fill: wash }, { series: [2, 1], fill: wash }] : [],
         width: Math.max(this.box.clientWidth, 200),
         height: CHART_HEIGHT,
         cursor: { sync: { key: "cornersmooth" }, drag: { x: true, y: false, dist: 6 }, points: { size: 6 } },
@@ -102,6 +96,12 @@ class Charts {
       });
       return plot;
     });
+    this.choose();
+  }
+
+  /** Shows the chart that is chosen; paper has all of them. */
+  choose() {
+    this.plots.forEach((plot, k) => plot.root.classList.toggle("shown", k === Number(this.select.value)));
   }
 
   /** @param {"way" | "time"} scale */
@@ -136,8 +136,7 @@ class Charts {
     });
   }
 
-  resize() {
-    const width = Math.max(this.box.clientWidth, 200);
+  resize(width = Math.max(this.box.clientWidth, 200)) {
     for (const plot of this.plots) if (Math.abs(plot.width - width) > 1) plot.setSize({ width, height: CHART_HEIGHT });
   }
 }
@@ -152,6 +151,7 @@ function drawLimit(plot, limit, colour) {
   if (limit === undefined) return;
   const { ctx, bbox } = plot;
   const y = plot.valToPos(limit, "y", true);
+  if (y < bbox.top) return;
   ctx.save();
   ctx.strokeStyle = colour;
   ctx.setLineDash([6, 4]);

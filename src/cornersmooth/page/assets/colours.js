@@ -10,9 +10,8 @@ const DIVERGING = ["#a63603", "#d9540d", "#f08a3c", "#eebb88", "#c9c9c9", "#9eca
 const KIND_COLOURS = ["#d55e00", "#e69f00", "#0072b2", "#56b4e9", "#0072b2"];
 const OUTSIDE = "#d55e00";
 const PLAIN = "#8c95a0";
-/** Of the planned motions. */
-const LAW_COLOURS = /** @type {Record<string, string>} */ ({ direct: "#e69f00", local: "#56b4e9", written: "#009e73" });
-const AXIS_COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#d55e00"];
+/** Of the planned motions, and their names. */
+const LAWS = /** @type {Record<string, [string, string]>} */ ({ direct: ["before", "#e69f00"], written: ["after", "#0072b2"] });
 
 /** @param {string} hex @returns {Rgb} */
 function rgb(hex) {
@@ -126,7 +125,7 @@ function showLegend(channel, meta, span) {
   box.replaceChildren();
   /** @param {string} colour @param {string} text @param {string} [style] */
   const key = (colour, text, style = "") => {
-    const line = made("div", "", "key");
+    const line = made("span", "", "key");
     const swatch = made("span", "", `swatch ${style}`);
     swatch.style.background = colour;
     line.append(swatch, made("span", text));
@@ -134,11 +133,11 @@ function showLegend(channel, meta, span) {
   };
   /** @param {string[]} stops @param {string[]} ticks */
   const strip = (stops, ticks) => {
-    const bar = made("div", "", "ramp");
+    const bar = made("span", "", "ramp");
     bar.style.background = `linear-gradient(to right, ${stops.join(",")})`;
-    const line = made("div", "", "ticks");
-    for (const tick of ticks) line.append(made("span", tick));
-    box.append(bar, line);
+    const line = made("span", "", "key");
+    line.append(made("span", ticks[0]), bar, ...ticks.slice(1).map((tick) => made("span", tick)));
+    box.append(line);
   };
   box.append(made("strong", `${channel.title}${channel.unit ? `, ${channel.unit}` : ""}`));
   if (channel.names) {
@@ -148,10 +147,11 @@ function showLegend(channel, meta, span) {
     });
     key(PLAIN, "straight");
   } else {
-    const { low, high, logarithmic } = channel;
-    const middle = logarithmic ? Math.sqrt(low * high) : 0.5 * (low + high);
-    strip(SEQUENTIAL_STOPS, [told(low), told(middle), told(high)]);
-    if (channel.bounded) key(OUTSIDE, `over ${told(high)} mm: out of tolerance`);
+    const { low, high } = channel;
+    strip(SEQUENTIAL_STOPS, [told(low), told(high)]);
+    let most = high;
+    for (const value of channel.values) if (value > most) most = value;
+    if (channel.bounded && most > high) key(OUTSIDE, `out of tolerance, up to ${told(most)}`);
   }
   if (span > 0) {
     box.append(made("strong", "machined surface, mm"));

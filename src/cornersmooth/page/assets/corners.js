@@ -1,23 +1,35 @@
-// The list of corners, the ones that matter first; only the rows in sight are in the document.
+// The corners in groups, the ones that matter first: equal kinds, and amounts of the same class, are one row.
 
-const ROW = 28;
+/** Classes of what rounded corners are off, for each tolerance, and of what sharp ones turn, for each right angle. */
+const CLASSES = 10;
+const TURNS = 9;
+/** Corners of an open group that are in the document. */
+const MOST_ROWS = 100;
 
 class Corners {
-  /** @param {Meta} meta @param {Record<string, Values>} arrays @param {(corner: number) => void} chosen */
+  /** @param {Meta} meta @param {Record<string, Values>} arrays @param {(place: Place, fly: boolean) => void} chosen */
   constructor(meta, arrays, chosen) {
     this.meta = meta;
     this.arrays = arrays;
     this.chosen = chosen;
     this.list = element("list");
-    this.rows = element("rows");
-    /** @type {number[]} */
-    this.shown = [];
     this.selected = -1;
-    this.filter = -1;
-    this.buildFilters();
-    this.apply();
-    this.list.addEventListener("scroll", () => this.draw());
-    new ResizeObserver(() => this.draw()).observe(this.list);
+    /** @type {number[][]} corners of each group */
+    this.groups = [];
+    /** @type {number[]} the group of each corner */
+    this.groupOf = [];
+    /** @type {Set<number>} */
+    this.open = new Set();
+    const known = new Map();
+    for (let i = 0; i < arrays.c_kind.length; i++) {
+      const key = `${this.title(i)} ${this.class(i)}`;
+      if (!known.has(key)) known.set(key, this.groups.push([]) - 1);
+      this.groups[known.get(key)].push(i);
+      this.groupOf.push(known.get(key));
+    }
+    const total = Object.values(meta.corners?.counts ?? {}).reduce((sum, count) => sum + count, 0);
+    element("corners").querySelector("h2").textContent = `${total.toLocaleString("en")} ${total === 1 ? "corner" : "corners"}`;
+    this.draw();
     this.list.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
       const step = { ArrowDown: 1, ArrowUp: -1, PageDown: 10, PageUp: -10 }[event.key];
       if (step === undefined) return;
@@ -27,62 +39,81 @@ class Corners {
     });
   }
 
-  buildFilters() {
-    const kinds = this.meta.corners?.kinds ?? [];
-    const counts = this.meta.corners?.counts ?? {};
-    const box = element("filters");
-    /** @param {string} name @param {number} kind */
-    const add = (name, kind) => {
-      const button = made("button", name);
-      button.setAttribute("type", "button");
-      button.setAttribute("aria-pressed", String(kind === this.filter));
-      button.addEventListener("click", () => {
-        this.filter = kind;
-        for (const other of box.children) other.setAttribute("aria-pressed", String(other === button));
-        this.apply();
-      });
-      box.append(button);
-    };
-    add("all", -1);
-    kinds.forEach((name, kind) => {
-      if (counts[name]) add(`${name} ${counts[name].toLocaleString("en")}`, kind);
-    });
+  /** Class of the amount that corners of a kind are ordered by. @param {number} i */
+  class(i) {
+    if (this.arrays.c_kind[i] === 1) return Math.floor((this.turn(i) * TURNS) / 90);
+    return Math.floor((this.off(i) * CLASSES) / this.meta.tolerance);
   }
 
-  apply() {
-    const kind = this.arrays.c_kind;
-    this.shown = [];
-    for (let i = 0; i < kind.length; i++) if (this.filter < 0 || kind[i] === this.filter) this.shown.push(i);
-    this.rows.style.height = `${this.shown.length * ROW}px`;
-    this.list.scrollTop = 0;
-    this.draw();
+  /** @param {number} i */
+  turn(i) {
+    const { c_turn: tip, c_axis_turn: top } = this.arrays;
+    return tip[i] < 1 ? top[i] : tip[i];
+  }
+
+  /** @param {number} i */
+  off(i) {
+    return Math.max(this.arrays.c_off[i] || 0, this.arrays.c_axis_off[i] || 0);
   }
 
   draw() {
-    const first = Math.max(Math.floor(this.list.scrollTop / ROW) - 3, 0);
-    const last = Math.min(first + Math.ceil(this.list.clientHeight / ROW) + 6, this.shown.length);
-    const nodes = [];
-    for (let k = first; k < last; k++) nodes.push(this.row(k));
-    this.rows.replaceChildren(...nodes);
+    const nodes = this.groups.flatMap((group, g) => {
+      if (group.length === 1) return [this.row(group[0])];
+      const open = this.open.has(g);
+      if (!open) return [this.head(group, g)];
+      const first = Math.min(Math.max(group.indexOf(this.selected) - MOST_ROWS / 2, 0), Math.max(group.length - MOST_ROWS, 0));
+      return [this.head(group, g), ...group.slice(first, first + MOST_ROWS).map((i) => this.row(i))];
+    });
+    const counts = this.meta.corners?.counts ?? {};
+    (this.meta.corners?.kinds ?? []).forEach((name, kind) => {
+      const rest = (counts[name] ?? 0) - this.arrays.c_kind.filter((own) => own === kind).length;
+      if (rest > 0) nodes.push(made("p", `and ${rest.toLocaleString("en")} more ${name}, which are off or turn less`));
+    });
+    if (counts.straight) nodes.push(made("p", `${counts.straight.toLocaleString("en")} more are straight`));
+    this.list.replaceChildren(...nodes);
   }
 
-  /** @param {number} k place in the list */
-  row(k) {
-    const i = this.shown[k];
-    const { c_kind: kind, c_line: line, c_turn: tip, c_axis_turn: top, c_off: off, c_axis_off: axis } = this.arrays;
-    const node = made("div", "", "row");
-    node.setAttribute("role", "option");
-    node.setAttribute("aria-selected", String(i === this.selected));
+  /** Row of a group. @param {number[]} group @param {number} g */
+  head(group, g) {
+    const turns = group.map((i) => this.turn(i));
+    const [least, most] = [Math.min(...turns), Math.max(...turns)].map((turn) => turn.toFixed(0));
+    const off = group.reduce((largest, i) => Math.max(largest, this.off(i)), 0);
+    const turn = least === most ? `${most}°` : `${least}–${most}°`;
+    const node = this.cells(group[0], this.title(group[0]), `${group.length.toLocaleString("en")} ×`, turn, `≤ ${offset(off)}`);
+    node.classList.add("group");
+    node.setAttribute("aria-expanded", String(this.open.has(g)));
+    node.addEventListener("click", () => {
+      if (!this.open.delete(g)) this.open.add(g);
+      this.draw();
+    });
+    return node;
+  }
+
+  /** Row of a corner. @param {number} i */
+  row(i) {
+    const node = this.cells(i, this.title(i), String(this.arrays.c_line[i]), degrees(this.turn(i)), offset(this.off(i)));
+    node.setAttribute("aria-pressed", String(i === this.selected));
     node.dataset.corner = String(i);
-    node.style.top = `${k * ROW}px`;
-    const name = made("span");
-    const dot = made("span", "", kind[i] < 2 ? "dot sharp" : "dot");
-    dot.style.background = KIND_COLOURS[kind[i]];
-    name.append(dot, this.title(i));
-    const larger = Math.max(Number.isFinite(off[i]) ? off[i] : 0, Number.isFinite(axis[i]) ? axis[i] : 0);
-    node.append(name, made("span", String(line[i])), made("span", degrees(tip[i] < 1 ? top[i] : tip[i])), made("span", offset(larger)));
     node.addEventListener("click", () => this.select(i));
     return node;
+  }
+
+  /** @param {number} i @param {string} name @param {string[]} cells */
+  cells(i, name, ...cells) {
+    const node = made("button", "", "row");
+    node.setAttribute("type", "button");
+    const title = made("span");
+    title.append(this.dot(i), name);
+    node.append(title, ...cells.map((cell) => made("span", cell)));
+    return node;
+  }
+
+  /** @param {number} i */
+  dot(i) {
+    const kind = this.arrays.c_kind[i];
+    const dot = made("span", "", kind < 2 ? "dot sharp" : "dot");
+    dot.style.background = KIND_COLOURS[kind];
+    return dot;
   }
 
   /** @param {number} i */
@@ -93,23 +124,23 @@ class Corners {
     return kind === 1 ? `sharp: ${reason}` : this.meta.corners?.kinds[kind] ?? "";
   }
 
-  /** @param {number} i */
-  select(i) {
+  /** @param {number} i -1 for none @param {boolean} [fly] whether the view goes there */
+  select(i, fly = true) {
     this.selected = i;
+    if (i >= 0) {
+      if (fly) this.open.add(this.groupOf[i]);
+      this.fill(i);
+      this.chosen(placeOf(this.arrays, "c", i), fly);
+    }
     this.draw();
-    this.fill(i);
-    this.chosen(i);
   }
 
-  /** The next corner of the list, or one farther on. @param {number} by */
+  /** The next corner in the order of what matters, or one farther on. @param {number} by */
   step(by) {
-    if (!this.shown.length) return;
-    const at = this.shown.indexOf(this.selected);
-    const next = Math.min(Math.max(at < 0 ? 0 : at + by, 0), this.shown.length - 1);
-    const top = next * ROW;
-    if (top < this.list.scrollTop) this.list.scrollTop = top;
-    else if (top + ROW > this.list.scrollTop + this.list.clientHeight) this.list.scrollTop = top + ROW - this.list.clientHeight;
-    this.select(this.shown[next]);
+    const count = this.groupOf.length;
+    if (!count) return;
+    this.select(Math.min(Math.max(this.selected < 0 ? 0 : this.selected + by, 0), count - 1));
+    this.list.querySelector("[aria-pressed=true]")?.scrollIntoView({ block: "nearest" });
   }
 
   /** @param {number} i */
@@ -117,16 +148,13 @@ class Corners {
     const a = this.arrays;
     const panel = element("panel");
     const head = made("h2");
-    const dot = made("span", "", a.c_kind[i] < 2 ? "dot sharp" : "dot");
-    dot.style.background = KIND_COLOURS[a.c_kind[i]];
-    head.append(dot, made("span", this.title(i)));
+    head.append(this.dot(i), made("span", `${i ? "" : "worst corner, "}${this.title(i)}`));
     const facts = made("dl");
     const limit = told(this.meta.tolerance);
     const place = [0, 1, 2].map((j) => (a.c_tip[3 * i + j] + this.meta.centre[j]).toFixed(4)).join("  ");
     /** @type {[string, string][]} */
     const rows = [
-      ["CL line", String(a.c_line[i])],
-      ["NC line", a.c_nc[i] ? String(a.c_nc[i]) : "–"],
+      ["lines", `CL ${a.c_line[i]}${a.c_nc[i] ? `, NC ${a.c_nc[i]}` : ""}`],
       ["turn", `${degrees(a.c_turn[i])} at the tip, ${degrees(a.c_axis_turn[i])} at the axis point`],
       ["length", told(a.c_length[i], "mm")],
       ["off at tip", `${offset(a.c_off[i])} of ${limit} mm`],
@@ -134,6 +162,6 @@ class Corners {
       ["place, mm", place],
     ];
     for (const [label, value] of rows) facts.append(made("dt", label), made("dd", value));
-    panel.replaceChildren(head, facts);
+    panel.replaceChildren(head, insetOf(this.meta, a, placeOf(a, "c", i)), facts);
   }
 }

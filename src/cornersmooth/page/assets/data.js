@@ -1,15 +1,18 @@
 // The data of the page: plain values as JSON, arrays in one compressed block.
 
-/** @typedef {{type: "f4" | "i4" | "i2" | "u1", at: number, count: number, width: number}} Entry */
-/** @typedef {Float32Array | Int32Array | Int16Array | Uint8Array} Values */
+/** @typedef {{type: "f4" | "i4" | "u1", at: number, count: number, width: number}} Entry */
+/** @typedef {Float32Array | Int32Array | Uint8Array} Values */
 /** @typedef {{from_second: number, text: string, line: number, outline: number[][]}} ToolShape */
 /** @typedef {{points: number, max_mm: number, mean_mm: number, percentile_95_mm: number, cl_line: number}} Side */
+/** @typedef {{severity: string, nc_line: number, cl_line: number, text: string, code: string}} Problem */
 /** @typedef {{points: number, rms_mm: number | null, overcut: Side, undercut: Side}} Metal */
 /**
  * @typedef {object} Meta
  * @property {string} title
  * @property {string} verdict
  * @property {string} badge
+ * @property {string[][]} head labels and values that are always in sight
+ * @property {Problem[]} problems in the order in which they are looked at
  * @property {string[][]} facts
  * @property {string[]} notes
  * @property {number} tolerance mm
@@ -20,7 +23,7 @@
  * @property {number} way mm
  * @property {Record<string, number>} totals seconds of each planned motion
  * @property {{kinds: string[], reasons: string[], counts: Record<string, number>} | null} corners
- * @property {{speeds: string[], axes?: string[]}} charts
+ * @property {{speeds: string[], axes: string[]}} charts
  * @property {ToolShape[]} tools
  * @property {Metal | undefined} surface
  * @property {Record<string, Entry>} arrays
@@ -56,7 +59,7 @@ async function readArrays(table) {
   node.remove();
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const buffer = await new Response(stream).arrayBuffer();
-  const kinds = { f4: Float32Array, i4: Int32Array, i2: Int16Array, u1: Uint8Array };
+  const kinds = { f4: Float32Array, i4: Int32Array, u1: Uint8Array };
   /** @type {Record<string, Values>} */
   const arrays = {};
   for (const [name, entry] of Object.entries(table)) {

@@ -60,7 +60,7 @@ function axisGeometry(arrays, points, height) {
   points.forEach((i, k) => {
     for (let j = 0; j < 3; j++) {
       position[6 * k + j] = tip[3 * i + j];
-      position[6 * k + 3 + j] = tip[3 * i + j] + (height * axis[3 * i + j]) / 32767;
+      position[6 * k + 3 + j] = tip[3 * i + j] + height * axis[3 * i + j];
     }
   });
   return geometryOf(position).setAttribute("color", new THREE.BufferAttribute(new Float32Array(position.length), 3));

@@ -1,5 +1,8 @@
 // Puts the page together.
 
+/** Pixels of a window up to which everything is in one column. */
+const NARROW = 900;
+
 async function start() {
   const meta = readMeta();
   showHead(meta);
@@ -16,15 +19,21 @@ async function start() {
     go: (value) => drive.set(charts.scale === "time" ? value : arrays.w_time[indexAt(arrays.w_way, value)], "chart"),
   });
   drive.moved = (seconds, way) => charts.mark(charts.scale === "time" ? seconds : way);
-  const corners = meta.corners ? new Corners(meta, arrays, (i) => showCorner(i)) : null;
-  if (!corners) element("side").hidden = true;
-  else element("panel").append(made("p", cornerSentence(meta)));
-
-  /** @param {number} i */
-  function showCorner(i) {
-    view.showCorner(i);
-    drive.set(arrays.w_time[indexAt(arrays.w_way, arrays.c_way[i])], "corner");
-  }
+  /** @param {Place | null} place @param {boolean} fly */
+  const go = (place, fly) => {
+    if (!place) return view.fit();
+    view.show(place, fly);
+    drive.set(place.second, "place");
+  };
+  const problems = new Problems(meta, arrays, (place) => {
+    corners?.select(-1);
+    go(place, true);
+  });
+  const corners = meta.corners ? new Corners(meta, arrays, (place, fly) => {
+    problems.select(-1);
+    go(place, fly);
+  }) : null;
+  element("corners").hidden = !corners;
 
   const channels = channelsOf(meta, arrays);
   const select = element("channel");
@@ -43,6 +52,7 @@ async function start() {
   };
   select.addEventListener("change", recolour);
   recolour();
+  wirePrinting(view, charts);
   wireSwitches(view, recolour);
   wireKeys(view, drive, corners);
   wirePicking(view, drive, corners, arrays);
@@ -63,29 +73,33 @@ async function start() {
   drive.set(arrays.w_time[Math.max(arrays.w_rapid.indexOf(0, 1), 0)] ?? 0, "start");
   view.mark(null);
   element("wait").hidden = true;
+  element("tools").open = innerWidth > NARROW;
   view.resize();
   view.fit();
+  // the first problem is looked at; else the worst corner is marked in the whole, and enlarged beside it
+  if (meta.problems[0]?.severity === "error") problems.select(0);
+  else if (corners?.groups.length) corners.select(0, false);
   // for tests and for the curious
-  Object.assign(globalThis, { cornersmooth: { meta, arrays, view, charts, corners, drive, channels } });
+  Object.assign(globalThis, { cornersmooth: { meta, arrays, view, charts, corners, problems, drive, channels } });
   document.documentElement.dataset.ready = "true";
 }
 
 /** @param {Meta} meta */
 function showHead(meta) {
   element("title").textContent = meta.title;
-  element("verdict").textContent = meta.verdict;
+  for (const [label, value] of meta.head) {
+    const pair = made("div");
+    pair.append(made("dt", label), made("dd", value));
+    element("head").append(pair);
+  }
+  // the sentence begins with the word of the badge
+  const [word, ...rest] = meta.verdict.startsWith(meta.badge) ? meta.verdict.split(": ") : [meta.badge, meta.verdict];
+  element("verdict").textContent = rest.join(": ");
   const badge = element("badge");
-  badge.textContent = meta.badge;
+  badge.textContent = word;
   badge.classList.add(meta.badge.toLowerCase().replace(" ", "-"));
   for (const [label, value] of meta.facts) element("facts").append(made("dt", label), made("dd", value));
   for (const note of meta.notes) element("notes").append(made("li", note));
-}
-
-/** @param {Meta} meta */
-function cornerSentence(meta) {
-  const counts = meta.corners?.counts ?? {};
-  const total = Object.values(counts).reduce((sum, count) => sum + count, 0);
-  return `${total.toLocaleString("en")} corners, ${(counts.straight ?? 0).toLocaleString("en")} of them straight. Choose one to go there; N and P step through the list.`;
 }
 
 /** @param {Record<string, Values>} arrays @param {number} i @returns {number[]} */

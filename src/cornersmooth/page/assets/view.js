@@ -133,14 +133,17 @@ class View {
     this.eye.fit();
   }
 
-  /** @param {number} i row of the list of corners */
-  showCorner(i) {
-    const { c_tip: tip, c_length: length } = this.arrays;
-    const target = vectorAt(tip, i);
-    attribute(this.ring, "position").setXYZ(0, target.x, target.y, target.z).needsUpdate = true;
+  /** Puts a ring about a place. @param {Place} place @param {boolean} fly whether the view goes there */
+  show(place, fly) {
+    const { tip, off, axisOff, length } = place;
+    attribute(this.ring, "position").setXYZ(0, tip.x, tip.y, tip.z).needsUpdate = true;
     this.ring.visible = true;
-    const size = Math.max(3 * (length[i] || 0), 20 * this.meta.tolerance, this.radius / 1000);
-    this.eye.flyTo(target, Math.min(size, this.radius) * 1.5);
+    this.touch();
+    if (!fly) return;
+    const { tolerance } = this.meta;
+    // where nothing is off and nothing rounded the tool is to be seen
+    const size = off || axisOff || length ? Math.max(3 * length, 6 * off, 6 * axisOff, 20 * tolerance) : 2 * this.height;
+    this.eye.flyTo(tip, Math.min(Math.max(size, this.radius / 1000), this.radius) * 1.5);
   }
 
   /** Marks a place on the path. @param {number[] | null} at */
@@ -184,15 +187,9 @@ class View {
     const stage = this.canvas.getBoundingClientRect();
     /** @param {string} id of what may lie over the view */
     const box = (id) => element(id).getBoundingClientRect();
-    const [tools, legend, place] = ["tools", "legend", "place"].map(box);
-    const over = tools.bottom > stage.top;
-    this.eye.setSize({
-      width,
-      height,
-      left: over && width > 800 ? legend.right - stage.left : 0,
-      top: over ? tools.bottom - stage.top : 0,
-      bottom: over && place.height ? stage.bottom - place.top : 0,
-    });
+    const [tools, legend] = ["tools", "legend"].map(box);
+    const over = getComputedStyle(element("legend")).position === "absolute";
+    this.eye.setSize({ width, height, top: over ? tools.bottom - stage.top : 0, bottom: over ? stage.bottom - legend.top : 0 });
     for (const paths of this.paths) paths?.setSize(width, height);
     this.touch();
   }

@@ -1,4 +1,7 @@
-// Switches, keys and clicks.
+// Switches, keys, clicks and paper.
+
+/** Pixels of a chart on paper: A4 and letter, upright. */
+const PAPER = 640;
 
 /** @param {View} view @param {() => void} recolour */
 function wireSwitches(view, recolour) {
@@ -45,6 +48,25 @@ function wireKeys(view, drive, corners) {
     else return;
     event.preventDefault();
   });
+}
+
+/** Paper is white, has all charts, and a photograph of the view. @param {View} view @param {Charts} charts */
+function wirePrinting(view, charts) {
+  /** @param {boolean} paper @param {number} [width] pixels */
+  const change = (paper, width) => {
+    document.documentElement.classList.toggle("paper", paper);
+    view.setScheme();
+    charts.build();
+    charts.resize(width);
+  };
+  addEventListener("beforeprint", () => {
+    change(true, PAPER);
+    view.draw(0, true);
+    const photo = element("photo");
+    [photo.width, photo.height] = [view.canvas.width, view.canvas.height];
+    photo.getContext("2d").drawImage(view.canvas, 0, 0);
+  });
+  addEventListener("afterprint", () => change(false));
 }
 
 /** @param {View} view @param {Drive} drive @param {Corners | null} corners @param {Record<string, Values>} arrays */
