@@ -1,4 +1,4 @@
-"""Writes docs/codes.md: every code of an error, a warning or a problem, with its message, as the source code has them.
+"""Writes docs/codes.md and cli/codes.toml: every code with its messages and hints, as the source has them.
 
 python docs/make_codes.py
 """
@@ -6,27 +6,22 @@ python docs/make_codes.py
 from __future__ import annotations
 
 import ast
+import json
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from cornersmooth.cli.explain import PARTS
 from cornersmooth.errors import Finding
 
 HERE = Path(__file__).resolve().parent
 SOURCE = HERE.parent / "src" / "cornersmooth"
+TABLE = SOURCE / "cli" / "codes.toml"
 CODE = re.compile(r"CS\d{3}")
 SEVERITIES = ("note", "warning", "error")
 
-#: what the hundreds of the codes are about
-PARTS = {
-    "1": "CL input",
-    "2": "Settings, controls and machines",
-    "3": "NC output",
-    "4": "Files",
-    "5": "Verification",
-}
 HEAD = """# Codes
 
 Errors, warnings and notes carry a code that does not change; reports name it. This table is made from the source code
@@ -35,6 +30,7 @@ Errors, warnings and notes carry a code that does not change; reports name it. T
 An *error* ends the command, with exit code 2 for settings, 3 for input, 4 for output. A *problem* is a fault of a
 program that verification finds (exit code 1). After *warnings* and *notes* the work goes on.
 A warning *to check* bears on the metal. The verdict counts it: `PASSED, 3 to check`.
+`cornersmooth explain CS337` prints the cause of a message and what to do.
 CS551 to CS559 and CS566 are about one word each: missing, not asked for, another one, or in another place.
 """
 #: arguments by which a code is given to a method that is called with its texts
@@ -50,6 +46,7 @@ class Entry:
     text: str
     kind: str
     package: str
+    hint: str = ""
 
 
 def called(call: ast.Call) -> str:
@@ -81,10 +78,14 @@ class Module:
                 texts = [list(self._texts(sibling)) for sibling in siblings]
                 kind = next((text for several in texts for text in several if text in SEVERITIES), "")
                 kind = kind or self._kind(around, code)
-                said = ([text for text in several if re.search("[A-Za-z]", text)] for several in texts)
-                for text in next((several for several in said if several and several != [kind]), []):
-                    if text != kind:
-                        yield Entry(code, text, kind, self.package)
+                said = [[text for text in several if re.search("[A-Za-z]", text)] for several in texts]
+                first = next((k for k, several in enumerate(said) if several and several != [kind]), len(said))
+                for text in said[first] if first < len(said) else ():
+                    what, _, hint = text.partition("; ")
+                    if kind == "error" and first + 1 < len(said):
+                        what, hint = text, next(iter(said[first + 1]), "")
+                    if what != kind and not re.match("CS[…0-9]", what) and (kind, self.package) != ("problem", "cl"):
+                        yield Entry(code, what, kind, self.package, hint)
 
     def codes(self, node: ast.AST) -> frozenset[str]:
         """Codes that a node stands for."""
@@ -99,7 +100,7 @@ class Module:
         if isinstance(around, ast.Dict) and node in around.keys:
             value = around.values[around.keys.index(node)]
             parts = value.elts if isinstance(value, ast.Tuple) else [value]
-            return around, parts if next(self._texts(parts[0]), "") in SEVERITIES else parts[:1]
+            return around, parts
         items = around.args if isinstance(around, ast.Call) else getattr(around, "elts", [])
         if node in items:
             return around, items[items.index(node) + 1 :] or items[:-1]
@@ -212,20 +213,41 @@ def codes_in_source() -> set[str]:
 
 def page() -> str:
     """Text of docs/codes.md."""
-    rows: dict[tuple[str, str, str], list[str]] = {}
+    rows: dict[tuple[str, str, str, str], list[str]] = {}
     for entry in entries():
-        rows.setdefault((entry.code, entry.kind, entry.text), []).append(f"`{entry.package}`")
+        rows.setdefault((entry.code, entry.kind, entry.text, entry.hint), []).append(f"`{entry.package}`")
     lines = [HEAD]
     for digit, title in PARTS.items():
-        lines += [f"## CS{digit}xx: {title}", "", "| code | kind | says | from |", "|---|---|---|---|"]
         lines += [
-            f"| {code} | {kind}{checked(code, kind)} | {text.replace('|', chr(92) + '|')} | {', '.join(packages)} |"
-            for (code, kind, text), packages in rows.items()
+            f"## CS{digit}xx: {title}",
+            "",
+            "| code | kind | message | what to do | from |",
+            "|---|---|---|---|---|",
+        ]
+        lines += [
+            "| "
+            + " | ".join(
+                part.replace("|", r"\|") for part in (code, kind + checked(code, kind), text, hint, ", ".join(packages))
+            )
+            + " |"
+            for (code, kind, text, hint), packages in rows.items()
             if code[2] == digit
         ]
         lines.append("")
     return "\n".join(lines)
 
 
+def table() -> str:
+    """Text of cli/codes.toml: for each code rows of kind, message and what to do, for ``cornersmooth explain``."""
+    rows: dict[str, list[tuple[str, str, str]]] = {}
+    for entry in entries():
+        row = (entry.kind + checked(entry.code, entry.kind), entry.text, entry.hint)
+        if row not in rows.setdefault(entry.code, []):
+            rows[entry.code].append(row)
+    lines = [f"{code} = {json.dumps(found, ensure_ascii=False)}" for code, found in rows.items()]
+    return "\n".join(["# made by docs/make_codes.py: kind, message, what to do", *lines, ""])
+
+
 if __name__ == "__main__":
     (HERE / "codes.md").write_text(page(), encoding="utf-8")
+    TABLE.write_text(table(), encoding="utf-8")

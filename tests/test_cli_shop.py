@@ -134,7 +134,7 @@ def test_controls_and_machines_of_the_shop(part: Path) -> None:
         ("[smooth]\ntolerance = 'abc'\n", "smooth.tolerance: 'abc' is not a length"),
         ("[smooth]\nmethod = 'magic'\n", "smooth.method: 'magic' is not one of"),
         ("[smooth]\nblock-numbers = 1\n", "smooth.block-numbers is 1; give true or false"),
-        ("[smooth]\nwith = 'cycle832'\n", "smooth.with is 'cycle832'; give a list of texts"),
+        ("[smooth]\nwith = 'cycle832'\n", "smooth.with is 'cycle832'; give a list of strings"),
         (
             "[controls.shop]\nlike = 'siemens'\nlayut = 1\n[smooth]\ncontrol = 'shop'\n",
             "unknown key layut; did you mean layout?",

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from cornersmooth.cli.explain import _one, codes
+from oracle.command import run
+from writing import faults, plain, sentences, words
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
@@ -42,3 +48,37 @@ def test_every_code_that_anything_speaks_of_is_in_the_table() -> None:
 
 def test_the_table_is_what_the_source_says(maker: ModuleType) -> None:
     assert (DOCS / "codes.md").read_text(encoding="utf-8") == maker.page(), "run: python docs/make_codes.py"
+    assert maker.TABLE.read_text(encoding="utf-8") == maker.table(), "run: python docs/make_codes.py"
+
+
+def test_every_code_is_explained_in_80_columns(maker: ModuleType) -> None:
+    """Of the data that is in the package, as an installed wheel has it."""
+    listed = run("explain").stdout.decode()
+    for code in maker.codes_in_source():
+        assert f"\n  {code}  " in listed
+        lines = [*_one(code, codes()[code])]
+        assert any(f"[{code}]: " in line for line in lines)
+        assert all(len(line) <= 80 for line in (*lines, *listed.splitlines()))
+        for text in (codes()[code]["cause"], codes()[code]["remedy"]):
+            assert [fault for one in sentences(plain(text)) for fault in faults(one)] == []
+            assert all(words(one) <= 20 for one in sentences(plain(text)))
+
+
+def test_causes_are_of_codes_that_there_are() -> None:
+    causes = tomllib.loads((DOCS.parent / "src" / "cornersmooth" / "cli" / "causes.toml").read_text(encoding="utf-8"))
+    assert set(causes) <= set(codes())
+    assert all(set(one) == {"cause", "remedy"} for one in causes.values())
+
+
+def test_explain_takes_a_code_as_it_is_printed() -> None:
+    said = run("explain", "CS337").stdout.decode()
+    assert said.startswith("CS337  NC output: warning, to check\n")
+    assert "cause       The first position of a tool is tilted" in said
+    assert "FILE:LINE: warning[CS337]: the first motion of a tool turns it to a tilted" in said
+    assert "hint: see that it is free to, or name the machine" in said
+    assert run("explain", "337").stdout == run("explain", "[cs337]").stdout == said.encode()
+    found = json.loads(run("explain", "CS337", "--json").stdout)["codes"]
+    assert list(found) == ["CS337"]
+    assert found["CS337"]["messages"][0]["kind"] == "warning, to check"
+    failed = run("explain", "CS999")
+    assert (failed.returncode, failed.stderr[:25]) == (2, b"error: no code 'CS999'\nhi")

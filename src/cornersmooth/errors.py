@@ -33,7 +33,7 @@ def printable(text: str) -> str:
 
 
 def message(
-    severity: str, text: str, *, code: str = "", place: str = "", hint: str = "", count: int = 1, beside: str = ""
+    severity: str, text: str, code: str = "", *, place: str = "", hint: str = "", count: int = 1, beside: str = ""
 ) -> str:
     """Give a message as every output has it: ``FILE:LINE: error[CS123]: what``, and ``hint: what to do`` on a line.
 

@@ -161,7 +161,7 @@ class Shelf:
         try:
             table = deepcopy(_read(text)) if isinstance(text, str) else dict(text)
         except tomllib.TOMLDecodeError as error:
-            raise SettingsError(self.unreadable, f"not TOML: {error}", "correct the text") from error
+            raise SettingsError(self.unreadable, f"not TOML: {error}", "correct the file") from error
         self.check_keys(table, (*self.keys, "like", "aliases"), "")
         table.pop("aliases", None)
         like = table.pop("like", "")

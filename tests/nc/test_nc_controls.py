@@ -136,7 +136,7 @@ def test_a_table_of_the_users_says_only_what_is_different(tmp_path: Path) -> Non
         ("like = 'fanuc'\n[words]\ncolant = {}", "own.toml: error: unknown key words.colant; did you mean coolant?"),
         ("like = 'fanuc'\n[digits]\nmm = 'x'", "own.toml: error: digits.mm is 'x'; give a whole number"),
         ("like = 'fanuc'\n[digits]\nmm = -1", "own.toml: error: digits.mm is -1; give a whole number"),
-        ("like = 'fanuc'\n[words]\nstop = 'M0'", "own.toml: error: words.stop is 'M0'; give a list of texts"),
+        ("like = 'fanuc'\n[words]\nstop = 'M0'", "own.toml: error: words.stop is 'M0'; give a list of strings"),
         (
             "like = 'fanuc'\n[words]\ntool_change = ['T{number}']",
             "own.toml: error: words.tool_change: 'T{number}' has unknown braces; use {tool}",

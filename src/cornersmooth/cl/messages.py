@@ -14,7 +14,7 @@ ERRORS: Final[dict[str, tuple[str, str]]] = {
     # the file
     "CS100": ("cannot be read: {why}", "check the path and the permissions"),
     "CS101": ("holds no tool positions", "give a CL file with GOTO statements, or a table of points"),
-    "CS102": ("is a binary file", "write the CL data as text: NX .cls, CATIA .aptsource, Creo .ncl, ..."),
+    "CS102": ("is a binary file", "write the CL data in readable form: NX .cls, CATIA .aptsource, Creo .ncl, ..."),
     "CS103": ("is not a complete gzip file: {why}", "compress it again"),
     "CS199": ("holds more than {limit}", "divide it; --no-size-limit reads it all the same"),
     # statements

@@ -26,7 +26,7 @@ ERRORS: dict[str, tuple[str, str]] = {
         "cannot tell decimal commas from separating commas",
         "put semicolons or tabs between the columns, or write decimal points",
     ),
-    "CS161": ("the file holds bytes that are no characters", "give a text file in UTF-8 or Windows-1252"),
+    "CS161": ("the file holds bytes that are no characters", "give a plain file in UTF-8 or Windows-1252"),
     "CS162": ("column {column!r} is in {unit!r}", "give lengths in mm or inch and feeds per minute"),
     "CS163": ("coordinate beyond {limit:g}", "check the columns and the units"),
     "CS164": ("an empty cell where a number is expected", "fill it or leave the line out"),

@@ -32,6 +32,7 @@ COMMANDS = {
     "machines": ("cornersmooth.cli.machines", "List the machines whose rotary words can be written, or describe one."),
     "config": ("cornersmooth.cli.config", "Say which values hold here, and where each comes from."),
     "completion": ("cornersmooth.cli.completion", "Print what makes a shell complete commands, names and files."),
+    "explain": ("cornersmooth.cli.explain", "Explain the code of a message: cause, and what to do."),
     "man": ("cornersmooth.cli.man", "Print the manual page."),
 }
 
@@ -171,7 +172,7 @@ def _unwritten(failure: OSError) -> int:
 
     _close_quietly()
     what = f"cannot write to it: {reason(failure)}"
-    _say(message("error", what, code="CS404", place="<stdout>", hint="choose another place"))
+    _say(message("error", what, "CS404", place="<stdout>", hint="choose another place"))
     return 4
 
 

@@ -254,12 +254,12 @@ def _checked(option: click.Option, value: Any, file: str, where: str) -> Any:
         return value
     if option.multiple:
         if not (isinstance(value, list) and all(isinstance(item, str) for item in value)):
-            raise SettingsError("CS242", f"{where} is {value!r}", "give a list of texts", file=file)
+            raise SettingsError("CS242", f"{where} is {value!r}", "give a list of strings", file=file)
         return value
     if isinstance(value, list):
         value = ",".join(map(str, value))
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        raise SettingsError("CS242", f"{where} is {value!r}", "give a number or a text", file=file)
+        raise SettingsError("CS242", f"{where} is {value!r}", "give a number or a string", file=file)
     try:
         return option.type.convert(value if isinstance(value, float) else str(value), option, None)
     except click.BadParameter as wrong:

@@ -215,7 +215,7 @@ def _tell_feeds(program: Program, feed: float | None) -> None:
         return
     what = f"feed move without a feed in the CL file, planned with --feed {feed:g} mm/min"
     place = f"{program.source.name}:{program.line[without[0]]}"
-    print_message(message("warning", what, code="CS311", place=place, count=len(without)))
+    print_message(message("warning", what, "CS311", place=place, count=len(without)))
 
 
 def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:

@@ -107,7 +107,7 @@ class WayBack:
         gone = unknown & (run.kind == Element.RAPID)
         if (unknown & ~gone).any():
             line = int(run.line[np.argmax(unknown & ~gone)])
-            hint = "say X Y Z in rapid behind a position of the machine, before the first feed"
+            hint = "say X Y Z in rapid after a position of the machine, before the first feed"
             raise InputError(
                 "CS503", "a feed move where not all of the position is known", hint, file=self._name, line=line
             )
