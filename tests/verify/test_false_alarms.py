@@ -13,6 +13,7 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.model import Program
 from cornersmooth.nc_reader import read_nc
+from cornersmooth.nc_reader.elements import FeedIs
 from cornersmooth.settings import Settings
 from cornersmooth.verify import Verification, verify
 from nc.cases import Case
@@ -633,10 +634,12 @@ def test_blocks_as_fast_as_f_can_say_are_right_in_a_plan_too(name: str) -> None:
 
 def test_a_plan_may_let_the_tip_creep_within_its_digits() -> None:
     text = read_nc(CREEPING.text.encode(), control="fanuc", machine=CREEPING.case.choose().machine, tcp=False)
-    part = replace(text.part(0, 3), feed=np.full(3, 100.0), feed_room=np.array([1.0, -1.0, np.nan]))
+    kinds = np.array([FeedIs.KNOWN, FeedIs.OF_AXIS_POINT, FeedIs.LEAST], np.uint8)
+    part = replace(text.part(0, 3), feed=np.full(3, 100.0), feed_room=np.array([1.0, 1.0, 0.0]), feed_is=kinds)
     known = part.at_most()
     assert known.feed.tolist() == [99.0, 99.0, 100.0]
-    assert [str(room) for room in known.feed_room.tolist()] == ["nan", "-inf", "nan"]
+    assert known.feed_is.tolist() == [FeedIs.LEAST, FeedIs.OF_AXIS_POINT, FeedIs.LEAST]
+    assert known.feed_room.tolist() == [0.0, np.inf, 0.0]
 
 
 def test_tip_that_turns_round_before_the_axis_point_is_not_going_back() -> None:

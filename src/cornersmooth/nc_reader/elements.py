@@ -27,6 +27,16 @@ class Element(IntEnum):
     CURVE = 3
 
 
+class FeedIs(IntEnum):
+    """What the feed of an element says of that of its move (`NcProgram.feed_is`)."""
+
+    KNOWN = 0
+    #: the feed of the axis point, where the tip stands; or the tip creeps, at most a few times the room
+    OF_AXIS_POINT = 1
+    #: the feed of the move may be higher: F is the largest that the control takes, or that of a plan
+    LEAST = 2
+
+
 @dataclass(frozen=True)
 class Curves:
     """Control points and knots of the curves, c of them, one after another.
@@ -234,11 +244,10 @@ class Elements:
     feed : (m,) float64
         mm/min or mm/rev; NaN for rapids and where none was given.
     per_revolution : (m,) bool
+    feed_is : (m,) uint8
+        `FeedIs`.
     feed_room : (m,) float64
         mm/min or mm/rev by which the feed is not known: digits of F, and of times and ways where it is timed.
-        Negative where the feed is that of the axis point, if the tip stands still, but where the tip may as well creep
-        by what the digits do not show: its feed is then anything up to a few times that room. NaN where the feed of the
-        move may be higher than this, as F is the largest that the control takes, and -inf where it may be any.
     second_room : (m,) float64
         By how much, as `second`, directions that must be exact may be off beside the printed digits.
     tip_room : (m,) float64, mm
@@ -258,6 +267,7 @@ class Elements:
     line: Ints
     feed: Floats
     per_revolution: NDArray[np.bool_]
+    feed_is: NDArray[np.uint8]
     feed_room: Floats
     second_room: Floats
     tip_room: Floats
@@ -297,14 +307,16 @@ class Elements:
         )
 
     def at_most(self) -> Self:
-        """Return the same elements with feeds below which those of the moves may not be (`feed_room` NaN).
+        """Return the same elements with feeds that those of the moves are not below.
 
-        Where the tip may creep its feed may be any lower one (-inf). No plan lowers a feed per revolution: threads.
+        Where the tip may creep its feed may be any lower one. No plan lowers a feed per revolution: threads.
         """
-        least = np.maximum(self.feed - np.abs(np.nan_to_num(self.feed_room)), np.finfo(np.float64).tiny)
+        least = np.maximum(self.feed - self.feed_room, np.finfo(np.float64).tiny)
         feed = np.where((self.feed > 0.0) & ~self.per_revolution, least, self.feed)
-        any_lower = np.where(self.feed_room < 0.0, -np.inf, np.nan)
-        return replace(self, feed=feed, feed_room=np.where(self.per_revolution, self.feed_room, any_lower))
+        creeps = self.feed_is == FeedIs.OF_AXIS_POINT
+        room = np.where(self.per_revolution, self.feed_room, np.where(creeps, np.inf, 0.0))
+        kind = np.where(self.per_revolution | creeps, self.feed_is, np.uint8(FeedIs.LEAST))
+        return replace(self, feed=feed, feed_room=room, feed_is=kind)
 
     @classmethod
     def joined(cls, parts: Sequence[Elements]) -> Elements:
@@ -319,7 +331,10 @@ class Elements:
 
 
 #: fields of `Elements` with a row for each
-_COLUMNS: Final = ("kind", "tip", "second", "line", "feed", "per_revolution", "feed_room", "second_room", "tip_room")
+_COLUMNS: Final = (
+    *("kind", "tip", "second", "line", "feed", "per_revolution"),
+    *("feed_is", "feed_room", "second_room", "tip_room"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -133,6 +133,7 @@ def execute(table: Table, modal: Modal, problems: list[Problem]) -> tuple[Elemen
         line=table.line[rows],
         feed=np.where(rapid, np.nan, feed[rows]),
         per_revolution=np.full(len(rows), modal.per_revolution),
+        feed_is=np.zeros(len(rows), np.uint8),
         feed_room=none,
         second_room=none.copy(),
         tip_room=none.copy(),

@@ -387,6 +387,7 @@ class Reader:
             line=number,
             feed=none,
             per_revolution=flag,
+            feed_is=kind,
             feed_room=none,
             second_room=none,
             tip_room=none,

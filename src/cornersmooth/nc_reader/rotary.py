@@ -15,7 +15,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.curves import basis, groups
-from cornersmooth.nc_reader.elements import Curves, Element, Elements
+from cornersmooth.nc_reader.elements import Curves, Element, Elements, FeedIs
 from cornersmooth.nc_reader.execution import Modal
 from cornersmooth.nc_reader.needed_states import MOST_TURN
 
@@ -188,12 +188,11 @@ class Rotary:
         angles = np.nan_to_num(np.vstack((before.second, run.second))[:, :2])
         tip, vector = self.tips(position, angles), self.directions(angles)
         curves = self._curves(run.curves)
-        feed, room = run.feed, run.feed_room
         if inverse_time:
-            feed, room = self._timed(feed, position, tip, vector, angles)
+            run = self._timed(run, position, tip, vector, angles)
         count = self._counts(run, position, angles)
         if not len(count) or count.max() == 1:
-            return replace(run, tip=tip[1:], second=vector[1:], curves=curves, feed=feed, feed_room=room)
+            return replace(run, tip=tip[1:], second=vector[1:], curves=curves)
         last = np.cumsum(count) - 1
         owner = np.repeat(np.arange(len(count)), count)
         left = last[owner] - np.arange(len(owner))
@@ -203,8 +202,7 @@ class Rotary:
         fine_tip, fine_vector = tip[1:][owner], vector[1:][owner]
         words = [start[own] + at * (start[own + 1] - start[own]) for start in (position, angles)]
         fine_tip[inner], fine_vector[inner] = self.tips(*words), self.directions(words[1])
-        run = replace(run, feed=feed, feed_room=room, curves=curves)
-        return replace(run.divided(owner, last), tip=fine_tip, second=fine_vector)
+        return replace(replace(run, curves=curves).divided(owner, last), tip=fine_tip, second=fine_vector)
 
     def swung(self, run: Elements, before: Modal) -> Ints:
         """Rapids in which the axes lead the tool a long way round, as when they turn back: (k,) elements.
@@ -283,16 +281,14 @@ class Rotary:
                 moved = moved.turned(axis, angles[:, index], turn[:, index], np.array(axis.point))
         return moved.bend, axis_bend
 
-    def _timed(
-        self, rate: Floats, position: Floats, tip: Floats, vector: Floats, angles: Floats
-    ) -> tuple[Floats, Floats]:
-        """Feeds (mm/min) of blocks whose F is moves per minute, and how far they are uncertain.
+    def _timed(self, run: Elements, position: Floats, tip: Floats, vector: Floats, angles: Floats) -> Elements:
+        """Blocks whose F is moves per minute, with their feeds (mm/min), and how far these are uncertain.
 
         Where the tip stands still the axis point runs with the feed; where the tip stays within ε and the axis point
         does not, either may. Without tip control the printed digits do not tell whether the tip stands or creeps:
-        either may have timed the block then, see `NcProgram.feed_room`.
+        either may have timed the block then, see `FeedIs`.
         """
-        levers = self.levers(position)
+        rate, levers = run.feed, self.levers(position)
         step, turn_step = self.steps(float(levers.max(initial=0.0, where=~np.isnan(levers))))
         length = np.linalg.norm(np.diff(tip, axis=0), axis=1)
         swing = np.linalg.norm(np.diff(tip + self.axis_length * vector, axis=0), axis=1)
@@ -307,17 +303,16 @@ class Rotary:
         either = ~still & (length < self.tolerance + printed) & (swing > self.tolerance - printed)
         room[either] += (rate * (swing - length))[either]
         way = np.where(~still & (length < self.tolerance) & (swing > self.tolerance), swing, way)
-        if not self.tip_control:
-            room[still] *= -1.0
+        kind = np.where(still & (not self.tip_control), np.uint8(FeedIs.OF_AXIS_POINT), np.uint8(FeedIs.KNOWN))
         room[(rate * turn > FAST_TURN) | (~still & short)] = np.inf
         feed = rate * way
         slowed = np.isin(rate, _FASTEST) & np.isfinite(room)
-        feed[slowed] -= np.abs(room[slowed])
+        feed[slowed] -= room[slowed]
         creeping = slowed & still & (not self.tip_control)  # the tip may have timed it, by what the digits do not show
         feed[creeping] = np.minimum(feed, rate * np.maximum(length - 2 * step, 0.0))[creeping]
         feed[slowed] = np.maximum(feed[slowed], _LEAST_FEED)
-        room[slowed] = np.nan
-        return feed, room
+        room[slowed], kind[slowed] = 0.0, FeedIs.LEAST
+        return replace(run, feed=feed, feed_room=room, feed_is=kind)
 
     def _curves(self, curves: Curves) -> Curves:
         """Curves in tip and tool vector."""

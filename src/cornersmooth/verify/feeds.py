@@ -6,12 +6,13 @@ Where a rounded pose changes the feed, the change may lie anywhere inside the ro
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Program
-from cornersmooth.nc_reader.elements import Element, Elements, Problem
+from cornersmooth.nc_reader.elements import Element, Elements, FeedIs, Problem
 from cornersmooth.nc_reader.rotary import SHORT_STEPS
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.findings import Findings, Runs
@@ -41,19 +42,21 @@ def check_feeds(match: Match, found: Findings) -> None:
         return
     start, end = start[feeding], end[feeding]
     low, high = _touched(match, start, end)
-    said, per_revolution, room = nc.feed[element], nc.per_revolution[element], nc.feed_room[element]
+    said = _Said(nc, element)
     rapid = nc.kind[element] == Element.RAPID
 
     def fits(k: int, moves: Ints) -> Bools:
         """(m,) whether row k carries the feed of moves."""
-        return _same(said[k], per_revolution[k], room[k], original, moves)
+        return _Said(nc, int(element[k])).same(original, moves)
 
     # a planned feed of what does not move the tool, as a table that turns about it, tells nothing but a time
-    still = np.isnan(room) & (np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC)
-    good = _same(said, per_revolution, room, original, low) | rapid | still
+    still = (nc.feed_is[element] == FeedIs.LEAST) & (
+        np.linalg.norm(match.six[end] - match.six[start], axis=1) <= ARITHMETIC
+    )
+    good = said.same(original, low) | rapid | still
     other = np.flatnonzero(~good)
     if len(other):
-        good[other] = _same(said[other], per_revolution[other], room[other], original, high[other])
+        good[other] = _Said(nc, element[other]).same(original, high[other])
         several = np.flatnonzero(~good & (high > low + 1))
         for k in several.tolist():
             good[k] = fits(k, np.arange(low[k], high[k] + 1)).any()
@@ -68,8 +71,7 @@ def check_feeds(match: Match, found: Findings) -> None:
         good[k] = fits(k, _alike(match, int(element[k]), *ends)).any() or _elsewhere(match, *ends, partial(fits, k))
         if good[k]:
             continue
-        pair = float(said[k]), float(room[k])
-        good[k] = _inside_rounding(match, int(start[k]), int(end[k]), int(low[k]), pair)
+        good[k] = _inside_rounding(match, *ends, int(low[k]), _Said(nc, int(element[k])))
     wrong = np.flatnonzero(~good)
     if len(wrong):
         runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
@@ -91,20 +93,29 @@ def _touched(match: Match, start: Ints, end: Ints) -> tuple[Ints, Ints]:
     return owner[segment + 1], owner[last + 1]
 
 
-def _same(
-    said: Floats | np.float64,
-    per_revolution: Bools | np.bool_,
-    room: Floats | np.float64,
-    original: Original,
-    move: Ints,
-) -> Bools:
-    pose = original.pose[move]
-    asked, mode = original.program.feed[pose], original.program.feed_mode[pose] == FeedMode.PER_REVOLUTION
-    slack = ARITHMETIC * np.maximum(np.abs(asked), 1.0)
-    near = (np.abs(said - asked) <= np.abs(room) + slack) | (asked <= -_CREEPING * room)
-    near |= np.isnan(room) & (said > 0.0) & (said <= asked + slack)
-    same: Bools = np.isnan(asked) | (near & (per_revolution == mode))
-    return same
+@dataclass(frozen=True)
+class _Said:
+    """What elements say of their feed."""
+
+    nc: Elements
+    element: Ints | int
+
+    def near(self, asked: Floats) -> Bools:
+        """Whether they may be feeds that are asked for; the unit is not looked at."""
+        nc, own = self.nc, self.element
+        feed, room, kind = nc.feed[own], nc.feed_room[own], nc.feed_is[own]
+        slack = ARITHMETIC * np.maximum(np.abs(asked), 1.0)
+        near: Bools = np.abs(feed - asked) <= room + slack
+        near |= (kind == FeedIs.OF_AXIS_POINT) & (asked <= _CREEPING * room)
+        near |= (kind == FeedIs.LEAST) & (feed > 0.0) & (feed <= asked + slack)
+        return near
+
+    def same(self, original: Original, move: Ints) -> Bools:
+        """Whether they are the feeds of moves, in their unit."""
+        pose = original.pose[move]
+        asked, mode = original.program.feed[pose], original.program.feed_mode[pose] == FeedMode.PER_REVOLUTION
+        same: Bools = np.isnan(asked) | (self.near(asked) & (self.nc.per_revolution[self.element] == mode))
+        return same
 
 
 def _alike(match: Match, element: int, start: int, end: int) -> Ints:
@@ -148,17 +159,9 @@ def _joined(fits: Callable[[Ints], Bools], first: Ints, last: Ints) -> bool:
     return not one.isdisjoint(other)
 
 
-def _inside_rounding(
-    match: Match,
-    start: int,
-    end: int,
-    move: int,
-    pair: tuple[float, float],
-) -> bool:
+def _inside_rounding(match: Match, start: int, end: int, move: int, said: _Said) -> bool:
     """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
     length, trail, pose, off = match.path.length, match.original.trail, match.original.pose, match.off
-    said, room = pair[0], abs(pair[1]) + ARITHMETIC * max(abs(pair[0]), 1.0)
-    creeping, slower = -_CREEPING * pair[1], bool(np.isnan(pair[1]))
     visible = match.margin / 2
     low, high = int(match.low[start]), int(match.high[start])
 
@@ -184,10 +187,7 @@ def _inside_rounding(
     ):
         if not low < pose_vertex <= high:
             continue
-        if not any(
-            abs(asked - said) <= room or asked <= creeping or (slower and 0.0 < said <= asked)
-            for asked in match.original.program.feed[pose[beyond(step)]]
-        ):
+        if not said.near(match.original.program.feed[pose[beyond(step)]]).any():
             continue
         there = length[pose_vertex]
         begin, other = length[trail.last[move - 1]], length[trail.last[move]]

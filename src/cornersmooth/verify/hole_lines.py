@@ -9,7 +9,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.ahead import Ahead
-from cornersmooth.nc_reader.elements import Element
+from cornersmooth.nc_reader.elements import Element, FeedIs
 from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.statements.tool_changes import ToolChanges
@@ -214,7 +214,7 @@ class HoleLines:
         if fed is None:
             return False
         nc, own = self.ahead.nc, fed - self.ahead.base
-        near = abs(nc.feed[own] - cycle.feed) <= 2 * abs(nc.feed_room[own])
+        near = abs(nc.feed[own] - cycle.feed) <= 2 * nc.feed_room[own]
         return bool(nc.per_revolution[own] and near)
 
     def wrong_feed(self, element: int, cycle: Drilling) -> bool:
@@ -224,8 +224,8 @@ class HoleLines:
             not np.isnan(cycle.feed)
             and (
                 np.isnan(nc.feed[own])
-                or abs(nc.feed[own] - cycle.feed) > 2 * abs(nc.feed_room[own])
-                or (np.isnan(nc.feed_room[own]) and nc.feed[own] > cycle.feed + ARITHMETIC)
+                or abs(nc.feed[own] - cycle.feed) > 2 * nc.feed_room[own]
+                or (nc.feed_is[own] == FeedIs.LEAST and nc.feed[own] > cycle.feed + ARITHMETIC)
                 or nc.per_revolution[own] != cycle.per_revolution
             )
         )
