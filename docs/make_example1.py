@@ -1,4 +1,4 @@
-"""Draws docs/example1.svg and prints its table: the paper's Example 1, measured in the written NURBS text.
+"""Draws docs/dev/example1.svg and prints its table: the paper's Example 1, measured in the written NURBS text.
 
 python docs/make_example1.py
 """
@@ -84,7 +84,7 @@ def main() -> None:
             x = LEFT + WIDTH * way / LENGTH
             parts.append(f'<text x="{x:.1f}" y="{top + HEIGHT + 18:.1f}" text-anchor="middle">{way}</text>')
         sys.stdout.write(table(found, tolerance) + "\n")
-    (HERE / "example1.svg").write_text("\n".join([*parts, "</svg>"]) + "\n", encoding="utf-8")
+    (HERE / "dev" / "example1.svg").write_text("\n".join([*parts, "</svg>"]) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

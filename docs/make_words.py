@@ -1,4 +1,4 @@
-"""Writes the tables of words into docs/words.md, as the lists of `verify` have them.
+"""Writes the tables of words into docs/dev/words.md, as the lists of `verify` have them.
 
 python docs/make_words.py
 """
@@ -13,7 +13,7 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 LISTS = HERE.parent / "src" / "cornersmooth" / "nc_reader" / "word_lists"
-PAGE = HERE / "words.md"
+PAGE = HERE / "dev" / "words.md"
 BEGIN, END = "<!-- made by make_words.py -->\n", "<!-- end -->\n"
 CONTROLS = ("fanuc", "mitsubishi", "haas", "linuxcnc", "generic", "siemens", "heidenhain")
 

@@ -26,7 +26,7 @@ from oracle.command import SCRIPT, SMALL, environment
 from oracle.share import share
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+PAGES = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md")))
 PROGRAM = r"(?:make|python3?|pip|dask|cd|find|npm) "
 
 #: every command of the pages, and what runs it: a test of this file, or the file that does
