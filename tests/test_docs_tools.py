@@ -35,6 +35,8 @@ RUN_BY = {
     "make test": "test_make_runs_the_tests",
     "make thorough": "test_make_runs_the_tests",
     "make docs": "test_make_docs_writes_the_reference",
+    "make check": ".ci/run",
+    "make packages": ".ci/run",
     # an hour, so it runs with few poses
     "make bench": "test_make_bench_times_the_command",
     "make bench BEFORE=FOLDER": "test_make_bench_compares_checkouts",
