@@ -1,4 +1,4 @@
-"""Holes as cycles of the control: which tools may have them, and the blocks of each hole.
+"""Holes as cycles of the control: which tools may have them, and which cycle does what the CL file asks for.
 
 Controls take no hole cycles and no cutter compensation under tool tip control. So a tool has cycles only where it stays
 along Z from its change to the next, and where the rotary axes are known to stand at zero: then it runs without tool tip
@@ -8,54 +8,22 @@ stays plain moves. Where cycles are asked for, a tool with cutter compensation r
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.kinematics import machine_position, tool_axis
-from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program, Statement
+from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
 from cornersmooth.nc.form import Form
-from cornersmooth.nc.holes import Cycle, in_force, read_cycle
-from cornersmooth.nc.program_table import Blocks
-from cornersmooth.nc.statement_args import number_after, whole_number, words_of
-from cornersmooth.text import format_number
-
-#: words that load a tool
-TOOL_WORDS: Final = frozenset({"LOADTL", "LOAD", "TURRET"})
-
-#: words of `TOOL_WORDS` with the number of a length register
-_REGISTERS: Final = ("ADJUST", "OSETNO")
+from cornersmooth.nc.hole_cycles import Cycle, in_force, read_cycle
+from cornersmooth.nc.statement_args import words_of
+from cornersmooth.nc.tools import tool_starts
 
 #: sides of the path on which cutter compensation keeps the tool
 _SIDES: Final = (["LEFT"], ["RIGHT"])
 
-#: words at which the program waits for time or the operator
-_WAITING: Final = frozenset({"STOP", "OPSTOP", "DELAY"})
-
 #: by how much a tool axis along Z may be off, and a position at angles of zero, mm
 _ALONG_Z, _SAME_PLACE = 1e-9, 1e-9
-
-
-def loaded_tool(statement: Statement) -> tuple[int, int] | None:
-    """Tool and length register of LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]; None where it loads none.
-
-    A number behind ADJUST, OSETNO or LENGTH is no tool: LOADTL/ADJUST,3 names none.
-    """
-    words = words_of(statement)
-    if statement.word == "LOAD" and words[:1] != ["TOOL"]:
-        return None
-    registers = [value for word in _REGISTERS for value in number_after(statement, word)]
-    behind = pairwise(("", *statement.args))
-    numbers = [value for word, value in behind if isinstance(value, float) and word not in (*_REGISTERS, "LENGTH")]
-    if not numbers and statement.word == "LOADTL" and words and words[0][:1] == "T" and words[0][1:].isdigit():
-        numbers = [float(words[0][1:])]
-    number = whole_number(numbers[:1])
-    if number is None:
-        return None
-    offset = whole_number(registers[:1])
-    return number, number if offset is None else offset
 
 
 def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
@@ -125,35 +93,6 @@ def _said_cycles(program: Program) -> list[tuple[int, tuple[float | str, ...], b
     return said
 
 
-def tool_loads(program: Program) -> list[tuple[int, tuple[int, int]]]:
-    """Pose, and tool and length register, of every statement that loads a tool."""
-    words = TOOL_WORDS if TOOL_WORDS & {statement.word for statement in program.statements} else {"TOOLNO"}
-    loads = [(statement.pose, loaded_tool(statement)) for statement in program.statements if statement.word in words]
-    return [(pose, tool) for pose, tool in loads if tool is not None]
-
-
-def ahead_of_tools(program: Program) -> frozenset[int]:
-    """Last statements of each word ahead of the first tool, if no motion and no wait comes before it; by identity."""
-    found: dict[str, int] = {}
-    for statement in program.statements:
-        if statement.pose > program.statements[0].pose or statement.word in _WAITING:
-            return frozenset()
-        if statement.word in TOOL_WORDS and loaded_tool(statement) is not None:
-            return frozenset(found.values())
-        found[statement.word] = id(statement)
-    return frozenset()
-
-
-def tool_starts(program: Program) -> list[int]:
-    """Poses at which another tool begins, the first pose among them; ascending."""
-    starts, tool = [0], None
-    for pose, loaded in tool_loads(program):
-        if loaded != tool:
-            starts.append(pose)
-            tool = loaded
-    return sorted({min(pose, len(program)) for pose in starts})
-
-
 def _can_stand_upright(form: Form) -> bool:
     """Whether the form has such blocks, and X Y Z are the tip while the rotary axes stand at zero."""
     if form.upright is None or form.curves or not form.table.program.retract:
@@ -194,85 +133,3 @@ def kind_of(cycle: Cycle, form: Form, program: Program, poses: Ints) -> str:
     else:
         name = "dwell" if cycle.dwell else "drill"
     return name if getattr(cycles, name) else ""
-
-
-@dataclass(frozen=True)
-class Hole:
-    """One hole, in units of the text.
-
-    Parameters
-    ----------
-    place : (3,) float64
-        Its top.
-    travel, clearance : float
-        Heights above it.
-    depth : float
-        Below it.
-    feed : str
-        As it is written.
-    """
-
-    place: Floats
-    travel: float
-    clearance: float
-    depth: float
-    feed: str
-
-
-def hole_blocks(hole: Hole, cycle: Cycle, kind: str, form: Form, speed: float, pitch: float, unit: float) -> Blocks:
-    """Blocks of one hole.
-
-    Parameters
-    ----------
-    hole : Hole
-    cycle : Cycle
-    kind : str
-        As `kind_of` gives it.
-    form : Form
-    speed : float
-        Of the spindle, revolutions per minute.
-    pitch : float
-        Of a thread, in units of the text.
-    unit : float
-        Millimetres per unit of the text.
-
-    Returns
-    -------
-    tuple of str
-        Distances are those between the heights as they are written.
-    """
-    decimals = form.tip_decimals("mm" if unit == 1.0 else "inch")
-    plus = form.mode.motion.signs
-
-    def number(value: float) -> str:
-        return format_number(value, decimals, plus=plus)
-
-    def rounded(value: float) -> float:
-        return float(format_number(value, decimals))
-
-    x, y, top = hole.place.tolist()
-    heights = {name: rounded(top + above) for name, above in (("travel", hole.travel), ("clearance", hole.clearance))}
-    top, bottom = rounded(top), rounded(top - hole.depth)
-    values = {
-        "x": number(x),
-        "y": number(y),
-        "top": number(top),
-        "bottom": number(bottom),
-        "travel": number(heights["travel"]),
-        "clearance": number(heights["clearance"]),
-        "setup": number(heights["clearance"] - top),
-        "above": number(heights["travel"] - top),
-        "depth": format_number(top - bottom, decimals),
-        "step": format_number(cycle.steps[0] / unit if cycle.steps else 0.0, decimals),
-        "feed": hole.feed,
-        "milliseconds": cycle.dwell,
-        "seconds": format_number(cycle.dwell / 1000.0, 3, trim=True),
-        "pitch": format_number(pitch, max(decimals, form.table.digits.most)),
-        "speed": format_number(speed, form.table.digits.speed, trim=True).rstrip("."),
-    }
-    return tuple(block.format(**values) for block in getattr(form.table.cycles, kind))
-
-
-def first_of_hole(blocks: Blocks) -> int:
-    """How many of the blocks of a cycle in the table stand before those that are written for each hole."""
-    return next((k for k, block in enumerate(blocks) if "{x}" in block), 0)

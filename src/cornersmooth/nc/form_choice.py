@@ -13,8 +13,8 @@ from cornersmooth.kinematics import Machine
 from cornersmooth.model import Floats, Move, Program
 from cornersmooth.nc.control import Control, Extra, FormTable, Mode, Orientation
 from cornersmooth.nc.control_tables import load_control
-from cornersmooth.nc.cycle_blocks import loaded_tool
 from cornersmooth.nc.form import ROTARY_SHARE, Form
+from cornersmooth.nc.tools import loaded_tool
 from cornersmooth.settings import Settings
 from cornersmooth.tables import closest
 from cornersmooth.vectors import norm

@@ -1,14 +1,237 @@
-"""The hole cycle that a CL file has in force: CYCLE, said, switched off and on again."""
+"""Hole cycles that a CL file asks for: what a CYCLE statement means, and which one is in force.
+
+All distances count along the tool axis from the position that the CL file gives, the top of the hole:
+
+* ``RAPTO`` (or ``CLEAR``) above it the feed begins; ``RTRCTO`` or ``RETURN`` above it the tool goes when it is done;
+* ``FEDTO`` or ``DEPTH`` below it the hole ends. NX writes ``FEDTO`` negative (``FEDTO,-33.0043``), everyone else
+  positive; a positive number in an NX file would lie in the air and is not understood.
+
+HSM's ``CLEAR`` is an absolute height and is passed over for its ``RAPTO`` and ``RETURN``.
+
+``CYCLE/ON`` goes on with the last cycle; words after it (``CYCLE/ON,FEDTO,-74.5``) take the place of its own.
+``CYCLE/DRILL,ON,...`` is how ISO 4343 (10.8.7) begins one. Autodesk's ISO 4343 post has a fixed order, in which some
+numbers have no word: ``CYCLE/DRILL, 12, MMPM, 85, 1`` says depth, unit, feed and clearance.
+
+Not understood, and so never drilled by guess: threads, bores that orient or stop the spindle, countersinks by
+diameter, other numbers without a word (CATIA's ``CYCLE/DRILL, 3.0, 5.0`` depends on the PP table). A plain ``TAP`` is
+understood, but only a cycle of the control can do it (`cycle_blocks`).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from cornersmooth.errors import InputError
-from cornersmooth.model import Program, Statement
+from cornersmooth.model import FeedMode, Program, Statement
 from cornersmooth.nc.findings import Findings
-from cornersmooth.nc.holes import Cycle, has_fixed_order, in_force, read_cycle
+from cornersmooth.nc.spindle import milliseconds
 from cornersmooth.nc.statement_args import words_of
+
+#: more pecks in one hole are a misunderstanding
+_MOST_PECKS = 1000
+
+_KINDS = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
+_PECKING = {"DEEP", "DEEP2", "BRKCHP"}
+_AT_FEED = {"REAM", "BORE"}
+_DEPTHS = ("FEDTO", "DEPTH")
+_RETURNS = ("RTRCTO", "RETURN")
+_STEPS = ("STEP", "INCR", "1STPECK", "SUBPECK")
+_DISTANCES = {*_DEPTHS, *_RETURNS, *_STEPS, "RAPTO", "CLEAR"}
+#: millimetres per unit of the feed, None for the unit of the file, and what it is per
+_FEEDS = {
+    "MMPM": (1.0, FeedMode.PER_MINUTE),
+    "IPM": (25.4, FeedMode.PER_MINUTE),
+    "PERMIN": (None, FeedMode.PER_MINUTE),
+    "MMPR": (1.0, FeedMode.PER_REVOLUTION),
+    "IPR": (25.4, FeedMode.PER_REVOLUTION),
+    "PERREV": (None, FeedMode.PER_REVOLUTION),
+}
+
+#: words of which a later one takes the place of all the others
+_FAMILIES = ({*_DEPTHS}, {*_RETURNS}, {*_STEPS}, {"RAPTO", "CLEAR"}, {*_FEEDS}, {"DWELL"})
+
+#: dialects in which the fixed order is that of ISO 4343; elsewhere a table of the post-processor says what numbers mean
+_FIXED_ORDER = ("plain", "hsm")
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """What a CYCLE statement asks for; lengths in mm along the tool axis.
+
+    Parameters
+    ----------
+    depth : float
+        Below the position.
+    clearance : float or None
+        Above the position: where feeding begins; None for the height of travel.
+    retract : float
+        Above the position: least height when the hole is done.
+    feed : float
+        mm/min or mm/rev; NaN for the feed in force.
+    feed_mode : FeedMode
+    dwell : int
+        Milliseconds at the depth.
+    steps : tuple of float
+        Depths of the pecks, the last one repeated; none for a single feed.
+    full_retract : bool
+        Whether a peck comes out of the hole.
+    feed_out : bool
+    pecking : bool
+        Whether `steps` are to be taken; without any the hole is drilled in one feed.
+    tap : bool
+        Whether a thread is cut: the spindle turns with the feed.
+    """
+
+    depth: float
+    clearance: float | None
+    retract: float = 0.0
+    feed: float = math.nan
+    feed_mode: FeedMode = FeedMode.PER_MINUTE
+    dwell: int = 0
+    steps: tuple[float, ...] = ()
+    full_retract: bool = True
+    feed_out: bool = False
+    pecking: bool = False
+    tap: bool = False
+
+
+def in_force(
+    before: tuple[float | str, ...], said: tuple[float | str, ...], program: Program
+) -> tuple[float | str, ...]:
+    """Arguments of the cycle that holds after a CYCLE statement, every number after the word that says what it is.
+
+    Parameters
+    ----------
+    before : tuple
+        Those that held before it.
+    said : tuple
+        Its own.
+    program : Program
+    """
+    own = _without_on(said)
+    if own == ["INIT"]:  # SolidWorks announces a cycle by it
+        return before
+    if own[:1] != ["ON"]:
+        clearance = _unit_place(own) + 2
+        named = (
+            [own[0], "DEPTH", *own[1:clearance], "CLEAR", *own[clearance:]] if has_fixed_order(said, program) else own
+        )
+        return tuple(named)
+    gone = set().union(*(family for family in _FAMILIES if family.intersection(own)))
+    kept, word = [], ""
+    for value in before:
+        if isinstance(value, str) and value not in ("AUTO", "REV"):
+            word = value
+        if word not in gone:
+            kept.append(value)
+    return (*kept, *own[1:])
+
+
+def has_fixed_order(args: tuple[float | str, ...], program: Program) -> bool:
+    """Whether numbers have no words, but the order of Autodesk's ISO 4343 post: kind, depth, unit, feed, clearance."""
+    own = _without_on(args)
+    unit = _unit_place(own)
+    numbers = [value for value in (*own[1:2], *own[unit + 1 : unit + 3]) if isinstance(value, float)]
+    if program.source.dialect not in _FIXED_ORDER or len(numbers) < 3:
+        return False
+    return own[0] in _KINDS and own[unit] in _FEEDS and numbers[0] > 0.0
+
+
+def _without_on(args: tuple[float | str, ...]) -> list[float | str]:
+    """Arguments that say something, without the ON of ISO 4343 after the kind of cycle."""
+    own = [value for value in args if value != ""]
+    return own[:1] + own[2:] if own[1:2] == ["ON"] and own[0] in _KINDS else own
+
+
+def _unit_place(args: Sequence[float | str]) -> int:
+    """Where the unit is in the fixed order: pecks come before it."""
+    return 4 if args[2:3] and args[2] in _STEPS else 2
+
+
+def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | None) -> Cycle | None:
+    """Read the arguments of a cycle, as `in_force` gives them; None where any of them is not understood.
+
+    Parameters
+    ----------
+    speed : float or None
+        Revolutions per minute, for a dwell in revolutions.
+    """
+    given = _pairs(args)
+    if given is None:
+        return None
+    kinds, values = given
+    scale = program.mm_per_unit
+    depths = [values[word][0] for word in _DEPTHS if word in values]
+    if not kinds or len(depths) != 1:
+        return None
+    depth = depths[0]
+    depth = -depth if program.source.dialect == "nx" else abs(depth)
+    returns = [values[word][0] for word in _RETURNS if word in values]
+    hsm = program.source.dialect == "hsm"
+    clearances = [values["RAPTO"][0]] if "RAPTO" in values else []
+    clearances += returns if hsm else values.get("CLEAR", ())[:1] or returns
+    if depth < 0.0 or any(height < 0.0 for height in (*clearances, *returns)):
+        return None
+    first, rest = values.get("1STPECK", ()), values.get("SUBPECK", ())
+    steps = tuple(scale * step for step in (*values.get("STEP", ()), *values.get("INCR", ()), *first, *rest))
+    if any(step <= 0.0 for step in steps) or (steps and depth * scale / min(steps) > _MOST_PECKS):
+        return None
+    dwell = 0
+    if "DWELL" in values:
+        time = milliseconds(values["DWELL"][0], "REV" in kinds, speed)
+        if time is None:
+            return None
+        dwell = time
+    elif "REV" in kinds:
+        return None
+    if "TAP" in kinds and (len(kinds) > 1 or steps or dwell or not depth > 0.0):
+        return None
+    cycle = Cycle(
+        depth=depth * scale,
+        clearance=clearances[0] * scale if clearances else None,
+        retract=max(returns, default=0.0) * scale,
+        dwell=dwell,
+        steps=steps,
+        full_retract="BRKCHP" not in kinds,
+        feed_out=bool(_AT_FEED & kinds),
+        pecking=bool(_PECKING & kinds),
+        tap="TAP" in kinds,
+    )
+    for word, (per_unit, mode) in _FEEDS.items():
+        if word in values:
+            cycle = replace(cycle, feed=values[word][0] * (per_unit or scale), feed_mode=mode)
+    return cycle
+
+
+def _pairs(args: tuple[float | str, ...]) -> tuple[set[str], dict[str, tuple[float, ...]]] | None:
+    """Words that say what kind of cycle it is, and words with their numbers; None for anything else."""
+    kinds: set[str] = set()
+    values: dict[str, tuple[float, ...]] = {}
+    word = ""
+    for value in args:
+        if isinstance(value, float):
+            many = word == "STEP" and word in values
+            if not math.isfinite(value) or not word or (word in values and not many):
+                return None
+            values[word] = (*values.get(word, ()), value)
+        elif value == "AUTO" and word in _RETURNS and word not in values:
+            word = ""  # the control's own height: ours is the height of travel
+        elif value == "REV" and word == "DWELL":
+            kinds.add(value)
+        elif value in _KINDS:
+            kinds.add(value)
+            word = ""
+        elif value in _DISTANCES or value in _FEEDS or value == "DWELL":
+            if value in values or (word and word not in values):
+                return None
+            word = value
+        elif value:
+            return None
+    if (word and word not in values) or len(_FEEDS.keys() & values.keys()) > 1:
+        return None
+    return kinds, values
 
 
 @dataclass

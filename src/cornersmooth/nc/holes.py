@@ -1,38 +1,33 @@
-"""Hole cycles as plain moves: rapid over the hole, rapid to the clearance, feed to the depth, out again.
+"""Holes of the motion: as cycles of the control, as plain moves, or only gone over.
 
-Plain moves run under tool tip control with any tool axis, where canned cycles are refused. All distances count along
-the tool axis from the position that the CL file gives, the top of the hole:
+Plain moves run under tool tip control with any tool axis, where canned cycles are refused: rapid over the hole, rapid
+to the clearance, feed to the depth, out again. The tool travels between holes at the greatest of the cycle's heights
+and of the height from which the first hole was approached. ``DEEP`` retracts to the clearance after every ``STEP``,
+``INCR`` or ``1STPECK``/``SUBPECK``, ``BRKCHP`` by `PECK_GAP` only. ``REAM`` and ``BORE`` come out at feed.
 
-* ``RAPTO`` (or ``CLEAR``) above it the feed begins; ``RTRCTO`` or ``RETURN`` above it the tool goes when it is done;
-* ``FEDTO`` or ``DEPTH`` below it the hole ends. NX writes ``FEDTO`` negative (``FEDTO,-33.0043``), everyone else
-  positive; a positive number in an NX file would lie in the air and is not understood.
-
-The tool travels between holes at the greatest of these heights and of the height from which the first hole was
-approached. ``DEEP`` retracts to the clearance after every ``STEP``, ``INCR`` or ``1STPECK``/``SUBPECK``, ``BRKCHP`` by
-`PECK_GAP` only. ``REAM`` and ``BORE`` come out at feed. HSM's ``CLEAR`` is an absolute height and is passed over for
-its ``RAPTO`` and ``RETURN``.
-
-``CYCLE/ON`` goes on with the last cycle; words after it (``CYCLE/ON,FEDTO,-74.5``) take the place of its own.
-``CYCLE/DRILL,ON,...`` is how ISO 4343 (10.8.7) begins one. Autodesk's ISO 4343 post has a fixed order, in which some
-numbers have no word: ``CYCLE/DRILL, 12, MMPM, 85, 1`` says depth, unit, feed and clearance.
-
-Not understood, and so never drilled by guess: threads, bores that orient or stop the spindle, countersinks by
-diameter, other numbers without a word that says what they are (CATIA's ``CYCLE/DRILL, 3.0, 5.0`` depends on the PP
-table). Where such holes may be left out, they are approached at the height from which the cycle was entered, and no
-further. A plain ``TAP`` is understood, but it is no moves: only a cycle of the control can do it (`cycle_blocks`).
+Python runs per run of holes; per hole where the control has a cycle for it, or nobody understands it.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cornersmooth.model import Bools, FeedMode, Floats, Ints, Move, Program
-from cornersmooth.nc.spindle import milliseconds
+from cornersmooth.nc.cycle_blocks import hole_feeds, kind_of
+from cornersmooth.nc.hole_cycles import Cycle
+from cornersmooth.nc.program_table import Blocks
+from cornersmooth.nc.run import Run
+from cornersmooth.smoothing.sampling import Rows
+from cornersmooth.text import format_number
 from cornersmooth.vectors import dot
+
+if TYPE_CHECKING:
+    from cornersmooth.nc.motion_writer import MotionWriter
 
 #: mm left above the last depth before feeding goes on, and moved up to break a chip
 PECK_GAP = 0.5
@@ -40,212 +35,152 @@ PECK_GAP = 0.5
 #: mm: the last peck takes what would be left; a tool only rubs there
 LEAST_PECK = 0.01
 
-#: more pecks in one hole are a misunderstanding
-_MOST_PECKS = 1000
-
 #: axes whose directions differ by less, in the cosine, are the same for the height of travel
 _SAME_AXIS = 1e-9
 
-_KINDS = {"DRILL", "FACE", "SPOT", "CSINK", "REAM", "BORE", "DEEP", "DEEP2", "BRKCHP", "TAP"}
-_PECKING = {"DEEP", "DEEP2", "BRKCHP"}
-_AT_FEED = {"REAM", "BORE"}
-_DEPTHS = ("FEDTO", "DEPTH")
-_RETURNS = ("RTRCTO", "RETURN")
-_STEPS = ("STEP", "INCR", "1STPECK", "SUBPECK")
-_DISTANCES = {*_DEPTHS, *_RETURNS, *_STEPS, "RAPTO", "CLEAR"}
-#: millimetres per unit of the feed, None for the unit of the file, and what it is per
-_FEEDS = {
-    "MMPM": (1.0, FeedMode.PER_MINUTE),
-    "IPM": (25.4, FeedMode.PER_MINUTE),
-    "PERMIN": (None, FeedMode.PER_MINUTE),
-    "MMPR": (1.0, FeedMode.PER_REVOLUTION),
-    "IPR": (25.4, FeedMode.PER_REVOLUTION),
-    "PERREV": (None, FeedMode.PER_REVOLUTION),
-}
 
-#: words of which a later one takes the place of all the others
-_FAMILIES = ({*_DEPTHS}, {*_RETURNS}, {*_STEPS}, {"RAPTO", "CLEAR"}, {*_FEEDS}, {"DWELL"})
-
-#: dialects in which the fixed order is that of ISO 4343; elsewhere a table of the post-processor says what numbers mean
-_FIXED_ORDER = ("plain", "hsm")
-
-
-@dataclass(frozen=True)
-class Cycle:
-    """What a CYCLE statement asks for; lengths in mm along the tool axis.
+@dataclass
+class HoleWriter:
+    """Writes the holes of a program.
 
     Parameters
     ----------
-    depth : float
-        Below the position.
-    clearance : float or None
-        Above the position: where feeding begins; None for the height of travel.
-    retract : float
-        Above the position: least height when the hole is done.
-    feed : float
-        mm/min or mm/rev; NaN for the feed in force.
-    feed_mode : FeedMode
-    dwell : int
-        Milliseconds at the depth.
-    steps : tuple of float
-        Depths of the pecks, the last one repeated; none for a single feed.
-    full_retract : bool
-        Whether a peck comes out of the hole.
-    feed_out : bool
-    pecking : bool
-        Whether `steps` are to be taken; without any the hole is drilled in one feed.
-    tap : bool
-        Whether a thread is cut: the spindle turns with the feed.
+    motion : MotionWriter
+        What the moves over holes and into them are written by.
+    native : bool
+        Whether holes are cycles of the control, where they can be.
     """
 
-    depth: float
-    clearance: float | None
-    retract: float = 0.0
-    feed: float = math.nan
-    feed_mode: FeedMode = FeedMode.PER_MINUTE
-    dwell: int = 0
-    steps: tuple[float, ...] = ()
-    full_retract: bool = True
-    feed_out: bool = False
-    pecking: bool = False
-    tap: bool = False
+    motion: MotionWriter
+    native: bool = False
 
+    @cached_property
+    def _approach(self) -> Ints:
+        return approaches(self.motion.program)
 
-def in_force(
-    before: tuple[float | str, ...], said: tuple[float | str, ...], program: Program
-) -> tuple[float | str, ...]:
-    """Arguments of the cycle that holds after a CYCLE statement, every number after the word that says what it is.
+    def write(self, rows: Rows) -> Iterator[bytes]:
+        """Holes of one cycle, of the control or as plain moves; those left out are only approached."""
+        motion = self.motion
+        cycle, program, poses = motion.statements.cycles.now, motion.program, rows.move
+        approach = self._approach[poses]
+        line = int(program.line[poses[0]])
+        kind = self._cycle_of_control(cycle, poses)
+        if cycle is None or (cycle.tap and not kind):
+            why = "its words are not understood" if cycle is None else self._why_no_tap(cycle, poses)
+            motion.statements.cycles.leave_out(why, line, len(poses))
+            yield from self._over_holes(rows, travel_height(program, poses, approach))
+            return
+        if kind:
+            yield from self._cycles(cycle, kind, poses, approach)
+            return
+        motion.findings.add("CS316", "note", line, "hole of a cycle written as plain moves", len(poses))
+        before = -1 if motion.operation.comes_first else int(poses[0]) - 1
+        motion.warnings.of_holes(poses, before, *travel_of(cycle, program, poses, approach))
+        moves = hole_moves(cycle, program, poses, approach)
+        move = poses[moves.hole]
+        ticks = motion.ticks_at(rows, moves.tip, moves.hole)
+        run = replace(Run.straight(program, ticks, move), rapid=moves.rapid, dwell=moves.dwell)
+        if not np.isnan(cycle.feed):
+            run = replace(run, feed=np.full(len(move), cycle.feed), mode=np.full(len(move), int(cycle.feed_mode)))
+        yield from motion.emit_above(motion.moving(run), cycle.dwell)
 
-    Parameters
-    ----------
-    before : tuple
-        Those that held before it.
-    said : tuple
-        Its own.
-    program : Program
-    """
-    own = _without_on(said)
-    if own == ["INIT"]:  # SolidWorks announces a cycle by it
-        return before
-    if own[:1] != ["ON"]:
-        clearance = _unit_place(own) + 2
-        named = (
-            [own[0], "DEPTH", *own[1:clearance], "CLEAR", *own[clearance:]] if has_fixed_order(said, program) else own
-        )
-        return tuple(named)
-    gone = set().union(*(family for family in _FAMILIES if family.intersection(own)))
-    kept, word = [], ""
-    for value in before:
-        if isinstance(value, str) and value not in ("AUTO", "REV"):
-            word = value
-        if word not in gone:
-            kept.append(value)
-    return (*kept, *own[1:])
+    def _cycle_of_control(self, cycle: Cycle | None, poses: Ints) -> str:
+        """Cycle of the control that drills holes, as `kind_of` names it; empty for none."""
+        if cycle is None or not self.motion.takes_cycles or not (self.native or cycle.tap):
+            return ""
+        if cycle.tap and not self._can_thread():
+            return ""
+        return kind_of(cycle, self.motion.writer.form, self.motion.program, poses)
 
+    def _why_no_tap(self, cycle: Cycle, poses: Ints) -> str:
+        """Why the control's cycle cannot do a tap, in words; plain moves cannot turn the spindle with the feed."""
+        if not kind_of(cycle, self.motion.writer.form, self.motion.program, poses):
+            return "a tap, and the control has no such cycle for it"
+        if not self._can_thread():
+            return "a tap takes a spindle that turns clockwise at a known speed"
+        return "a tap, and the tool does not stay along Z between its changes, or nothing says that the rotary axes do"
 
-def has_fixed_order(args: tuple[float | str, ...], program: Program) -> bool:
-    """Whether numbers have no words, but the order of Autodesk's ISO 4343 post: kind, depth, unit, feed, clearance."""
-    own = _without_on(args)
-    unit = _unit_place(own)
-    numbers = [value for value in (*own[1:2], *own[unit + 1 : unit + 3]) if isinstance(value, float)]
-    if program.source.dialect not in _FIXED_ORDER or len(numbers) < 3:
-        return False
-    return own[0] in _KINDS and own[unit] in _FEEDS and numbers[0] > 0.0
+    def _can_thread(self) -> bool:
+        """Whether the spindle turns as a thread needs it."""
+        return bool(self.motion.statements.clockwise and self.motion.statements.speed and self.motion.operation.turning)
 
+    def _cycles(self, cycle: Cycle, kind: str, poses: Ints, approach: Ints) -> Iterator[bytes]:
+        """Holes as cycles of the control, each from the height at which the tool goes from hole to hole."""
+        motion, program, writer = self.motion, self.motion.program, self.motion.writer
+        line = int(program.line[poses[0]])
+        motion.findings.add("CS347", "note", line, "hole written as a cycle of the control", len(poses))
+        if kind == "tap":
+            text = "a tap is left to the control's cycle: see that it turns the spindle with the feed"
+            motion.findings.add("CS348", "warning", line, text, len(poses))
+        motion.warnings.of_cut(int(poses[0]), turning=motion.operation.turning)
+        feeds, modes = hole_feeds(cycle, program, poses)
+        travel, clearance = travel_of(cycle, program, poses, approach)
+        table = writer.form.table.cycles
+        once = next(
+            (k for k, block in enumerate(getattr(table, kind)) if "{x}" in block), 0
+        )  # before those of each hole
+        frame = np.eye(3) if writer.plane is None else writer.plane.frame
+        said: tuple[str, ...] = ()
+        for k, pose in enumerate(poses.tolist()):
+            tip = program.tip[pose]
+            over = writer.ticks((tip + travel[k] * frame[:, 2])[None], program.axis[[pose]])
+            above = Run.straight(program, over, poses[[k]])
+            level = above.ticks[0, 2]
+            if not said or motion.position is None or motion.position[2] != level:
+                yield from motion.text(table.off if said else ())
+                said = ()
+                yield from motion.emit(motion.moving(replace(above, rapid=np.ones(1, np.bool_))))
+                yield from motion.text(motion.operation.go_on())
+                yield from motion.text(writer.feed_mode(int(modes[0])))
+            blocks = self._blocks(cycle, kind, tip @ frame, travel[k], clearance[k], feeds[k], int(modes[k]))
+            yield from motion.text(blocks[once:] if said == blocks[:once] and said else blocks)
+            said = blocks[:once] or blocks
+            motion.position = motion.last = above.ticks[0]
+        yield from motion.text(table.off)
+        writer.forget_feed()
 
-def _without_on(args: tuple[float | str, ...]) -> list[float | str]:
-    """Arguments that say something, without the ON of ISO 4343 after the kind of cycle."""
-    own = [value for value in args if value != ""]
-    return own[:1] + own[2:] if own[1:2] == ["ON"] and own[0] in _KINDS else own
+    def _blocks(
+        self, cycle: Cycle, kind: str, top: Floats, travel: float, clearance: float, feed: float, mode: int
+    ) -> Blocks:
+        """Blocks of one hole with its top, (3,) mm, and heights above it; distances are those of written heights."""
+        writer, unit = self.motion.writer, self.motion.program.mm_per_unit
+        table, speed = writer.form.table, self.motion.statements.speed or 0.0
+        decimals, plus = writer.form.tip_decimals(self.motion.program.units), writer.form.mode.motion.signs
 
+        def rounded(value: float) -> float:
+            return float(format_number(value, decimals))
 
-def _unit_place(args: Sequence[float | str]) -> int:
-    """Where the unit is in the fixed order: pecks come before it."""
-    return 4 if args[2:3] and args[2] in _STEPS else 2
+        x, y, z = (top / unit).tolist()
+        places = {"x": x, "y": y, "top": rounded(z), "bottom": rounded(z - cycle.depth / unit)}
+        places |= {"travel": rounded(z + travel / unit), "clearance": rounded(z + clearance / unit)}
+        places |= {"setup": places["clearance"] - places["top"], "above": places["travel"] - places["top"]}
+        pitch = feed / unit / (1.0 if mode == FeedMode.PER_REVOLUTION or not speed else speed)
+        values = {name: format_number(value, decimals, plus=plus) for name, value in places.items()} | {
+            "depth": format_number(places["top"] - places["bottom"], decimals),
+            "step": format_number(cycle.steps[0] / unit if cycle.steps else 0.0, decimals),
+            "feed": writer.feed_word(feed, mode),
+            "milliseconds": cycle.dwell,
+            "seconds": format_number(cycle.dwell / 1000.0, 3, trim=True),
+            "pitch": format_number(pitch, max(decimals, table.digits.most)),
+            "speed": format_number(speed, table.digits.speed, trim=True).rstrip("."),
+        }
+        return tuple(block.format(**values) for block in getattr(table.cycles, kind))
 
-
-def read_cycle(args: tuple[float | str, ...], program: Program, speed: float | None) -> Cycle | None:
-    """Read the arguments of a cycle, as `in_force` gives them; None where any of them is not understood.
-
-    Parameters
-    ----------
-    speed : float or None
-        Revolutions per minute, for a dwell in revolutions.
-    """
-    given = _pairs(args)
-    if given is None:
-        return None
-    kinds, values = given
-    scale = program.mm_per_unit
-    depths = [values[word][0] for word in _DEPTHS if word in values]
-    if not kinds or len(depths) != 1:
-        return None
-    depth = depths[0]
-    depth = -depth if program.source.dialect == "nx" else abs(depth)
-    returns = [values[word][0] for word in _RETURNS if word in values]
-    hsm = program.source.dialect == "hsm"
-    clearances = [values["RAPTO"][0]] if "RAPTO" in values else []
-    clearances += returns if hsm else values.get("CLEAR", ())[:1] or returns
-    if depth < 0.0 or any(height < 0.0 for height in (*clearances, *returns)):
-        return None
-    first, rest = values.get("1STPECK", ()), values.get("SUBPECK", ())
-    steps = tuple(scale * step for step in (*values.get("STEP", ()), *values.get("INCR", ()), *first, *rest))
-    if any(step <= 0.0 for step in steps) or (steps and depth * scale / min(steps) > _MOST_PECKS):
-        return None
-    dwell = 0
-    if "DWELL" in values:
-        time = milliseconds(values["DWELL"][0], "REV" in kinds, speed)
-        if time is None:
-            return None
-        dwell = time
-    elif "REV" in kinds:
-        return None
-    if "TAP" in kinds and (len(kinds) > 1 or steps or dwell or not depth > 0.0):
-        return None
-    cycle = Cycle(
-        depth=depth * scale,
-        clearance=clearances[0] * scale if clearances else None,
-        retract=max(returns, default=0.0) * scale,
-        dwell=dwell,
-        steps=steps,
-        full_retract="BRKCHP" not in kinds,
-        feed_out=bool(_AT_FEED & kinds),
-        pecking=bool(_PECKING & kinds),
-        tap="TAP" in kinds,
-    )
-    for word, (per_unit, mode) in _FEEDS.items():
-        if word in values:
-            cycle = replace(cycle, feed=values[word][0] * (per_unit or scale), feed_mode=mode)
-    return cycle
-
-
-def _pairs(args: tuple[float | str, ...]) -> tuple[set[str], dict[str, tuple[float, ...]]] | None:
-    """Words that say what kind of cycle it is, and words with their numbers; None for anything else."""
-    kinds: set[str] = set()
-    values: dict[str, tuple[float, ...]] = {}
-    word = ""
-    for value in args:
-        if isinstance(value, float):
-            many = word == "STEP" and word in values
-            if not math.isfinite(value) or not word or (word in values and not many):
-                return None
-            values[word] = (*values.get(word, ()), value)
-        elif value == "AUTO" and word in _RETURNS and word not in values:
-            word = ""  # the control's own height: ours is the height of travel
-        elif value == "REV" and word == "DWELL":
-            kinds.add(value)
-        elif value in _KINDS:
-            kinds.add(value)
-            word = ""
-        elif value in _DISTANCES or value in _FEEDS or value == "DWELL":
-            if value in values or (word and word not in values):
-                return None
-            word = value
-        elif value:
-            return None
-    if (word and word not in values) or len(_FEEDS.keys() & values.keys()) > 1:
-        return None
-    return kinds, values
+    def _over_holes(self, rows: Rows, height: Floats) -> Iterator[bytes]:
+        motion, program = self.motion, self.motion.program
+        decimals = motion.writer.form.tip_decimals(program.units)
+        poses = rows.move
+        tips = program.tip[poses] + height[:, None] * program.axis[poses]
+        ticks = motion.ticks_at(rows, tips, np.arange(len(poses)))
+        for index, pose in enumerate(poses.tolist()):
+            tip = (program.tip[pose] / program.mm_per_unit).tolist()
+            place = " ".join(
+                f"{letter}{format_number(value, decimals)}" for letter, value in zip("XYZ", tip, strict=True)
+            )
+            yield from motion.text(motion.statements.warning_comment(f"NOT DRILLED: HOLE AT {place}"))
+            run = Run.straight(program, ticks[index : index + 1], poses[index : index + 1])
+            run = replace(run, rapid=np.ones(1, np.bool_))
+            yield from motion.emit_above(motion.moving(run))
 
 
 @dataclass(frozen=True)

@@ -18,14 +18,14 @@ from cornersmooth.nc.block_writer import BlockWriter
 from cornersmooth.nc.control import INVERSE_TIME
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.first_block import UPRIGHT, FirstBlock
-from cornersmooth.nc.hole_writer import HoleWriter
-from cornersmooth.nc.motion_warnings import MotionWarnings
+from cornersmooth.nc.holes import HoleWriter
 from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.planes import Planes
 from cornersmooth.nc.rewinds import refuse_compensated, retracts_before
 from cornersmooth.nc.run import Run
 from cornersmooth.nc.statement_args import with_starts
 from cornersmooth.nc.statement_writer import StatementWriter
+from cornersmooth.nc.warnings import MotionWarnings
 from cornersmooth.slices import some_rows
 from cornersmooth.smoothing.sampling import Rows
 

@@ -15,7 +15,7 @@ from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.planes import Plane, Planes
-from cornersmooth.nc.tool_machines import ToolTravel
+from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.vectors import norm
 
 #: turn on an arc from one place that is looked at to the next, rad: between them it goes 1e-5 of its radius farther

@@ -17,9 +17,10 @@ import numpy as np
 
 from cornersmooth.kinematics import Machine, machine_position, solutions, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, Keep, Move, Program
-from cornersmooth.nc.cycle_blocks import has_cycles, tool_starts
+from cornersmooth.nc.cycle_blocks import has_cycles
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.tools import tool_starts
 from cornersmooth.settings import Settings
 from cornersmooth.text import format_number
 from cornersmooth.vectors import norm

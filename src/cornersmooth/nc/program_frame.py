@@ -15,9 +15,9 @@ from cornersmooth.model import Move, Program
 from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.control import LINE_ENDS, Control, TextStyle
 from cornersmooth.nc.control_tables import control_names, load_control
-from cornersmooth.nc.cycle_blocks import tool_loads
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.program_table import Blocks, ProgramTable
+from cornersmooth.nc.tools import tool_loads
 from cornersmooth.settings import Settings
 from cornersmooth.tables import filled as filled_in
 from cornersmooth.text import format_number

@@ -14,9 +14,9 @@ import numpy as np
 from cornersmooth.errors import InputError
 from cornersmooth.kinematics import Machine, tool_axis
 from cornersmooth.model import Bools, Floats, Ints, Program
-from cornersmooth.nc.cycle_blocks import tool_starts
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
+from cornersmooth.nc.tools import tool_starts
 from cornersmooth.vectors import dot
 
 #: degrees by which the way of the tool axis may be longer than the shortest one

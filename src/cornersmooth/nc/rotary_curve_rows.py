@@ -13,7 +13,7 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.rewinds import from_zero
 from cornersmooth.nc.rotary_words import machine_of, note_inserted
-from cornersmooth.nc.tool_machines import ToolTravel
+from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary import rapid_moves
 from cornersmooth.rotary.angle_curves import CurveGroup, RotaryCurves, angle_allowance, rotary_curves
 from cornersmooth.smoothing.sampling import Rows

@@ -14,7 +14,7 @@ from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import TIP_SHARE, Form
 from cornersmooth.nc.long_rows import LONG_CHUNK, corner_blends, line_limits
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of, note_inserted, rotary_way
-from cornersmooth.nc.tool_machines import ToolTravel
+from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary import FilledPath, fill, insertions, rapid_moves
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.long_lines import LineLimits, Vertices, fewest_lines, segments_of_rows, vertices

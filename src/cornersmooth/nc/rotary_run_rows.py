@@ -20,7 +20,7 @@ from cornersmooth.nc.form import Form
 from cornersmooth.nc.rotary_curve_rows import warn_of_curves
 from cornersmooth.nc.rotary_rows import lines_of_way
 from cornersmooth.nc.rotary_words import RotaryWay, machine_of, rotary_way
-from cornersmooth.nc.tool_machines import ToolTravel
+from cornersmooth.nc.tools import ToolTravel
 from cornersmooth.rotary.run_angles import Guide, RunAngles, lever_at, run_angles
 from cornersmooth.slices import some_rows, some_runs
 from cornersmooth.smoothing.runs.rows import STEPS_PER_UNIT, SectionRows, line_places, polylines_of, section_rows

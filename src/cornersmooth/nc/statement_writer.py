@@ -15,7 +15,6 @@ from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.compensation import begin_compensation
 from cornersmooth.nc.control import Words
-from cornersmooth.nc.cycle_blocks import TOOL_WORDS, ahead_of_tools, loaded_tool
 from cornersmooth.nc.findings import Findings
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.hole_cycles import HoleCycles
@@ -23,6 +22,7 @@ from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.program_table import Blocks
 from cornersmooth.nc.spindle import milliseconds, revolutions
 from cornersmooth.nc.statement_args import number_after, numbers_of, spoken_text, whole_number, words_of
+from cornersmooth.nc.tools import TOOL_WORDS, ahead_of_tools, loaded_tool
 from cornersmooth.text import format_number
 
 #: words whose text is for the machinist: comments without the word
