@@ -81,7 +81,7 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
     rule : {"left", "right", "tangent"} or None
         Sense of rotation that overrides the dialect's; "tangent" is settled when the neighbours are known.
     decimals : int
-        Digits behind the point that the dialect prints at most.
+        Digits after the point that the dialect prints at most.
 
     Raises
     ------

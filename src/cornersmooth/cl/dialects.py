@@ -13,8 +13,6 @@ from typing import Final, Literal
 from cornersmooth.cl.messages import unknown
 from cornersmooth.model import Units
 
-Hand = Literal["left", "right"]
-
 #: how much of a file is looked at
 HEAD: Final = 1 << 16
 
@@ -28,8 +26,6 @@ class Dialect:
     name : str
     fingerprint : bytes
         Regular expression, searched in the head of a file, line by line.
-    long_arcs : {"left", "right"}
-        Turning sense of CIRCLE with 11 or more numbers about its normal.
     short_axis : {"hold", "up"}
         What a GOTO of three numbers means for the axis: the last one, or +Z.
     multax_off : {"lock", "up"} or None
@@ -38,14 +34,13 @@ class Dialect:
     units : {"mm", "inch"}
         Where the file does not say.
     decimals : int
-        Digits behind the point of coordinates.
+        Digits after the point of coordinates.
     strips_zeros : bool
         Whether zeros at their end are left out, so that a statement alone does not tell the digits.
     """
 
     name: str
     fingerprint: bytes
-    long_arcs: Hand = "left"
     short_axis: Literal["hold", "up"] = "hold"
     multax_off: Literal["lock", "up"] | None = None
     units: Units = "mm"

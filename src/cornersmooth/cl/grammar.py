@@ -1,7 +1,7 @@
 """Lines of a CL file to statements: continuation, comments, labels, text words, numbers.
 
 Follows the NCCS PostWorks 15.1 manual (PostMacro 1.2, appendix G) where CAM systems agree with it, and real files
-where they do not: `$` joins lines and hides what stands behind it, `$$` begins a comment, `;` separates statements,
+where they do not: `$` joins lines and hides what stands after it, `$$` begins a comment, `;` separates statements,
 blanks mean nothing outside text, text statements are never taken apart.
 """
 
@@ -179,7 +179,7 @@ def _text_statement(source: _Lines, line: int, text: str, found: re.Match[str]) 
 
 
 def _statements(source: _Lines, line: int, text: str) -> Iterator[Record]:
-    """Yield the statements of a line, joined with its continuation lines, and the comment behind them."""
+    """Yield the statements of a line, joined with its continuation lines, and the comment after them."""
     part, goes_on, comment = _cut(text)
     parts = [part]
     cut_short = False

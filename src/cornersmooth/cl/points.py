@@ -12,22 +12,18 @@ from numpy.typing import NDArray
 
 from cornersmooth.cl import points_header
 from cornersmooth.cl import points_table as table
+from cornersmooth.cl.builder import UNIT_TOLERANCE
+from cornersmooth.cl.bulk import FARTHEST
+from cornersmooth.cl.messages import error, finding
 from cornersmooth.cl.points_header import Columns
-from cornersmooth.cl.points_messages import error, finding
 from cornersmooth.errors import Finding
 from cornersmooth.model import MM_PER_UNIT, Bools, Floats, Ints, Move, Program, Source, Units
-
-#: largest ||v|−1| of an axis vector; three printed decimals leave 1e-3
-UNIT_TOLERANCE: Final = 1e-2
 
 #: largest spread of |B−A| over its mean in a file of second points
 DISTANCE_SPREAD: Final = 1e-2
 
 #: without a header, second points stand farther from the tip than this, in units of the file, or from the origin
 LEAST_DISTANCE: Final = 1.5
-
-#: no machine reaches farther, in units of the file
-FARTHEST: Final = 1e7
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from cornersmooth.cl.points_messages import error
+from cornersmooth.cl.messages import error
 from cornersmooth.model import Units
 
 #: what the second three columns hold; "values" leaves it to the numbers
@@ -37,7 +37,7 @@ _RAPIDS: dict[str, Rapid] = {
 }
 _COUNTERS = ("n", "no", "nr", "num", "number", "id", "idx", "index", "line", "row", "point", "pose", "t", "time")
 
-#: units a header may state behind a name, as in ``x [mm]``
+#: units a header may state after a name, as in ``x [mm]``
 _LENGTHS: dict[str, Units] = {"mm": "mm", "in": "inch", "inch": "inch", "inches": "inch"}
 _FEED_UNITS: dict[str, Units] = {"mm/min": "mm", "mmpm": "mm", "in/min": "inch", "ipm": "inch", "inch/min": "inch"}
 _UNIT = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]|[_/](mm|in|inch)$")

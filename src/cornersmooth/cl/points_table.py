@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cornersmooth.cl.messages import error
 from cornersmooth.cl.points_header import Columns, is_header
-from cornersmooth.cl.points_messages import error
 from cornersmooth.model import Floats, Ints
 from cornersmooth.text import parse_numbers
 
@@ -300,7 +300,7 @@ def _fast(chunk: bytes, width: int) -> tuple[Floats, Ints] | None:
 
 def _same_gaps(cell: Ints, comma: Ints, end: int, size: int) -> bool:
     """Whether commas stand between the same cells in every row as in the first, which ends at `end`."""
-    gaps = np.searchsorted(cell[0], comma[comma < end], side="right") - 1  # a gap lies behind the cell of its number
+    gaps = np.searchsorted(cell[0], comma[comma < end], side="right") - 1  # a gap lies after the cell of its number
     if len(comma) != len(cell) * len(gaps):
         return False
     if not len(gaps):

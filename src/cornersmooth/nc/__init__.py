@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol
 
 from cornersmooth.errors import Finding, SettingsError
 from cornersmooth.model import Ints, SmoothProgram, Units
@@ -30,7 +29,7 @@ from cornersmooth.nc.operation import Operation
 from cornersmooth.nc.own_words import own_words
 from cornersmooth.nc.plane_travel import check_travel_in_planes, check_travel_without_axes
 from cornersmooth.nc.planes import Planes, plan_planes
-from cornersmooth.nc.program_frame import POINT_APPROACH, Frame
+from cornersmooth.nc.program_frame import POINT_APPROACH, Frame, Stream
 from cornersmooth.nc.rewound_curve_rows import curve_rows_of, rewound_curve_rows
 from cornersmooth.nc.rotary_rows import rotary_rows
 from cornersmooth.nc.run_reach import within_reach
@@ -66,13 +65,6 @@ _POLYNOMIAL = ("poly", "spl")
 
 #: curve styles of controls that may turn the tool in their own way on a line between two axis points
 _TURNING = ("bspline", "poly")
-
-
-class Stream(Protocol):
-    """What text is written to: any binary stream."""
-
-    def write(self, data: bytes, /) -> object:
-        """Write the bytes."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +165,7 @@ def write(
     form : str or Form, optional
         The control's default, or what `choose_form` gave.
     frame : Frame, optional
-        Program name, block numbers, texts before and behind.
+        Program name, block numbers, texts before and after.
     progress : callable, optional
         Called now and then with (poses done, poses in all).
 

@@ -100,7 +100,7 @@ class BlockWriter:
         self._said_blend = self._usual_blend
 
     def _spelt(self, columns: Sequence[int]) -> tuple[tuple[bytes, ...], bytes]:
-        """What stands before the numbers of columns, and behind the last of them."""
+        """What stands before the numbers of columns, and after the last of them."""
         motion = self.form.mode.motion
         words, end = [], ""
         for place, column in enumerate(columns):
@@ -188,7 +188,7 @@ class BlockWriter:
         return lifted(self.form, self.program.units, self.program.mm_per_unit, ticks, distance)
 
     def rapid(self, ticks: Ints, words: str = "") -> str:
-        """Rapid block of a row of ticks, behind words of other kinds."""
+        """Rapid block of a row of ticks, after words of other kinds."""
         return f"{words}{self._blank}" * bool(words) + self._rapid(ticks, slice(None))
 
     def _rapid(self, ticks: Ints, chosen: slice | Bools) -> str:
@@ -410,7 +410,7 @@ class BlockWriter:
         return table[key].encode() + b"\n" if key in table else b""
 
     def _suffixes(self, run: Run, dwell: int) -> tuple[list[bytes], Ints]:
-        """Table of what stands behind the numbers, feed or weight, and an entry for each row."""
+        """Table of what stands after the numbers, feed or weight, and an entry for each row."""
         motion, digits = self.form.mode.motion, self.form.table.digits
         table = [b"\n", f"{motion.rapid_end}\n".encode()]
         chosen = run.rapid.astype(np.int64)

@@ -104,7 +104,7 @@ class Motion:
     radius, feed : str
         Addresses.
     arc_directions : tuple of str
-        What says behind the radius of a circular block that it goes clockwise, and counterclockwise. Such blocks have X
+        What says after the radius of a circular block that it goes clockwise, and counterclockwise. Such blocks have X
         and Y alone: arcs in the plane XY at one height. Empty where the code says it, in blocks of X, Y and Z.
     feed_point : bool
         Whether a whole feed is written with a point.
@@ -118,7 +118,7 @@ class Motion:
     endless_words : bool
         Whether words of endless rotary axes beyond 0 to 360 degrees are taken on every machine.
     shortest : tuple of str
-        What stands before and behind the number of a modulo axis that goes the shorter way; none where the control has
+        What stands before and after the number of a modulo axis that goes the shorter way; none where the control has
         no words for that.
     inch_feed : int
         What one inch per minute is written as: 10 where F counts tenths.
@@ -131,7 +131,7 @@ class Motion:
         Largest F per minute that the control takes; 0 where its manual names none.
     with_z : str
         Block, the last of those that switch the length of the tool on, whose words stand in the first block that moves
-        Z instead, behind the approach: alone it may move the axis. Empty where it never does.
+        Z instead, after the approach: alone it may move the axis. Empty where it never does.
     """
 
     rapid: str = "G0"
@@ -196,7 +196,7 @@ class Mode:
     words : tuple of str
         Addresses of vector or point; rotary addresses come from the machine.
     on, off : tuple of str
-        Blocks before the motion and behind it; with ``{offset}``, the length register.
+        Blocks before the motion and after it; with ``{offset}``, the length register.
     within_on, within_off : tuple of str
         Blocks that stand within these: the latter before the retract.
     begin : tuple of str or None
@@ -239,7 +239,7 @@ class TextStyle:
     units : mapping
         What ``{units}`` stands for.
     comment : (str, str)
-        What stands before and behind a comment.
+        What stands before and after a comment.
     comment_orders : tuple of str
         First words by which a comment would be an order to the control; they get a mark before them.
     block_number : str
@@ -336,7 +336,7 @@ class Extra:
         Blocks around the motion, with ``{blend}``, a tenth of ε, and ``{turn}``, the degrees that are worth as much at
         the axis point.
     outside : bool
-        Whether they stand before tool tip control is switched on and behind its end, or within.
+        Whether they stand before tool tip control is switched on and after its end, or within.
     forms : tuple of str
         Forms that they go with; empty for all.
     warning : str

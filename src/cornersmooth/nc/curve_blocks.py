@@ -25,55 +25,33 @@ class RowWriter(Protocol):
         ...
 
 
-class Curves(Protocol):
-    """What the block writer asks of a way to write curves.
+class Curves:
+    """How curves are written: here as what there are none of.
 
     `format` is None where control points have the words of lines; else rows on curves have words of their own and
     `numbers`.
     """
 
-    format: RowWriter | None
-
-    def prepare(self, run: Run) -> Run:
-        """Return the run with only the rows that become blocks, and remember what follows."""
-        ...
-
-    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
-        """Give rows on curves an entry in the table of prefixes; return the blocks that rows make beside their own."""
-        ...
-
-    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
-        """Give rows on curves an entry in the table of suffixes."""
-        ...
-
-    def numbers(self, run: Run, curved: Bools) -> Ints:
-        """Ticks of the rows on curves in `format`."""
-        ...
-
-
-class NoCurves:
-    """Forms of lines only."""
-
     format: RowWriter | None = None
 
     def prepare(self, run: Run) -> Run:
-        """Return the run as it is."""
+        """Return the run with only the rows that become blocks, and remember what follows."""
         return run
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
-        """Nothing to add."""
+        """Give rows on curves an entry in the table of prefixes; return the blocks that rows make beside their own."""
         return 0
 
     def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
-        """Nothing to add."""
+        """Give rows on curves an entry in the table of suffixes."""
 
     def numbers(self, run: Run, curved: Bools) -> Ints:
-        """Return the ticks as they are."""
+        """Ticks of the rows on curves in `format`."""
         return run.ticks[curved]
 
 
-class KnotBlocks(NoCurves):
-    """FANUC's G06.2: a knot before and a weight behind every control point, the last four knots in blocks of their own.
+class KnotBlocks(Curves):
+    """FANUC's G06.2: a knot before and a weight after every control point, the last four knots in blocks of their own.
 
     The first control point is the current position (B-63324EN/03 4.17). Knots {0, 0, 0, 0, 1/2, 1, 1, 1, 1}.
     """
@@ -110,7 +88,7 @@ class KnotBlocks(NoCurves):
         chosen[curved] = base + which + np.where(run.curve[curved] == 5, len(ends), 0)
 
 
-class RotaryKnotBlocks(NoCurves):
+class RotaryKnotBlocks(Curves):
     """The same with any number of control points and knots of their own, for curves with rotary axes."""
 
     def __init__(self, weight_decimals: int, blank: bytes = b" ") -> None:
@@ -143,7 +121,7 @@ class RotaryKnotBlocks(NoCurves):
         return b"K" + format_number(knot, self._decimals, trim=True).encode()
 
 
-class SplineBlocks(NoCurves):
+class SplineBlocks(Curves):
     """Siemens' BSPLINE: the first control point is where the block before ended; knot intervals PL and weights PW.
 
     With the clamped knots u the block of control point j has PL = u[j+2] − u[j+1]: 0, 1/2, 1/2, 0. Curves that follow

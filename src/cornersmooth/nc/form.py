@@ -69,17 +69,17 @@ class Form:
 
     @property
     def vectors(self) -> bool:
-        """Whether the words behind the tip are a tool vector."""
+        """Whether the words after the tip are a tool vector."""
         return self.orientation == "vector"
 
     @property
     def rotary(self) -> bool:
-        """Whether the words behind the tip are angles."""
+        """Whether the words after the tip are angles."""
         return self.orientation in ("angles", "machine")
 
     @property
     def other_words(self) -> tuple[str, ...]:
-        """Addresses behind those of the tip; rotary ones in the order of the alphabet."""
+        """Addresses after those of the tip; rotary ones in the order of the alphabet."""
         return tuple(sorted(self.machine.names)) if self.machine is not None and self.rotary else self.mode.words
 
     def tip_decimals(self, units: Units) -> int:

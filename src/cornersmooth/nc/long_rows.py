@@ -65,7 +65,7 @@ def line_limits(settings: Settings, form: Form, largest_turn: float = 0.0) -> Li
 def corner_blends(
     rows: Vertices, kept: Ints, rapid: Bools, limits: LineLimits, settings: Settings, form: Form
 ) -> Floats | None:
-    """How far the control may round the corner at each kept row, mm: the usual blend behind rapids.
+    """How far the control may round the corner at each kept row, mm: the usual blend after rapids.
 
     None where it is not told for each.
     """

@@ -100,12 +100,12 @@ class Operation:
 
     @property
     def turning(self) -> bool:
-        """Whether the spindle turns at the next motion: it does, or goes on behind a tool change."""
+        """Whether the spindle turns at the next motion: it does, or goes on after a tool change."""
         return bool(self.spindle or self._stopped.get("spindle"))
 
     @property
     def _tool_end(self) -> Blocks:
-        """Steps behind the last motion of a tool, or of a tilted plane."""
+        """Steps after the last motion of a tool, or of a tilted plane."""
         return self.form.table.program.tool_end if self.mode.tool_end is None else self.mode.tool_end
 
     def _let_turn(self) -> list[str]:
@@ -119,7 +119,7 @@ class Operation:
         return [hold for hold, _ in self.clamps]
 
     def end_tool(self, line: int = 0, *, another: bool = False) -> list[str]:
-        """Blocks behind the last motion of a tool.
+        """Blocks after the last motion of a tool.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ class Operation:
 
     @property
     def comes_first(self) -> bool:
-        """Whether the next motion is the first behind a retract, or of a tool where there is none."""
+        """Whether the next motion is the first after a retract, or of a tool where there is none."""
         return self.retracted or not (self.begun or self.can_rewind())
 
     def can_rewind(self) -> bool:
@@ -174,7 +174,7 @@ class Operation:
         return self._expand(("{functions_off}", "{tip_control_off}"))
 
     def end(self, rotary: RotaryBlocks = _NO_ROTARY) -> list[str]:
-        """Blocks behind everything else."""
+        """Blocks after everything else."""
         steps, blocks = self.form.table.program.end, self.end_tool()
         home = self._home_position()
         zero = rotary["rotary_zero"]
@@ -197,7 +197,7 @@ class Operation:
         self.halted, self._halted = True, {"spindle", "coolant"}
 
     def go_on(self) -> list[str]:
-        """Blocks before the first motion behind a stop: spindle and coolant as they were."""
+        """Blocks before the first motion after a stop: spindle and coolant as they were."""
         blocks = [
             *(self.spindle[-1:] if "spindle" in self._halted else ()),
             *(self.coolant if "coolant" in self._halted else ()),
@@ -244,13 +244,13 @@ class Operation:
         return blocks
 
     def change_position(self) -> list[str]:
-        """Blocks that bring the axes to where tools are changed, behind a retract."""
+        """Blocks that bring the axes to where tools are changed, after a retract."""
         position = self._own_position("tool_change")
         high = {"Z": position.pop("Z")} if "Z" in position else {}
         return [*self._to_position(position), *self._to_position(high)]
 
     def _home_position(self) -> list[str]:
-        """Blocks that bring the other axes home, behind the last retract."""
+        """Blocks that bring the other axes home, after the last retract."""
         return self._to_position({name: value for name, value in self._own_position("home").items() if name != "Z"})
 
     def _own_position(self, key: str) -> dict[str, float]:

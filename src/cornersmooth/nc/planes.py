@@ -121,7 +121,7 @@ def plan_planes(
 
 
 def _runs(program: Program) -> list[tuple[int, int]]:
-    """First poses, and those behind the last, of runs that could be written in a plane."""
+    """First poses, and those after the last, of runs that could be written in a plane."""
     kind, axis = program.kind, program.axis
     moving = np.flatnonzero(kind != Move.FROM)
     if not len(moving):

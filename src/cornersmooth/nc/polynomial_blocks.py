@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints, Units
-from cornersmooth.nc.curve_blocks import Curves, KnotBlocks, NoCurves, RotaryKnotBlocks, SplineBlocks
+from cornersmooth.nc.curve_blocks import Curves, KnotBlocks, RotaryKnotBlocks, SplineBlocks
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
 from cornersmooth.slices import some_rows
@@ -33,10 +33,10 @@ def curves_for(form: Form, units: Units) -> Curves:
         return PolyBlocks(form, units)
     if form.curve == "spl":
         return SplBlocks(form, units)
-    return NoCurves()
+    return Curves()
 
 
-class _Polynomials(NoCurves):
+class _Polynomials(Curves):
     """One block for each knot interval, in the last rows of a curve.
 
     Parameters

@@ -42,7 +42,7 @@ _COMMENT = re.compile(r"\([^)]*\)|;.*")
 
 
 class Stream(Protocol):
-    """What text is written to."""
+    """What a program is written to: any binary stream."""
 
     def write(self, data: bytes, /) -> object:
         """Write the bytes."""
@@ -59,7 +59,7 @@ class Frame:
     block_numbers : bool
         Whether blocks are numbered where the control does not ask for it.
     header, footer : tuple of str
-        Lines behind the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``.
+        Lines after the head and before the tail, with ``{program}``, ``{units}`` and ``{blend}``.
     comments : bool
         Whether what the CL file says in words is written, and `provenance`.
     work_offset : str or None
@@ -67,7 +67,7 @@ class Frame:
     provenance : tuple of str
         What the text is made of, for comments before the header.
     approach, retract : float, mm
-        How far the tool comes down along its axis to the first position behind a retract, and goes back along it before
+        How far the tool comes down along its axis to the first position after a retract, and goes back along it before
         a retract; 0 for neither. A form with a point on the axis comes down by `POINT_APPROACH` at least.
     skip_cycles : bool
         Whether holes whose cycle cannot be written are only gone over, with a warning and a comment NOT DRILLED; an

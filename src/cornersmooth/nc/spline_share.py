@@ -16,7 +16,7 @@ _WINDOW, _LEAST = 10, 6
 
 @dataclass
 class SplineShare:
-    """Looks at ten feed blocks from the beginning of every spline on; what comes behind a rapid is no spline.
+    """Looks at ten feed blocks from the beginning of every spline on; what comes after a rapid is no spline.
 
     Parameters
     ----------

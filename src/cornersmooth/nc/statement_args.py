@@ -18,7 +18,7 @@ def words_of(statement: Statement) -> list[str]:
 
 
 def number_after(statement: Statement, word: str) -> list[float]:
-    """Return the number that stands behind a word, if any."""
+    """Return the number that stands after a word, if any."""
     args = statement.args
     place = args.index(word) + 1 if word in args else len(args)
     return [value for value in args[place : place + 1] if isinstance(value, float)]
@@ -39,7 +39,7 @@ def spoken_text(statement: Statement) -> str:
 
 
 def with_starts(program: Program) -> tuple[Statement, ...]:
-    """Statements of the program, and one for every FROM, which is a pose there, behind what stands before it."""
+    """Statements of the program, and one for every FROM, which is a pose there, after what stands before it."""
     starts = np.flatnonzero(program.kind == Move.FROM).tolist()
     if not starts:
         return program.statements

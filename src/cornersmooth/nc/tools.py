@@ -26,7 +26,7 @@ _WAITING: Final = frozenset({"STOP", "OPSTOP", "DELAY"})
 def loaded_tool(statement: Statement) -> tuple[int, int] | None:
     """Tool and length register of LOADTL/n, LOAD/TOOL,n[,ADJUST,m], TURRET/n[,OSETNO,m]; None where it loads none.
 
-    A number behind ADJUST, OSETNO or LENGTH is no tool: LOADTL/ADJUST,3 names none.
+    A number after ADJUST, OSETNO or LENGTH is no tool: LOADTL/ADJUST,3 names none.
     """
     words = words_of(statement)
     if statement.word == "LOAD" and words[:1] != ["TOOL"]:
