@@ -137,11 +137,17 @@ class Source:
         ``"apt"`` or ``"points"``.
     dialect : str
         ``"nx"``, ``"catia"``, ``"creo"``, ``"solidworks"``, ``"hsm"``, ``"ncl"``, ``"makino"``, ``"plain"``, ``"csv"``.
+    operation : int
+        Number of the operation that was taken alone; 0 for the whole file.
+    operation_name : str
+        Empty where the file gives none.
     """
 
     name: str = "<memory>"
     format: str = "apt"
     dialect: str = "plain"
+    operation: int = 0
+    operation_name: str = ""
 
 
 @dataclass(frozen=True)

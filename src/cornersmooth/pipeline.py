@@ -372,6 +372,7 @@ def _provenance(
         machine=form.machine.name if form.machine is not None and form.rotary else "",
         tcp=form.orientation != "machine",
         source=program.source.name,
+        operation=program.source.operation,
         sha256="" if isinstance(source, Program) else sha256_of(source),
         weights=None if any_weights else (1.0, *settings.weights),
     )

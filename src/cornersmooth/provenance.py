@@ -42,6 +42,8 @@ class Provenance:
         What the tool axis may be off, in place of ε at the axis point.
     work_offset : str
         With ``_`` for blanks; ``"none"`` where the text says none, empty for that of the control's own table.
+    operation : int
+        Number of the operation of the CL file that it holds alone; 0 for all.
     """
 
     version: str
@@ -58,6 +60,7 @@ class Provenance:
     planned_feeds: bool = False
     axis_tolerance: float | None = None
     work_offset: str = ""
+    operation: int = 0
 
     def lines(self) -> tuple[str, ...]:
         """Texts of the comments."""
@@ -73,6 +76,7 @@ class Provenance:
             **({"WEIGHTS": self.weights_word} if self.weights_word else {}),
             **({"FEEDS": "plan"} if self.planned_feeds else {}),
             **({"OFFSET": self.work_offset} if self.work_offset else {}),
+            **({"OPERATION": f"{self.operation}"} if self.operation else {}),
         }
         mark = f"CORNERSMOOTH {self.version}:"
         lines = [mark]
@@ -124,6 +128,7 @@ def read_provenance(text: bytes) -> Provenance | None:
             planned_feeds=words.get("FEEDS") == "plan",
             axis_tolerance=float(words["AXIS"]) if "AXIS" in words else None,
             work_offset=words.get("OFFSET", ""),
+            operation=int(words.get("OPERATION", "0")),
         )
     except (KeyError, ValueError):
         return None

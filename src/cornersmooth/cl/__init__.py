@@ -40,6 +40,7 @@ def read(
     lenient: bool = False,
     tool_number: int | None = None,
     spindle: tuple[float, str] | None = None,
+    operation: str | None = None,
     size_limit: bool = True,
 ) -> Program:
     """Read a tool path.
@@ -64,6 +65,8 @@ def read(
         Of the tool, for inputs that load none.
     spindle : (float, str) or None
         Revolutions per minute, and ``CLW`` or ``CCLW``, for inputs that start no spindle.
+    operation : str or None
+        Name or number of the operation to read alone, as `cl.operations` finds them; None for the whole file.
     size_limit : bool
         Refuse inputs of more than 2 GB, and gzip files that grow 200-fold.
 
@@ -100,6 +103,10 @@ def read(
         text = clean(data, name)
         program = read_apt(text, name=name, dialect=dialect, units=units, arc_rule=arc_rule, lenient=lenient)
     program = replace(program, source=replace(program.source, name=os.path.basename(name)))
+    if operation is not None:
+        from cornersmooth.cl.operations import one_operation
+
+        program = one_operation(program, operation)
     return with_tool(program, tool_number, spindle)
 
 

@@ -81,6 +81,17 @@ def _file(info: Info) -> Rows:
     yield "poses", _counts(info.motion.moves)
     if info.statements:
         yield "statements", _counts(info.statements)
+    for tool in info.tools:
+        number = "no tool number" if tool.number is None else f"T{tool.number}"
+        used = ", ".join(map(str, tool.operations))
+        yield "tool", f"{number}{', ' + tool.shape if tool.shape else ''}: operations {used}"
+    for one in info.operations:
+        tool_named = "" if one.tool is None else f", T{one.tool}"
+        yield (
+            f"operation {one.number}",
+            f"{one.name}{tool_named}, lines {one.first_line} to {one.last_line}, {one.poses} poses, "
+            f"{one.feed_length_mm:.6g} mm of lines at feed, tool axis {one.axis}".lstrip(", "),
+        )
 
 
 def _motion(info: Info) -> Rows:

@@ -45,7 +45,9 @@ COMMAND_TABLES = ("smooth", "filter", "verify", "compare", "time", "setup", "inf
 _OWN_TABLES = {"controls": ("control",), "machines": ("machine", "limits")}
 
 #: options that belong to one run
-_ONE_RUN = frozenset("output directory force reports csv summary scheduler as_json law no_verify help".split())
+_ONE_RUN = frozenset(
+    "output directory force reports csv summary scheduler as_json law no_verify operation help".split()
+)
 
 
 #: commands with a verdict, whose line says what settings loosen

@@ -231,6 +231,7 @@ def _take_over(given: dict[str, Any], nc: bytes | str | os.PathLike[str], source
         words["axis_tolerance"] = ("AXIS", made.axis_tolerance)
     words |= {"control": ("CONTROL", made.control)} if made.control in control_names() else {}
     words |= {"machine": ("MACHINE", made.machine or None)} if made.machine in ("", *machine_names()) else {}
+    words |= {"operation": ("OPERATION", str(made.operation))} if made.operation else {}
     words |= {"no_tcp": ("TCP", not made.tcp), "slower": ("FEEDS", made.planned_feeds)}
     words = {name: word for name, word in words.items() if not _typed(context, name)}
     if "axis_length" in words and (_typed(context, "axis_tolerance") or made.axis_tolerance is not None):
@@ -275,6 +276,8 @@ def _loose(before: dict[str, Any], given: dict[str, Any], taken: set[str]) -> It
     if looser and taken & {"axis_length", "axis_tolerance"}:
         name = "-H" if given["axis_tolerance"] is None else "--axis-tolerance"
         yield f"the tolerance of the tool axis is the program's own word, looser than without: name it with {name}"
+    if "operation" in taken:
+        yield f"that operation {given['operation']} is enough is the program's own word: name it with --operation"
     if "slower" in taken and given["slower"]:
         yield "feeds: that they may be lower is the program's own word: name it with --planned-feeds"
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final, Literal
 
 import numpy as np
 
+from cornersmooth.cl.operations import Operation, find_operations
 from cornersmooth.errors import Finding
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, LimitedBy, Move, Program, Status, Trait
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.axis_steps import axis_step_findings
 from cornersmooth.smoothing.construction import construction_of
+from cornersmooth.surface.tool import tools_of
 from cornersmooth.vectors import angle_between, dot, norm
 
 SCHEMA: Final = "cornersmooth-info/2"
@@ -153,6 +156,44 @@ class CornerSummary:
 
 
 @dataclass(frozen=True)
+class OperationSummary:
+    """One operation.
+
+    Parameters
+    ----------
+    number : int
+    name : str
+        Empty where the file gives none.
+    tool : int or None
+        Number of its tool.
+    first_line, last_line : int
+        In the CL file.
+    poses : int
+    feed_length_mm : float
+        Of its linear feed moves.
+    axis : {"fixed", "indexed", "simultaneous"}
+    """
+
+    number: int
+    name: str
+    tool: int | None
+    first_line: int
+    last_line: int
+    poses: int
+    feed_length_mm: float
+    axis: Axes
+
+
+@dataclass(frozen=True)
+class ToolSummary:
+    """One tool: its number, None where none is loaded; its shape, empty where the file does not describe it."""
+
+    number: int | None
+    shape: str
+    operations: list[int]
+
+
+@dataclass(frozen=True)
 class Info:
     """Description of a program; `as_dict` gives the JSON form."""
 
@@ -162,6 +203,8 @@ class Info:
     units: str
     poses: int
     statements: dict[str, int]
+    operations: list[OperationSummary]
+    tools: list[ToolSummary]
     motion: Motion
     axis: AxisMotion
     arcs: ArcSummary
@@ -191,6 +234,7 @@ def describe(program: Program, tolerance: float, axis_length: float) -> Info:
     """
     settings = Settings(tolerance=tolerance, axis_length=axis_length)
     segments = _Segments.of(program)
+    operations = find_operations(program)
     words = Counter(statement.word for statement in program.statements)
     return Info(
         name=program.source.name,
@@ -199,6 +243,8 @@ def describe(program: Program, tolerance: float, axis_length: float) -> Info:
         units=program.units,
         poses=len(program),
         statements=dict(sorted(words.items(), key=lambda item: (-item[1], item[0]))),
+        operations=[_operation(program, segments, operation) for operation in operations],
+        tools=_tools(program, operations),
         motion=_motion(program, segments),
         axis=_axis(program, segments),
         arcs=_arcs(program),
@@ -221,6 +267,37 @@ class _Segments:
         linear = program.kind[1:] == Move.LINEAR
         linear &= program.kind[:-1] != Move.FROM
         return cls(norm(step), angle_between(program.axis[:-1], program.axis[1:]), linear)
+
+
+def _operation(program: Program, segments: _Segments, operation: Operation) -> OperationSummary:
+    own = slice(max(operation.first - 1, 0), max(operation.stop - 1, 0))  # steps into its poses
+    segments = _Segments(segments.length[own], segments.turn[own], segments.linear[own])
+    return OperationSummary(
+        operation.number,
+        operation.name,
+        operation.tool,
+        operation.first_line,
+        operation.last_line,
+        int(np.count_nonzero(program.kind[operation.first : operation.stop] != Move.FROM)),
+        float(segments.length[segments.linear].sum()),
+        _axes(segments),
+    )
+
+
+def _tools(program: Program, operations: Sequence[Operation]) -> list[ToolSummary]:
+    """Tools by number, in the order in which they come, with the last shape described before their first cut."""
+    described = tools_of(program)
+    found: dict[int | None, ToolSummary] = {}
+    for operation in operations:
+        shapes = [tool.describe() for pose, tool, _ in described if pose < operation.stop]
+        tool = found.setdefault(operation.tool, ToolSummary(operation.tool, shapes[-1] if shapes else "", []))
+        tool.operations.append(operation.number)
+    return list(found.values())
+
+
+def _axes(segments: _Segments) -> Axes:
+    turns = segments.turn > AXIS_NOISE
+    return "simultaneous" if turns[segments.linear].any() else "indexed" if turns.any() else "fixed"
 
 
 def _motion(program: Program, segments: _Segments) -> Motion:
@@ -248,10 +325,9 @@ def _motion(program: Program, segments: _Segments) -> Motion:
 def _axis(program: Program, segments: _Segments) -> AxisMotion:
     length, turn = segments.length[segments.linear], segments.turn[segments.linear]
     turning, moving = turn > AXIS_NOISE, length > Settings().duplicate_distance
-    kind: Axes = "simultaneous" if turning.any() else "indexed" if (segments.turn > AXIS_NOISE).any() else "fixed"
     up = np.broadcast_to((0.0, 0.0, 1.0), program.axis.shape)
     return AxisMotion(
-        kind=kind,
+        kind=_axes(segments),
         tilt_deg=Spread.of(np.degrees(angle_between(program.axis, up))),
         step_deg=Spread.of(np.degrees(turn[turning])),
         translations=int(np.count_nonzero(moving & ~turning)),

@@ -112,11 +112,14 @@ def record(
 
 def cl_file(program: Program, sha256: str = "") -> dict[str, Any]:
     """The CL file that a program was read from; `sha256` is that of the file."""
+    source = program.source
+    alone = {"operation": {"number": source.operation, "name": source.operation_name}} if source.operation else {}
     return {
-        "name": program.source.name,
+        "name": source.name,
         "sha256": sha256 or None,
-        "format": program.source.format,
-        "dialect": program.source.dialect,
+        "format": source.format,
+        "dialect": source.dialect,
+        **alone,
         "units": program.units,
         "poses": len(program),
         "feed_moves": int(np.isin(program.kind, (Move.LINEAR, Move.ARC)).sum()),

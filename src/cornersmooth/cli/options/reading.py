@@ -63,6 +63,13 @@ spindle = click.option(
     metavar="RPM[,CCLW]",
     help="Speed of the spindle, clockwise or with CCLW counterclockwise, for inputs that start none.",
 )
+operation = click.option(
+    "--operation",
+    type=str,
+    metavar="N|NAME",
+    help="Take one operation of the CL file alone, with the tool, spindle and coolant that hold there; "
+    "'cornersmooth info' lists them.",
+)
 lenient = click.option("--lenient", is_flag=True, help="Go on after errors in the input where it is safe.")
 
 no_size_limit = click.option(
@@ -74,6 +81,7 @@ _READING = {
     "dialect": dialect,
     "units": units,
     "arc_rule": arc_rule,
+    "operation": operation,
     "lenient": lenient,
 }
 _TOOL = {"tool_number": tool_number, "spindle": spindle}
