@@ -1,4 +1,4 @@
-"""LAPACK's solver of symmetric positive definite systems with few diagonals, at once.
+"""LAPACK's solvers of symmetric positive definite systems with few diagonals.
 
 `scipy.linalg` loads much that is not used here: half as long as all else that a short run loads. Its compiled module
 alone loads in a hundredth of that; where another version of SciPy keeps it elsewhere, `scipy.linalg` is loaded.
@@ -14,8 +14,10 @@ from typing import Any
 
 import scipy
 
+_NAMES = ("dpbsv", "dpbtrf", "dpbtrs")
 
-def _solver() -> Callable[..., Any]:
+
+def _solvers() -> list[Callable[..., Any]]:
     spec = PathFinder.find_spec("_flapack", [str(Path(folder, "linalg")) for folder in scipy.__path__])
     if spec is not None and spec.loader is not None:
         try:
@@ -24,12 +26,13 @@ def _solver() -> Callable[..., Any]:
         except ImportError:
             pass
         else:
-            if hasattr(module, "dpbsv"):
-                return module.dpbsv  # type: ignore[no-any-return]
-    from scipy.linalg.lapack import dpbsv
+            if all(hasattr(module, name) for name in _NAMES):
+                return [getattr(module, name) for name in _NAMES]
+    from scipy.linalg import lapack
 
-    return dpbsv
+    return [getattr(lapack, name) for name in _NAMES]
 
 
-#: ``dpbsv(bands, right, lower=0, overwrite_ab=0)``: the factors, the solution, and 0 where all pivots are positive
-dpbsv = _solver()
+#: ``dpbsv(bands, right, lower=0, overwrite_ab=0)``: the factors, the solution, and 0 where all pivots are positive;
+#: ``dpbtrf(bands)``: the factors, and 0; ``dpbtrs(factors, right)``: the solution, and 0
+dpbsv, dpbtrf, dpbtrs = _solvers()

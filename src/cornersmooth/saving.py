@@ -13,7 +13,6 @@ from cornersmooth.errors import CornersmoothError
 from cornersmooth.feedrate import BlockLimits, Limits, direct, limiting, plan_text
 from cornersmooth.feedrate.linuxcnc import line_times
 from cornersmooth.feedrate.linuxcnc_program import axis_limits, program_lines
-from cornersmooth.feedrate.written import written_motion
 from cornersmooth.kinematics import Machine, endless, tool_axis, with_dynamics
 from cornersmooth.model import Floats, Ints, Move, Program
 from cornersmooth.nc import Form
@@ -91,7 +90,7 @@ class Timing:
             blocks=self.blocks,
             progress=_stage(progress, "planning as written"),
         )
-        moves = written_motion(read, program.source.name, self.settings.axis_length).program
+        moves = law.path.program
         begin, end = _from_to(program, moves.tip, moves.axis)
         told = tuple(limiting(law))
         if begin < 0:

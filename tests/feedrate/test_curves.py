@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cornersmooth.feedrate import curves
+from cornersmooth.feedrate import rational_curves as curves
 from cornersmooth.geometry import nurbs
 
 SIDES = np.array([0, 1])
@@ -22,6 +22,11 @@ def corner(turn: float, leg_in: float, leg_out: float, weights: tuple[float, flo
     return np.repeat(points, 2, axis=0), np.repeat(np.array([weights]), 2, axis=0)
 
 
+def halves(points: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Powers of both halves of one curve."""
+    return np.concatenate([curves.polynomial(points[:1], weights[:1], side) for side in SIDES.tolist()])
+
+
 CORNERS = [
     (turn, *legs, weights)
     for turn in (1.0, 90.0, 165.0)
@@ -33,7 +38,7 @@ CORNERS = [
 @pytest.mark.parametrize("given", CORNERS)
 def test_halves_are_the_curve(given: tuple[float, float, float, tuple[float, float]]) -> None:
     points, weights = corner(*given)
-    powers = curves.half_curves(points, weights, SIDES)
+    powers = halves(points, weights)
     t = np.linspace(0.0, 1.0, 11)
     found = curves.evaluate(powers, np.tile(t, (2, 1)))
     for side in SIDES:
@@ -44,7 +49,7 @@ def test_halves_are_the_curve(given: tuple[float, float, float, tuple[float, flo
 @pytest.mark.parametrize("given", CORNERS)
 def test_arc_length_and_back(given: tuple[float, float, float, tuple[float, float]]) -> None:
     points, weights = corner(*given)
-    powers = curves.half_curves(points, weights, SIDES)
+    powers = halves(points, weights)
     lengths = curves.interval_lengths(powers, curves.interval_borders(SIDES)).sum(axis=1)
     dense = curves.evaluate(powers, np.tile(np.linspace(0.0, 1.0, 100_001), (2, 1)))
     chords = np.linalg.norm(np.diff(dense, axis=1), axis=2)
@@ -62,7 +67,7 @@ def test_arc_length_and_back(given: tuple[float, float, float, tuple[float, floa
 def test_curvature_closed_form(turn: float) -> None:
     points, weights = corner(turn, 0.4, 0.4, (1.0, 1.0))
     beta = np.radians(turn) / 2
-    powers = curves.half_curves(points, weights, SIDES)
+    powers = halves(points, weights)
     largest = curves.interval_curvatures(powers, curves.interval_borders(SIDES)).max(axis=1)
     assert largest == pytest.approx(2 * np.sin(beta) / (0.4 * np.cos(beta) ** 2), rel=1e-9)
     assert curves.curvature(powers, np.array([[0.0], [1.0]])) == pytest.approx(0.0, abs=1e-9)
@@ -71,7 +76,7 @@ def test_curvature_closed_form(turn: float) -> None:
 @pytest.mark.parametrize("given", CORNERS)
 def test_piece_curvature_is_an_upper_bound(given: tuple[float, float, float, tuple[float, float]]) -> None:
     points, weights = corner(*given)
-    powers = curves.half_curves(points, weights, SIDES)
+    powers = halves(points, weights)
     borders = curves.interval_borders(SIDES)
     bound = curves.interval_curvatures(powers, borders)
     for piece in range(curves.INTERVALS):
@@ -83,6 +88,6 @@ def test_piece_curvature_is_an_upper_bound(given: tuple[float, float, float, tup
 
 def test_a_leg_of_length_zero_is_straight() -> None:
     points, weights = corner(60.0, 0.4, 0.0, (1.0, 1.0))
-    powers = curves.half_curves(points, weights, SIDES)
+    powers = halves(points, weights)
     assert curves.interval_curvatures(powers, curves.interval_borders(SIDES)).max() == 0.0
     assert curves.interval_lengths(powers, curves.interval_borders(SIDES)).sum() == pytest.approx(0.4, rel=1e-12)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cornersmooth.feedrate import Limits, curves, plan, taylor
+from cornersmooth.feedrate import Limits, plan, rational_curves, taylor
 from cornersmooth.feedrate.motion import derivatives, poses
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.timelaw import TimeLaw
@@ -82,7 +82,7 @@ def test_derivatives_of_a_path(chain: Callable[[int], Program], weights: tuple[f
 def halves_way(path: Path, element: int, t: Floats, h: float) -> Floats:
     """Way between the parameters t − h and t + h of a half."""
     tip = np.repeat(path.curves.tip[path.row[[element]]], len(t), axis=0)
-    ends = curves.evaluate(tip, np.stack((t - h, t + h), axis=1))
+    ends = rational_curves.evaluate(tip, np.stack((t - h, t + h), axis=1))
     return np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1)
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from cornersmooth.feedrate.axispeaks import AxisPeaks, axis_peaks
 from cornersmooth.feedrate.compare import Comparison, compare
-from cornersmooth.feedrate.limiting import limiting
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
+from cornersmooth.feedrate.reached import AxisPeaks, axis_peaks, limiting
 from cornersmooth.feedrate.timelaw import States, TimeLaw
 from cornersmooth.feedrate.written import BlockLimits, block_feeds, plan_text
 

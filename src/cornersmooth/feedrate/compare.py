@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from cornersmooth.feedrate.axispeaks import axis_peaks
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.planner import direct, plan
+from cornersmooth.feedrate.reached import axis_peaks
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics import Machine
 from cornersmooth.methods import METHODS

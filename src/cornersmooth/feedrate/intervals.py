@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cornersmooth.feedrate import arcs, curves
+from cornersmooth.feedrate import arcs, rational_curves
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
 from cornersmooth.feedrate.motion import curvature, derivatives
@@ -28,8 +28,8 @@ INTERVALS = 4
 POLE_INTERVALS, FIRST_INTERVAL = 40, 0.05
 #: the cone at the pole in which derivatives are cut off here, over the cone of the machine: smaller, to be safe
 WITHIN = 0.5
-#: places in every interval at which derivatives are sampled
-_SAMPLED = np.linspace(0.0, 1.0, 5)
+#: places inside of every interval at which derivatives are sampled
+_QUARTERS = np.array([0.25, 0.5, 0.75])
 #: elements sampled together
 _TOGETHER = 4096
 #: most that parabolas may miss of derivatives where the tip all but stands
@@ -140,12 +140,14 @@ def path_limits(path: Path, limits: Limits) -> tuple[Intervals, Ints]:
         bound = limits.centripetal_accel / curvature(arcs.series(path.program, path.move[arc], 0.0))
         cap[arc] = np.minimum(cap[arc], bound)
     bent = np.flatnonzero(path.bent)
-    which, share, interval_cap = curves.curvature_limits(path.curves, path.row[bent], path.speed[bent], limits)
+    which, share, interval_cap = rational_curves.curvature_caps(
+        path.curves.tip, path.curves.half, path.row[bent], path.speed[bent], limits.centripetal_accel
+    )
     which = bent[which]
 
     # one slot for the junction before each element, then its intervals
     count = np.ones(m, np.int64)
-    count[which] = curves.INTERVALS
+    count[which] = rational_curves.INTERVALS
     joined = np.isfinite(path.junction_speed[:-1]) & (path.junction_speed[:-1] > 0.0)
     begin = np.concatenate(([0], np.cumsum(count + joined)))
     total = int(begin[-1])
@@ -154,7 +156,7 @@ def path_limits(path: Path, limits: Limits) -> tuple[Intervals, Ints]:
     single = count == 1
     width[first[single]] = path.length[single]
     bounds[first[single]] = cap[single]
-    inside = first[which][:, None] + np.arange(curves.INTERVALS)
+    inside = first[which][:, None] + np.arange(rational_curves.INTERVALS)
     width[inside] = share * (path.length[which] / share.sum(axis=1))[:, None]
     bounds[inside] = interval_cap
     bounds[begin[:-1][joined]] = path.junction_speed[:-1][joined] ** 2
@@ -191,22 +193,17 @@ class _Quantities:
     bounds: Floats
     counts: Bools
 
-    def sampled(self, element: Ints, borders: Floats) -> Floats:
-        """First three derivatives (3, g, p, 5, d) at start, quarters and end of the intervals between borders."""
-        inner = borders[:, :-1, None] + np.diff(borders, axis=1)[..., None] * _SAMPLED[1:-1]
-        share = np.concatenate((borders, inner.reshape(len(borders), -1)), axis=1)
-        which = np.repeat(element, share.shape[1])
+    def sampled(self, element: Ints, fine: Floats) -> Floats:
+        """First three derivatives (3, g, p, 5, d) in intervals whose ends and quarters are at `fine` (g, 4·p + 1)."""
+        which, share = np.repeat(element, fine.shape[1]), fine.ravel()
         found = []
         if len(self.vectors):
-            orders = np.stack([norm(order) for order in derivatives(self.path, which, share.ravel())])
+            orders = np.stack([norm(order) for order in derivatives(self.path, which, share)])
             found.append(orders.transpose(0, 2, 1)[..., self.vectors])
         if self.machine_axes is not None:
-            found.append(np.stack(self.machine_axes.orders(which, share.ravel())[1:]))
-        values = np.concatenate(found, axis=-1).reshape(3, *share.shape, -1)
-        intervals = borders.shape[1] - 1
-        ends, inside = values[:, :, : intervals + 1, None], values[:, :, intervals + 1 :]
-        inside = inside.reshape(*values.shape[:2], intervals, len(_SAMPLED) - 2, -1)
-        return np.concatenate((ends[:, :, :-1], inside, ends[:, :, 1:]), axis=3)
+            found.append(np.stack(self.machine_axes.orders(which, share)[1:]))
+        values = np.concatenate(found, axis=-1).reshape(3, *fine.shape, -1)
+        return values[:, :, np.arange(0, fine.shape[1] - 1, 4)[:, None] + np.arange(5)]
 
 
 def axis_limits(path: Path, limits: Limits, run: Ints, machine_axes: MachineAxes | None = None) -> AxisLimits | None:
@@ -236,7 +233,9 @@ def axis_limits(path: Path, limits: Limits, run: Ints, machine_axes: MachineAxes
         close |= machine_axes.near_pole() & steady
     quantities = _Quantities(path, vectors, machine_axes, bounds, counts)
     bent, asked = path.bent, counts.any(axis=1)
-    count = np.where(asked, np.where(close, 2 * POLE_INTERVALS, np.where(bent, curves.INTERVALS, INTERVALS)), 1)
+    count = np.where(
+        asked, np.where(close, 2 * POLE_INTERVALS, np.where(bent, rational_curves.INTERVALS, INTERVALS)), 1
+    )
     begin = np.concatenate(([0], np.cumsum(count)))
     total = int(begin[-1])
     width = np.repeat(path.length, count)
@@ -250,10 +249,10 @@ def axis_limits(path: Path, limits: Limits, run: Ints, machine_axes: MachineAxes
         for at in range(0, len(chosen), size):
             element = chosen[at : at + size]
             graded = _graded(path, element, slow[element], machine_axes) if near else None
-            borders, share = _borders(path, element, curve, graded)
-            into = begin[element][:, None] + np.arange(borders.shape[1] - 1)
+            fine, share, quarters = _divided(path, element, curve, graded)
+            into = begin[element][:, None] + np.arange(share.shape[1])
             width[into] = share * path.length[element][:, None]
-            along = quantities.sampled(element, borders)
+            along = quantities.sampled(element, fine)
             amounts = np.where(counts[element][:, None], _largest(along), 0.0)
             cap[0, into], rows[0][:, into] = _judge(amounts[..., :own], bounds[:, :own])
             if machine_axes is None:
@@ -262,10 +261,9 @@ def axis_limits(path: Path, limits: Limits, run: Ints, machine_axes: MachineAxes
             cap[1, into], rows[1][:, into] = _judge(amounts, bounds[:, own:])
             cap[0, into] = np.minimum(cap[0, into], _judge(amounts[:1], bounds[:1, own:])[0])
             finite = np.isfinite(along).all(axis=(0, 3, 4))
-            shares = _quarters(path, element, borders, curve)
-            middle[into] = shares[1]
+            middle[into] = quarters[1]
             along = np.where((finite & steady[element][:, None])[..., None, None], along, 0.0)
-            off = np.stack([_missed(values, shares) for values in along])
+            off = np.stack([_missed(values, quarters) for values in along])
             value[:, :, into] = along[..., ::2, :].transpose(0, 4, 1, 2, 3)
             missed[:, :, into] = off.transpose(0, 3, 1, 2)
             # where the tip all but stands, and derivatives change much, huge terms cancel
@@ -285,7 +283,7 @@ def _graded(path: Path, element: Ints, slow: Bools, machine_axes: MachineAxes | 
     if len(swift) and machine_axes is not None:
         borders[swift] = _around(*machine_axes.closest(element[swift]), POLE_INTERVALS)
     if slow.any():
-        places, _, felt = curves.slowest(path.curves.tip[path.row[element[slow]]])
+        places, _, felt = rational_curves.slowest(path.curves.tip[path.row[element[slow]]])
         both = [_around(places[:, k], felt[:, k], POLE_INTERVALS // 2) for k in range(2)]
         borders[slow] = np.sort(np.concatenate(both, axis=1), axis=1)[:, :-1]  # two of them are the end
     return borders
@@ -301,16 +299,30 @@ def _around(closest: Floats, felt: Floats, intervals: int) -> Floats:
     return borders
 
 
-def _borders(path: Path, element: Ints, curve: bool, given: Floats | None) -> tuple[Floats, Floats]:
-    """Parameters that divide elements, and the shares of their length between them."""
+def _divided(path: Path, element: Ints, curve: bool, given: Floats | None) -> tuple[Floats, Floats, Floats]:
+    """Ends and quarters (g, 4·p + 1) of intervals that divide elements, their shares (g, p) of the length.
+
+    Third come the shares (3, g, p) of the length of an interval that are before the quarters of its parameter.
+    """
+    row = path.row[element]
+    if given is not None:
+        borders = given
+    elif curve:
+        borders = rational_curves.interval_borders(path.curves.half[row])
+    else:
+        borders = np.tile(np.linspace(0.0, 1.0, INTERVALS + 1), (len(element), 1))
+    step = np.diff(borders, axis=1)
+    fine = np.repeat(borders, 4, axis=1)[:, :-3]
+    for number in (1, 2, 3):
+        fine[:, number::4] = borders[:, :-1] + _QUARTERS[number - 1] * step
     if not curve:
-        borders = np.tile(np.linspace(0.0, 1.0, INTERVALS + 1), (len(element), 1)) if given is None else given
-        return borders, np.diff(borders, axis=1)
-    tip, half = path.curves.tip[path.row[element]], path.curves.half[path.row[element]]
-    borders = curves.interval_borders(half) if given is None else given
-    before = np.maximum.accumulate(curves.lengths_before(tip, half, borders), axis=1)
-    lengths = np.diff(before, axis=1)
-    return borders, lengths / lengths.sum(axis=1, keepdims=True)
+        return fine, step, np.broadcast_to(_QUARTERS[:, None, None], (3, *step.shape))
+    before = rational_curves.lengths_before(path.curves.tip[row], path.curves.half[row], fine)
+    before = np.maximum.accumulate(before, axis=1)
+    along = before[:, 1:].reshape(*step.shape, 4) - before[:, :-1:4, None]
+    whole = along[..., 3]
+    quarters = np.where(whole[..., None] > 0.0, along[..., :3] / np.maximum(whole, 1e-300)[..., None], _QUARTERS)
+    return fine, whole / whole.sum(axis=1, keepdims=True), quarters.transpose(2, 0, 1)
 
 
 def _judge(amounts: Floats, bounds: Floats) -> tuple[Floats, Floats]:
@@ -324,23 +336,6 @@ def _judge(amounts: Floats, bounds: Floats) -> tuple[Floats, Floats]:
     (one, two, three), (_, accel, jerk) = amounts, bounds
     rows = np.stack((0.5 * one / accel, two / accel, one / jerk, 1.5 * two / jerk, three / jerk))
     return cap, rows.max(axis=-1, initial=0.0)
-
-
-def _quarters(path: Path, element: Ints, borders: Floats, curve: bool) -> Floats:
-    """(3, g, p) shares of the lengths of intervals that are before the quarters of their parameter."""
-    parts = np.linspace(0.0, 1.0, 5)[1:-1]
-    if not curve:
-        return np.broadcast_to(parts[:, None, None], (3, len(borders), borders.shape[1] - 1))
-    fine = np.repeat(borders, 4, axis=1)[:, :-3]
-    for number, part in enumerate(parts):
-        fine[:, number + 1 :: 4] = borders[:, :-1] + part * (borders[:, 1:] - borders[:, :-1])
-    row = path.row[element]
-    before = curves.lengths_before(path.curves.tip[row], path.curves.half[row], fine)
-    before = np.maximum.accumulate(before, axis=1)
-    along = before[:, 1:].reshape(len(borders), -1, 4) - before[:, :-1:4, None]
-    whole = along[..., 3:]
-    shares: Floats = np.where(whole > 0.0, along[..., :3] / np.maximum(whole, 1e-300), parts).transpose(2, 0, 1)
-    return shares
 
 
 def parabola(share: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:

@@ -18,9 +18,9 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import taylor
-from cornersmooth.feedrate.curves import WHOLE
 from cornersmooth.feedrate.motion import known_by_way, taylor_along
 from cornersmooth.feedrate.path import NO_TURN, Path
+from cornersmooth.feedrate.rational_curves import WHOLE
 from cornersmooth.kinematics import Machine, solutions
 from cornersmooth.kinematics.machine import PARALLEL
 from cornersmooth.kinematics.poses import angle_between, continued

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cornersmooth.feedrate import arcs, taylor
-from cornersmooth.feedrate.curves import parameters_at, taylor_series
 from cornersmooth.feedrate.path import Kind, Path
+from cornersmooth.feedrate.rational_curves import parameters_at, taylor_series
 from cornersmooth.model import Floats, Ints
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.vectors import norm

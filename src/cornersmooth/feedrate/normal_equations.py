@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cornersmooth.feedrate.speed_problem import Batch, ahead, behind, weight_of_z
-from cornersmooth.lapack import dpbsv
+from cornersmooth.lapack import dpbtrf, dpbtrs
 from cornersmooth.model import Floats, Ints
 
 #: what is added to the main diagonal of the normal equations, relative to it, where they cannot be solved without
@@ -25,14 +25,14 @@ class Equations:
         Of each row the derivative of left minus right side by z.
     downhill : (n,) float64
         Derivative of the time by the coefficients.
-    bands : (3, n) float64
-        The matrix, its main diagonal last.
+    factors : (3, n) float64 or None
+        Of the matrix; None where it has no positive pivots, even stiffened.
     """
 
     batch: Batch
     by_z: tuple[Floats, ...]
     downhill: Floats
-    bands: Floats
+    factors: Floats | None
 
     @classmethod
     def of(cls, batch: Batch, c: Floats, stiffness: Floats, bites: list[Floats]) -> Equations:
@@ -73,7 +73,7 @@ class Equations:
         beside += behind(behind(bb * r1 * r2 + r1 * k2 + r2 * k1))
         beyond += behind(behind(bb * r0 * r2 + r0 * k2 + r2 * k0))
         _eliminate(batch, bands)
-        return cls(batch, weights, -0.5 * batch.weight * c**-1.5, bands)
+        return cls(batch, weights, -0.5 * batch.weight * c**-1.5, _factors(bands))
 
     def step(self, pressure: Floats) -> Floats:
         """Change of the coefficients (n,) under the forces (rows, n) of the limits."""
@@ -91,23 +91,25 @@ class Equations:
         gradient = on_z[2] + self.downhill + near * node_z - node_s + r0 * on_bend
         gradient += behind(far * node_z + node_s + r1 * on_bend + on_z[3]) + behind(behind(r2 * on_bend))
         _fold(batch, gradient)
-        step = _solved(self.bands, -gradient)
+        step = np.zeros(n) if self.factors is None else np.asarray(dpbtrs(self.factors, -gradient)[0], np.float64)
+        if not np.isfinite(step).all():
+            step = np.zeros(n)
         batch.follow(step)
         return step
 
 
-def _solved(bands: Floats, right: Floats) -> Floats:
-    """Solve the normal equations; where rounding leaves no positive pivot they are stiffened.
+def _factors(bands: Floats) -> Floats | None:
+    """Factors of the matrix; where rounding leaves no positive pivot it is stiffened.
 
     A stiffened step is shorter or points a little aside: it costs rounds, never a limit.
     """
     for ridge in _RIDGES:
         matrix = np.array(bands, order="F")
         matrix[-1] *= 1.0 + ridge
-        _, step, info = dpbsv(matrix, right, overwrite_ab=1)
-        if info == 0 and np.isfinite(step).all():
-            return np.asarray(step, np.float64)
-    return np.zeros_like(right)
+        factors, info = dpbtrf(matrix, overwrite_ab=1)
+        if info == 0 and np.isfinite(factors).all():
+            return np.asarray(factors)
+    return None
 
 
 def _eliminate(batch: Batch, bands: Floats) -> None:

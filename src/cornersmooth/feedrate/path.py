@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import arcs
-from cornersmooth.feedrate.curves import STANDSTILL, WHOLE, Curves, end_tangents
+from cornersmooth.feedrate.curves import Curves
 from cornersmooth.feedrate.limits import Limits
+from cornersmooth.feedrate.rational_curves import STANDSTILL, WHOLE, end_tangents
 from cornersmooth.model import Bools, Corners, FeedMode, Floats, Ints, Move, Program, Runs, Status
 from cornersmooth.settings import Settings
 from cornersmooth.smoothing.neighbours import find_neighbours

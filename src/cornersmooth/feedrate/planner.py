@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from cornersmooth.feedrate import scurve
-from cornersmooth.feedrate.grid import Resolution, in_cells, make_grid
+from cornersmooth.feedrate.grid import in_cells, make_grid
 from cornersmooth.feedrate.intervals import AxisLimits, Intervals, axis_limits, path_limits
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
@@ -37,7 +37,6 @@ def plan(
     limits: Limits | None = None,
     *,
     machine: Machine | None = None,
-    resolution: Resolution | None = None,
     progress: Progress | None = None,
 ) -> TimeLaw:
     """Plan the motion along the smoothed path.
@@ -53,8 +52,6 @@ def plan(
     limits : Limits, optional
     machine : Machine, optional
         Keep the limits of its five axes.
-    resolution : Resolution, optional
-        How fine the cells are that the speed is planned in.
     progress : callable, optional
         Called with (work done, work in all).
 
@@ -69,7 +66,7 @@ def plan(
     path = build_path(
         smooth_program.program, smooth_program.corners, smooth_program.settings, limits, runs=smooth_program.runs
     )
-    return plan_path(path, limits, machine=machine, resolution=resolution, progress=progress)
+    return plan_path(path, limits, machine=machine, progress=progress)
 
 
 def direct(
@@ -79,7 +76,6 @@ def direct(
     *,
     settings: Settings | None = None,
     machine: Machine | None = None,
-    resolution: Resolution | None = None,
     progress: Progress | None = None,
 ) -> TimeLaw:
     """Plan the motion along the original path.
@@ -107,7 +103,7 @@ def direct(
     limits = Limits() if limits is None else limits
     settings = Settings() if settings is None else settings
     path = build_path(program, None, settings, limits, stop_everywhere=baseline == "exact_stop")
-    return plan_path(path, limits, machine=machine, resolution=resolution, progress=progress)
+    return plan_path(path, limits, machine=machine, progress=progress)
 
 
 def _not_crowded(path: Path, period: float) -> Floats:
@@ -128,7 +124,6 @@ def plan_path(
     limits: Limits,
     *,
     machine: Machine | None = None,
-    resolution: Resolution | None = None,
     progress: Progress | None = None,
 ) -> TimeLaw:
     """Plan the motion along any path."""
@@ -140,7 +135,7 @@ def plan_path(
         own = path.part(begin, stop)
         own_axes = None if machine_axes is None else replace(machine_axes, path=own)
         report = None if progress is None else partial(_report, progress, len(path), begin, stop)
-        own, found, length = _plan_part(own, limits, own_axes, resolution, report)
+        own, found, length = _plan_part(own, limits, own_axes, report)
         found[1] = found[1] + start[begin]
         phases.append(found)
         junctions.append(own.junction_speed[1:])
@@ -179,7 +174,6 @@ def _plan_part(
     path: Path,
     limits: Limits,
     machine_axes: MachineAxes | None,
-    resolution: Resolution | None,
     progress: Progress | None,
 ) -> tuple[Path, list[Floats], float]:
     """Plan from a stop to a stop: the path with its speeds at junctions, phases of the law, and the length."""
@@ -196,7 +190,7 @@ def _plan_part(
     parts = [_level_runs(own, np.flatnonzero(level))]
     uneven = np.flatnonzero(~level)
     if len(uneven):
-        parts.append(_uneven_runs(own, more, uneven, resolution, progress))
+        parts.append(_uneven_runs(own, more, uneven, progress))
     run, *phases = (np.concatenate([part[i] for part in parts]) for i in range(7))
     order = np.argsort(run, kind="stable")
     order = order[phases[0][order] > 0.0]
@@ -230,10 +224,10 @@ def _level_runs(limits: Intervals, runs: Ints) -> tuple[Floats | Ints, ...]:
 
 
 def _uneven_runs(
-    own: Intervals, more: AxisLimits | None, runs: Ints, resolution: Resolution | None, progress: Progress | None
+    own: Intervals, more: AxisLimits | None, runs: Ints, progress: Progress | None
 ) -> tuple[Floats | Ints, ...]:
     """Phases of runs whose speed limit changes on the way: one per cell."""
-    grid = make_grid([own] if more is None else [own, more.all], runs, resolution)
+    grid = make_grid([own] if more is None else [own, more.all], runs)
     batch = problem_of(grid)
     if more is None or more.samples is None:
         c = solve_runs(batch, grid, progress)

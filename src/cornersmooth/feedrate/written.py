@@ -9,10 +9,11 @@ import numpy as np
 
 from cornersmooth.errors import SettingsError
 from cornersmooth.feedrate import scurve
-from cornersmooth.feedrate.curves import Curves, polynomial
+from cornersmooth.feedrate.curves import Curves
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.path import Path, build_path
 from cornersmooth.feedrate.planner import Progress, plan_path
+from cornersmooth.feedrate.rational_curves import polynomial
 from cornersmooth.feedrate.timelaw import TimeLaw
 from cornersmooth.kinematics import Machine, endless
 from cornersmooth.model import Arcs, Bools, FeedMode, Floats, Ints, Move, Program, Source, Statement
