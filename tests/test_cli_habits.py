@@ -10,6 +10,8 @@ import pytest
 
 from cornersmooth import optional_packages
 from cornersmooth.cli.files import Beginning
+from cornersmooth.cli.group import COMMANDS, GROUPS
+from cornersmooth.cli.headings import HEADINGS
 from cornersmooth.nc import control_aliases, control_names, load_control
 from oracle.command import DONE, SMALL, USAGE, run, seen_on_a_terminal
 from oracle.messages import one_line
@@ -176,3 +178,39 @@ def test_a_terminal_is_not_flooded(options: tuple[str, ...]) -> None:
     told = [line for line in lines if line.endswith("more lines; -o FILE writes them, -o - shows them all")]
     assert (len(told) == 1) != bool(options)
     assert (len(lines) > 2000) == bool(options)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_helps_have_parts_and_fit_80_columns(name: str) -> None:
+    lines = run(name, "-h").stdout.decode().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert not any("\x1b" in line for line in lines)
+    if name in ("smooth", "filter", "verify", "compare", "time"):
+        heads = [line[:-1] for line in lines if line and not line.startswith((" ", "Usage"))]
+        assert heads[0] == "Everyday"
+        assert heads == [heading for heading in HEADINGS if heading in heads]
+        everyday = lines[lines.index("Everyday:") + 1 : lines.index("Output:")]
+        options = [line for line in everyday if line.startswith("  -")]
+        assert 3 <= len(options) <= 11
+        assert options[0].startswith("  -e, --tolerance")
+
+
+def test_the_list_of_commands_has_every_command_once() -> None:
+    assert sorted(name for names in GROUPS.values() for name in names.split()) == sorted(COMMANDS)
+
+
+def test_a_terminal_shows_helps_and_messages_in_colour_but_for_no_color(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("part.cls").write_bytes(SMALL.replace(b"LOADTL/1\n", b""))
+    for words, what in (
+        (("smooth", "-h"), b"Everyday"),
+        (("smooth", "part.cls", "-o", "o.nc", "--force"), b"CS334"),
+    ):
+        seen = seen_on_a_terminal(*words, TERM="xterm")
+        assert what in seen
+        assert b"\x1b[1" in seen
+        plain = seen_on_a_terminal(*words, TERM="xterm", NO_COLOR="1")
+        assert b"\x1b[3" not in plain
+        assert max(len(line) for line in plain.decode().replace("\r", "").splitlines()) <= 80

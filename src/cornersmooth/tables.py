@@ -322,7 +322,7 @@ class Shelf:
     def texts(self, value: object, where: str, count: int | None = None, hint: str = "") -> tuple[str, ...]:
         """Refuse what is no list of so many texts."""
         if not isinstance(value, list) or count not in (None, len(value)) or not all(isinstance(x, str) for x in value):
-            many = "a list of texts" if count is None else f"{_COUNTS[count]} texts in brackets"
+            many = "a list of strings" if count is None else f"{_COUNTS[count]} texts in brackets"
             raise self.wrong(f"{where} is {value!r}", hint or f'give {many}, as in ["M8"]')
         return tuple(self.text(each, where) for each in value)
 

@@ -59,7 +59,7 @@ def command(source: str, **given: Any) -> int:
     \b
     Examples:
       cornersmooth compare part.cls --control siemens --limits table-ac
-      cornersmooth compare part.cls -e 0.04 --control fanuc --limits mill.toml --csv part.csv
+      cornersmooth compare part.cls --control fanuc --limits mill.toml --csv p.csv
       cornersmooth compare part.cls --control linuxcnc --machine xyzac-trt -v
     """
     from cornersmooth.cl import read

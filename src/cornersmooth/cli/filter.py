@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli.files import STANDARD, check_path, read_input, target_of
+from cornersmooth.cli.headings import option
 from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_input
 from cornersmooth.cli.options import motion, nc_text, outputs, smoothing
 from cornersmooth.cli.options.parameters import PATH
@@ -36,12 +37,15 @@ PATTERNS = ("*.nc", "*.ngc", "*.mpf", "*.spf", "*.h", "*.tap", "*.cnc", "*.eia",
 #: reasons shown without -v, and problems
 _SHOWN, _WRONG_SHOWN = 10, 20
 
-tip_control = click.option(
+tip_control = option(
+    "Reading",
     "--tip-control",
     is_flag=True,
     help="Tool tip control is on where the program begins, as in a subprogram, or where the kinematics are always on.",
 )
-units = click.option("--units", type=click.Choice(["mm", "inch"]), help="Units of a program that does not say them.")
+units = option(
+    "Reading", "--units", type=click.Choice(["mm", "inch"]), help="Units of a program that does not say them."
+)
 
 
 @click.command(
@@ -83,7 +87,7 @@ def command(inputs: tuple[str, ...], **given: Any) -> int:
 
     \b
     Examples:
-      cornersmooth filter part.ngc --control linuxcnc --machine xyzac-trt -e 0.01 -o smooth.ngc
+      cornersmooth filter part.ngc --control linuxcnc --machine xyzac-trt -o n.ngc
       cornersmooth filter part.mpf --control siemens -e 0.01 -o smooth.mpf
       cornersmooth filter part.nc -e 0.01 --lines long -o smooth.nc
       cornersmooth filter *.mpf --control siemens -d smooth/

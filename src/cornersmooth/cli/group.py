@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 from cornersmooth import __version__
+from cornersmooth.cli.headings import write_part
 from cornersmooth.cli.shutdown import Shutdown
 
 #: name of each command, its module and its line in the list of commands
@@ -34,6 +35,15 @@ COMMANDS = {
     "completion": ("cornersmooth.cli.completion", "Print what makes a shell complete commands, names and files."),
     "explain": ("cornersmooth.cli.explain", "Explain the code of a message: cause, and what to do."),
     "man": ("cornersmooth.cli.man", "Print the manual page."),
+}
+
+#: how the list shows them
+GROUPS = {
+    "Make programs": "smooth filter",
+    "Check programs": "verify surface",
+    "Save time": "compare time setup",
+    "Look up": "info controls machines config explain",
+    "Shell": "completion man",
 }
 
 EXIT_INTERRUPTED = 130
@@ -79,8 +89,8 @@ class LazyGroup(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands without importing them."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+        for heading, names in GROUPS.items():
+            write_part(formatter, heading, [(name, COMMANDS[name][1]) for name in names.split()])
         with formatter.section("Pages that helps name"):
             formatter.write_dl([("docs/", str(_pages()))])
 

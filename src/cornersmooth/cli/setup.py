@@ -9,6 +9,7 @@ import click
 
 from cornersmooth.cli import completing
 from cornersmooth.cli.files import read_input
+from cornersmooth.cli.headings import option
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 #: savings of less are none, %
 _WORTH = 0.1
 
-limits = click.option(
+limits = option(
+    "Everyday",
     "--limits",
     required=True,
     type=str,
@@ -30,7 +32,8 @@ limits = click.option(
     help="Machine that the program runs on: a name that 'cornersmooth machines' lists (its numbers are examples), or a "
     "TOML file with [dynamics.X] and so on.",
 )
-tilt = click.option(
+tilt = option(
+    "Limits",
     "--tilt",
     type=click.FloatRange(0.0, 90.0),
     default=45.0,
@@ -38,11 +41,19 @@ tilt = click.option(
     metavar="DEG",
     help="Largest tilt about X and about Y, either way; 0 for none.",
 )
-no_turn = click.option(
-    "--no-turn", is_flag=True, help="Do not turn the part about Z. A table that turns without end does that itself."
+no_turn = option(
+    "Limits",
+    "--no-turn",
+    is_flag=True,
+    help="Do not turn the part about Z. A table that turns without end does that itself.",
 )
-plans = click.option(
-    "--plans", type=click.IntRange(min=1), default=6, show_default=True, help="Setups that are planned as written."
+plans = option(
+    "Limits",
+    "--plans",
+    type=click.IntRange(min=1),
+    default=6,
+    show_default=True,
+    help="Setups that are planned as written.",
 )
 
 
@@ -78,7 +89,7 @@ def command(source: str, **given: Any) -> int:
     \b
     Examples:
       cornersmooth setup part.cls --limits mill.toml
-      cornersmooth setup part.cls --limits mill.toml --control siemens -f bspline -e 0.01 --tilt 30
+      cornersmooth setup part.cls --limits mill.toml --control siemens -f bspline
       cornersmooth setup part.cls --limits table-ac --tilt 20 --json
     """
     from cornersmooth.cl import read

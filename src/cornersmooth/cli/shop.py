@@ -33,6 +33,7 @@ from typing import Any
 
 import click
 
+from cornersmooth.cli.headings import HeadedCommand
 from cornersmooth.cli.show import warn
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import reason
@@ -89,7 +90,7 @@ class Shop:
 _TYPED = f"{__name__}.typed"
 
 
-class ShopCommand(click.Command):
+class ShopCommand(HeadedCommand):
     """A command whose options have defaults in shop settings."""
 
     def __init__(self, *args: Any, **given: Any) -> None:

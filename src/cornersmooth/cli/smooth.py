@@ -89,10 +89,10 @@ def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
     Examples:
       cornersmooth smooth part.cls -e 0.04 -o part.nc
       cornersmooth smooth part.cls -e 0.04 -o part.nc --report part.html
-      cornersmooth smooth part.cls -e 0.04 -f g6.2 -o part.nc --report part.json --report part.csv
-      cornersmooth smooth part.cls -e 0.04 --control siemens -f bspline -o part.mpf
-      cornersmooth smooth part.cls -e 0.01 --method global --control siemens -f bspline -o part.mpf
-      cornersmooth smooth part.cls -e 0.04 --control linuxcnc --machine xyzac-trt -o part.ngc
+      cornersmooth smooth part.cls -e 0.04 -f g6.2 -o part.nc --report part.csv
+      cornersmooth smooth part.cls --control siemens -f bspline -o part.mpf
+      cornersmooth smooth part.cls --method global -f g6.2 -o part.nc
+      cornersmooth smooth part.cls --control linuxcnc --machine xyzac-trt -o p.ngc
       cornersmooth smooth part.ncl -e 0.0005in -H 25 -o part.nc
       cornersmooth smooth *.cls -e 0.04 -d out/ -j 2
       cornersmooth smooth cl/ -e 0.04 -d nc/ -j --summary made.csv

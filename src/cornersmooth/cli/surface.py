@@ -54,7 +54,7 @@ def command(source: str, text: str, **given: Any) -> int:
     \b
     Examples:
       cornersmooth surface part.cls part.nc -e 0.04 -H 12
-      cornersmooth surface part.cls part.nc --tool 10,5 --report map.html --report map.png
+      cornersmooth surface part.cls part.nc --tool 10,5 --report map.html
       cornersmooth surface part.cls part.nc --tool 12,0,3 --report points.csv
     """
     from cornersmooth.cl import read

@@ -74,7 +74,7 @@ def command(source: str, **given: Any) -> int:
     \b
     Examples:
       cornersmooth time part.cls -e 0.04 --limits table-ac
-      cornersmooth time part.cls -e 0.04 --feed 1800 --accel 1000 --jerk 5000 --period 2ms --json
+      cornersmooth time part.cls -e 0.04 --feed 1800 --accel 1000 --json
       cornersmooth time part.cls -e 0.04 --csv motion.csv
       cornersmooth time part.cls -e 0.04 --machine mill.toml --csv axes.csv
       cornersmooth time part.cls -e 0.04 --report times.html

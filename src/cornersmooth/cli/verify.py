@@ -77,9 +77,9 @@ def command(source: str, text: str, **given: Any) -> int:
     \b
     Examples:
       cornersmooth verify part.cls part.nc
-      cornersmooth verify part.cls part.nc -e 0.04 -H 25 --report found.json --report poses.csv
+      cornersmooth verify part.cls part.nc -e 0.04 -H 25 --report poses.csv
       cornersmooth verify part.cls part.mpf -e 0.04 --control siemens
-      cornersmooth verify part.cls part.ngc -e 0.04 --control linuxcnc --machine xyzac-trt
+      cornersmooth verify part.cls part.ngc -e 0.04 --control linuxcnc
       cornersmooth verify part.cls part.nc -e 0.04 --report found.html
     """
     from cornersmooth.cl import read

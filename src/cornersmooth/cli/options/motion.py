@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli import completing
+from cornersmooth.cli.headings import option
 from cornersmooth.cli.options.parameters import PATH, Duration, all_of
 from cornersmooth.methods import METHODS
 
@@ -15,19 +16,30 @@ if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
 
 _LIMITS = {
-    "feed": click.option(
-        "--feed", type=float, metavar="MM/MIN", help="Feed of all feed moves instead of the programmed ones."
+    "feed": option(
+        "Limits", "--feed", type=float, metavar="MM/MIN", help="Feed of all feed moves instead of the programmed ones."
     ),
-    "accel": click.option(
-        "--accel", type=float, default=1000.0, show_default=True, metavar="MM/S2", help="Acceleration along the path."
+    "accel": option(
+        "Limits",
+        "--accel",
+        type=float,
+        default=1000.0,
+        show_default=True,
+        metavar="MM/S2",
+        help="Acceleration along the path.",
     ),
-    "jerk": click.option(
-        "--jerk", type=float, default=5000.0, show_default=True, metavar="MM/S3", help="Jerk along the path."
+    "jerk": option(
+        "Limits", "--jerk", type=float, default=5000.0, show_default=True, metavar="MM/S3", help="Jerk along the path."
     ),
-    "centripetal": click.option(
-        "--centripetal", type=float, metavar="MM/S2", help="Acceleration across the path. [default: that of --accel]"
+    "centripetal": option(
+        "Limits",
+        "--centripetal",
+        type=float,
+        metavar="MM/S2",
+        help="Acceleration across the path. [default: that of --accel]",
     ),
-    "period": click.option(
+    "period": option(
+        "Limits",
         "--period",
         type=Duration(),
         default=0.002,
@@ -35,16 +47,27 @@ _LIMITS = {
         help="Interpolation period, as in 2ms: at corners that stay sharp the velocity changes by at most accel times "
         "period. [default: 2ms]",
     ),
-    "rapid": click.option(
-        "--rapid", type=float, default=10000.0, show_default=True, metavar="MM/MIN", help="Speed of rapid moves."
+    "rapid": option(
+        "Limits",
+        "--rapid",
+        type=float,
+        default=10000.0,
+        show_default=True,
+        metavar="MM/MIN",
+        help="Speed of rapid moves.",
     ),
-    "rapid_accel": click.option(
-        "--rapid-accel", type=float, metavar="MM/S2", help="Acceleration of rapids. [default: that of --accel]"
+    "rapid_accel": option(
+        "Limits",
+        "--rapid-accel",
+        type=float,
+        metavar="MM/S2",
+        help="Acceleration of rapids. [default: that of --accel]",
     ),
-    "rapid_jerk": click.option(
-        "--rapid-jerk", type=float, metavar="MM/S3", help="Jerk of rapids. [default: that of --jerk]"
+    "rapid_jerk": option(
+        "Limits", "--rapid-jerk", type=float, metavar="MM/S3", help="Jerk of rapids. [default: that of --jerk]"
     ),
-    "angular_feed": click.option(
+    "angular_feed": option(
+        "Limits",
         "--angular-feed",
         type=float,
         default=30.0,
@@ -52,22 +75,36 @@ _LIMITS = {
         metavar="DEG/S",
         help="Speed of moves that only turn the tool axis.",
     ),
-    "angular_accel": click.option(
-        "--angular-accel", type=float, default=150.0, show_default=True, metavar="DEG/S2", help="Their acceleration."
+    "angular_accel": option(
+        "Limits",
+        "--angular-accel",
+        type=float,
+        default=150.0,
+        show_default=True,
+        metavar="DEG/S2",
+        help="Their acceleration.",
     ),
-    "angular_jerk": click.option(
-        "--angular-jerk", type=float, default=3000.0, show_default=True, metavar="DEG/S3", help="Their jerk."
+    "angular_jerk": option(
+        "Limits", "--angular-jerk", type=float, default=3000.0, show_default=True, metavar="DEG/S3", help="Their jerk."
     ),
-    "vector_jerk": click.option(
-        "--vector-jerk", type=float, metavar="MM/S3", help="Jerk of the tip in any direction. [default: no limit]"
+    "vector_jerk": option(
+        "Limits",
+        "--vector-jerk",
+        type=float,
+        metavar="MM/S3",
+        help="Jerk of the tip in any direction. [default: no limit]",
     ),
-    "turn_speed": click.option(
-        "--turn-speed", type=float, metavar="DEG/S", help="Turning of the tool axis in all moves. [default: no limit]"
+    "turn_speed": option(
+        "Limits",
+        "--turn-speed",
+        type=float,
+        metavar="DEG/S",
+        help="Turning of the tool axis in all moves. [default: no limit]",
     ),
-    "turn_accel": click.option(
-        "--turn-accel", type=float, metavar="DEG/S2", help="Its acceleration. [default: no limit]"
+    "turn_accel": option(
+        "Limits", "--turn-accel", type=float, metavar="DEG/S2", help="Its acceleration. [default: no limit]"
     ),
-    "turn_jerk": click.option("--turn-jerk", type=float, metavar="DEG/S3", help="Its jerk. [default: no limit]"),
+    "turn_jerk": option("Limits", "--turn-jerk", type=float, metavar="DEG/S3", help="Its jerk. [default: no limit]"),
 }
 
 
@@ -83,7 +120,8 @@ def limits_of(given: dict[str, Any]) -> Limits:
     return Limits(**{name: given[name] for name in _LIMITS})
 
 
-feed_from_plan = click.option(
+feed_from_plan = option(
+    "Limits",
     "--feed-from-plan",
     is_flag=True,
     help="Give every block the feed that a plan of the program reaches there, within --accel, --jerk and the limits of "
@@ -117,7 +155,8 @@ def planned_limits_of(given: dict[str, Any]) -> Limits | None:
     return None
 
 
-limits = click.option(
+limits = option(
+    "Limits",
     "--limits",
     type=str,
     metavar="NAME|FILE",
@@ -125,38 +164,45 @@ limits = click.option(
     help="Say the time under the limits of this machine's axes; the words of the program stay as they are. A name that "
     "'cornersmooth machines' lists, or a TOML file with [dynamics.X] and so on. [default: those of --machine]",
 )
-planned_time = click.option("--time", is_flag=True, help="Say the time of programs of more than 20,000 poses, too.")
-text = click.option(
+planned_time = option("Limits", "--time", is_flag=True, help="Say the time of programs of more than 20,000 poses, too.")
+text = option(
+    "Everyday",
     "--text",
     type=PATH,
     metavar="NC",
     help="Plan this NC program in place of the one that these options write: its lines, digits and feeds.",
 )
-text_machine = click.option(
+text_machine = option(
+    "Reading",
     "--text-machine",
     type=str,
     metavar="NAME|FILE",
     shell_complete=completing.machines,
     help="Machine whose rotary words --text has. [default: that of its head, else --machine]",
 )
-block_time = click.option(
+block_time = option(
+    "Lines",
     "--block-time",
     type=Duration(),
     help="Shortest time that the control takes for one block, of lines to write and in the plan. [default: that of the "
     "control's table for lines, none in the plan]",
 )
-look_ahead = click.option(
+look_ahead = option(
+    "Limits",
     "--look-ahead",
     type=click.IntRange(min=1),
     metavar="BLOCKS",
     help="Blocks within which the control must be able to stop. [default: all]",
 )
-law = click.option(
+law = option(
+    "Output",
     "--law",
     type=click.Choice(["direct_exact_stop", "direct_velocity_jump", *METHODS, "as_written"]),
     default="as_written",
     show_default=True,
-    help="Motion that --csv writes: of a method the ideal curves.",
+    metavar="LAW",
+    help="Motion that --csv writes: as_written, direct_exact_stop, direct_velocity_jump, or the curves of a method "
+    f"({', '.join(METHODS)}).",
 )
-rows_csv = click.option("--csv", type=PATH, help="Write the rows.")
-motion_csv = click.option("--csv", type=PATH, help="Write the motion, a row every period.")
+rows_csv = option("Output", "--csv", type=PATH, help="Write the rows.")
+motion_csv = option("Output", "--csv", type=PATH, help="Write the motion, a row every period.")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli import completing
+from cornersmooth.cli.headings import option
 from cornersmooth.cli.options.parameters import LENGTH, PATH, all_of
 from cornersmooth.errors import SettingsError
 
@@ -15,7 +16,8 @@ if TYPE_CHECKING:
     from cornersmooth.kinematics import Machine
     from cornersmooth.nc import Control
 
-form = click.option(
+form = option(
+    "Everyday",
     "-f",
     "--form",
     type=str,
@@ -23,7 +25,8 @@ form = click.option(
     shell_complete=completing.forms,
     help="Dense lines, or curves in the control's own form; 'cornersmooth controls' lists them. [default: g1]",
 )
-control = click.option(
+control = option(
+    "Everyday",
     "--control",
     type=str,
     metavar="NAME|FILE",
@@ -32,7 +35,8 @@ control = click.option(
     show_default=True,
     help="Control that the program is for: a name that 'cornersmooth controls' lists, or a TOML file.",
 )
-machine = click.option(
+machine = option(
+    "Everyday",
     "--machine",
     type=str,
     metavar="NAME|FILE",
@@ -40,10 +44,14 @@ machine = click.option(
     help="Write rotary words of this machine instead of tool vectors: a name that 'cornersmooth machines' "
     "lists, or a TOML file.",
 )
-no_tcp = click.option(
-    "--no-tcp", is_flag=True, help="Positions of the machine's axes, for controls that do not keep the tool tip."
+no_tcp = option(
+    "Control",
+    "--no-tcp",
+    is_flag=True,
+    help="Positions of the machine's axes, for controls that do not keep the tool tip.",
 )
-extras = click.option(
+extras = option(
+    "Control",
     "--with",
     "extras",
     type=str,
@@ -51,45 +59,53 @@ extras = click.option(
     multiple=True,
     help="Switch a function of the control on, such as cycle832; 'cornersmooth controls' lists them. May be repeated.",
 )
-program_name = click.option(
+program_name = option(
+    "Program",
     "--program-name",
     type=str,
     metavar="TEXT",
     help="Name or number of the NC program. [default: from the name of the CL file]",
 )
-line_ends = click.option(
+line_ends = option(
+    "Program",
     "--line-ends",
     type=click.Choice(["lf", "crlf"]),
     help="What each line of the program ends with. [default: that of the control's table, lf]",
 )
-work_offset = click.option(
+work_offset = option(
+    "Program",
     "--work-offset",
     type=str,
     metavar="WORD",
     help="Work offset, such as G55, or the number of a preset; 'none' leaves it out. [default: G54, or preset 1]",
 )
-approach = click.option(
+approach = option(
+    "Program",
     "--approach",
     type=LENGTH,
     help="How far the tool comes down along its axis to the first position after a retract. [default: straight down]",
 )
-retract = click.option(
+retract = option(
+    "Program",
     "--retract",
     type=LENGTH,
     help="How far the tool goes back along its axis before it goes up. [default: straight up]",
 )
-rewind = click.option(
+rewind = option(
+    "Program",
     "--rewind",
     type=LENGTH,
     help="Where a rotary axis would pass its limit in a cut, leave the cut along the tool by this length. "
     "The axis turns back above the retract, and the cut goes on. [default: an error]",
 )
-skip_cycles = click.option(
+skip_cycles = option(
+    "Holes and planes",
     "--skip-cycles",
     is_flag=True,
     help="Leave out holes whose cycle cannot be written; the program says NOT DRILLED there. [default: an error]",
 )
-cycles = click.option(
+cycles = option(
+    "Holes and planes",
     "--cycles",
     type=click.Choice(["moves", "native"]),
     default="moves",
@@ -97,7 +113,8 @@ cycles = click.option(
     help="Holes as plain moves, or as the control's own cycles where it has such and the tool stays along Z (or in a "
     "tilted plane).",
 )
-planes = click.option(
+planes = option(
+    "Holes and planes",
     "--planes",
     type=click.Choice(["none", "tilted"]),
     default="none",
@@ -105,20 +122,23 @@ planes = click.option(
     help="Whether a tool that keeps a tilted axis between rapids runs in a tilted plane of the control: CYCLE800, "
     "PLANE SPATIAL, G68.2, G254.",
 )
-header = click.option(
+header = option(
+    "Program",
     "--header",
     type=PATH,
     metavar="FILE",
     help="Lines to write after the head; {program} and {units} are filled in.",
 )
-footer = click.option("--footer", type=PATH, metavar="FILE", help="Lines to write before the tail.")
-slower = click.option(
+footer = option("Program", "--footer", type=PATH, metavar="FILE", help="Lines to write before the tail.")
+slower = option(
+    "Verification",
     "--planned-feeds",
     "slower",
     is_flag=True,
     help="Feeds of the program may be lower than those of the CL file, as --feedrate plan of smooth writes them.",
 )
-trusted = click.option(
+trusted = option(
+    "Verification",
     "--trust",
     "trusted",
     type=PATH,
@@ -126,7 +146,8 @@ trusted = click.option(
     metavar="FILE",
     help="Lines of the program that you put there, as with --header and --footer of smooth. May be repeated.",
 )
-digits = click.option(
+digits = option(
+    "Control",
     "--digits",
     type=str,
     metavar="N|NAME",
@@ -134,18 +155,29 @@ digits = click.option(
     help="Decimals of lengths in mm (in inches one more), or an increment system of the control, as in IS-B. "
     "[default: what the control takes; fanuc IS-C]",
 )
-block_numbers = click.option("--block-numbers", is_flag=True, help="Number the blocks.")
-modal = click.option(
-    "--modal", is_flag=True, help="Leave out words that repeat from block to block, where the control keeps them."
+block_numbers = option("Program", "--block-numbers", is_flag=True, help="Number the blocks.")
+modal = option(
+    "Program",
+    "--modal",
+    is_flag=True,
+    help="Leave out words that repeat from block to block, where the control keeps them.",
 )
-no_comments = click.option("--no-comments", is_flag=True, help="Leave out what the CL file says in words.")
-no_verify = click.option(
-    "--no-verify", is_flag=True, help="Do not read the program back and measure it before it takes its place."
+no_comments = option("Program", "--no-comments", is_flag=True, help="Leave out what the CL file says in words.")
+no_verify = option(
+    "Verification",
+    "--no-verify",
+    is_flag=True,
+    help="Do not read the program back and measure it before it takes its place.",
 )
-strict = click.option(
-    "--strict", is_flag=True, help="Take no verdict but PASSED: else the program goes to OUT.failed, and 1 is returned."
+strict = option(
+    "Verification",
+    "--strict",
+    is_flag=True,
+    help="Take no verdict but PASSED: else the program goes to OUT.failed, and 1 is returned.",
 )
-strict_verdict = click.option("--strict", is_flag=True, help="Take no verdict but PASSED: else 1 is returned.")
+strict_verdict = option(
+    "Verification", "--strict", is_flag=True, help="Take no verdict but PASSED: else 1 is returned."
+)
 
 
 def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:

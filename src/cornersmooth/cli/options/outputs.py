@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
-import click
-
+from cornersmooth.cli.headings import option
 from cornersmooth.cli.options.parameters import PATH, Jobs
 
-output = click.option(
-    "-o", "--output", type=PATH, help="NC file, - for standard output. [default: - for a single input]"
+output = option(
+    "Everyday", "-o", "--output", type=PATH, help="NC file, - for standard output. [default: - for a single input]"
 )
-directory = click.option(
+directory = option(
+    "Batches",
     "-d",
     "--directory",
     type=PATH,
     help="Folder for the NC files of several inputs, made where missing; folders below an input stay folders.",
 )
-glob = click.option(
+glob = option(
+    "Batches",
     "--glob",
     type=str,
     metavar="PATTERN",
     multiple=True,
     help="Files to take from folders, as in '*.cls'. May be repeated. [default: names of CL files]",
 )
-skip_existing = click.option(
-    "--skip-existing", is_flag=True, help="Leave outputs that exist as they are, whatever they were made of."
+skip_existing = option(
+    "Batches", "--skip-existing", is_flag=True, help="Leave outputs that exist as they are, whatever they were made of."
 )
-summary = click.option("--summary", type=PATH, help="Write a row for each file of a batch: .json or .csv.")
-jobs = click.option(
+summary = option("Batches", "--summary", type=PATH, help="Write a row for each file of a batch: .json or .csv.")
+jobs = option(
+    "Batches",
     "-j",
     "--jobs",
     type=Jobs(),
@@ -35,13 +37,15 @@ jobs = click.option(
     flag_value=0,
     help="Processes for several inputs; a bare -j takes all cores. [default: 1]",
 )
-scheduler = click.option(
+scheduler = option(
+    "Batches",
     "--scheduler",
     type=str,
     metavar="ADDRESS|FILE",
     help="Have a Dask cluster do the files of a batch: tcp://HOST:8786, or the scheduler's file. See docs/batch.md.",
 )
-reports = click.option(
+reports = option(
+    "Everyday",
     "--report",
     "reports",
     type=PATH,
@@ -49,14 +53,16 @@ reports = click.option(
     help="Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} is "
     "the input's name.",
 )
-json_reports = click.option(
+json_reports = option(
+    "Everyday",
     "--report",
     "reports",
     type=PATH,
     multiple=True,
     help="Write what was done: .json. May be repeated; {stem} is the input's name.",
 )
-found_reports = click.option(
+found_reports = option(
+    "Everyday",
     "--report",
     "reports",
     type=PATH,
@@ -64,23 +70,28 @@ found_reports = click.option(
     help="Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
     "repeated.",
 )
-page_reports = click.option(
-    "--report", "reports", type=PATH, multiple=True, help="Write a page to look at: .html. May be repeated."
+page_reports = option(
+    "Everyday", "--report", "reports", type=PATH, multiple=True, help="Write a page to look at: .html. May be repeated."
 )
-surface_reports = click.option(
+surface_reports = option(
+    "Everyday",
     "--report",
     "reports",
     type=PATH,
     multiple=True,
     help="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be repeated.",
 )
-as_json = click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines to read.")
-table = click.option(
-    "--table", is_flag=True, help="Print the table of the name: what a TOML file of your own starts from."
+as_json = option("Output", "--json", "as_json", is_flag=True, help="One JSON object instead of lines to read.")
+table = option(
+    "Output", "--table", is_flag=True, help="Print the table of the name: what a TOML file of your own starts from."
 )
-force = click.option("--force", is_flag=True, help="Replace existing files.")
-quiet = click.option("-q", "--quiet", is_flag=True, help="Only errors.")
-verbose = click.option("-v", "--verbose", count=True, help="More: every finding, times of the stages.")
-verbose_found = click.option(
-    "-v", "--verbose", count=True, help="More: every problem, and how large deviations are and where along the path."
+force = option("Everyday", "--force", is_flag=True, help="Replace existing files.")
+quiet = option("Output", "-q", "--quiet", is_flag=True, help="Only errors.")
+verbose = option("Output", "-v", "--verbose", count=True, help="More: every finding, times of the stages.")
+verbose_found = option(
+    "Output",
+    "-v",
+    "--verbose",
+    count=True,
+    help="More: every problem, and how large deviations are and where along the path.",
 )

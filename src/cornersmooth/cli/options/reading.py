@@ -8,26 +8,34 @@ from typing import Any
 
 import click
 
+from cornersmooth.cli.headings import option
 from cornersmooth.cli.options.parameters import all_of
 
-feed = click.option("--feed", type=float, metavar="MM/MIN", help="Feed for moves that the CL file gives none for.")
-input_format = click.option(
+feed = option(
+    "Everyday", "--feed", type=float, metavar="MM/MIN", help="Feed for moves that the CL file gives none for."
+)
+input_format = option(
+    "Reading",
     "--input-format",
     "format",
     type=click.Choice(["apt", "points"]),
     help="Form of the input, instead of what it looks like.",
 )
-dialect = click.option(
+dialect = option(
+    "Reading",
     "--dialect",
     type=str,
     metavar="NAME",
     help="CL dialect, instead of what the file looks like: nx, catia, creo, solidworks, hsm, ncl, makino or plain.",
 )
-units = click.option(
-    "--units", type=click.Choice(["mm", "inch"]), help="Units of the input, where it does not say or says it wrong."
+units = option(
+    "Reading",
+    "--units",
+    type=click.Choice(["mm", "inch"]),
+    help="Units of the input, where it does not say or says it wrong.",
 )
-arc_rule = click.option(
-    "--arc-rule", type=click.Choice(["left", "right", "tangent"]), help="Sense of CIRCLE about its axis."
+arc_rule = option(
+    "Reading", "--arc-rule", type=click.Choice(["left", "right", "tangent"]), help="Sense of CIRCLE about its axis."
 )
 
 
@@ -51,29 +59,32 @@ class SpindleType(click.ParamType[tuple[float, str]]):
         return speed, direction
 
 
-tool_number = click.option(
+tool_number = option(
+    "Reading",
     "--tool-number",
     type=click.IntRange(1, 99999999),
     metavar="N",
     help="Tool that is loaded first, with its length, for inputs that load none.",
 )
-spindle = click.option(
+spindle = option(
+    "Reading",
     "--spindle",
     type=SpindleType(),
     metavar="RPM[,CCLW]",
     help="Speed of the spindle, clockwise or with CCLW counterclockwise, for inputs that start none.",
 )
-operation = click.option(
+operation = option(
+    "Reading",
     "--operation",
     type=str,
     metavar="N|NAME",
     help="Take one operation of the CL file alone, with the tool, spindle and coolant that hold there; "
     "'cornersmooth info' lists them.",
 )
-lenient = click.option("--lenient", is_flag=True, help="Go on after errors in the input where it is safe.")
+lenient = option("Reading", "--lenient", is_flag=True, help="Go on after errors in the input where it is safe.")
 
-no_size_limit = click.option(
-    "--no-size-limit", is_flag=True, help="Read inputs of more than 2 GB, and gzip files that grow 200-fold."
+no_size_limit = option(
+    "Reading", "--no-size-limit", is_flag=True, help="Read inputs of more than 2 GB, and gzip files that grow 200-fold."
 )
 
 _READING = {

@@ -7,16 +7,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from cornersmooth.cli.headings import option
 from cornersmooth.cli.options.parameters import LENGTH, Duration, Weights, all_of
 from cornersmooth.methods import AUTO, METHODS
 
 if TYPE_CHECKING:
     from cornersmooth.settings import Settings
 
-tolerance = click.option(
-    "-e", "--tolerance", type=LENGTH, default=0.01, show_default=True, help="Largest deviation of the written path."
+tolerance = option(
+    "Everyday",
+    "-e",
+    "--tolerance",
+    type=LENGTH,
+    default=0.01,
+    show_default=True,
+    help="Largest deviation of the written path.",
 )
-axis_length = click.option(
+axis_length = option(
+    "Everyday",
     "-H",
     "--axis-length",
     type=LENGTH,
@@ -24,14 +32,16 @@ axis_length = click.option(
     show_default=True,
     help="Distance from the tool tip to the second point that keeps the tolerance: the length of the cutting edge.",
 )
-axis_tolerance = click.option(
+axis_tolerance = option(
+    "Curves",
     "--axis-tolerance",
     type=float,
     metavar="DEG",
     help="Largest deviation of the tool axis where the tip is within -e, in place of -e at the axis point (-H): for"
     " ball-end mills, whose centre is all that counts.",
 )
-method = click.option(
+method = option(
+    "Everyday",
     "--method",
     type=click.Choice([AUTO, *METHODS]),
     default=AUTO,
@@ -40,10 +50,15 @@ method = click.option(
     + " ".join(f"With {item.name}: {item.summary}." for item in METHODS.values())
     + " Global takes less time on the machine and about a block a pose in curves; on LinuxCNC it takes more time.",
 )
-weights = click.option(
-    "--weights", type=Weights(), default=(1.0, 1.0), help="Weights w1,w2 of the curves, up to 3. [default: 1,1]"
+weights = option(
+    "Curves",
+    "--weights",
+    type=Weights(),
+    default=(1.0, 1.0),
+    help="Weights w1,w2 of the curves, up to 3. [default: 1,1]",
 )
-reversal_angle = click.option(
+reversal_angle = option(
+    "Curves",
     "--reversal-angle",
     type=float,
     metavar="DEG",
@@ -51,24 +66,28 @@ reversal_angle = click.option(
     show_default=True,
     help="Corners that turn by more stay sharp.",
 )
-lines = click.option(
+lines = option(
+    "Lines",
     "--lines",
     type=click.Choice(["dense", "long"]),
     help="Lines close to the curves, or as few as -e allows. [default: what suits the control]",
 )
-chord_tolerance = click.option(
+chord_tolerance = option(
+    "Lines",
     "--chord",
     "chord_tolerance",
     type=LENGTH,
     help="Largest distance between the written lines and the curve. [default: a tenth of -e, at most 0.0005]",
 )
-block_time = click.option(
+block_time = option(
+    "Lines",
     "--block-time",
     type=Duration(),
     help="Shortest time in which the control takes a block, as in 1ms. At the programmed feed, no line along a curve "
     "takes less. [default: that of the control's table]",
 )
-axis_step = click.option(
+axis_step = option(
+    "Lines",
     "--axis-step",
     type=float,
     metavar="DEG",

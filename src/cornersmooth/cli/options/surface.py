@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import click
 
+from cornersmooth.cli.headings import option
 from cornersmooth.cli.options.parameters import ToolShape
 
-tool = click.option(
+tool = option(
+    "Reading",
     "--tool",
     type=ToolShape(),
     metavar="D[,R[,TAPER[,LENGTH]]]",
     help="Shape of the tool: diameter, corner radius, taper in degrees, length. [default: that of the file]",
 )
-stations = click.option(
+stations = option(
+    "Output",
     "--stations",
     type=click.IntRange(1, 1_000_000),
     metavar="N",
@@ -20,7 +23,8 @@ stations = click.option(
     show_default=True,
     help="Places along the path.",
 )
-levels = click.option(
+levels = option(
+    "Output",
     "--levels",
     type=click.IntRange(1, 60),
     metavar="N",
