@@ -213,4 +213,3 @@ def test_a_terminal_shows_helps_and_messages_in_colour_but_for_no_color(
         assert b"\x1b[1" in seen
         plain = seen_on_a_terminal(*words, TERM="xterm", NO_COLOR="1")
         assert b"\x1b[3" not in plain
-        assert max(len(line) for line in plain.decode().replace("\r", "").splitlines()) <= 80
