@@ -71,10 +71,6 @@ class CurveGroup:
         As they are to be written: with three decimals at most. All of a curve may have a power of two as common factor.
     angles : (g, p, 2) float64, degrees
         Control points of the rotary angles in the order of `Machine.axes`.
-    orientation_error : (g,) float64, degrees
-        Largest angle between the axis that the angles give and the direction of Q(u) − P(u), as measured.
-    ruled : (g,) bool
-        The angles join with the rates of the ruled motion, not with those of the line beside.
     """
 
     smoothed: SmoothProgram
@@ -82,8 +78,6 @@ class CurveGroup:
     knots: Floats
     weights: Floats
     angles: Floats
-    orientation_error: Floats
-    ruled: Bools
 
     def __len__(self) -> int:
         return len(self.row)
@@ -92,11 +86,6 @@ class CurveGroup:
     def points(self) -> int:
         """Control points of each curve."""
         return int(self.angles.shape[1])
-
-    @property
-    def tip(self) -> Floats:
-        """(g, p, 3) control points of the tip: `tips` of all curves."""
-        return self.tips(slice(None))
 
     def tips(self, chosen: slice) -> Floats:
         """Control points of the tip of some curves, in mm: the same curves as those of the five points, exactly."""
@@ -120,17 +109,11 @@ class RotaryCurves:
         Corners that no curve meets, as points of dense lines.
     points : (k,) int64
         Control points of each row of `Corners`; 0 where it is not smoothed or belongs to `lines`.
-    orientation_error : (k,) float64, degrees
-        As in the groups; NaN where `points` is 0.
-    start_angles, end_angles : (k, 2) float64, degrees
-        Angles at both joints of smoothed corners, NaN elsewhere.
     pose_angles : (n, 2) float64, degrees
         Angles at the poses that are passed; NaN where nothing is written (`Status.DUPLICATE`, `Move.FROM`). At a
         rounded pose what its axis would need.
     inserted : Insertions
         Points that the straight remainders need, as in `RotaryMotion`.
-    even : (n,) bool
-        The segment into the pose runs evenly in its angles, joints included: no points inserted.
     findings : tuple of Finding
         Those of `rotary_angles`, and of corners that no curve meets.
     """
@@ -138,12 +121,8 @@ class RotaryCurves:
     groups: tuple[CurveGroup, ...]
     lines: CornerLines
     points: Ints
-    orientation_error: Floats
-    start_angles: Floats
-    end_angles: Floats
     pose_angles: Floats
     inserted: Insertions
-    even: Bools
     findings: tuple[Finding, ...]
 
 
@@ -209,33 +188,24 @@ def rotary_curves(
     for spans, ruled in TRIALS:
         more, pending = work.trial(spans, ruled, pending)
         found += more
-    start, end = np.full((2, len(corners), 2), np.nan)
-    pose, after = corners.pose[motion.rows], corners.after[motion.rows]
-    start[motion.rows], end[motion.rows] = motion.end.angles[pose], motion.start.angles[after]
     lines = corner_lines(smoothed, machine, motion, pending, file)
     findings = motion.findings + _lines_finding(smoothed, machine, motion.rows[pending])
-    rows, pose_angles, inserted, even = motion.rows, motion.pose_angles, motion.inserted, motion.even
+    rows, pose_angles, inserted = motion.rows, motion.pose_angles, motion.inserted
     del work, motion  # as large as what is made of it
-    groups = [
-        _group(smoothed, rows, spans, same)
-        for spans in SPANS
-        if (same := [part for part in found if part.spans == spans])
-    ]
-    points, error = np.zeros(len(corners), np.int64), np.full(len(corners), np.nan)
-    for group in groups:
-        points[group.row], error[group.row] = group.points, group.orientation_error
-    return RotaryCurves(tuple(groups), lines, points, error, start, end, pose_angles, inserted, even, findings)
+    groups, points = [], np.zeros(len(corners), np.int64)
+    for spans in SPANS:
+        if same := [part for part in found if part.angles.shape[1] == spans + nurbs.DEGREE]:
+            groups.append(_group(smoothed, rows, spans, same))
+            points[groups[-1].row] = groups[-1].points
+    return RotaryCurves(tuple(groups), lines, points, pose_angles, inserted, findings)
 
 
 @dataclass(frozen=True)
 class _Found:
-    """Curves that keep their tolerance: numbers of corners in `RotaryMotion.rows`, and `CurveGroup.angles` and more."""
+    """Curves that keep their tolerance: numbers of corners in `RotaryMotion.rows`, and `CurveGroup.angles`."""
 
-    spans: int
     numbers: Ints
     angles: Floats
-    error: Floats
-    ruled: bool
 
 
 @dataclass(frozen=True)
@@ -263,7 +233,7 @@ class _Work:
                 points, error = self.curves(spans, ruled, part, samples)
                 met = error <= SHARE * self.allowed[self.motion.rows[part]]
                 if met.any():
-                    found.append(_Found(spans, part[met], points[met], error[met], ruled))
+                    found.append(_Found(part[met], points[met]))
                 open_.append(part[~met])
         return found, np.sort(np.concatenate(open_))
 
@@ -327,11 +297,9 @@ def _group(smoothed: SmoothProgram, smooth_rows: Ints, spans: int, found: list[_
     refined = nurbs.refinement(spans)
     numbers = np.sort(np.concatenate([part.numbers for part in found]))
     rows = smooth_rows[numbers]
-    angles, error = np.empty((len(rows), refined.points, 2)), np.empty(len(rows))
-    ruled = np.empty(len(rows), np.bool_)
+    angles = np.empty((len(rows), refined.points, 2))
     for part in found:
-        at = np.searchsorted(numbers, part.numbers)
-        angles[at], error[at], ruled[at] = part.angles, part.error, part.ruled
+        angles[np.searchsorted(numbers, part.numbers)] = part.angles
     own = refined.homogeneous(nurbs.full_weights(smoothed.corners.weights[rows]))
     return CurveGroup(
         smoothed=smoothed,
@@ -339,8 +307,6 @@ def _group(smoothed: SmoothProgram, smooth_rows: Ints, spans: int, found: list[_
         knots=refined.knots * max(1, spans // SPANS_PER_UNIT),
         weights=np.round(own * weight_factors(own)[:, None], WEIGHT_DECIMALS),
         angles=angles,
-        orientation_error=error,
-        ruled=ruled,
     )
 
 

@@ -66,10 +66,6 @@ class Insertions:
     def __len__(self) -> int:
         return len(self.segment)
 
-    def counts(self, n: int) -> Ints:
-        """Points to insert into each of the n - 1 segments: (n-1,)."""
-        return np.bincount(self.segment, minlength=max(n - 1, 0)).astype(np.int64)
-
 
 @dataclass(frozen=True)
 class FilledPath:
