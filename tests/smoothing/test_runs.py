@@ -170,19 +170,18 @@ def test_runs_start_and_end_like_their_segments() -> None:
 
 def test_smoothest_is_what_a_general_solver_finds() -> None:
     lines = through(winding(9))
-    rough = fit(lines, (0.05, 0.05))
-    splines = rough.splines
+    splines, rough = fit(lines, (0.05, 0.05))
     samples = Samples.of(splines, lines, Pieces.of(splines, lines))
     windows = Windows.of(splines, splines.span_first[:-1], np.diff(splines.span_first))
     rng = np.random.default_rng(4)
     lever = samples.target[:, 3:] - samples.target[:, :3]
     axis, stretch = lever / np.linalg.norm(lever, axis=1)[:, None], rng.uniform(-0.9, 1.0, len(lever))
     free, one = np.flatnonzero(windows.free), np.zeros(len(samples.s), np.int64)
-    basis = np.zeros((len(samples.s), len(rough.control)))
+    basis = np.zeros((len(samples.s), len(rough)))
     np.put_along_axis(basis, splines.span_control[samples.span][:, None] + np.arange(4), samples.basis, axis=1)
-    third = np.zeros((len(splines.width), len(rough.control)))
+    third = np.zeros((len(splines.width), len(rough)))
     np.put_along_axis(third, splines.span_control[:, None] + np.arange(4), splines.third, axis=1)
-    start = rough.control[:, 3:]
+    start = rough[:, 3:]
     off = (basis @ start - samples.target[:, 3:]) / 0.05
 
     def size(off: np.ndarray) -> np.ndarray:

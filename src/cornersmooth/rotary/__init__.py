@@ -1,7 +1,6 @@
 """Rotary angles along a path: one solution for every pose, points where angles need them, curves of angles."""
 
-from cornersmooth.rotary.angle_path import RotaryPath, rapid_moves, rotary_angles, still_poses
-from cornersmooth.rotary.rewinding import rewound_angles
+from cornersmooth.rotary.angle_path import RotaryPath, rapid_moves, rewound_angles, rotary_angles, still_poses
 from cornersmooth.rotary.subdivision import FilledPath, Insertions, fill, insertions
 
 __all__ = [

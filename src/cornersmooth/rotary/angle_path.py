@@ -20,11 +20,13 @@ from cornersmooth.kinematics.poses import (
 from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.rotary.axis_findings import limit_error, pole_finding, reach_error, rewind_finding, swap_finding
 from cornersmooth.rotary.branch_choice import LIMIT_SLACK, PREFERENCE_COST, NoChoiceError, Stretches, choose
-from cornersmooth.rotary.cut_parts import CutTooFarError, parts_of_cut, too_far
+from cornersmooth.rotary.rewinds import CutTooFarError, parts_of_cut, too_far
 from cornersmooth.rotary.unwrapping import WideSteps, meet_at_pole, unwrap
 
 #: Poses worked on at a time, so that memory is needed for their angles and little else.
 CHUNK = 1 << 15
+#: Rounds of dividing cuts, after which limits are an error; a round divides all cuts that are too far by themselves.
+REWIND_ROUNDS = 100
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,55 @@ def rotary_angles(
     if len(machine.names) == 2:
         findings += swap_finding(machine, swaps[~left[swaps]], line)
     return RotaryPath(angles, deviation, branch, findings)
+
+
+def rewound_angles(
+    machine: Machine,
+    tip: Floats,
+    axis: Floats,
+    *,
+    tolerance: float,
+    rapid: Bools,
+    line: Ints,
+    file: str | None,
+    still: Bools | None = None,
+    still_tolerance: float = 0.0,
+) -> tuple[RotaryPath, Ints, Bools]:
+    """Rotary angles of a path in which cuts are left, where nothing else keeps the limits.
+
+    Parameters and errors are those of `rotary_angles`.
+
+    Returns
+    -------
+    path : RotaryPath
+        Of m rows: where a cut is left its pose is there twice, before and after the turn of the axes.
+    source : (m,) int64
+        Row of the path given.
+    left : (m,) bool
+        Second rows of such pairs.
+    """
+    source, left = np.arange(len(tip)), np.zeros(len(tip), np.bool_)
+    for number in range(REWIND_ROUNDS + 1):
+        try:
+            path = rotary_angles(
+                machine,
+                tip[source],
+                axis[source],
+                tolerance=tolerance,
+                rapid=rapid[source],
+                left=left,
+                still=None if still is None else still[source],
+                still_tolerance=still_tolerance,
+                divide=number < REWIND_ROUNDS,
+                line=line[source],
+                file=file,
+            )
+        except CutTooFarError as far:
+            behind = far.poses + 1
+            source, left = np.insert(source, behind, source[far.poses]), np.insert(left, behind, True)
+            continue
+        break
+    return path, source, left
 
 
 def rapid_moves(kind: NDArray[np.uint8]) -> Bools:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from cornersmooth.geometry.bsplines import Splines
@@ -36,19 +34,10 @@ WINGS = 2.2
 _RIDGE = 1e-6
 
 
-@dataclass(frozen=True)
-class Fit:
-    """Splines near the runs."""
+def fit(lines: Polylines, tolerances: tuple[float, float]) -> tuple[Splines, Floats]:
+    """Fit splines with control points (c, 6), mm, to runs of 3 poses or more.
 
-    splines: Splines
-    control: Floats  # (c, 6), mm
-    off: Floats  # largest deviation in every span over the tolerances
-
-
-def fit(lines: Polylines, tolerances: tuple[float, float]) -> Fit:
-    """Fit splines to runs of 3 poses or more; position, tangent and curvature zero are kept at their ends.
-
-    Spans are refined until `CLOSE` of the tolerances of tip and axis point (mm) is kept, or they are too short.
+    Position, tangent and curvature zero are kept at their ends. Spans are refined until `CLOSE` of the tolerances of tip and axis point (mm) is kept, or they are too short.
     """
     splines = first_knots(lines)
     control = lines_to_control(lines, splines)
@@ -67,7 +56,7 @@ def fit(lines: Polylines, tolerances: tuple[float, float]) -> Fit:
         if not bad.any():
             break
         splines, control, active, off = _refine(lines, splines, control, off, np.flatnonzero(bad), corner)
-    return Fit(splines, control, off)
+    return splines, control
 
 
 def holding_poses(splines: Splines, lines: Polylines) -> Bools:

@@ -59,24 +59,13 @@ def _bound(
     low, width = (pieces.low[rows] - lines.s[segment]) / length, (pieces.high[rows] - pieces.low[rows]) / length
     original = start[:, None] + (low[:, None] + width[:, None] * _THIRDS)[:, :, None] * step[:, None]
     whole_off, whole_levers = hull - original, original[:, :, 3:] - original[:, :, :3]
-    for part in range(parts):
-        cut = _cut(part / parts, (part + 1) / parts)
+    ends = np.arange(parts + 1) / parts
+    whole = Splines(np.array([0.0, 1.0]), np.array([2]))
+    for cut in whole.bernstein(np.zeros(parts, np.int64), ends[:-1], ends[1:]):
         off, levers = cut @ whole_off, cut @ whole_levers
         np.maximum(largest[:, 0], _longest(off[:, :, :3]), out=largest[:, 0])
         np.maximum(largest[:, 1], _axis_bound(off, levers, axis_length), out=largest[:, 1])
     return largest
-
-
-def _cut(low: float, high: float) -> Floats:
-    """(4, 4): from the Bernstein points of a cubic to those of its part low..high, the blossoms at both."""
-    rows = []
-    for row in range(4):
-        values = np.eye(4)
-        for level in range(3):
-            share = high if level < row else low
-            values = (1.0 - share) * values[:-1] + share * values[1:]
-        rows.append(values[0])
-    return np.stack(rows)
 
 
 def _axis_bound(off: Floats, levers: Floats, axis_length: float) -> Floats:

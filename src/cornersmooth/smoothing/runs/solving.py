@@ -73,11 +73,10 @@ def solve_runs(
     processes: int = 1,
 ) -> RunCurves:
     """Find the smoothest pair of splines for every run; parameters are those of `solve_groups`."""
-    rough = fit(lines, tolerances)
-    splines = rough.splines
+    splines, rough = fit(lines, tolerances)
     pieces = Pieces.of(splines, lines)
-    problem = Problem(lines, splines, pieces, rough.control, tolerances, axis_length)
-    control, proven = rough.control.copy(), np.zeros((len(pieces.span), 2))
+    problem = Problem(lines, splines, pieces, rough, tolerances, axis_length)
+    control, proven = rough.copy(), np.zeros((len(pieces.span), 2))
     tight = np.ones((len(pieces.span), 2))
     windows = _cut(splines)
     _solve(problem, windows, _own(splines, windows), control, tight, GAPS, progress, processes)
@@ -102,7 +101,7 @@ def solve_runs(
         if not len(failed):
             break
         share = _fade(splines, pieces.span[failed], part)[:, None]
-        control = rough.control + share * (control - rough.control)
+        control = rough + share * (control - rough)
         changed = _touched(splines, pieces, np.flatnonzero(share[:, 0] < 1.0))
         proven[changed] = bounds(splines, control, lines, pieces.only(changed), axis_length, tolerances)
     worst = np.zeros((len(lines.count), 2))
