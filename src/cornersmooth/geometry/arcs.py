@@ -31,7 +31,7 @@ def arc_radii(program: Program) -> Floats:
 
 
 def arc_lines(program: Program, settings: Settings) -> Ints:
-    """(k,) number of lines that stand for each arc within the chord tolerance, at the tip and at the axis point."""
+    """(k,) number of lines for each arc within the chord tolerance, at the tip and at the axis point."""
     chord = min(
         settings.chord,
         _MOST_OF_TOLERANCE * min(settings.tip_tolerance, settings.axis_point_tolerance),

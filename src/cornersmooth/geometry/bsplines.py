@@ -94,7 +94,7 @@ class Splines:
 
     @cached_property
     def greville(self) -> Floats:
-        """(controls,) mean of the three inner knots of each control point; those of a line stand there."""
+        """(controls,) mean of the three inner knots of each control point; the control points of a line lie there."""
         means: Floats = self.inner_knots.sum(axis=1) / 3.0
         return means
 

@@ -78,7 +78,7 @@ def rotary_angles(
     rapid : (n,) bool
         The move into the pose does not cut, so that solution and turn may change in it; only the first by default.
     left : (n,) bool
-        The pose repeats the one before, behind which a cut is left: solution and turn may change there, too.
+        The pose repeats the one before, after which a cut is left: solution and turn may change there, too.
     divide : bool
         Whether cuts that leave the limits are to be divided.
     still : (n,) bool
@@ -203,7 +203,7 @@ def rapid_moves(kind: NDArray[np.uint8]) -> Bools:
 
 
 def still_poses(kind: NDArray[np.uint8]) -> Bools:
-    """Poses of a program through which nothing is cut: holes, and rapids with no cut behind them; (n,) bool."""
+    """Poses of a program through which nothing is cut: holes, and rapids with no cut after them; (n,) bool."""
     rapid = rapid_moves(kind)
     still: Bools = rapid & np.append(rapid[1:], True) | (kind == Move.HOLE)
     return still
@@ -334,7 +334,7 @@ def _fill_cone(
     left, right = steady[before], steady[np.minimum(after, len(steady) - 1)]
     from_left = (left < poses) & (run[left] == run[poses])
     to_right = (right > poses) & (run[right] == run[poses])
-    # Waiting angle of a cut without any pose outside: where the axis stands after the last one, or will stand first.
+    # Waiting angle of a cut without any pose outside: its place after the last one, or before the first.
     left_angles = angles[np.where(left < poses, left, right)]
     right_angles = angles[right]
     start, end = np.minimum(left + 1, len(length) - 1), np.maximum(right - 1, 0)
@@ -365,7 +365,7 @@ def _extremes(members: Ints, unwrapped: Floats, way: WideSteps) -> tuple[Floats,
 def _divided(
     stretches: Stretches, stuck: NoChoiceError, begins: Ints, unwrapped: Floats, way: WideSteps, limits: Floats
 ) -> Ints | None:
-    """Rows behind which cuts are to be left: in the one that is stuck, and in all that can be in no turn."""
+    """Rows after which cuts are to be left: in the one that is stuck, and in all that can be in no turn."""
     ends = np.append(begins[1:], len(unwrapped))
     left = []
     for number in np.union1d(too_far(stretches, limits), stuck.stretch).tolist():

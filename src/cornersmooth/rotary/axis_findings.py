@@ -1,4 +1,4 @@
-"""What is said about rotary axes: poses out of reach, limits, the pole, rewinds, changes of solution."""
+"""Messages about rotary axes: poses out of reach, limits, the pole, rewinds, changes of solution."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class Insertions:
     segment : (m,) int64
         The segment from pose ``segment`` to pose ``segment + 1``.
     fraction : (m,) float64
-        Share of the segment behind the point, in (0, 1).
+        Share of the segment before the point, in (0, 1).
     angles : (m, 2) float64, degrees
     unsolved : (u,) int64
         Segments that no division brought within the tolerances: the axis jumps there.
@@ -187,7 +187,7 @@ def ruled(tip: Floats, axis: Floats, segment: Ints, fraction: Floats) -> tuple[F
 
 @dataclass(frozen=True)
 class Intervals:
-    """Parts of segments: where they begin and end, and what stands there."""
+    """Parts of segments: where they begin and end, with angles and branches."""
 
     segment: Ints
     start: Floats

@@ -48,7 +48,7 @@ def unwrap(machine: Machine, axis: Floats, start: Ints, end: Ints, angles: Float
     Parameters
     ----------
     start, end : (e,) int64
-        Poses before and behind each step.
+        Poses before and after each step.
     angles : (e + 1, 2, 2) float64, degrees
         The first row is unwrapped already; after a break the turns are counted from 0 again.
 

@@ -24,13 +24,13 @@ _LEAST_BEND = 1e-300
 #: b₁ over P/|Δt|: 4, and what its controller was found to go beyond that
 _REACH = 4.8
 
-#: where a blend is looked at: where both lines are as far from the corner, 0, and before and behind that, -1 and 1
+#: where a blend is looked at: where both lines are as far from the corner, 0, and before and after that, -1 and 1
 _PLACES = (-0.35, 0.0, 0.35)
 
 #: Degrees by which rotary axes may speed up while linear ones do by one mm: machines differ, the largest ratio counts.
 _TURNS = (0.1, 0.4, 1.0)
 
-#: what stands still has this much of a way, so that nothing is divided by zero
+#: least way of a line, so that nothing is divided by zero
 _STANDING = 1e-9
 
 #: blend tolerances go in steps of this ratio, so that few lines change them
@@ -51,7 +51,7 @@ _LEAST = 0.005
 
 @dataclass(frozen=True)
 class _Corners:
-    """Vertices between two lines, v of them, and the lines before and behind (each (v, ...))."""
+    """Vertices between two lines, v of them, and the lines before and after (each (v, ...))."""
 
     tip: Floats
     words: Floats
@@ -61,7 +61,7 @@ class _Corners:
     rate: tuple[Floats, Floats]  # change of the parameter per mm
     half: tuple[Floats, Floats]  # half of the lengths, mm
     bend: Floats  # |Δt|
-    quicker: Floats  # acceleration of the line behind over that of the one before
+    quicker: Floats  # acceleration of the line after over that of the one before
 
     @classmethod
     def of(cls, rows: Vertices, kept: Ints) -> _Corners:

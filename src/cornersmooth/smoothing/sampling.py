@@ -51,7 +51,7 @@ class Rows:
         Of control points where not all curves are five-point curves: knot, weight and, in the last row of a curve, the
         last knot.
     blend : (r,) float64 or None, mm
-        How far the control may round the corner at each row by itself; None where it is not told for each.
+        How far the control may round the corner at each row by itself; None where one value holds for all.
     left : (r,) bool or None
         Rows at which the tool comes back into a cut that it has left at the row before; None where there is none.
     """
@@ -83,7 +83,7 @@ class _Batch:
 
 @dataclass(frozen=True)
 class _RunRows:
-    """Rows of whole runs, m in path order, and the poses of the program that they stand for."""
+    """Rows of whole runs, m in path order, and the poses of the program that they replace."""
 
     move: Ints
     tip: Floats

@@ -237,8 +237,7 @@ def _straying_transitions(smoothed: SmoothProgram) -> Ints:
 def _straying_remainders(smoothed: SmoothProgram) -> Ints:
     """Rows of corners beside segments of which the transitions leave what strays.
 
-    There the tip is ahead of the axis, or behind it, by what the two were cut unlike: the more of it is left, the less,
-    but the axis of the original turns fastest in the middle of its segment.
+    There tip and axis are out of step by what the two were cut unlike.
     """
     segments = segments_of(smoothed, dense=False)
     unlike = (segments.entry != segments.axis_entry) | (segments.exit != segments.axis_exit)

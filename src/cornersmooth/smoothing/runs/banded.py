@@ -18,7 +18,7 @@ _RIDGES = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
 _PAIRS = [(a, a + o) for o in range(TAPS) for a in range(TAPS - o)]
 
-#: where the numbers of a block stand among its six, and which of the 24 numbers of a control point the 36 of its three
+#: places of the numbers of a block among its six, and which of the 24 numbers of a control point the 36 of its three
 #: columns are: 12d + k is the element k below the diagonal in column d, in row e of the block o with 3o + e = d + k
 _BLOCK = ((0, 3, 4), (3, 1, 5), (4, 5, 2))
 _ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))

@@ -57,7 +57,7 @@ OWN_WAY = 0.5
 #: round; and spans on either side that tell whether they do (docs/global.md, neighbouring passes)
 PENALTY, SURROUNDINGS = 6.0, 12
 
-#: squared ratio of the lever's speed to the tip's beyond which the tip stands
+#: largest squared ratio of the lever's speed to that of a tip that moves
 _LARGEST_RATIO = 1e100
 
 

@@ -27,7 +27,7 @@ ROUNDS, SHORTEST = 30, 8
 #: reach of a sharp corner over ε and its turn: with 6 a transition of its own would be ε off (docs/method.md, c = 1/6)
 _CORNER = 6.5
 
-#: where a second knot stands beside a sharp corner, over the first: without it the curve could not swing out
+#: place of a second knot beside a sharp corner, over the first: without it the curve could not swing out
 WINGS = 2.2
 
 #: weight of the third derivative, which settles what samples leave open
@@ -37,7 +37,8 @@ _RIDGE = 1e-6
 def fit(lines: Polylines, tolerances: tuple[float, float]) -> tuple[Splines, Floats]:
     """Fit splines with control points (c, 6), mm, to runs of 3 poses or more.
 
-    Position, tangent and curvature zero are kept at their ends. Spans are refined until `CLOSE` of the tolerances of tip and axis point (mm) is kept, or they are too short.
+    Position, tangent and curvature zero are kept at their ends. Spans are refined until `CLOSE` of the tolerances of tip
+    and axis point (mm) is kept, or they are too short.
     """
     splines = first_knots(lines)
     control = lines_to_control(lines, splines)
@@ -145,7 +146,7 @@ def _largest(splines: Splines, samples: Samples, control: Floats, tolerances: tu
 
 
 def _corner_reach(lines: Polylines, tolerances: tuple[float, float]) -> Floats:
-    """(n,) how far from each pose a knot should stand where its corner is sharp, steps."""
+    """(n,) distance of a knot from each pose whose corner is sharp, steps."""
     reach = np.full(len(lines.s), np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = np.diff(lines.point, axis=0) / np.diff(lines.s)[:, None]
@@ -190,7 +191,7 @@ def _refine(
 def _insert(
     lines: Polylines, splines: Splines, control: Floats, off: Floats, run: Ints, knot: Floats
 ) -> tuple[Splines, Floats, Bools, Floats]:
-    """Add knots; control points far from them stay, the others stand on the run until they are fitted."""
+    """Add knots; control points far from them stay, the others lie on the run until they are fitted."""
     all_run = np.concatenate((np.repeat(np.arange(len(splines.count)), splines.count), run))
     all_knot = np.concatenate((splines.knot, knot))
     order = np.lexsort((all_knot, all_run))

@@ -13,7 +13,7 @@ from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import search, spread, starts
 from cornersmooth.model import Floats, Ints
 
-#: steps of the shortest segment: knots stand between its ends
+#: steps of the shortest segment: knots lie between its ends
 _LEAST = 4
 
 #: samples of a piece whose share of its span is above each of these; a cubic within bounds at quarters is nearly so
@@ -27,7 +27,7 @@ _PLACES = {1: (0.0,), 2: (0.0, 0.5), 3: (0.0, 0.25, 0.75)}
 
 @dataclass(frozen=True)
 class Polylines:
-    """Poses of r runs, one behind the other.
+    """Poses of r runs, one after the other.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Polylines:
     s : (n,) float64
         Length from the start of the run in steps of `step`, whole numbers, by m(D) (docs/method.md).
     step : float, mm
-        Small beside ε. Poses and knots stand at whole steps, so that knots can be written with few digits.
+        Small beside ε. Poses and knots lie at whole steps, so that knots can be written with few digits.
     """
 
     point: Floats

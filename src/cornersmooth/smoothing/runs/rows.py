@@ -24,7 +24,7 @@ from cornersmooth.vectors import angle_between, norm, unit
 #: share of ε that turning the axis inside a line may take; `global_runs` leaves it free
 TURNING = 0.02
 
-#: mm of a piece in which the tip stands, however short the piece is
+#: speed below which the tip stands still, mm per piece
 _STANDING = 1e-30
 
 #: pieces measured together
@@ -67,7 +67,7 @@ def largest_curvature(lines: Polylines, splines: Splines, control: Floats) -> Fl
         hull = splines.bezier(control[:, :3], span, low, high)
         first, second = 3.0 * slope @ np.diff(hull, axis=1), 6.0 * bend @ np.diff(hull, 2, axis=1)
         speed = norm(first)
-        # where the tip all but stands there is no curvature to speak of
+        # a tip that stands still has no curvature
         least = np.maximum(1e-6 * (high - low)[:, None] * lines.step, _STANDING)
         curvature = np.divide(norm(np.cross(first, second)), speed**3, out=np.zeros_like(speed), where=speed > least)
         middle = (lines.s[segment] + lines.s[segment + 1])[:, None] / 2.0
@@ -161,7 +161,7 @@ class SectionRows:
 
 
 def section_rows(runs: Runs, program: Program) -> SectionRows:
-    """Cut the runs into sections; poses behind which a statement stands are ends of sections."""
+    """Cut the runs into sections; poses with a statement after them are ends of sections."""
     splines = Splines(runs.knot, runs.knot_count)
     begin_run, begin_s, end_s = _cuts(runs, splines, program)
     # distinct knots of every section: its ends and the run's knots between
