@@ -37,8 +37,8 @@ _RIDGE = 1e-6
 def fit(lines: Polylines, tolerances: tuple[float, float]) -> tuple[Splines, Floats]:
     """Fit splines with control points (c, 6), mm, to runs of 3 poses or more.
 
-    Position, tangent and curvature zero are kept at their ends. Spans are refined until `CLOSE` of the tolerances of tip
-    and axis point (mm) is kept, or they are too short.
+    Position, tangent and curvature zero are kept at their ends. Spans are refined until `CLOSE` of the tolerances of
+    tip and axis point (mm) is kept, or they are too short.
     """
     splines = first_knots(lines)
     control = lines_to_control(lines, splines)
