@@ -110,9 +110,8 @@ def choose(stretches: Stretches, limits: Floats) -> tuple[Ints, Floats]:
 
 def _cheapest_branches(stretches: Stretches, limits: Floats) -> Ints:
     """Branches with the least rotation between stretches that fit into the limits, each in some turn."""
-    lowest = np.ceil((limits[:, 0] - LIMIT_SLACK - stretches.low) / 360)  # turns that bring the stretch inside
-    highest = np.floor((limits[:, 1] + LIMIT_SLACK - stretches.high) / 360)
-    outside = np.where((lowest > highest).any(axis=2), OUTSIDE_COST, 0.0)
+    fewest, most = turns_inside(stretches.low, stretches.high, limits)
+    outside = np.where((fewest > most).any(axis=2), OUTSIDE_COST, 0.0)
     step = stretches.first[1:, None, :, :] - stretches.last[:-1, :, None, :]  # [edge, from, to, axis]
     cost = np.abs(step - 360 * np.round(step / 360)).sum(axis=3) + outside[1:, None, :]
     start = (stretches.dislike + np.abs(stretches.first[0]).sum(axis=1) + outside[0]).tolist()
@@ -125,6 +124,13 @@ def _cheapest_branches(stretches: Stretches, limits: Floats) -> Ints:
     for origin in reversed(origins):
         branch.append(origin[branch[-1]])
     return np.array(branch[::-1], dtype=np.int64)
+
+
+def turns_inside(low: Floats, high: Floats, limits: Floats) -> tuple[Floats, Floats]:
+    """Fewest and most whole turns (..., 2) that bring angles from `low` to `high` (..., 2) inside the limits."""
+    fewest: Floats = np.ceil((limits[:, 0] - LIMIT_SLACK - low) / 360)
+    most: Floats = np.floor((limits[:, 1] + LIMIT_SLACK - high) / 360)
+    return fewest, most
 
 
 def _nearest_turns(
@@ -143,8 +149,7 @@ def _start_inside(stretches: Stretches, branch: Ints, turns: Floats, limits: Flo
     index = np.arange(len(stretches))
     low = (stretches.low[index, branch] + 360 * turns).min(axis=0)
     high = (stretches.high[index, branch] + 360 * turns).max(axis=0)
-    fewest = np.ceil((limits[:, 0] - LIMIT_SLACK - low) / 360)
-    most = np.floor((limits[:, 1] + LIMIT_SLACK - high) / 360)
+    fewest, most = turns_inside(low, high, limits)
     if (fewest > most).any():
         return False
     turns += np.clip(0, fewest, most)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cornersmooth.model import Bools, Floats, Ints
-from cornersmooth.rotary.branch_choice import LIMIT_SLACK, NoChoiceError, Stretches
+from cornersmooth.model import Floats, Ints
+from cornersmooth.rotary.branch_choice import LIMIT_SLACK, NoChoiceError, Stretches, turns_inside
 
 
 class CutTooFarError(Exception):
@@ -18,10 +18,8 @@ class CutTooFarError(Exception):
 
 def too_far(stretches: Stretches, limits: Floats) -> Ints:
     """Stretches that are inside the limits on no branch and in no turn: (k,) int64."""
-    least = np.ceil((limits[:, 0] - LIMIT_SLACK - stretches.low) / 360)
-    most = np.floor((limits[:, 1] + LIMIT_SLACK - stretches.high) / 360)
-    fits: Bools = np.logical_and.reduce(least <= most, axis=2)
-    return np.flatnonzero(~np.logical_or.reduce(fits, axis=1))
+    fewest, most = turns_inside(stretches.low, stretches.high, limits)
+    return np.flatnonzero(np.logical_and.reduce(np.logical_or.reduce(fewest > most, axis=2), axis=1))
 
 
 def parts_of_cut(
@@ -64,16 +62,8 @@ def _first_outside(low: Floats, high: Floats, limits: Floats, branch: float, tur
 
 def _farthest(angles: Floats, low: Floats, high: Floats, limits: Floats) -> int:
     """First row outside of the limits for the branch and the turns that reach farthest from the first row on."""
-    reached = []
-    for branch in (0, 1):
-        stops = []
-        for axis in (0, 1):
-            lowest = np.minimum.accumulate(np.append(angles[:1, branch, axis], low[1:, branch, axis]))
-            highest = np.maximum.accumulate(np.append(angles[:1, branch, axis], high[1:, branch, axis]))
-            # within the limits as long as a whole number lies between both
-            least = np.ceil((limits[axis, 0] - LIMIT_SLACK - lowest) / 360)
-            most = np.floor((limits[axis, 1] + LIMIT_SLACK - highest) / 360)
-            outside = np.flatnonzero(least > most)
-            stops.append(int(outside[0]) if len(outside) else len(angles))
-        reached.append(min(stops))
-    return max(reached)
+    lowest = np.minimum.accumulate(np.concatenate((angles[:1], low[1:])))
+    highest = np.maximum.accumulate(np.concatenate((angles[:1], high[1:])))
+    fewest, most = turns_inside(lowest, highest, limits)  # as long as a whole number lies between both
+    outside = (fewest > most).any(axis=2)
+    return int(np.where(outside.any(axis=0), outside.argmax(axis=0), len(angles)).max())
