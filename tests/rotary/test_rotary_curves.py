@@ -77,9 +77,8 @@ def motion(group: CurveGroup, i: int, u: np.ndarray = U) -> tuple[np.ndarray, np
     """Tip and angles of one written curve."""
     at = u * group.knots[-1]
     weights = group.weights[i]
-    return spline(group.knots, group.tips(slice(i, i + 1))[0], weights, at), spline(
-        group.knots, group.angles[i], weights, at
-    )
+    tip = group.tips(slice(i, i + 1))[0]
+    return spline(group.knots, tip, weights, at), spline(group.knots, group.angles[i], weights, at)
 
 
 def jet(group: CurveGroup, i: int, u: float, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -43,5 +43,7 @@ def search(values: Floats, counts: Ints, row: Ints, place: Floats, side: Literal
     (m,) int64
         Indices into `values`.
     """
-    base = starts(np.floor(values[starts(counts)[1:] - 1]).astype(np.int64) + 2)[:-1].astype(np.float64)
-    return np.searchsorted(values + np.repeat(base, counts), place + base[row], side=side)
+    last = values[starts(counts)[1:] - 1]
+    base = starts(np.floor(last).astype(np.int64) + 2)[:-1].astype(np.float64)
+    inside = np.clip(place, -0.5, last[row] + 0.5)  # rows lie more than 1 apart
+    return np.searchsorted(values + np.repeat(base, counts), inside + base[row], side=side)
