@@ -24,8 +24,10 @@ class Pack:
         self._length = 0
         self.table: dict[str, dict[str, Any]] = {}
 
-    def add(self, name: str, values: NDArray[Any], kind: str) -> None:
-        """Add an array (n,) or (n, w) as ``"f4"``, ``"i4"`` or ``"u1"``."""
+    def add(self, name: str, values: NDArray[Any], kind: str, bits: int | None = None) -> None:
+        """Add an array (n,) or (n, w) as ``"f4"``, ``"i4"`` or ``"u1"``; to so many binary places it packs better."""
+        if bits is not None:
+            values = np.ldexp(np.round(np.ldexp(values, bits)), -bits)
         data = np.ascontiguousarray(values, dtype=np.dtype(_TYPES[kind]).newbyteorder("<")).tobytes()
         width = 1 if values.ndim == 1 else values.shape[1]
         self.table[name] = {"type": kind, "at": self._length, "count": len(values), "width": width}

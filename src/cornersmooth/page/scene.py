@@ -46,6 +46,9 @@ _BESIDE = 1
 #: steps of the charts: this many, or so many for each pose where that is more, but no more than the last
 _STEPS, _STEPS_PER_POSE, _MOST_STEPS = 2000, 6, 12_000
 
+#: binary places of unit vectors and of angles, degrees: what nobody sees
+_FINE = 18
+
 #: points along the axis of a program without a length of anything
 _NO_WAY = 1e-9
 
@@ -217,7 +220,7 @@ def _add_original(
         must |= _seen(corners, np.arange(len(program)), len(program))[original.pose]
     rows = thinned(original.tip, np.zeros(len(must)), must, MOST_POINTS)
     pack.add("o_tip", original.tip[rows] - centre, "f4")
-    pack.add("o_axis", original.axis[rows], "f4")
+    pack.add("o_axis", original.axis[rows], "f4", _FINE)
     pack.add("o_way", original.way[original.pose[rows]], "f4")
     pack.add("o_line", program.line[original.pose[rows]], "i4")
     pack.add("o_move", np.where(original.breaks, 0, np.where(original.rapid, 1, 2))[rows], "u1")
@@ -250,15 +253,15 @@ def _add_written(
     if planned.seconds is not None:
         speed = speeds_over(planned.laws["written"], planned.seconds)
     pack.add("w_tip", written.tip[rows] - centre, "f4")
-    pack.add("w_axis", written.axis[rows], "f4")
+    pack.add("w_axis", written.axis[rows], "f4", _FINE)
     pack.add("w_kind", kind[rows], "u1")
     pack.add("w_rapid", written.rapid[rows], "u1")
+    pack.add("w_angle", written.angle_off[rows], "f4", _FINE)
     for name, values in (
         ("w_way", written.way),
         ("w_time", seconds),
         ("w_off", written.tip_off),
         ("w_axis_off", written.axis_off),
-        ("w_angle", written.angle_off),
         ("w_feed", written.feed),
         ("w_speed", speed),
         ("w_curvature", written.curvature),
@@ -304,7 +307,7 @@ def _add_corners(
     pack: Pack, corners: CornerList, program: Program, original: OriginalPath, places: Ints, centre: Floats
 ) -> None:
     pack.add("c_tip", program.tip[corners.pose] - centre, "f4")
-    pack.add("c_axis", program.axis[corners.pose], "f4")
+    pack.add("c_axis", program.axis[corners.pose], "f4", _FINE)
     pack.add("c_kind", corners.kind, "u1")
     pack.add("c_reason", corners.reason, "u1")
     pack.add("c_way", original.way[corners.pose], "f4")
