@@ -1,8 +1,8 @@
-"""The figures of the paper (10, 11, 14 to 16) as pages, made from the samples.
+"""The figures of the paper (10, 11, 14, 16) as pages, made from the samples.
 
 python docs/make_pages.py [FOLDER]
 
-Figures 10 and 11 show the deviation of Table 1 at two tolerances, 14 and 15 speed and acceleration on an impeller blade
+Figures 10 and 11 show the deviation of Table 1 at two tolerances, 14 the speed on an impeller blade
 with direct and smoothed motion, 16 the errors of the machined surface.
 docs/page.png shows the page of the first program of README.md, as Chromium draws it.
 """
@@ -56,7 +56,7 @@ FIGURES = (
         (("smooth", "IN", "-e", "0.15", *PAPER, "-o", "NC", "--report", "PAGE", "--force"),),
     ),
     Figure(
-        "figure14_15",
+        "figure14",
         "impeller.cls",
         (("time", "IN", "-e", "0.04", "-H", "12", *LIMITS, "--report", "PAGE", "--force"),),
     ),
