@@ -209,13 +209,13 @@ class Builder:
         return self._merge([chunk.line for chunk in self._chunks], np.array(self._single_line, np.int64))
 
     def axes(self) -> tuple[Floats, list[Finding]]:
-        """(n, 3) float64: the unit axis of every pose in the first system, and what is to be said about them.
+        """(n, 3) float64: the unit axis of every pose in the first system, and findings about them.
 
         Raises
         ------
         InputError
-            CS111 for a zero vector, CS112 for one that is no unit vector, CS188 and CS197 for those that nobody can
-            know.
+            CS111 for a zero vector, CS112 for one that is no unit vector, CS188 and CS197 for one that dialects read
+            differently.
         """
         single = [axis is not None for axis in self._single_axis]
         own = self._merge([chunk.own_axis for chunk in self._chunks], np.array(single, np.bool_))

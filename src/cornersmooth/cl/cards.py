@@ -1,7 +1,7 @@
 """What stands beside the statements on punched cards and in listings: numbers in columns 73 to 80, or in front.
 
-They are cut where every line has them and they ascend; where only some lines have them nobody can tell them from the
-statement, and the file is refused.
+They are cut where every line has them and they ascend; where only some lines have them they cannot be told from the
+statement: an error.
 """
 
 from __future__ import annotations

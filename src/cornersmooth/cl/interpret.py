@@ -135,7 +135,7 @@ def _is_nc_motion(text: str) -> bool:
 
 
 def _numbers_in_a_row(record: Record) -> int:
-    """Length of the longest row of numbers in a statement that nobody knows."""
+    """Length of the longest row of numbers in an unknown statement."""
     row = most = 0
     for value in record.args:
         for part in [value] if isinstance(value, float) else value.replace(",", " ").split() or [""]:

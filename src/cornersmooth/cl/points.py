@@ -131,7 +131,7 @@ def _find_columns(text: table.PointText, name: str) -> Columns:
 
 
 def _axis(rows: _Rows, scale: float, lenient: bool) -> tuple[Floats, list[Finding]]:
-    """Axis vectors of any length, and what is to be said about them."""
+    """Axis vectors of any length, and findings about them."""
     if rows.columns.second is None:
         return np.tile((0.0, 0.0, 1.0), (len(rows.values), 1)), [finding("CS170", 0)]
     tip, second = rows.take(rows.columns.tip), rows.take(rows.columns.second)

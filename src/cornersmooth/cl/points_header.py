@@ -62,7 +62,7 @@ class Columns:
     rapid_name : str
         Of that column, for messages.
     unused : tuple of str
-        Names of columns that hold something nobody reads; counters and times are not counted among them.
+        Names of columns that are not read; counters and times are not counted among them.
     units : {"mm", "inch"} or None
         What the header says about units.
     """
@@ -105,7 +105,7 @@ def from_header(text: str, file: str, line: int) -> Columns:
     Raises
     ------
     InputError
-        CS156 where the names leave tip or axis open, CS162 for units nobody reads, CS165 for a quaternion.
+        CS156 where the names leave tip or axis open, CS162 for unknown units, CS165 for a quaternion.
     """
     names = _split(text, r"[,;\t]") if re.search(r"[,;\t]", text) else _split(text, r"\s+")
     if len(names) < 3 or not _find(_TIPS, _plain(names)):

@@ -194,7 +194,7 @@ def _rapid(cell: str, columns: Columns, file: str, line: int) -> float:
     Raises
     ------
     InputError
-        CS166 for a word nobody knows, and for numbers in a column whose name does not tell what they mean.
+        CS166 for an unknown word, and for numbers in a column whose name does not tell what they mean.
     """
     word = re.sub(r"[^a-z0-9.]", "", cell.lower())
     number = _number(word)

@@ -21,7 +21,7 @@ MOTION_WORDS: Final = GOTO_WORDS | {
     *("INDIRV", "INDIRP", "AUTOPS", "PSIS", "TLON,GOFWD"),
 }
 
-#: what is said of words that are not carried out
+#: codes for words that are not carried out
 MOVES, TURNS, REPEATS = "CS108", "CS117", "CS186"
 
 #: words that are not carried out: what they do, where they are described, the words

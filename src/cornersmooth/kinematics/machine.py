@@ -133,7 +133,7 @@ class Machine:
         The same by number of tool, for those that `tool_length` is not for.
     home, tool_change : tuple of (str, float)
         Axes and where they go in machine coordinates, mm or degrees, for retracts and the end of a program, and for a
-        change of tool; the control's own words where nothing is said.
+        change of tool; the control's own words where there are none.
     tip_control : tuple of str or None
         Blocks that switch on and off what keeps the tip, for controls whose kinematics do; empty where these always do;
         None where that is not known.

@@ -201,7 +201,7 @@ def write(
     motion = MotionWriter(
         program, writer, upright, planes, statements, operation, findings, approach, frame.retract, native
     )
-    of_rows = Findings()  # rows are made in a thread of their own: what is said of them comes last, whenever it is met
+    of_rows = Findings()  # rows are made in a thread of their own: their findings come last
     with _BackgroundWriter(stream) as behind:
         text = frame.start(behind, chosen)
         text.write_blocks(operation.start())

@@ -51,7 +51,7 @@ class BlockWriter:
     stretch : float
         `Form.stretch`.
     blend : str
-        How far the head lets the control round the corners of lines; empty where nothing else is said.
+        How far the head lets the control round the corners of lines; empty for no other.
     plane : Plane or None
         Tilted plane in whose coordinates positions are written.
     modal : bool
@@ -78,7 +78,7 @@ class BlockWriter:
     _share: SplineShare | None = field(init=False)
     _modulo: list[int] = field(init=False)  #: columns of modulo axes
     _closing: bytes = field(init=False)
-    _said_blend: int = field(init=False)  # in steps of its last digit
+    _blend_in_force: int = field(init=False)  # in steps of its last digit
 
     def __post_init__(self) -> None:
         motion = self.form.mode.motion
@@ -88,7 +88,7 @@ class BlockWriter:
         decimals = self.form.decimals(self.program.units)
         modulo = self.form.machine.modulo if self.form.machine is not None and self.form.rotary else ()
         self._modulo = [k for k, word in enumerate(words) if k > 2 and word in modulo]
-        spaced, self._closing = self._spelt(range(len(words)))
+        spaced, self._closing = self._addresses(range(len(words)))
         if self._leaves_out:  # what is left out takes the blank before it with it
             spaced = (self._blank.encode() + spaced[0], *spaced[1:])
         self._format = self._row_format(spaced, decimals)
@@ -97,10 +97,10 @@ class BlockWriter:
         self._arc_format = self._row_format((*spaced[:said], radius), decimals[:said] + decimals[:1])
         self._curves = curves_for(self.form, self.program.units)
         self._share = SplineShare(self.program.line, self.findings) if self.form.curve == "bspline" else None
-        self._said_blend = self._usual_blend
+        self._blend_in_force = self._usual_blend
 
-    def _spelt(self, columns: Sequence[int]) -> tuple[tuple[bytes, ...], bytes]:
-        """What stands before the numbers of columns, and after the last of them."""
+    def _addresses(self, columns: Sequence[int]) -> tuple[tuple[bytes, ...], bytes]:
+        """Addresses of columns, as they precede the numbers, and what follows the last number."""
         motion = self.form.mode.motion
         words, end = [], ""
         for place, column in enumerate(columns):
@@ -110,7 +110,7 @@ class BlockWriter:
             end = behind
         return tuple(words), end.encode()
 
-    def _said(self, ticks: Ints) -> Ints:
+    def _modulo_ticks(self, ticks: Ints) -> Ints:
         """Ticks of rows with those of modulo axes from 0 to 360 degrees."""
         if not self._modulo:
             return ticks
@@ -165,7 +165,7 @@ class BlockWriter:
         return [self._rapid(ticks, np.arange(len(ticks)) != 2)]
 
     def tool_axis(self, ticks: Ints) -> Floats:
-        """(3,) tool axis of a row of ticks, in the coordinates in which X and Y are said while the tool is high."""
+        """(3,) tool axis of a row of ticks, in the coordinates in which X and Y are given while the tool is high."""
         machine, orientation = self.form.machine, self.form.orientation
         axis: Floats = np.array([0.0, 0.0, 1.0])  # axes of the machine, or a tool that stays along Z
         if self.plane is not None:
@@ -196,11 +196,11 @@ class BlockWriter:
         motion = self.form.mode.motion
         columns = np.arange(self.columns)[chosen].tolist()
         decimals = np.array(self.form.decimals(self.program.units))[chosen].tolist()
-        spelt, closing = self._spelt(columns)
+        spelt, closing = self._addresses(columns)
         prefix, suffix = f"{motion.rapid}{self._blank}".encode(), closing + motion.rapid_end.encode()
         row = self._row_format(spelt, tuple(decimals))
         none = np.zeros(1, np.int64)
-        return row.rows(self._said(ticks)[chosen][None], [prefix], none, [suffix], none)[0].decode()
+        return row.rows(self._modulo_ticks(ticks)[chosen][None], [prefix], none, [suffix], none)[0].decode()
 
     @property
     def columns(self) -> int:
@@ -301,7 +301,7 @@ class BlockWriter:
             apart.append((curved, self._curves.format, self._curves.numbers(run, curved)))
         if not apart:
             suffix = [self._closing + end for end in suffix]
-            return self._format.rows(self._said(run.ticks), prefix, prefix_id, suffix, suffix_id, left_out)[0]
+            return self._format.rows(self._modulo_ticks(run.ticks), prefix, prefix_id, suffix, suffix_id, left_out)[0]
         which = np.zeros(len(run), np.int64)
         for number, (rows, _, _) in enumerate(apart, start=1):
             which[rows] = number
@@ -388,7 +388,7 @@ class BlockWriter:
     def _say_blends(self, run: Run, table: list[bytes], chosen: Ints) -> int:
         """Put blocks before rows from which on the control may round otherwise than before; returns how many."""
         block, usual = self.form.table.lines.rounding, self._usual_blend
-        if not block or not usual or (run.blend is None and self._said_blend == usual):
+        if not block or not usual or (run.blend is None and self._blend_in_force == usual):
             return 0
         if self.statements.compensated:  # LinuxCNC refuses the block then; what held before was for the usual blend
             return 0
@@ -396,8 +396,8 @@ class BlockWriter:
         if run.blend is not None:
             steps = np.floor(run.blend / (self.program.mm_per_unit * BLEND_STEP) + _ROUNDING)
             blend = np.maximum(steps, 1.0).astype(np.int64)
-        rows = np.flatnonzero(np.diff(blend, prepend=self._said_blend))
-        self._said_blend = int(blend[-1])
+        rows = np.flatnonzero(np.diff(blend, prepend=self._blend_in_force))
+        self._blend_in_force = int(blend[-1])
         pairs, which = np.unique(np.column_stack((blend[rows], chosen[rows])), axis=0, return_inverse=True)
         chosen[rows] = len(table) + which.reshape(-1)
         table += [

@@ -340,7 +340,7 @@ class Extra:
     forms : tuple of str
         Forms that they go with; empty for all.
     warning : str
-        What is said to who asks for it; empty for nothing.
+        Shown to the user who asks for it; empty for none.
     """
 
     name: str = ""
@@ -398,7 +398,7 @@ class Control:
     systems : mapping of str to Digits
         Digits to choose from by name, such as increment systems.
     own : bool
-        Whether the table is the user's own, whose words may mean what nobody else knows.
+        Whether the table is the user's own, whose words may mean anything.
     trusted : frozenset of str
         Machine functions of the shop that move nothing: verification accepts them where the table or the user writes
         them.

@@ -53,72 +53,42 @@ class Curves:
 class KnotBlocks(Curves):
     """FANUC's G06.2: a knot before and a weight after every control point, the last four knots in blocks of their own.
 
-    The first control point is the current position (B-63324EN/03 4.17). Knots {0, 0, 0, 0, 1/2, 1, 1, 1, 1}.
+    The first control point is the current position (B-63324EN/03 4.17). Curves without `Run.spline` have the knots
+    {0, 0, 0, 0, 1/2, 1, 1, 1, 1}.
     """
 
-    _knots = (b"K0.", b"K0.", b"K0.", b"K0.", b"K0.5")
-    _last_knots = b"K1.\n" * 4
-
-    def __init__(self, weight_decimals: int, blank: bytes = b" ") -> None:
-        self._decimals, self._blank = weight_decimals, blank
-        self._any = RotaryKnotBlocks(weight_decimals, blank)  # curves with knots of their own
-
-    def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
-        """Knots."""
-        if run.spline is not None:
-            return self._any.add_prefixes(run, table, chosen)
-        curved = run.curve > 0
-        chosen[curved] = len(table) - 1 + run.curve[curved]
-        first, *others = (knot + self._blank for knot in self._knots)
-        table += [b"G6.2" + self._blank + b"P4" + self._blank + first, *others]
-        return 4 * int(np.count_nonzero(run.curve == 5))
-
-    def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
-        """Weights, and the last knots."""
-        if run.spline is not None:
-            self._any.add_suffixes(run, table, chosen)
-            return
-        curved = run.curve > 0
-        values, which = _weights(run, curved)
-        word = self._blank + b"R"
-        ends = [word + format_number(value, self._decimals, trim=True).encode() + b"\n" for value in values]
-        base = len(table)
-        table += ends
-        table += [end + self._last_knots for end in ends]
-        chosen[curved] = base + which + np.where(run.curve[curved] == 5, len(ends), 0)
-
-
-class RotaryKnotBlocks(Curves):
-    """The same with any number of control points and knots of their own, for curves with rotary axes."""
-
     def __init__(self, weight_decimals: int, blank: bytes = b" ") -> None:
         self._decimals, self._blank = weight_decimals, blank
 
     def add_prefixes(self, run: Run, table: list[bytes], chosen: Ints) -> int:
         """Knots."""
-        assert run.spline is not None
-        curved = run.curve > 0
-        knots, which = np.unique(run.spline[curved, 0], return_inverse=True)
-        base = len(table)
-        words = [self._knot(knot) + self._blank for knot in knots.tolist()]
-        table += words
-        table += [b"G6.2" + self._blank + b"P4" + self._blank + word for word in words]
-        chosen[curved] = base + which.reshape(-1) + np.where(run.curve[curved] == 1, len(words), 0)
-        return 4 * int(np.count_nonzero(run.spline[:, 2] > 0.0))
+        curve = run.curve[run.curve > 0]
+        knots, which, ends = np.array([0.0, 0.5]), (curve == 5).astype(np.int64), curve == 5
+        if run.spline is not None:
+            knots, which = np.unique(run.spline[run.curve > 0, 0], return_inverse=True)
+            ends = run.spline[:, 2] > 0.0
+        words = [self._word(b"K", knot) + self._blank for knot in knots.tolist()]
+        chosen[run.curve > 0] = len(table) + which.reshape(-1) + np.where(curve == 1, len(words), 0)
+        table += [*words, *(b"G6.2" + self._blank + b"P4" + self._blank + word for word in words)]
+        return 4 * int(np.count_nonzero(ends))
 
     def add_suffixes(self, run: Run, table: list[bytes], chosen: Ints) -> None:
         """Weights, and the last knots."""
-        assert run.spline is not None
         curved = run.curve > 0
-        pairs, which = np.unique(run.spline[curved, 1:], axis=0, return_inverse=True)
-        base = len(table)
-        for weight, last in pairs.tolist():
-            end = self._blank + b"R" + format_number(weight, self._decimals, trim=True).encode() + b"\n"
-            table.append(end + 4 * (self._knot(last) + b"\n") if last > 0.0 else end)
-        chosen[curved] = base + which.reshape(-1)
+        if run.spline is None:
+            weights, which = _weights(run, curved)
+            pairs = [(weight, last) for last in (0.0, 1.0) for weight in weights]
+            which += np.where(run.curve[curved] == 5, len(weights), 0)
+        else:
+            found, which = np.unique(run.spline[curved, 1:], axis=0, return_inverse=True)
+            pairs = [(weight, last) for weight, last in found.tolist()]
+        chosen[curved] = len(table) + which.reshape(-1)
+        for weight, last in pairs:
+            end = self._blank + self._word(b"R", weight) + b"\n"
+            table.append(end + 4 * (self._word(b"K", last) + b"\n") if last > 0.0 else end)
 
-    def _knot(self, knot: float) -> bytes:
-        return b"K" + format_number(knot, self._decimals, trim=True).encode()
+    def _word(self, letter: bytes, value: float) -> bytes:
+        return letter + format_number(value, self._decimals, trim=True).encode()
 
 
 class SplineBlocks(Curves):

@@ -250,7 +250,7 @@ class HoleCycles:
     findings: Findings
     skip: bool = False
     now: Cycle | None = None  #: the cycle in force, None where it is not understood
-    _said: Statement | None = None  #: the last CYCLE
+    _statement: Statement | None = None  #: the last CYCLE
     _args: tuple[float | str, ...] = ()
     _on: bool = False
 
@@ -258,9 +258,9 @@ class HoleCycles:
         """CYCLE/OFF."""
         self.now, self._on = None, False
 
-    def say(self, statement: Statement, speed: float | None) -> None:
+    def begin(self, statement: Statement, speed: float | None) -> None:
         """CYCLE with the words of a cycle, ON, or INIT, at a speed of the spindle in revolutions per minute."""
-        self._said = statement
+        self._statement = statement
         self._on |= words_of(statement) != ["INIT"]
         self._args = in_force(self._args, statement.args, self.program)
         self.read(speed)
@@ -305,4 +305,4 @@ class HoleCycles:
     @property
     def line(self) -> int:
         """Line of the last CYCLE statement, 0 for none."""
-        return 0 if self._said is None else self._said.line
+        return 0 if self._statement is None else self._statement.line

@@ -5,7 +5,7 @@ to the clearance, feed to the depth, out again. The tool travels between holes a
 and of the height from which the first hole was approached. ``DEEP`` retracts to the clearance after every ``STEP``,
 ``INCR`` or ``1STPECK``/``SUBPECK``, ``BRKCHP`` by `PECK_GAP` only. ``REAM`` and ``BORE`` come out at feed.
 
-Python runs per run of holes; per hole where the control has a cycle for it, or nobody understands it.
+Python runs per run of holes; per hole where the control has a cycle for it, or its words are not understood.
 """
 
 from __future__ import annotations

@@ -76,14 +76,14 @@ class MotionWriter:
     _return_to: int = _NOWHERE  #: first pose after a tool change, until it is reached
     _next_statement: int = 0
     _arc_begun: int = -1  #: arc after a FROM whose start has been gone to
-    _said: tuple[Statement, ...] = field(init=False)
+    _in_order: tuple[Statement, ...] = field(init=False)
     _holes: HoleWriter = field(init=False)
 
     def __post_init__(self) -> None:
         self.writer = self.tilting
         self.warnings = MotionWarnings(self.program, self.findings)
         self.operation.withdraw = self._withdraw
-        self._said = with_starts(self.program)
+        self._in_order = with_starts(self.program)
         self._holes = HoleWriter(self, self.native)
 
     def write(self, rows: Rows, ticks: Ints) -> Iterator[bytes]:
@@ -96,13 +96,13 @@ class MotionWriter:
             if stop > start:
                 yield from self._between(rows, ticks, start, stop)
                 start = stop
-            yield from self._say(statement)
+            yield from self._write_statement(statement)
         yield from self._between(rows, ticks, start, len(moves))
 
     def finish(self) -> Iterator[bytes]:
         """Text of the statements after the last row, and the blocks that end the program."""
-        for statement in self._said[self._next_statement :]:
-            yield from self._say(statement)
+        for statement in self._in_order[self._next_statement :]:
+            yield from self._write_statement(statement)
         if self._repeated:
             text = "move of zero length in the written digits left out"
             self.findings.add("CS312", "note", 0, text, self._repeated)
@@ -129,12 +129,12 @@ class MotionWriter:
     # ------------------------------------------------------------------------------------------------ order
 
     def _statements_until(self, pose: int) -> Sequence[Statement]:
-        begin, said = self._next_statement, self._said
+        begin, said = self._next_statement, self._in_order
         while self._next_statement < len(said) and said[self._next_statement].pose <= pose:
             self._next_statement += 1
         return said[begin : self._next_statement]
 
-    def _say(self, statement: Statement) -> Iterator[bytes]:
+    def _write_statement(self, statement: Statement) -> Iterator[bytes]:
         text = self.statements.blocks(statement)
         if self.statements.changed:  # a tool change leaves the machine elsewhere
             self.position, self._return_to, self.statements.changed = None, statement.pose, False
@@ -345,7 +345,7 @@ class MotionWriter:
             height = above or self.approach * bool(run.rapid[0])
             self._look_at_first(writer.lifted(first, height), pose)
             yield from self.text(self._approaches(first, height))
-            run = run if above else run.first_as_said(self.program)
+            run = run if above else run.with_programmed_feed(self.program)
         self.warnings.of_tool(pose, self.statements.tool)
         if not run.rapid.all():
             self.warnings.of_cut(int(run.move[np.argmin(run.rapid)]), turning=bool(operation.spindle))

@@ -56,12 +56,12 @@ class Operation:
     plane: Mapping[str, str] = field(default_factory=dict)  #: numbers of the tilted plane at hand
     mode: Mode = field(init=False)  #: what tool tip control is for the tool at hand
     _with_z: str = ""  # words that wait for the first block that moves Z
-    _clamped: bool = True  # nobody knows what was before
+    _clamped: bool = True  # the state before is not known
     _tip_control: bool = False
     _functions: bool = False
     _moved: bool = False  # the tool has been used since it was up
     _used: bool = False  # the tool has been used
-    _halted: set[str] = field(default_factory=set)  # what a stop has switched off, and nothing has said again
+    _halted: set[str] = field(default_factory=set)  # what a stop has switched off, until it is switched on again
     _stopped: dict[str, Blocks] = field(default_factory=dict)  # what a tool change has switched off, as it was on
     _stopped_line: int = 0
 

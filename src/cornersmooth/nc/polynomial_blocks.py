@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cornersmooth.geometry.bsplines import Splines
 from cornersmooth.geometry.ragged import ranges
 from cornersmooth.model import Bools, Floats, Ints, Units
-from cornersmooth.nc.curve_blocks import Curves, KnotBlocks, RotaryKnotBlocks, SplineBlocks
+from cornersmooth.nc.curve_blocks import Curves, KnotBlocks, SplineBlocks
 from cornersmooth.nc.form import Form
 from cornersmooth.nc.run import Run
 from cornersmooth.slices import some_rows
@@ -25,8 +25,7 @@ def curves_for(form: Form, units: Units) -> Curves:
     """Way to write curves of a form."""
     decimals = form.table.digits.weight
     if form.curve == "g6.2":
-        blank = b" " if form.mode.motion.spaces else b""
-        return RotaryKnotBlocks(decimals, blank) if form.rotary else KnotBlocks(decimals, blank)
+        return KnotBlocks(decimals, b" " if form.mode.motion.spaces else b"")
     if form.curve == "bspline":
         return SplineBlocks(decimals)
     if form.curve == "poly":
@@ -113,7 +112,7 @@ class PolyBlocks(_Polynomials):
 class SplBlocks(_Polynomials):
     """Heidenhain's SPL (iTNC 530): end point, then ``K3X K2X K1X K3Y ...`` of a parameter that runs from 1 to 0.
 
-    X(t) = K3·t³ + K2·t² + K1·t + X; where the block starts is said again by the sum and may differ by a micrometre.
+    X(t) = K3·t³ + K2·t² + K1·t + X; the sum gives the start of the block again and may differ by a micrometre.
     """
 
     def __init__(self, form: Form, units: Units) -> None:

@@ -160,7 +160,7 @@ class Frame:
             "kinematics_on": switch[:1],
             "kinematics_off": switch[1:],
             "plane_reset": () if form.plane is None else form.plane.reset,
-            "header": (*self._told(form.table.layout), *_filled(self.header, values)),
+            "header": (*self._head_comments(form.table.layout), *_filled(self.header, values)),
             "footer": tuple(_filled(self.footer, values)),
         }
 
@@ -188,8 +188,8 @@ class Frame:
         usual = load_control(table.dialect).program.work_offset if table.dialect in control_names() else ""
         return "" if offset == usual else offset.replace(" ", "_") or "none"
 
-    def _told(self, layout: TextStyle) -> Blocks:
-        """Comments that say what the text is made of."""
+    def _head_comments(self, layout: TextStyle) -> Blocks:
+        """Comments on what the program is made of."""
         texts = self.provenance if self.comments else ()
         return tuple(line for text in texts for line in comment_lines(text, layout.comment, layout.comment_orders))
 

@@ -64,7 +64,7 @@ class Run:
     def __len__(self) -> int:
         return len(self.ticks)
 
-    def first_as_said(self, program: Program) -> Run:
+    def with_programmed_feed(self, program: Program) -> Run:
         """Give the first move the program's feed where it has a time, which counts the way from the pose before."""
         if self.mode[0] != INVERSE_TIME:
             return self

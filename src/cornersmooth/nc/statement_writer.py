@@ -92,7 +92,7 @@ class StatementWriter:
         if handler is not None:
             written = handler(self, statement)
             if written is not None:
-                return [*written, *(self.comment(statement.text) if self._says_more(statement) else ())]
+                return [*written, *(self.comment(statement.text) if self._has_other_words(statement) else ())]
             self._not_understood(statement)
         elif word in _TEXT_WORDS:
             return self.comment(spoken_text(statement))
@@ -103,7 +103,7 @@ class StatementWriter:
         return self.comment(statement.text or word)
 
     @staticmethod
-    def _says_more(statement: Statement) -> bool:
+    def _has_other_words(statement: Statement) -> bool:
         """Whether a statement that is understood has words that no block says: gears, lengths, holders."""
         words = set(words_of(statement))
         if statement.word == "SPINDL":
@@ -309,7 +309,7 @@ class StatementWriter:
         if words_of(statement)[:1] in (["OFF"], ["NOMORE"]):
             self.cycles.end()
             return []
-        self.cycles.say(statement, self.speed)
+        self.cycles.begin(statement, self.speed)
         return self.comment(statement.text)
 
     def end(self, statement: Statement) -> list[str]:
@@ -321,7 +321,7 @@ class StatementWriter:
         return [*self.comment(statement.text), *self.halt(self.words.stop)]
 
     def insert(self, statement: Statement) -> list[str]:
-        """INSERT: text for the NC file; as a comment, since nobody has looked at what it does."""
+        """INSERT: text for the NC file; as a comment, since its meaning is not known."""
         text = spoken_text(statement)
         if _NC_WORDS.fullmatch(text):
             what = "INSERT with NC words is written as a comment; put them in by hand where the machine needs them"

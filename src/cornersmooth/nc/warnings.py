@@ -1,8 +1,8 @@
-"""What is said of a program: before it is written, of arcs, feeds and functions; while it is, of what moves."""
+"""Warnings of a program: before it is written, of arcs, feeds and functions; while it is, of what moves."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -99,16 +99,18 @@ class MotionWarnings:
 
     program: Program
     findings: Findings
-    _said_tool: bool = False
-    _said_zero: bool = False
-    _said_spindle: bool = False
-    _said_turns: bool = False
+    _noted: set[str] = field(default_factory=set)  #: codes of what is noted once
     _tilted: bool = False
     _looked_until: int = 0
 
     def another_tool(self) -> None:
-        """Begin anew with what is said for each tool."""
-        self._said_spindle = False
+        """Begin anew with what is noted for each tool."""
+        self._noted.discard("CS335")
+
+    def _once(self, code: str, pose: int, text: str) -> None:
+        if code not in self._noted:
+            self._noted.add(code)
+            self.findings.add(code, "warning", int(self.program.line[pose]), text)
 
     def of_first(self, pose: int, form: Form, *, rapid: bool) -> None:
         """Say that the control turns the tool on its own before its first position, or feeds to it."""
@@ -162,38 +164,34 @@ class MotionWarnings:
 
     def of_tool(self, pose: int, tool: int | None) -> None:
         """Say that a tool moves that was not loaded, or that is none."""
-        if tool is None and not self._said_tool:
-            self._said_tool = True
+        if tool is None:
             text = (
                 "the CL file loads no tool before it moves: the tool in the spindle is taken, with length register 1; "
                 "see that it is the right one, or load it with LOADTL"
             )
-            self.findings.add("CS334", "warning", int(self.program.line[pose]), text)
-        if tool == 0 and not self._said_zero:
-            self._said_zero = True
+            self._once("CS334", pose, text)
+        if tool == 0:
             text = "tool 0 moves: controls take T0 for an empty spindle, and H0 for no length; give it a number"
-            self.findings.add("CS382", "warning", int(self.program.line[pose]), text)
+            self._once("CS382", pose, text)
 
     def of_cut(self, pose: int, *, turning: bool) -> None:
         """Say that a tool cuts while the spindle stands."""
-        if not turning and not self._said_spindle:
-            self._said_spindle = True
+        if not turning:
             text = "the spindle is not started before the first cut of a tool; put SPINDL before it"
-            self.findings.add("CS335", "warning", int(self.program.line[pose]), text)
+            self._once("CS335", pose, text)
 
     def of_turns(self, run: Run, form: Form, angles: Floats) -> None:
         """Say that an endless axis gets words that some machines of the control refuse; `angles` are those of `run`."""
-        if self._said_turns or form.mode.motion.endless_words or form.machine is None:
+        if "CS346" in self._noted or form.mode.motion.endless_words or form.machine is None:
             return
         axes = form.machine.axes[: len(form.machine.names)]
         endless = np.array([axis.limits is None and not axis.modulo for axis in axes])
         angles = angles[:, : len(axes)]
         rows = np.flatnonzero(((angles[:, endless] < 0.0) | (angles[:, endless] >= 360.0)).any(axis=1))
         if len(rows):
-            self._said_turns = True
             names = " and ".join(form.machine.names[axis] for axis in np.flatnonzero(endless).tolist())
             text = (
                 f"words of {names} beyond 0 to 360 deg: a modulo axis takes them only where the builder allows it "
                 "(MD30455 bit 0, else alarm 16830); where not, write modulo = true for the axis in a machine file"
             )
-            self.findings.add("CS346", "warning", int(self.program.line[run.move[rows[0]]]), text)
+            self._once("CS346", int(run.move[rows[0]]), text)
