@@ -10,7 +10,8 @@ import difflib
 import re
 import tomllib
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import lru_cache, partial
@@ -172,6 +173,14 @@ class Shelf:
         base = self.parse(self.built_in(like)).table
         base.pop("name", None)
         return Parsed(_merged(base, table), self.find(like))
+
+    @contextmanager
+    def in_file(self, file: str) -> Iterator[None]:
+        """Let errors say in which file the table is."""
+        try:
+            yield
+        except SettingsError as error:
+            raise SettingsError(error.code, error.what, error.hint, file=file) from error
 
     def check_keys(self, table: Iterable[str], known: Sequence[str], where: str) -> None:
         """Refuse a key that is not known; `where` is what stands before it in the message.

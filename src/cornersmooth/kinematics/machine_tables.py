@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cornersmooth.errors import SettingsError
 from cornersmooth.kinematics.dynamics import LINEAR, Dynamics, Travel
 from cornersmooth.kinematics.machine import Machine, RotaryAxis
 from cornersmooth.tables import Shelf, Table
@@ -26,9 +25,7 @@ _SHELF = Shelf(
 )
 
 
-def machine_names() -> tuple[str, ...]:
-    """Names of the machines that come with the program, sorted."""
-    return _SHELF.names()
+machine_names, machine_table = _SHELF.names, _SHELF.built_in
 
 
 def load_machine(name_or_path: str | Path) -> Machine:
@@ -43,17 +40,6 @@ def load_machine(name_or_path: str | Path) -> Machine:
     """
     text, file, name = _SHELF.choose(name_or_path)
     return parse_machine(text, file=file, name=name)
-
-
-def machine_table(name: str) -> str:
-    """Text of the table of a machine that comes with the program, every key with a comment.
-
-    Raises
-    ------
-    SettingsError
-        The name is unknown.
-    """
-    return _SHELF.built_in(name)
 
 
 def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "machine") -> Machine:
@@ -80,7 +66,7 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
     SettingsError
         The text is not TOML, has an unknown key (with the closest known one), or does not describe a machine.
     """
-    try:
+    with _SHELF.in_file(file):
         table, _ = _SHELF.parse(text)
         entries = table.get("axis", [])
         if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
@@ -103,8 +89,6 @@ def parse_machine(text: str | Table, *, file: str = "<machine>", name: str = "ma
             home=position,
             tool_change=position,
         )
-    except SettingsError as error:
-        raise SettingsError(error.code, error.what, error.hint, file=file) from error
 
 
 def _axis(entry: Table, where: str) -> RotaryAxis:

@@ -12,7 +12,6 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
-from cornersmooth.errors import SettingsError
 from cornersmooth.nc.control import Control, Digits, FormTable, Mode, Motion, Orientation, Words
 from cornersmooth.nc.program_table import STEPS, Blocks
 from cornersmooth.nc.trusted_words import trusted_words
@@ -82,19 +81,8 @@ _SHELF = _Controls(
 )
 
 
-def control_names() -> tuple[str, ...]:
-    """Names of the controls that come with the program, sorted."""
-    return _SHELF.names()
-
-
-def control_aliases() -> dict[str, str]:
-    """Name of the control for each of its other names, such as that of a model."""
-    return _SHELF.aliases()
-
-
-def find_control(name: str) -> str:
-    """Return the name of the control that comes with the program and is called so; empty for none."""
-    return _SHELF.find(name)
+control_names, control_aliases, find_control = _SHELF.names, _SHELF.aliases, _SHELF.find
+control_table = _SHELF.built_in
 
 
 def load_control(name_or_path: str | Path) -> Control:
@@ -134,7 +122,7 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
     SettingsError
         The text is not TOML, has an unknown key (with the closest known one), or does not describe a control.
     """
-    try:
+    with _SHELF.in_file(file):
         table, like = _SHELF.parse(text)
         digits = _SHELF.table(table.get("digits", {}), "digits")
         motion = table.get("motion", {})
@@ -150,19 +138,6 @@ def parse_control(text: str | Table, *, file: str = "<control>", name: str = "co
             forms=lambda forms, where: _forms(forms, where, motion),
             trusted=partial(_trusted, dialect=like),
         )
-    except SettingsError as error:
-        raise SettingsError(error.code, error.what, error.hint, file=file) from error
-
-
-def control_table(name: str) -> str:
-    """Text of the table of a control that comes with the program.
-
-    Raises
-    ------
-    SettingsError
-        The name is unknown.
-    """
-    return _SHELF.built_in(name)
 
 
 def _digits(table: Any, where: str) -> Digits:
