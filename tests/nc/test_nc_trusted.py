@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -31,8 +32,8 @@ TABLES = {
 }
 
 
-def smoothed(folder: Path, like: str, trusted: str, *more: str, words: str = "") -> tuple[int, list[str]]:
-    (folder / "part.cls").write_text(CL)
+def smoothed(folder: Path, like: str, trusted: str, *more: str, words: str = "", cl: str = CL) -> tuple[int, list[str]]:
+    (folder / "part.cls").write_text(cl)
     (folder / "shop.toml").write_text(f'{trusted}\nlike = "{like}"\n[words]\n{words or TABLES[like]}\n')
     told = run("smooth", "part.cls", "--control", "./shop.toml", "-o", "o.nc", "--strict", "--force", *more, cwd=folder)
     return told.returncode, told.stderr.decode().splitlines()
@@ -98,3 +99,41 @@ def test_what_may_move_the_tool_cannot_be_trusted(like: str, patterns: str, why:
     with pytest.raises(SettingsError, match=r"trusted") as error:
         parse_control(f'like = "{like}"\ntrusted = {patterns}\n')
     assert why in str(error.value)
+
+
+TWO_TOOLS = CL.replace("COOLNT/ON\n", "").replace("FINI\n", "LOADTL/4\n{}RAPID\nGOTO/0,0,50\nGOTO/0,0,0\nFINI\n")
+
+
+@pytest.mark.parametrize(
+    ("like", "words", "calls"),
+    [
+        ("heidenhain", 'tool_change = ["TOOL CALL {tool} Z S{speed}"]', ("TOOL CALL 3 Z S3000", "TOOL CALL 4 Z S{}")),
+        ("fanuc", 'tool_change = ["T{tool} M6", "S{speed}"]', ("S3000", "S{}")),
+    ],
+)
+@pytest.mark.parametrize(
+    ("second", "speed"),
+    [
+        ("SPINDL/500,RPM,CLW\n", 500),
+        ("", 3000),
+        ("CUTTER/10\nTLDATA/MILL,10,0,50,0,0\nSPINDL/31.4159265,SMM,CLW\n", 1000),
+    ],
+)
+def test_the_block_of_a_tool_change_may_have_the_first_speed_of_the_tool(
+    like: str, words: str, calls: tuple[str, str], second: str, speed: int, tmp_path: Path
+) -> None:
+    """The speed of the SPINDL after the tool, or what holds; 31.4159 m/min at a diameter of 10 mm are 1000 rev/min."""
+    code, told = smoothed(tmp_path, like, "", words=words, cl=TWO_TOOLS.format(second))
+    assert (code, told[0][:6]) == (0, "PASSED"), told
+    blocks = [line.lstrip("0123456789 ") for line in (tmp_path / "o.nc").read_text().splitlines()]
+    changes = [k for k, block in enumerate(blocks) if "M6" in block or re.match(r"TOOL CALL \d", block)]
+    assert len(changes) == 2
+    assert all(call.format(speed) in blocks[at : at + 2] for at, call in zip(changes, calls, strict=True))
+
+
+def test_a_tool_without_any_speed_is_an_error_of_its_line(tmp_path: Path) -> None:
+    words = 'tool_change = ["TOOL CALL {tool} Z S{speed}"]'
+    code, told = smoothed(tmp_path, "heidenhain", "", words=words, cl=CL.replace("SPINDL/3000,RPM,CLW\n", ""))
+    assert code == 3
+    assert told[0].startswith("part.cls:1: error")
+    assert "gives tool 3 none" in told[0]

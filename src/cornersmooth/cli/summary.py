@@ -46,7 +46,8 @@ def end_lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             yield f"{row['status']:<8}  {name}{what}"
     for code, found in warnings_of(rows).items():
         files = f"{found['files']} file{'s' * (found['files'] != 1)}"
-        yield f"warning   {code} in {files}, {found['count']} times, as in {found['first']}: {found['text']}"
+        times = f", {found['count']} times" if found["count"] > found["files"] else ""
+        yield f"warning   {code} in {files}{times}, as in {found['first']}: {found['text'].partition('; ')[0]}"
     yield counts_line(rows)
 
 

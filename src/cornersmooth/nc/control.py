@@ -43,7 +43,7 @@ class Words:
     Parameters
     ----------
     tool_change, tool_select : tuple of str
-        With ``{tool}``; the latter only brings the tool near.
+        With ``{tool}``; the latter only brings the tool near. The former may have ``{speed}``, the first of the tool.
     spindle_speed : tuple of str
         With ``{speed}`` and ``{direction}``, one of the next two.
     clockwise, counterclockwise : str

@@ -23,7 +23,7 @@ _MOTION_KEYS = tuple(item.name for item in fields(Motion))
 _PROGRAM_BRACES: Table = {"program": "O1", "units": "G21", "blend": "0.001"} | dict.fromkeys(STEPS, "")
 #: what stands in braces in blocks
 _BRACES: dict[str, Table] = {
-    "tool_change": {"tool": 1},
+    "tool_change": {"tool": 1, "speed": "1"},
     "tool_select": {"tool": 1},
     "spindle_speed": {"speed": "1", "direction": "M3"},
     "dwell": {"milliseconds": 1, "seconds": "1."},

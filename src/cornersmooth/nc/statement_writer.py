@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from cornersmooth.errors import InputError
 from cornersmooth.model import Move, Program, Statement
 from cornersmooth.nc.comments import comment_lines
 from cornersmooth.nc.compensation import begin_compensation
@@ -24,6 +25,9 @@ from cornersmooth.nc.spindle import milliseconds, revolutions
 from cornersmooth.nc.statement_args import number_after, numbers_of, spoken_text, whole_number, words_of
 from cornersmooth.nc.tools import TOOL_WORDS, ahead_of_tools, loaded_tool
 from cornersmooth.text import format_number
+
+#: words of SPINDL whose number is no speed
+_LIMITS = ("RANGE", "MAXRPM")
 
 #: words whose text is for the machinist: comments without the word
 _TEXT_WORDS = frozenset("$$ PPRINT REMARK TPRINT LETTER DISPLY".split())
@@ -153,10 +157,60 @@ class StatementWriter:
         blocks = self.operation.end_tool(statement.line, another=self.tool not in (None, number))
         if number != self.tool:
             blocks += self.operation.change_position()
-            blocks += [block.format(tool=number) for block in self.words.tool_change]
+            blocks += self._tool_change(number, statement)
         self.changed = True
         self.tool, self.operation.offset = number, offset
         return blocks
+
+    def _tool_change(self, number: int, statement: Statement) -> list[str]:
+        """Blocks of a tool change; a speed in them is the first that the tool is given, or else what holds."""
+        blocks = self.words.tool_change
+        if not any("{speed}" in block for block in blocks):
+            return [block.format(tool=number) for block in blocks]
+        speed = self._first_speed(statement) or self.speed
+        if not speed:
+            raise InputError(
+                "CS354",
+                f"the tool change of the control table has {{speed}}, and the CL file gives tool {number} none",
+                "add SPINDL, or --spindle",
+                file=self.program.source.name,
+                line=statement.line,
+            )
+        return [block.format(tool=number, speed=self._speed_text(speed)) for block in blocks]
+
+    def _first_speed(self, load: Statement) -> float | None:
+        """First speed between a tool change and the next one, rev/min."""
+        statements = self.program.statements
+        begin = next(k for k, statement in enumerate(statements) if statement is load)
+        diameter, loading = self._diameter, {"TOOLNO"} if self.toolno_loads else TOOL_WORDS
+        try:
+            for statement in statements[begin + 1 :]:
+                if statement.word in ("CUTTER", "TLDATA"):
+                    self.cutter(statement)
+                elif statement.word == "SPINDL" and (speed := self._speed_of(statement)):
+                    return speed
+                elif statement.word in loading and loaded_tool(statement) not in (None, loaded_tool(load)):
+                    return None
+            return None
+        finally:
+            self._diameter = diameter
+
+    def _speed_of(self, statement: Statement) -> float | None:
+        """Revolutions per minute that SPINDL gives; None for none."""
+        words, numbers = words_of(statement), numbers_of(statement)
+        for word in _LIMITS:
+            for number in number_after(statement, word) if word in words else ():
+                numbers.remove(number)
+        if len(numbers) != 1 or numbers[0] <= 0.0:
+            return None
+        cutting = next((unit for unit in ("SFM", "SMM") if unit in words), None)
+        if cutting is None:
+            return numbers[0]
+        speed = revolutions(numbers[0], cutting, self._diameter)
+        return None if speed is None else float(round(speed))
+
+    def _speed_text(self, speed: float) -> str:
+        return format_number(speed, self.form.table.digits.speed, trim=True).rstrip(".")
 
     def go_home(self, statement: Statement) -> list[str]:
         """GOHOME without coordinates: to the height of the retract."""
@@ -194,7 +248,7 @@ class StatementWriter:
     def spindle(self, statement: Statement) -> list[str] | None:
         """SPINDL in every order of its words."""
         words, numbers = words_of(statement), numbers_of(statement)
-        for word in ("RANGE", "MAXRPM"):  # gears and limits are the control's own affair
+        for word in _LIMITS:  # gears and limits are the control's own affair
             if word in words:
                 following = number_after(statement, word)
                 words = [other for other in words if other not in _GEARS]
@@ -231,7 +285,7 @@ class StatementWriter:
             return [direction]
         self.speed = self.speed if speed is None else speed
         self.cycles.read(self.speed)
-        digits = format_number(self.speed or 0.0, self.form.table.digits.speed, trim=True).rstrip(".")
+        digits = self._speed_text(self.speed or 0.0)
         turning = tuple(block.format(speed=digits, direction=direction) for block in self.words.spindle_speed)
         if not self.operation.spindle and id(statement) in self._ahead_of_tools:
             return self.operation.later("spindle", turning)
