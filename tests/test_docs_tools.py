@@ -58,9 +58,6 @@ RUN_BY = {
     "python -m verify.slices": "tests/verify/test_slices.py",
     "python -m verify.word_mutations 2": "tests/verify/test_word_mutations.py",
     "python -m verify.hole_mutations": "test_hole_mutations_are_scored",
-    "python tests/nc/linuxcnc_controller.py samples/impeller.cls -e 0.01": (
-        "tests/kinematics/test_linuxcnc_controller.py"
-    ),
     # needs the network
     "cd web && npm ci && npm run bundle && npm run check": "test_scripts_of_the_page_are_there",
     "dask scheduler --scheduler-file /shared/scheduler.json &": "tests/test_cli_cluster.py",

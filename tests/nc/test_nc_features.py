@@ -104,7 +104,7 @@ def work_offset(control: str) -> str:
     text = lines(control, TWO_TOOLS)
     offsets, tip = where(text, r"G54$|CYCL DEF 247"), where(text, "TRAORI")
     if tip:
-        return yes(offsets[0] > tip[0], "yes, behind TRAORI")
+        return yes(offsets[0] > tip[0], "yes, after TRAORI")
     return yes(bool(offsets), "yes, CYCL DEF 247" if "CYCL" in text[(offsets or [0])[0]] else "yes")
 
 
