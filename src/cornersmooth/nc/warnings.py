@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from cornersmooth.errors import Severity
 from cornersmooth.methods import CURVES_METHOD, DEFAULT_METHOD
 from cornersmooth.model import FeedMode, Floats, Ints, Move, Program, SmoothProgram
 from cornersmooth.nc.circles import Circles
@@ -107,10 +108,10 @@ class MotionWarnings:
         """Begin anew with what is noted for each tool."""
         self._noted.discard("CS335")
 
-    def _once(self, code: str, pose: int, text: str) -> None:
+    def _once(self, code: str, severity: Severity, pose: int, text: str) -> None:
         if code not in self._noted:
             self._noted.add(code)
-            self.findings.add(code, "warning", int(self.program.line[pose]), text)
+            self.findings.add(code, severity, int(self.program.line[pose]), text)
 
     def of_first(self, pose: int, form: Form, *, rapid: bool) -> None:
         """Say that the control turns the tool on its own before its first position, or feeds to it."""
@@ -169,16 +170,16 @@ class MotionWarnings:
                 "the CL file loads no tool before it moves: the tool in the spindle is taken, with length register 1; "
                 "see that it is the right one, or load it with LOADTL"
             )
-            self._once("CS334", pose, text)
+            self._once("CS334", "warning", pose, text)
         if tool == 0:
             text = "tool 0 moves: controls take T0 for an empty spindle, and H0 for no length; give it a number"
-            self._once("CS382", pose, text)
+            self._once("CS382", "warning", pose, text)
 
     def of_cut(self, pose: int, *, turning: bool) -> None:
         """Say that a tool cuts while the spindle stands."""
         if not turning:
             text = "the spindle is not started before the first cut of a tool; put SPINDL before it"
-            self._once("CS335", pose, text)
+            self._once("CS335", "warning", pose, text)
 
     def of_turns(self, run: Run, form: Form, angles: Floats) -> None:
         """Say that an endless axis gets words that some machines of the control refuse; `angles` are those of `run`."""
@@ -194,4 +195,4 @@ class MotionWarnings:
                 f"words of {names} beyond 0 to 360 deg: a modulo axis takes them only where the builder allows it "
                 "(MD30455 bit 0, else alarm 16830); where not, write modulo = true for the axis in a machine file"
             )
-            self._once("CS346", int(run.move[rows[0]]), text)
+            self._once("CS346", "warning", int(run.move[rows[0]]), text)
