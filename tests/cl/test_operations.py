@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
@@ -11,7 +12,10 @@ import pytest
 from cornersmooth.cl import read
 from cornersmooth.cl.operations import find_operations
 from cornersmooth.errors import InputError
+from cornersmooth.pipeline import postprocess
+from cornersmooth.verdict import Verdict
 from oracle.command import run
+from oracle.files import OWN, SAMPLES
 
 #: files in the manner of each dialect, and number, name, tool and first line of each operation
 FILES = {
@@ -179,3 +183,26 @@ def test_info_lists_operations_and_tools(tmp_path: Path) -> None:
     assert "operation 2   FINISH, T4, lines 8 to 14, 2 poses" in said
     alone = json.loads(run("info", "part.cls", "--json", "--operation", "finish", cwd=tmp_path).stdout)
     assert alone["poses"] == 2
+
+
+def test_an_nc_program_has_no_operations(tmp_path: Path) -> None:
+    (tmp_path / "part.cls").write_text(HEAD + ONE + TWO)
+    assert run("smooth", "part.cls", "-o", "o.nc", cwd=tmp_path).returncode == 0
+    for command in ("info o.nc --operation 1", "verify o.nc o.nc --operation 1"):
+        told = run(*command.split(), cwd=tmp_path)
+        assert told.returncode == 2
+        assert b"--operation is for CL files" in told.stderr
+
+
+@pytest.mark.parametrize("path", [*sorted(OWN.iterdir()), SAMPLES / "two_tools.cls"], ids=lambda path: path.name)
+def test_operations_are_the_whole_file_and_each_is_right_alone(path: Path) -> None:
+    """Every pose belongs to one operation; where a file has several, each is written and PASSED alone."""
+    whole = read(path)
+    found = find_operations(whole)
+    assert [one.first for one in found] == [0, *(one.stop for one in found[:-1])]
+    assert found[-1].stop == len(whole)
+    for one in found if len(found) > 1 else ():
+        alone = read(path, operation=str(one.number))
+        np.testing.assert_array_equal(alone.tip, whole.tip[one.first : one.stop])
+        np.testing.assert_array_equal(alone.feed, whole.feed[one.first : one.stop])
+        assert postprocess(alone, io.BytesIO(), feed=500.0).verdict == Verdict.PASSED

@@ -103,6 +103,7 @@ def command(source: str, text: str, **given: Any) -> int:
     _check_outputs(source, text, given)
     data, name = read_input(source, size_limit=not given["no_size_limit"])
     if first_block(data[:HEAD]):
+        reading.refuse_operation(given)
         return verify_with_program(name, data, text, given)
     nc: bytes | str | os.PathLike[str] = read_input(text)[0] if text == STANDARD else text
     head = _take_over(given, nc, data)

@@ -108,6 +108,12 @@ def tool_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return all_of(function, _TOOL.values())
 
 
+def refuse_operation(given: dict[str, Any]) -> None:
+    """Refuse an operation of an input that is an NC program."""
+    if given["operation"] is not None:
+        raise click.UsageError("--operation is for CL files, and the input is an NC program; leave it out")
+
+
 def reading_of(given: dict[str, Any]) -> dict[str, Any]:
     """Keyword arguments of `cornersmooth.read` that were given."""
     found = {name: given[name] for name in (*_READING, *_TOOL) if name in given}
