@@ -69,21 +69,17 @@ def rotary_angles(
     Parameters
     ----------
     machine : Machine
-    tip : (n, 3) float64, mm
-    axis : (n, 3) float64
-        Unit vectors in part coordinates.
+    tip, axis : (n, 3) float64, mm and unit vectors
     tolerance : float, degrees
         By how much the axis may deviate near the pole, where the first angle is then free to turn ahead of time, and
         may lie outside the reach of the machine.
-    rapid : (n,) bool
-        The move into the pose does not cut, so that solution and turn may change in it; only the first by default.
-    left : (n,) bool
-        The pose repeats the one before, after which a cut is left: solution and turn may change there, too.
+    rapid, left : (n,) bool
+        Poses in whose moves solution and turn may change: these do not cut, or the pose repeats the one before, after
+        which a cut is left.
     divide : bool
         Whether cuts that leave the limits are to be divided.
     still : (n,) bool
-        Nothing is cut on the way through the pose (`still_poses`), so that it need not deviate near the pole; none by
-        default.
+        Nothing is cut on the way through the pose (`still_poses`), so that it need not deviate near the pole.
     still_tolerance : float, degrees
         By how much the axis may deviate there all the same: what the digits of the words account for.
     line, file : (n,) int64 and str, optional
@@ -211,19 +207,11 @@ def still_poses(kind: NDArray[np.uint8]) -> Bools:
 
 @dataclass(frozen=True)
 class _Poses:
-    """Poses by what their axes are.
+    """Poses by what their axes are."""
 
-    Parameters
-    ----------
-    cone, steady : (c,) and (s,) int64
-        In the cone of the pole, and outside of it.
-    beyond : (b,) int64
-        Just out of reach of the machine.
-    """
-
-    cone: Ints
-    steady: Ints
-    beyond: Ints
+    cone: Ints  # in the cone of the pole
+    steady: Ints  # outside of it
+    beyond: Ints  # just out of reach of the machine
 
 
 def _sorted_poses(

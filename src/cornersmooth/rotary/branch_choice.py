@@ -58,14 +58,9 @@ class Stretches:
 
 
 class NoChoiceError(Exception):
-    """No choice keeps the path inside the limits.
+    """No choice keeps the path inside the limits: `stretch` is the first that cannot be reached.
 
-    Parameters
-    ----------
-    stretch : int
-        The first stretch that cannot be reached inside the limits.
-    states : (s, 3) int64
-        Branch and turns of both axes in which that stretch can be entered, all of which leave the limits inside it.
+    In `states` (s, 3), branch and turns of both axes, it can be entered; all of them leave the limits inside it.
     """
 
     def __init__(self, stretch: int, states: Ints) -> None:
@@ -75,19 +70,9 @@ class NoChoiceError(Exception):
 
 
 def choose(stretches: Stretches, limits: Floats) -> tuple[Ints, Floats]:
-    """Branch and turns of every stretch.
+    """Branch (p,) of every stretch, and whole turns (p, 2) to add to its angles.
 
-    Parameters
-    ----------
-    stretches : Stretches
-    limits : (2, 2) float64, degrees
-        Lowest and highest word of each axis, infinite where there is none.
-
-    Returns
-    -------
-    branch : (p,) int64
-    turns : (p, 2) float64
-        Whole turns to add to the angles of the stretch.
+    The limits (2, 2), degrees, are the lowest and highest word of each axis, infinite where there is none.
 
     Raises
     ------

@@ -69,23 +69,13 @@ class Insertions:
 
 @dataclass(frozen=True)
 class FilledPath:
-    """A path with its inserted points.
+    """A path with its inserted points: m rows, exact points of the ruled motion."""
 
-    Parameters
-    ----------
-    pose : (m,) int64
-        The pose of the original path that each row is, or that it leads to.
-    inserted : (m,) bool
-    tip, axis : (m, 3) float64
-        Exact points of the ruled motion.
-    angles : (m, 2) float64, degrees
-    """
-
-    pose: Ints
+    pose: Ints  # of the original path that each row is, or that it leads to
     inserted: Bools
     tip: Floats
     axis: Floats
-    angles: Floats
+    angles: Floats  # degrees
 
     def only(self, rows: Ints) -> FilledPath:
         """The path without its other rows."""

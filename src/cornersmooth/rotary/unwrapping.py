@@ -43,19 +43,9 @@ class WideSteps:
 
 
 def unwrap(machine: Machine, axis: Floats, start: Ints, end: Ints, angles: Floats, broken: Bools) -> WideSteps:
-    """Make both branches continuous from the first row on, in place, where nothing breaks the path.
+    """Make both branches of angles (e + 1, 2, 2), degrees, continuous from the first row on, in place.
 
-    Parameters
-    ----------
-    start, end : (e,) int64
-        Poses before and after each step.
-    angles : (e + 1, 2, 2) float64, degrees
-        The first row is unwrapped already; after a break the turns are counted from 0 again.
-
-    Returns
-    -------
-    WideSteps
-        Rows are those of the steps.
+    Steps lead from the poses `start` to `end` (e,); after a broken one the turns are counted from 0 again.
     """
     step = np.diff(angles, axis=0)
     change = -np.round(step / 360)

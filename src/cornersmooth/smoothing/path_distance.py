@@ -15,7 +15,6 @@ import numpy as np
 from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Floats, Ints, SmoothProgram
-from cornersmooth.smoothing.corner_table import legs_at
 from cornersmooth.smoothing.sampling import nodes
 from cornersmooth.smoothing.segments import lines_of
 from cornersmooth.vectors import dot, norm
@@ -43,18 +42,11 @@ class _Transitions:
 
     @classmethod
     def of(cls, smoothed: SmoothProgram, rows: Ints) -> _Transitions:
-        corners, height = smoothed.corners, smoothed.settings.axis_length
-        pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
-        legs = legs_at(smoothed.program, height, pose, before, after)
-        trim = np.stack((corners.trim_in[rows], corners.trim_out[rows]), axis=1)[..., None]
-        return cls(
-            np.stack((legs.tip_in, legs.tip_out), axis=1) * trim,
-            np.stack((legs.turn_in, legs.turn_out), axis=1) * trim,
-            height * legs.axis,
-            corners.weights[rows],
-            corners.ratio[rows],
-            height,
-        )
+        program, corners, height = smoothed.program, smoothed.corners, smoothed.settings.axis_length
+        _, *tip = nurbs.trimmed_legs(program.tip, corners, rows)
+        axis, *turn = nurbs.trimmed_legs(program.axis, corners, rows)
+        legs = np.stack(tip, axis=1), height * np.stack(turn, axis=1)
+        return cls(*legs, height * axis, corners.weights[rows], corners.ratio[rows], height)
 
     def only(self, rows: Ints) -> _Transitions:
         return _Transitions(

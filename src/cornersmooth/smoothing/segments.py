@@ -15,6 +15,7 @@ from cornersmooth.geometry import nurbs
 from cornersmooth.methods import METHODS
 from cornersmooth.model import Bools, Floats, Ints, Move, SmoothProgram, Status
 from cornersmooth.settings import FLIP_ANGLE, STANDING, Settings
+from cornersmooth.smoothing.corner_table import legs_at
 from cornersmooth.vectors import norm, square
 
 #: exponent of the graded nodes s = (j/n)^(2/3)
@@ -180,10 +181,9 @@ def lines_per_half(smoothed: SmoothProgram) -> Ints:
 def lines_of(smoothed: SmoothProgram, rows: Ints) -> Ints:
     """(g,) lines per half of the transitions of some smoothed corners, as in `lines_per_half`."""
     program, corners, settings = smoothed.program, smoothed.corners, smoothed.settings
-    pose, before, after = corners.pose[rows], corners.before[rows], corners.after[rows]
-    tip_in, tip_out = program.tip[pose] - program.tip[before], program.tip[after] - program.tip[pose]
-    turn_in = settings.axis_length * (program.axis[pose] - program.axis[before])
-    turn_out = settings.axis_length * (program.axis[after] - program.axis[pose])
+    after = corners.after[rows]
+    legs = legs_at(program, settings.axis_length, corners.pose[rows], corners.before[rows], after)
+    tip_in, tip_out, turn_in, turn_out, _ = legs
     bends = (
         tip_out * corners.trim_out[rows][:, None] - tip_in * corners.trim_in[rows][:, None],
         (tip_out + turn_out) * corners.axis_trim_out[rows][:, None]

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cornersmooth.geometry.arcs import arc_points
+from cornersmooth.geometry.arcs import arc_points, divided
+from cornersmooth.geometry.ragged import spread
 from cornersmooth.model import Bools, Floats, Ints, Move, Program
 from cornersmooth.nc_reader import NcProgram
 from cornersmooth.nc_reader.elements import Element
@@ -65,8 +66,7 @@ class RuledMotion:
         top = step + height * (self.axis[:, 1] - self.axis[:, 0])
         size = np.maximum(np.linalg.norm(step, axis=1), np.linalg.norm(top, axis=1))
         count = np.maximum(np.ceil(size / longest), 1.0).astype(np.int64)
-        segment = np.repeat(np.arange(len(self)), count)
-        number = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
+        segment, number = spread(count)
         low, high = number / count[segment], (number + 1) / count[segment]
         ends = [self.at(segment, share) for share in (low, high)]
         turn = ends[1][1] - ends[0][1]
@@ -111,9 +111,7 @@ def original_cuts(program: Program) -> RuledMotion:
     arcs = program.arcs
     pieces = np.ones(len(program), np.int64)
     pieces[arcs.pose] = np.maximum(np.ceil(arcs.sweep / _ARC_STEP), 1.0).astype(np.int64)
-    pose = np.repeat(np.arange(len(program)), pieces)
-    last = np.cumsum(pieces)
-    share = (np.arange(len(pose)) - np.repeat(last - pieces, pieces) + 1) / pieces[pose]
+    pose, share = divided(pieces)
     tip, axis = program.tip[pose].copy(), program.axis[pose].copy()
     if len(arcs):
         row = np.full(len(program), -1, np.int64)
@@ -131,8 +129,7 @@ def written_cuts(nc: NcProgram) -> RuledMotion:
     if pieces.max(initial=1) == 1:
         tip, axis, element = nc.tip, directions(nc, nc.tip, nc.second), np.arange(len(nc))
     else:
-        element = np.repeat(np.arange(len(nc)), pieces)
-        share = (np.arange(len(element)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1) / pieces[element]
+        element, share = divided(pieces)
         tip, axis = written_at(nc, element, share)
     cutting = nc.kind != Element.RAPID
     cutting[:1] = False
