@@ -142,7 +142,7 @@ def place_proportional(asked: Wanted, settings: Settings) -> Placed:
     limited_by = np.where(asked.by_tolerance <= room, LimitedBy.TOLERANCE, LimitedBy.SEGMENT).astype(np.uint8)
     length = np.minimum(room, asked.by_tolerance)
 
-    # The construction runs on chords of the sphere, the promise is about b = tip + H·axis at constant H. The bound
+    # The construction runs on chords of the sphere, the tolerance is about b = tip + H·axis at constant H. The bound
     # |b′−b| ≤ |A′−A| + H|O′−O| proves most corners; the others are evaluated and shortened until they keep it.
     axis_length = settings.axis_length
     shortest_lever = axis_length * asked.half_cosine - length * per_length_turn  # below |B−A| of both motions

@@ -1,4 +1,4 @@
-"""Which transitions of the paper's method keep the tolerance: measured, since its equations do not promise it.
+"""Which transitions of the paper's method keep the tolerance: measured, as its equations do not guarantee it.
 
 Equation (10) bounds each of the two curves, not the motion that their synchronisation makes of them. So transitions,
 and what they leave of the segments between them, are sampled and measured here against the original motion.

@@ -1,4 +1,4 @@
-"""The promise of runs, proved: bounds of the deviation at common parameters over whole stretches, not at samples.
+"""Proof that runs keep ε: bounds of the deviation at common parameters over whole stretches, not at samples.
 
 Between neighbouring knots and poses the curve less the original motion is one cubic in each coordinate, and a cubic
 stays within the hull of its Bernstein points. For the tip that is all. The axis point b = tip + H·axis is measured at
