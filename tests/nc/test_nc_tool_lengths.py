@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cornersmooth.cl import read
-from cornersmooth.errors import SettingsError
+from cornersmooth.errors import InputError, SettingsError
 from cornersmooth.kinematics import Machine, parse_machine, tip_position
 from cornersmooth.nc import Form, Frame, choose_form
 from cornersmooth.verify import verify
@@ -103,3 +103,25 @@ def test_what_is_no_table_of_lengths_is_refused() -> None:
     for text in ("x = 3", "1 = -3", '1 = "a"'):
         with pytest.raises(SettingsError):
             machine(text)
+
+
+#: a right angle below 60 mm, the tool along Z
+UPRIGHT = "UNITS/MM\nLOADTL/{}\nRAPID\nGOTO/0,0,60\nFEDRAT/MMPM,300\nGOTO/0,0,0\nGOTO/30,0,0\nGOTO/30,30,0\nFINI\n"
+
+
+@pytest.mark.parametrize(
+    ("form", "axes", "method"),
+    [
+        ("g1", "axis = []", "proportional"),
+        ("g1", 'like = "head-ac"', "proportional"),
+        ("g6.2", 'like = "head-ac"', "proportional"),
+        ("g6.2", 'like = "head-ac"', "global"),
+    ],
+)
+def test_travel_counts_with_the_length_of_the_tool_at_hand(form: str, axes: str, method: str) -> None:
+    """The nose is at 60 + 120 mm with tool 1, at 60 + 81.5 mm with tool 7."""
+    lengths = "tool_length = 0\n[tool_lengths]\n1 = 120\n7 = 81.5\n[travel]\nZ = [-500, 150]\n"
+    chosen = choose_form("fanuc", form, machine=parse_machine(f"{axes}\n{lengths}"))
+    assert lines_of(chosen, UPRIGHT.format(7), method=method)
+    with pytest.raises(InputError, match=r"Z of machine would have to go to 180\.000 mm"):
+        lines_of(chosen, UPRIGHT.format(1), method=method)

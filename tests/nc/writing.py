@@ -35,10 +35,10 @@ def text_of_cl(cl: str, form: str = "g1", **settings: Any) -> tuple[list[str], W
     return text_of(read(cl.encode(), name="test.cls"), form, **settings)
 
 
-def lines_of(form: Form, cl: str, *, frame: Frame | None = None) -> list[str]:
+def lines_of(form: Form, cl: str, *, frame: Frame | None = None, **settings: Any) -> list[str]:
     """Lines of the NC text of a CL text in any form; as many blocks are reported as stand in it."""
     program = read(cl.encode(), name="part.cls")
-    smoothed = smooth(program, fit_settings(Settings(tolerance=0.05), form, program.units))
+    smoothed = smooth(program, fit_settings(Settings(tolerance=0.05, **settings), form, program.units))
     stream = io.BytesIO()
     found = write(smoothed, stream, form=form, frame=frame)
     lines = stream.getvalue().decode("ascii").splitlines()
