@@ -24,7 +24,7 @@ def corner(turn: float, leg_in: float, leg_out: float, weights: tuple[float, flo
 
 def halves(points: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Powers of both halves of one curve."""
-    return np.concatenate([curves.polynomial(points[:1], weights[:1], side) for side in SIDES.tolist()])
+    return curves.polynomial(points, weights, SIDES)
 
 
 CORNERS = [

@@ -135,27 +135,33 @@ class Curves:
         if not parts:
             nothing = np.zeros((0, 4, 4))
             return cls.measured(nothing, nothing, np.zeros((0, 3)), np.zeros(0, np.int64))
+        if len(parts) == 1:
+            return parts[0]
         return cls(*(np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(cls)))
 
     @classmethod
-    def of_corners(cls, program: Program, corners: Corners, rows: Ints, half: int, move: Ints, height: float) -> Curves:
+    def of_corners(
+        cls, program: Program, corners: Corners, rows: Ints, half: Ints, move: Ints, height: float
+    ) -> Curves:
         """First (0) or second (1) halves of the transitions of some corners, at the ends of the moves into poses."""
-        tip, axis_point = nurbs.control_points(program, corners, rows, height)
         pose = corners.pose[rows]
         origin, weights = program.tip[pose], corners.weights[rows]
-        trim = (corners.axis_trim_in, corners.axis_trim_out)[half][rows]
-        zero, one = np.zeros(len(rows)), np.ones(len(rows))
+        powers = np.zeros((2, len(rows), 4, 4))
+        for some in groups(np.arange(len(rows))):
+            for into, points in zip(powers, nurbs.control_points(program, corners, rows[some], height), strict=True):
+                into[some] = polynomial(points - origin[some, None], weights[some], half[some])
+        one, trims = np.ones(len(rows)), (corners.axis_trim_in[rows], corners.axis_trim_out[rows])
         legs = (
             corners.trim_in[rows] * norm(program.tip[pose] - program.tip[corners.before[rows]]),
             corners.trim_out[rows] * norm(program.tip[corners.after[rows]] - program.tip[pose]),
         )
         return cls.measured(
-            polynomial(tip - origin[:, None], weights, half),
-            polynomial(axis_point - origin[:, None], weights, half),
+            powers[0],
+            powers[1],
             origin,
             move,
-            half=np.full(len(rows), half),
-            span=np.stack((zero, trim) if half else (one - trim, one), axis=1),
+            half=half,
+            span=np.where(half[:, None] == 0, np.stack((1.0 - trims[0], one), 1), np.stack((0.0 * one, trims[1]), 1)),
             inner=np.ones(len(rows), np.bool_),
             corner=rows,
             resting=np.minimum(legs[0], legs[1]) <= STANDSTILL,

@@ -165,8 +165,9 @@ def in_cells(limits: Sequence[Intervals], grid: Grid, runs: Ints) -> Grid:
     for each in limits:
         met = cell_intervals(each, grid, runs)
         cap = np.minimum(cap, np.minimum.reduceat(np.append(each.cap, np.inf), met)[::2])
-        own = np.concatenate((each.rows, np.zeros((5, 1))), axis=1)
-        rows = np.maximum(rows, np.maximum.reduceat(own, met, axis=1)[:, ::2])
+        for own, into in zip(each.rows, rows, strict=True):
+            if own.any():
+                np.maximum(into, np.maximum.reduceat(np.append(own, 0.0), met)[::2], out=into)
     return replace(grid, cap=cap, rows=rows)
 
 

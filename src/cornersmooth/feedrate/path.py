@@ -130,7 +130,8 @@ def build_path(
     number[moves] = np.arange(len(moves))
     trims, parts = np.zeros((4, len(moves))), [] if curves is None else [curves]
     if corners is not None:
-        trims, parts = _transitions(program, corners, moves, start, settings.axis_length)
+        trims, halves = _transitions(program, corners, moves, start, settings.axis_length)
+        parts.append(halves)
     if runs is not None and len(runs):
         parts.append(Curves.of_runs(program, runs, settings.axis_length))
     bent = Curves.joined(parts)
@@ -217,26 +218,24 @@ def _moves(program: Program, settings: Settings) -> tuple[Ints, Ints]:
     return moves, start[moves]
 
 
-def _transitions(
-    program: Program, corners: Corners, moves: Ints, start: Ints, height: float
-) -> tuple[Floats, list[Curves]]:
+def _transitions(program: Program, corners: Corners, moves: Ints, start: Ints, height: float) -> tuple[Floats, Curves]:
     """Fractions (4, k) of the moves that transitions take, and their halves.
 
     Fractions are of the tip segment at its start and at its end, then those of the axis-point segment.
     """
     entry = np.full(len(program), -1)  # smoothed corner at a pose
     entry[corners.pose[corners.smoothed]] = np.flatnonzero(corners.smoothed)
-    trims, halves = np.zeros((4, len(moves))), []
-    cut = program.kind[moves] == Move.LINEAR
-    for side, pose, own in (
-        (0, start, (corners.trim_out, corners.axis_trim_out)),
-        (1, moves, (corners.trim_in, corners.axis_trim_in)),
+    ends = np.where(program.kind[moves] == Move.LINEAR, entry[np.stack((start, moves))], -1)
+    has = ends >= 0
+    trims = np.zeros((2, *ends.shape))
+    for into, both in zip(
+        trims, ((corners.trim_out, corners.trim_in), (corners.axis_trim_out, corners.axis_trim_in)), strict=True
     ):
-        has = np.flatnonzero(cut & (entry[pose] >= 0))
-        rows = entry[pose[has]]
-        trims[side, has], trims[2 + side, has] = (trim[rows] for trim in own)
-        halves.append(Curves.of_corners(program, corners, rows, 1 - side, moves[has], height))
-    return trims, halves
+        for own, trim, at in zip(into, both, ends, strict=True):
+            own[at >= 0] = trim[at[at >= 0]]
+    side, number = np.nonzero(has)
+    halves = Curves.of_corners(program, corners, ends[has], 1 - side, moves[number], height)
+    return trims.reshape(4, -1), halves
 
 
 def _rests(

@@ -25,7 +25,7 @@ TOGETHER = 512
 
 #: Bernstein coefficients of the five basis functions on the first half: Bézier point j is Σ w_i·P_i·_TO_BEZIER[j, i]
 _TO_BEZIER = np.array([[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0.5, 0.5, 0, 0], [0, 0.25, 0.5, 0.25, 0]])
-_HALVES = (_TO_BEZIER, _TO_BEZIER[::-1, ::-1])
+_HALVES = np.stack((_TO_BEZIER, _TO_BEZIER[::-1, ::-1]))
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
@@ -47,7 +47,7 @@ _SAMPLES = 4
 _CLOSER = 3
 
 
-def polynomial(points: Floats, weights: Floats | None = None, half: int | None = None) -> Floats:
+def polynomial(points: Floats, weights: Floats | None = None, half: Ints | None = None) -> Floats:
     """Powers of t (g, d + 1, 4) of w·P and w; ``[:, k]`` belongs to t^k, the last coordinate is w.
 
     Parameters
@@ -56,14 +56,14 @@ def polynomial(points: Floats, weights: Floats | None = None, half: int | None =
         Bézier points, or the five control points of transitions (g, 5, 3).
     weights : (g, d + 1) float64, optional
         All 1 by default; w1 and w2 (g, 2) of transitions.
-    half : int, optional
-        First (0) or second (1) half of transitions; t runs with u on both.
+    half : (g,) int64, optional
+        First (0) or second (1) halves of transitions; t runs with u on both.
     """
     if half is not None and weights is not None:
         weights = nurbs.full_weights(weights)
     w = np.ones(points.shape[:2]) if weights is None else weights
     weighted = np.concatenate((points * w[..., None], w[..., None]), axis=-1)
-    convert = _to_powers(points.shape[1] - 1) if half is None else _to_powers(3) @ _HALVES[half]
+    convert = _to_powers(points.shape[1] - 1) if half is None else (_to_powers(3) @ _HALVES)[half]
     powers: Floats = convert @ weighted
     return powers
 

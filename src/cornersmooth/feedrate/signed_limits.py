@@ -1,6 +1,6 @@
 """Plans made faster where the terms of an axis' limit cancel: its acceleration q₂·z + q₁·z′/2 and its jerk.
 
-The first plan keeps sums of amounts, which is on the safe side (`axis_limits`). Here limits are kept with their signs,
+The first plan keeps sums of amounts, which is on the safe side (`intervals`). Here limits are kept with their signs,
 |q₃·z + 3/2·q₂·z′ + q₁·z″/2| ≤ J·z^(−1/2), at chosen places (an exchange method for semi-infinite programmes: Hettich
 and Kortanek 1993): at both ends of each cell for the axes that come nearest to their limits in it, and wherever inside
 a cell a plan was seen beyond a limit. Each round solves with these, measures all axes at all samples, and adds the
@@ -29,9 +29,6 @@ AXES, ROUNDS = 2, 9
 
 #: rounds whose plans are so far from the last that what they leave free is forgotten again
 _TRIALS = 2
-
-#: slots on either side of a limit that rounds do not mend, in which sums of amounts are kept
-_BESIDE = 4
 
 #: how much slower than the plan before the next one begins, so that it keeps its limits with room to spare
 _SLOWER = 0.97
@@ -255,7 +252,6 @@ def faster(grid: Grid, free: Grid, places: Places, batch: Batch, best: Floats) -
     ends = places.at_ends(bare)
     run = np.repeat(np.arange(len(first)), last - first + 1)
     summed, going = places.unknown.copy(), np.ones(len(first), np.bool_)
-    slower, stuck = np.zeros(len(first)), np.zeros(len(first), np.bool_)
     inside: list[_Signed] = []
     c, (taken, highest) = best.copy(), np.zeros((2, 2, len(places.accel), len(batch)))
     held = np.zeros(taken.shape, np.bool_)
@@ -269,8 +265,6 @@ def faster(grid: Grid, free: Grid, places: Places, batch: Batch, best: Floats) -
                 beyond = asks & (used > 1.0)
                 own += np.where(beyond, used - 1.0 + _ROOM, 0.0)
                 summed |= (beyond & (own > _MOST)).any(axis=0)  # signs do not help there
-                # where nothing is gained, what is mended in one cell comes up again in the next
-                summed |= _near((used > 1.0 + _ROOM).any(axis=0) & stuck[run])
             np.maximum(high, used, out=high)
             asks[:] = False
             np.put_along_axis(asks, np.argpartition(-high, AXES - 1, axis=0)[:AXES], True, axis=0)
@@ -281,8 +275,7 @@ def faster(grid: Grid, free: Grid, places: Places, batch: Batch, best: Floats) -
         start, gap = _within(problem, best, run), GAP if number else ROUGH
         c[going[run]] = solve_runs(problem.of(going), free.of(going), start=start[going[run]], gap=gap, most=_STEPS)
         # sums of amounts keep limits by themselves, with less room for what lies between samples than is measured here
-        found = _slower([np.where(summed, 0.0, used) for used in places.uses(bare, c)[0]], batch)
-        slower, stuck = found, stuck | (found <= slower + _ROOM)
+        slower = _slower([np.where(summed, 0.0, used) for used in places.uses(bare, c)[0]], batch)
         kept = c * slower[run]
         time, before = (np.bincount(run, batch.weight / np.sqrt(values)) for values in (kept, best))
         best = np.where((time < before)[run], kept, best)
@@ -314,14 +307,6 @@ def _rows(
         assert limit.axis is not None
         found += limit.rows(np.zeros_like(slot), share[1][limit.axis[0], slot])
     return found
-
-
-def _near(where: Bools) -> Bools:
-    """Slots, and the `_BESIDE` next to them on either side."""
-    total = np.concatenate(([0], np.cumsum(where)))
-    at = np.arange(len(where))
-    near: Bools = total[np.minimum(at + _BESIDE + 1, len(where))] > total[np.maximum(at - _BESIDE, 0)]
-    return near
 
 
 def _slower(uses: list[Floats], batch: Batch) -> Floats:
