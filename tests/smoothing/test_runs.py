@@ -200,11 +200,8 @@ def test_smoothest_is_what_a_general_solver_finds() -> None:
             stretch=stretch,
             radius=radius,
             penalty=penalty,
-            free=windows.free,
+            windows=windows,
             sample_window=one,
-            span_window=np.zeros(len(splines.width), np.int64),
-            control_window=windows.window,
-            windows=1,
         )
         change = smoothest(task, off, third @ start / 0.05, 1e-5, COLD)
         assert not change[~windows.free].any()

@@ -186,7 +186,6 @@ class _Places:
     normal: Floats  # (m, 3) of the plane of the axes, or 0
     penalty: Floats
     sample_window: Ints
-    span_window: Ints
 
     @classmethod
     def of(cls, problem: Problem, windows: Windows, tight: Floats) -> _Places:
@@ -204,16 +203,15 @@ class _Places:
         smooth = Gather(windows.local, splines.third[windows.span], len(windows.control))
         lever = samples.target[:, 3:] - samples.target[:, :3]
         length = np.sqrt(dot(lever, lever))
-        span_window = np.repeat(np.arange(len(windows.count)), windows.count)
         rough = (near.apply(problem.rough[windows.control]) - samples.target) / np.repeat(problem.tolerances, 3)
         axis, short = lever / length[:, None], length / problem.axis_length
         normal = problem.normal[splines.span_run[windows.span[span]]]
-        window = span_window[span]
+        window = windows.span_window[span]
         length_of_samples = (own.high - own.low)[samples.piece] / np.bincount(samples.piece)[samples.piece]
-        share = length_of_samples / np.bincount(span_window, splines.width[windows.span])[window]
+        share = length_of_samples / np.bincount(windows.span_window, splines.width[windows.span])[window]
         penalty = PENALTY * share * problem.sampled[windows.span[span]]
         places = samples.target, near, smooth, axis, short, limit, rough, normal, penalty
-        return cls(problem, windows, *places, window, span_window)
+        return cls(problem, windows, *places, window)
 
     def deviation(self, moved: Floats, part: int) -> Floats:
         """(m, 3) of tip or axis point from control points (c, 6)."""
@@ -254,16 +252,13 @@ class _Places:
         return Task(
             near=self.near,
             smooth=self.smooth,
+            windows=self.windows,
+            sample_window=self.sample_window,
+            penalty=self.penalty,
             weight=weight,
             axis=axis,
             stretch=stretch,
             radius=radius,
-            penalty=self.penalty,
-            free=self.windows.free,
-            sample_window=self.sample_window,
-            span_window=self.span_window,
-            control_window=self.windows.window,
-            windows=len(self.windows.count),
             normal=normal,
         )
 
@@ -295,7 +290,7 @@ def even_weights(splines: Splines, windows: Windows, control: Floats) -> Floats:
     """
     curve = np.hstack((TIP_COUNTS * control[:, :3], control[:, 3:] - control[:, :3]))
     mean = _third_squares(splines, windows, curve)
-    window = np.repeat(np.arange(len(windows.count)), windows.count)
+    window = windows.span_window
     largest = np.zeros(len(windows.count))
     np.maximum.at(largest, window, mean)
     relative = mean / np.where(largest > 0.0, largest, 1.0)[window]
@@ -308,7 +303,7 @@ def _third_squares(splines: Splines, windows: Windows, curve: Floats) -> Floats:
     third = np.zeros((len(windows.span), curve.shape[1]))
     for k in range(TAPS):
         third += splines.third[windows.span, k, None] * curve[windows.local + k]
-    window, width = np.repeat(np.arange(len(windows.count)), windows.count), splines.width[windows.span]
+    window, width = windows.span_window, splines.width[windows.span]
     own = width * _squares(third)
     total, length = own.copy(), width.copy()
     for shift in range(1, NEIGHBOURS + 1):

@@ -15,6 +15,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.smoothing.runs.banded import Gather, couplings, keep_in_planes, solve_blocks
+from cornersmooth.smoothing.runs.windows import Windows
 
 #: steps at most, and the share of the way to the bounds that each may go
 STEPS, BACK_OFF = 40, 0.95
@@ -38,16 +39,13 @@ class Task:
 
     near: Gather  # samples at the control points
     smooth: Gather  # spans at the control points
+    windows: Windows
+    sample_window: Ints  # window of each sample
+    penalty: Floats  # p over the first part of the objective at the beginning, (m,)
     weight: Floats  # of the squared third derivatives, times the widths, (spans,)
     axis: Floats  # O at the samples, (m, 3)
     stretch: Floats  # k > -1, (m,)
     radius: Floats  # r, (m,)
-    penalty: Floats  # p over the first part of the objective at the beginning, (m,)
-    free: Bools  # (c,)
-    sample_window: Ints
-    span_window: Ints
-    control_window: Ints
-    windows: int
     normal: Floats | None = None  # control points do not move along it, (c, 3); 0 where they move as they like
 
     @cached_property
@@ -58,17 +56,17 @@ class Task:
     @cached_property
     def coupled(self) -> Floats:
         """(c, 4) which control points are free together with their neighbours."""
-        return couplings(self.free)
+        return couplings(self.windows.free)
 
     @cached_property
     def sample_first(self) -> Ints:
         """(windows,) where the samples of each window begin; every window has some."""
-        return np.searchsorted(self.sample_window, np.arange(self.windows))
+        return np.searchsorted(self.sample_window, np.arange(len(self.windows.count)))
 
     @cached_property
     def span_first(self) -> Ints:
         """(windows,) where the spans of each window begin."""
-        return np.searchsorted(self.span_window, np.arange(self.windows))
+        return np.searchsorted(self.windows.span_window, np.arange(len(self.windows.count)))
 
     def pull(self, off: Floats) -> Floats:
         """M·x of deviations (3, m)."""
@@ -103,9 +101,9 @@ def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float
         The same at the beginning, as far as it is known: `COLD` or `WARM`.
     """
     off, jerk = np.ascontiguousarray(off.T), np.ascontiguousarray(jerk.T)
-    change = np.zeros((3, len(task.free)))
+    change = np.zeros((3, len(task.windows.free)))
     first = task.roughness(task.weight, jerk)
-    weight = task.weight / np.where(first > 0.0, first, 1.0)[task.span_window]
+    weight = task.weight / np.where(first > 0.0, first, 1.0)[task.windows.span_window]
     stiff = task.smooth.bands(weight)
     many = task.total(np.ones(len(task.radius)))
     pull = task.pull(off)
@@ -115,7 +113,7 @@ def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float
     penalty = np.where(first > 0.0, 1.0, 0.0)[task.sample_window] * task.penalty
     cost = task.cost(weight, jerk, penalty, off)
     force = np.maximum(begin * cost / many, 1e-12)[task.sample_window] / room  # the multipliers
-    ahead: Floats = np.ones(task.windows)  # part of the slope at the beginning that no multipliers hold yet
+    ahead: Floats = np.ones(len(task.windows.count))  # part of the slope at the beginning that no multipliers hold yet
     for _ in range(STEPS):
         gap = task.total(room * force)
         bent = force / room
@@ -137,11 +135,11 @@ def smoothest(task: Task, off: Floats, jerk: Floats, enough: float, begin: float
         done = (gap <= enough * cost) & (ahead <= SETTLED) & ~outside
         reach[done] = 0.0
         ahead = ahead * (1.0 - reach)
-        change += reach[task.control_window] * step
+        change += reach[task.windows.window] * step
         by_sample = reach[task.sample_window]
         off += by_sample * step_off
         pull += by_sample * step_pull
-        jerk += reach[task.span_window] * step_jerk
+        jerk += reach[task.windows.span_window] * step_jerk
         force = force + by_sample * step_force
         slack = slack - by_sample * (along + 0.5 * by_sample * square)
         room = np.where(inside, slack, np.maximum(room + by_sample * step_room, slack))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +26,11 @@ class Windows:
     local: Ints  # index into `control` of the first control point of each span
     window: Ints  # window of each control point
     free: Bools  # false for the outer control points, which stay
+
+    @cached_property
+    def span_window(self) -> Ints:
+        """(spans,) window of each span."""
+        return spread(self.count)[0]
 
     @classmethod
     def of(cls, splines: Splines, begin: Ints, count: Ints) -> Windows:
