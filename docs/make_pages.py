@@ -19,6 +19,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "build" / "pages"
 
+#: ms until a page is drawn, also by a busy machine without a graphics card
+PATIENCE = 15_000
+
 #: ``cornersmooth`` of the interpreter that runs this
 COMMAND = (sys.executable, "-m", "cornersmooth")
 
@@ -86,15 +89,17 @@ def picture(folder: Path, target: Path) -> None:
     page, program = folder / "part.html", shutil.which("chromium") or "chromium-browser"
     made = ("-e", "0.01", "--limits", "table-ac", "-o", str(folder / "part.nc"), "--report", str(page), "--force", "-q")
     subprocess.run([*COMMAND, "smooth", str(ROOT / "samples" / "impeller.cls"), *made], check=True)
-    drawing = (
-        "--headless",
-        "--no-sandbox",
-        "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader",
-        "--hide-scrollbars",
-    )
-    size = ("--virtual-time-budget=20000", "--window-size=1100,700", f"--screenshot={target}")
-    subprocess.run([program, *drawing, *size, page.as_uri()], check=True, capture_output=True)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driving:
+        browser = driving.chromium.launch(
+            executable_path=program, args=["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+        )
+        shown = browser.new_page(viewport={"width": 1100, "height": 700})
+        shown.goto(page.as_uri())
+        shown.wait_for_timeout(PATIENCE)
+        shown.screenshot(path=str(target))
+        browser.close()
 
 
 def main(folder: Path) -> int:
