@@ -73,12 +73,8 @@ def command(source: str, text: str, **given: Any) -> int:
     data, name = read_input(source, size_limit=not given["no_size_limit"])
     program = read(data, name=name, **reading.reading_of(given))
     tool = _tool(program, given["tool"])
-    nc = read_nc(
-        read_input(text)[0] if text == STANDARD else text,
-        tolerance=given["tolerance"],
-        axis_length=given["axis_length"],
-        **how,
-    )
+    written = read_input(text)[0] if text == STANDARD else text
+    nc = read_nc(written, tolerance=given["tolerance"], axis_length=given["axis_length"], **how)
     found = measure_surface(
         program,
         nc,
@@ -90,7 +86,7 @@ def command(source: str, text: str, **given: Any) -> int:
     )
     for path in given["reports"]:
         with open_output(target_of(path)) as output:
-            for part in _report(path, program, data, text, nc, found, given):
+            for part in _report(path, program, data, written, nc, found, given):
                 output.stream.write(part)
     if given["as_json"]:
         say_json(found.as_dict())
@@ -119,7 +115,7 @@ def _tool(program: Program, asked: Tool | None) -> Tool:
 
 
 def _report(
-    path: str, program: Program, source: bytes, text: str, nc: Any, found: SurfaceMap, given: dict[str, Any]
+    path: str, program: Program, source: bytes, written: bytes | str, nc: Any, found: SurfaceMap, given: dict[str, Any]
 ) -> Any:
     """Parts of a report, as bytes."""
     from cornersmooth.report import report_json
@@ -135,8 +131,9 @@ def _report(
         from cornersmooth.page import verified_page
         from cornersmooth.verify import verify
 
-        checked = verify(program, nc, tolerance=given["tolerance"], axis_length=given["axis_length"])
-        name, control = "" if text == STANDARD else text, nc_text.control_of(given).name
+        how = {"tolerance": given["tolerance"], "axis_length": given["axis_length"], **nc_text.reading_back_of(given)}
+        checked = verify(program, written, **how)
+        name, control = written if isinstance(written, str) else "", nc_text.control_of(given).name
         page = verified_page(program, nc, checked, name=name, control=control, source=source, surface=found)
         yield page.encode("utf-8")
     else:

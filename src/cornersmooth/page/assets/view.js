@@ -1,6 +1,5 @@
 // The view in three dimensions: its objects, and what of them is drawn.
 
-const MOST_WHISKERS = 1500;
 /** Everything, and coarser ones for pictures that move. */
 const DETAILS = /** @type {Detail[]} */ ([
   { chords: Infinity, ribs: 20000, wide: true },
@@ -30,9 +29,7 @@ class View {
     const sun = new THREE.DirectionalLight(0xffffff, 2.2);
     sun.position.set(0.4, -0.7, 1);
     this.eye.camera.add(sun);
-    this.wanted = { tool: true, original: true, written: true };
-    /** @type {"surface" | "whiskers" | "none"} */
-    this.axes = "surface";
+    this.wanted = { tool: true, original: true, written: true, axes: true };
     /** @type {Float32Array} */
     this.colours = new Float32Array(arrays.w_tip.length);
     this.gray = new THREE.Color();
@@ -40,14 +37,11 @@ class View {
     this.paths = DETAILS.map(() => null);
     this.near = new Near(arrays);
     this.rapids = this.buildRapids();
-    this.whiskerPoints = every(arrays.w_rapid, Math.max(1, Math.ceil(arrays.w_rapid.length / MOST_WHISKERS)));
-    const axes = axisGeometry(arrays, this.whiskerPoints, this.height);
-    this.whiskers = new THREE.LineSegments(axes, new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.75 }));
     this.ring = this.buildMark("ring", 30, 5);
     this.spot = this.buildMark("disk", 11, 6);
     this.surface = meta.surface ? buildMetal(arrays, this.radius / 8) : null;
     this.tool = new ToolBody(meta.tools, this.height);
-    this.scene.add(this.near.group, this.rapids, this.whiskers, this.buildMarkers(), this.ring, this.tool.group, this.spot);
+    this.scene.add(this.near.group, this.rapids, this.buildMarkers(), this.ring, this.tool.group, this.spot);
     if (this.surface) this.scene.add(this.surface);
     this.pace = new Pace(DETAILS.length - 1, (level, still) => this.draw(level, still), () => this.finish());
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -107,13 +101,6 @@ class View {
     this.colours = colours;
     for (const paths of this.paths) paths?.setColours(colours);
     if (this.near.written) colourSegments(this.near.written, this.near.segments, colours);
-    colourAxes(this.whiskers, this.whiskerPoints, colours);
-    this.touch();
-  }
-
-  /** @param {"surface" | "whiskers" | "none"} axes */
-  setAxes(axes) {
-    this.axes = axes;
     this.touch();
   }
 
@@ -220,9 +207,8 @@ class View {
     if (this.near.original) this.near.original.visible = wanted.original;
     if (this.near.written) this.near.written.visible = wanted.written;
     // close by, the tool and the surface of its axis would stand before the eye
-    shown.ribs.visible = wanted.written && this.axes === "surface" && distance > 0.8 * this.height;
+    shown.ribs.visible = wanted.written && wanted.axes && distance > 0.8 * this.height;
     this.tool.group.visible = wanted.tool && distance > 1.2 * this.height;
-    this.whiskers.visible = this.axes === "whiskers" && wanted.written;
     eye.adjust();
     this.renderer.render(this.scene, eye.camera);
     if (still && this.pace.whole > PATIENT) this.fineness = 1;
@@ -235,13 +221,6 @@ class View {
     setSizes([this.near.original, this.near.written], width, height);
     if (this.near.original) this.near.original.material.color = this.gray;
   }
-}
-
-/** Points of feed moves, one in so many. @param {Values} rapid @param {number} step */
-function every(rapid, step) {
-  const points = /** @type {number[]} */ ([]);
-  for (let i = 0; i < rapid.length; i += step) if (!rapid[i]) points.push(i);
-  return points;
 }
 
 /** Whether pictures are made without a graphics card. */

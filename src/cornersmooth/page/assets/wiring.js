@@ -5,7 +5,6 @@ const PAPER = 640;
 
 /** @param {View} view @param {() => void} recolour */
 function wireSwitches(view, recolour) {
-  element("axes").addEventListener("change", (/** @type {any} */ event) => view.setAxes(event.target.value));
   element("fit").addEventListener("click", () => view.fit());
   /** @param {string} id @param {(on: boolean) => void} apply */
   const wire = (id, apply) => {
@@ -18,12 +17,12 @@ function wireSwitches(view, recolour) {
   wire("show-original", (on) => (view.wanted.original = on));
   wire("show-written", (on) => (view.wanted.written = on));
   wire("show-rapids", (on) => (view.rapids.visible = on));
+  wire("show-axes", (on) => (view.wanted.axes = on));
   wire("show-tool", (on) => (view.wanted.tool = on));
   if (view.surface) {
     const { surface } = view;
     element("surface-label").hidden = false;
-    element("axes").value = "none";
-    view.setAxes("none");
+    view.wanted.axes = element("show-axes").checked = false;
     wire("show-surface", (on) => {
       surface.visible = on;
       recolour();
