@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from importlib import import_module
 from pathlib import Path
 
@@ -47,6 +48,13 @@ def test_helps_are_written_by_the_rules(name: str) -> None:
         text for one in helps for text in one.replace("\b\n", "\n").split("\n\n") if "  cornersmooth " not in text
     ]
     assert [fault for text in spoken for one in sentences(plain(" ".join(text.split()))) for fault in faults(one)] == []
+
+
+def test_explanations_are_written_by_the_rules() -> None:
+    causes = tomllib.loads((ROOT / "src" / "cornersmooth" / "cli" / "causes.toml").read_text(encoding="utf-8"))
+    told = [one for entry in causes.values() for text in entry.values() for one in sentences(plain(text))]
+    assert len(told) > 20
+    assert [fault for one in told for fault in faults(one)] == []
 
 
 def test_the_measure_sees_what_the_rules_forbid() -> None:
