@@ -205,7 +205,6 @@ class Shelf:
         ----------
         kind : type
             A dataclass; fields without a default must be in the table.
-        table : dict
         where : str
             Name of the table, for messages.
         given : mapping, optional

@@ -73,7 +73,6 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
 
     Parameters
     ----------
-    record : Record
     values : list of float
         Its numbers, in order.
     file : str
@@ -170,7 +169,6 @@ def resolve(table: ArcTable, tip: Floats, kind: NDArray[np.uint8], file: str, ru
 
     Parameters
     ----------
-    table : ArcTable
     tip : (n, 3) float64
         Tips as written, in the unit of the arcs.
     kind : (n,) uint8

@@ -23,7 +23,6 @@ class Dialect:
 
     Parameters
     ----------
-    name : str
     fingerprint : bytes
         Regular expression, searched in the head of a file, line by line.
     short_axis : {"hold", "up"}

@@ -17,7 +17,6 @@ def with_tool(program: Program, number: int | None, spindle: tuple[float, str] |
 
     Parameters
     ----------
-    program : Program
     number : int or None
         Of the tool; None where the program keeps its own.
     spindle : (float, str) or None

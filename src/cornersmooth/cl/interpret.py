@@ -48,8 +48,6 @@ def plain(state: ReaderState, count: int, line: int) -> None:
 
     Parameters
     ----------
-    state : ReaderState
-    count : int
     line : int
         Line of the first, for messages.
     """

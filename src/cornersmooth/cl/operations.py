@@ -110,7 +110,6 @@ def one_operation(program: Program, which: str) -> Program:
 
     Parameters
     ----------
-    program : Program
     which : str
         Name of the operation, in any case, or its number.
 

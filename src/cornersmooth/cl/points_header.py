@@ -55,7 +55,6 @@ class Columns:
     second : (int, int, int) or None
         Axis vector or second point, see `meaning`.
     meaning : {"none", "vectors", "points", "values"}
-    feed : int or None
     rapid : int or None
         Says which moves are rapid, as `rapid_as` has it.
     rapid_as : {"flag", "code", "word"}

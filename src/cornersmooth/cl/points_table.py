@@ -58,8 +58,6 @@ class PointText:
         The rows; starts where line `first_line` of the file starts.
     first_line : int
         From 1.
-    header : str or None
-    header_line : int
     width, row_line : int
         Cells of the first row and its line, 0 where there is no row.
     header_certain : bool
@@ -108,7 +106,6 @@ def numbers(text: PointText, columns: Columns, file: str) -> tuple[Floats, Ints]
 
     Parameters
     ----------
-    text : PointText
     columns : Columns
         Says which columns must hold a number, and which may (the feed); whatever stands in the others becomes NaN
         where it is no number.

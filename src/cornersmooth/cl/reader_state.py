@@ -27,7 +27,6 @@ class ReaderState:
     ----------
     file : str
         For messages.
-    dialect : Dialect
     builder : Builder
         Takes the poses.
     arc_rule : {"left", "right", "tangent"} or None

@@ -40,7 +40,6 @@ def read_drive_arc(record: Record, start: Vector, direction: Direction, file: st
 
     Parameters
     ----------
-    record : Record
     start : (x, y, z)
         Where the tool stands; the unit of the file.
     direction : (word, vector) or None

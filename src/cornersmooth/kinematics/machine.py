@@ -116,7 +116,6 @@ class Machine:
 
     Parameters
     ----------
-    name : str
     axes : tuple of RotaryAxis
         In the order in which they are met on the way from the part to the tool: for two tables the one that carries
         the part first, for two heads the one that carries the tool last. Those that a machine has not are made up to

@@ -63,7 +63,6 @@ class Posed:
 
     Parameters
     ----------
-    machine : Machine
     angles : (2,) float64, degrees
         In the order of the machine's axes; zero for those that it has not.
     tip : (3,) float64, mm

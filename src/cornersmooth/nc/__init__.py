@@ -246,12 +246,7 @@ def _one_ahead(chunks: Iterator[tuple[Rows, Ints]]) -> Iterator[tuple[Rows, Ints
 
 
 class _BackgroundWriter:
-    """A stream that is written to while the next text is made; an error shows with one of the next writes.
-
-    Parameters
-    ----------
-    stream : Stream
-    """
+    """A stream that is written to while the next text is made; an error shows with one of the next writes."""
 
     #: bytes gathered before they are handed on
     _CHUNK = 1 << 18

@@ -14,10 +14,8 @@ def lifted(form: Form, units: Units, mm_per_unit: float, ticks: Ints, distance: 
 
     Parameters
     ----------
-    form : Form
     units : Units
         Of the text.
-    mm_per_unit : float
     ticks : (c,) int64
         A row, in steps of its last digits.
     distance : float, mm

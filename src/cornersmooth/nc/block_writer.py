@@ -41,11 +41,8 @@ class BlockWriter:
 
     Parameters
     ----------
-    form : Form
-    program : Program
     statements : StatementWriter
         Knows the plane, which statements change too, and the words of the control.
-    findings : Findings
     circles : Circles
         How arcs are written.
     stretch : float

@@ -46,7 +46,6 @@ class Words:
         With ``{tool}``; the latter only brings the tool near. The former may have ``{speed}``, the first of the tool.
     spindle_speed : tuple of str
         With ``{speed}`` and ``{direction}``, one of the next two.
-    clockwise, counterclockwise : str
     speed_without_tip_control : bool
         Whether tool tip control must be off where a speed is given.
     coolant : mapping
@@ -201,7 +200,6 @@ class Mode:
         Blocks that stand within these: the latter before the retract.
     begin : tuple of str or None
         In place of `ProgramTable.begin`.
-    motion : Motion
     circles : bool
         Whether arcs may be written as circular blocks, without the words of the orientation.
     timed_turns : bool
@@ -331,7 +329,6 @@ class Extra:
 
     Parameters
     ----------
-    name, description : str
     on, off : tuple of str
         Blocks around the motion, with ``{blend}``, a tenth of ε, and ``{turn}``, the degrees that are worth as much at
         the axis point.

@@ -31,8 +31,6 @@ def upright_poses(program: Program, form: Form, *, drills: bool) -> Bools:
 
     Parameters
     ----------
-    program : Program
-    form : Form
     drills : bool
         Whether holes are to be written as cycles; taps are in any case.
     """
@@ -60,8 +58,6 @@ def has_cycles(program: Program, form: Form, part: slice, *, drills: bool) -> bo
 
     Parameters
     ----------
-    program : Program
-    form : Form
     part : slice
     drills : bool
         As in `upright_poses`.

@@ -40,7 +40,6 @@ class FirstBlock:
 
     Parameters
     ----------
-    form : Form
     machine : Machine or None
         With the length of the tool.
     plane : Plane or None

@@ -23,12 +23,8 @@ class Form:
 
     Parameters
     ----------
-    table : Control
     name : str
         As on the command line.
-    curve : CurveStyle
-    orientation : Orientation
-    mode : Mode
     machine : Machine or None
         For rotary words.
     extras : tuple of Extra

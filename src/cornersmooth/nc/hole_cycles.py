@@ -70,14 +70,12 @@ class Cycle:
         Above the position: least height when the hole is done.
     feed : float
         mm/min or mm/rev; NaN for the feed in force.
-    feed_mode : FeedMode
     dwell : int
         Milliseconds at the depth.
     steps : tuple of float
         Depths of the pecks, the last one repeated; none for a single feed.
     full_retract : bool
         Whether a peck comes out of the hole.
-    feed_out : bool
     pecking : bool
         Whether `steps` are to be taken; without any the hole is drilled in one feed.
     tap : bool
@@ -108,7 +106,6 @@ def in_force(
         Those that held before it.
     said : tuple
         Its own.
-    program : Program
     """
     own = _without_on(said)
     if own == ["INIT"]:  # SolidWorks announces a cycle by it
@@ -240,8 +237,6 @@ class HoleCycles:
 
     Parameters
     ----------
-    program : Program
-    findings : Findings
     skip : bool
         Whether cycles that cannot be written are left out with a warning; an error otherwise.
     """
@@ -284,7 +279,6 @@ class HoleCycles:
             Why there is no motion for them.
         line : int
             Of the first one.
-        holes : int
 
         Raises
         ------

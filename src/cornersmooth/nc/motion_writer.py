@@ -39,15 +39,10 @@ class MotionWriter:
 
     Parameters
     ----------
-    program : Program
     tilting : BlockWriter
         For tools under tool tip control.
     upright : (n,) bool
         `cycle_blocks.upright_poses`.
-    planes : Planes
-    statements : StatementWriter
-    operation : Operation
-    findings : Findings
     approach, retract : float, mm
         Along the tool, after a retract and before one.
     native : bool

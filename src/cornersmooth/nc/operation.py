@@ -32,12 +32,10 @@ class Operation:
 
     Parameters
     ----------
-    form : Form
     values : mapping
         What stands for braces in blocks.
     texts : mapping
         Blocks of the steps that a user gives: ``work_offset``, ``header``, ``footer``.
-    findings : Findings
     """
 
     form: Form

@@ -30,8 +30,6 @@ def check_travel_in_planes(planes: Planes, program: Program, form: Form, finding
 
     Parameters
     ----------
-    planes : Planes
-    program : Program
     form : Form
         Without a machine with travel nothing is known.
     findings : Findings

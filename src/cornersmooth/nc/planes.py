@@ -86,8 +86,6 @@ def plan_planes(
 
     Parameters
     ----------
-    program : Program
-    settings : Settings
     form : Form
         Where it has no `Form.plane` there are none.
     upright : (n,) bool

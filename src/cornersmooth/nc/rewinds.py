@@ -34,7 +34,6 @@ def swinging(machine: Machine, before: Floats, after: Floats) -> Bools:
 
     Parameters
     ----------
-    machine : Machine
     before, after : (m, 2) float64, degrees
         Rotary words, in the order of the machine's axes, which run evenly from the ones to the others.
 
@@ -70,7 +69,6 @@ def retracts_before(form: Form, angles: Floats, rapid: Bools, line: Ints, findin
     rapid : (r,) bool
     line : (r,) int64
         Of the CL file.
-    findings : Findings
     possible : bool
         Whether the control has a retract.
     """
@@ -98,7 +96,6 @@ def from_zero(form: Form, program: Program, axis: Floats, angles: Floats, move: 
     ----------
     form : Form
         With rotary words.
-    program : Program
     axis : (r, 3) float64
         Tool axis of each row.
     angles : (r, 2) float64, degrees

@@ -33,7 +33,6 @@ def rewound_curve_rows(smoothed: SmoothProgram, form: Form, findings: Findings) 
 
     Parameters
     ----------
-    smoothed : SmoothProgram
     form : Form
         Of curves in rotary words, with a rewind.
     findings : Findings

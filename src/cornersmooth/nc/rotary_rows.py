@@ -59,8 +59,6 @@ def rotary_rows(
     ----------
     rows : iterator of Rows
         From `dense_rows`, with tool vectors.
-    smoothed : SmoothProgram
-    form : Form
     findings : Findings
         Takes what the kinematics notice.
     long : bool

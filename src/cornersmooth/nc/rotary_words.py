@@ -54,7 +54,6 @@ def rotary_way(rows: Iterator[Rows], smoothed: SmoothProgram, form: Form, findin
     Parameters
     ----------
     rows : iterator of Rows
-    smoothed : SmoothProgram
     form : Form
         With rotary words.
     findings : Findings

@@ -22,13 +22,7 @@ _SWING = 2.0
 
 
 def within_reach(smoothed: SmoothProgram, form: Form) -> SmoothProgram:
-    """Round runs at the limits of the rotary axes corner by corner, if the machine cannot follow their curves.
-
-    Parameters
-    ----------
-    smoothed : SmoothProgram
-    form : Form
-    """
+    """Round runs at the limits of the rotary axes corner by corner, if the machine cannot follow their curves."""
     if smoothed.runs is None or form.machine is None or not form.rotary or form.rewind:
         return smoothed
     near = _near_limits(smoothed, form)

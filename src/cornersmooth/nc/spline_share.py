@@ -22,7 +22,6 @@ class SplineShare:
     ----------
     line : (n,) int64
         Lines of the CL file, for messages.
-    findings : Findings
     """
 
     line: Ints

@@ -53,8 +53,6 @@ class StatementWriter:
 
     Parameters
     ----------
-    form : Form
-    program : Program
     findings : Findings
         Takes what is noticed.
     operation : Operation

@@ -90,13 +90,7 @@ def _feeds(program: Program, findings: Findings) -> None:
 
 @dataclass
 class MotionWarnings:
-    """Says each of them once, or once for each tool.
-
-    Parameters
-    ----------
-    program : Program
-    findings : Findings
-    """
+    """Says each of them once, or once for each tool."""
 
     program: Program
     findings: Findings
