@@ -499,6 +499,12 @@ def test_the_first_problem_is_open_and_looked_at(look, wrong):
     assert [node.get_attribute("aria-pressed") for node in buttons.all()] == ["true"] + ["false"] * (len(problems) - 1)
     first, corners = page.locator("#problems").bounding_box(), page.locator("#corners").bounding_box()
     assert 0 <= first["y"] < corners["y"]
+    assert (
+        page.evaluate(
+            "() => { const box = document.getElementById('problems'); return box.scrollHeight - box.clientHeight; }"
+        )
+        <= 0
+    )
     # the view is there, so is the tool; both paths are drawn enlarged, what is off in its own colour
     target = np.array(page.evaluate("() => cornersmooth.view.eye.controls.target.toArray()"))
     centre = np.array(page.evaluate("() => cornersmooth.meta.centre"))
