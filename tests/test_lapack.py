@@ -17,6 +17,9 @@ def test_solves_as_scipy_does() -> None:
     _, solution, info = lapack.dpbsv(np.array(bands, order="F"), right, overwrite_ab=1)
     assert info == 0
     np.testing.assert_array_equal(solution, scipy.linalg.solveh_banded(bands, right))
+    factors, info = lapack.dpbtrf(np.array(bands, order="F"))
+    assert info == 0
+    np.testing.assert_array_equal(lapack.dpbtrs(factors, right)[0], solution)
 
 
 def test_says_where_a_pivot_is_not_positive() -> None:
@@ -25,4 +28,5 @@ def test_says_where_a_pivot_is_not_positive() -> None:
 
 def test_another_place_of_the_compiled_module_is_no_harm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(PathFinder, "find_spec", lambda *_: None)
-    assert lapack._solver() is scipy.linalg.lapack.dpbsv
+    own = scipy.linalg.lapack
+    assert lapack._solvers() == [own.dpbsv, own.dpbtrf, own.dpbtrs]
