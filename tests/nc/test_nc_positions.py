@@ -174,4 +174,4 @@ def test_a_control_without_such_words_is_told_nothing() -> None:
 def test_positions_that_no_axis_goes_to(home, more, says: str) -> None:
     with pytest.raises(SettingsError) as error:
         machine_of(home, {}, **more)
-    assert says in str(error.value)
+    assert says in f"{error.value.what}; {error.value.hint}"
