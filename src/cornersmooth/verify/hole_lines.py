@@ -220,12 +220,13 @@ class HoleLines:
     def wrong_feed(self, element: int, cycle: Drilling) -> bool:
         """Whether the feed of an element is not that of a cycle."""
         nc, own = self.ahead.nc, element - self.ahead.base
+        least = nc.feed_is[own] == FeedIs.LEAST  # of a plan, which may lower it
+        off = nc.feed[own] - cycle.feed
         return bool(
             not np.isnan(cycle.feed)
             and (
                 np.isnan(nc.feed[own])
-                or abs(nc.feed[own] - cycle.feed) > 2 * nc.feed_room[own]
-                or (nc.feed_is[own] == FeedIs.LEAST and nc.feed[own] > cycle.feed + ARITHMETIC)
+                or (off > ARITHMETIC if least else abs(off) > 2 * nc.feed_room[own])
                 or nc.per_revolution[own] != cycle.per_revolution
             )
         )
