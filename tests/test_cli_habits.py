@@ -108,7 +108,8 @@ def test_no_trailing_blanks_and_no_colours_in_pipes(words: tuple[object, ...]) -
 
 
 def warnings(*words: object) -> list[str]:
-    return [line for line in one_line(run("smooth", *words).stderr).splitlines() if ": warning: " in line]
+    lines = one_line(run("smooth", *words).stderr).splitlines()
+    return [line for line in lines if ": warning: " in line or line.startswith("CHECK  ")]
 
 
 def test_what_is_strange_is_warned_of(tmp_path: Path) -> None:

@@ -234,7 +234,7 @@ def told(tmp_path: Path, data: bytes, *options: str) -> tuple[list[str], dict[st
     report = tmp_path / "r.json"
     result = run("smooth", "-", "-o", tmp_path / "o.nc", "--report", report, "--force", *options, data=data)
     assert result.returncode == 0, result.stderr.decode()
-    lines = [line for line in result.stderr.decode().splitlines() if line.startswith("method")]
+    lines = [line for line in result.stderr.decode().splitlines() if line.startswith("        method")]
     return lines, json.loads(report.read_text())["summary"]
 
 
@@ -247,12 +247,12 @@ def test_the_method_and_what_it_could_not_do_are_said_in_one_line(tmp_path: Path
     data = f"UNITS/MM\nLOADTL/1\nSPINDL/900,CLW\nFEDRAT/300,MMPM\n{goto}FINI\n".encode()
     why = "corner rounded by itself: the tool axis turns by more than 30 deg in one move of its run (3 times)"
     lines, summary = told(tmp_path, data, "-f", "g6.2")
-    assert lines == [f"method        global; {why}"]
+    assert lines == [f"        method global; {why}"]
     assert summary["instead"] == [{"count": 3, "text": why.removesuffix(" (3 times)")}]
     lines, summary = told(tmp_path, data, "--method", "global")
-    assert lines == ["method        global, 1 run with 3 corners"]
+    assert lines == ["        method global, 1 run with 3 corners"]
     assert (summary["method"], summary["runs"], summary["corners_in_runs"], summary["instead"]) == ("global", 1, 3, [])
-    assert told(tmp_path, data)[0] == ["method        proportional"]
+    assert told(tmp_path, data)[0] == ["        method proportional"]
 
 
 @pytest.mark.parametrize(("options", "said"), [((), False), (("--lines", "dense"), False), (("--lines", "long"), True)])

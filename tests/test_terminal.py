@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -79,7 +80,7 @@ def test_a_message_has_its_place_code_and_hint(tmp_path: Path) -> None:
         "hint: give decimal numbers separated by commas\n"
     )
     part.write_bytes(SMALL.replace(b"LOADTL/1\n", b""))
-    said = run("smooth", part, "-o", program).stderr.decode()
+    said = run("smooth", part, "-d", tmp_path).stderr.decode()
     assert f"\n{part}:5: warning[CS334]: the CL file loads no tool before it moves: " in said
     assert "\nhint: see that it is the right one, or load it with LOADTL\n" in said
     program.write_bytes(program.read_bytes().replace(b"S12000", b"S11000"))
@@ -92,3 +93,21 @@ def test_a_hint_is_no_part_of_what_a_stranger_wrote() -> None:
         r"x\n:1: error[CS100]: no 'a\nhint: b'" "\nhint: c"
     )
     assert message("warning", "a; b; c", count=3, beside="NC line 4") == "warning: a (NC line 4) (3 times)\nhint: b; c"
+
+
+def test_the_verdict_names_program_control_blocks_error_corners_and_what_to_check(small: Path, tmp_path: Path) -> None:
+    """Sizes by thinking: 4 poses, 2 corners; a path of lines at right angles keeps ε with curves of both sides."""
+    small.write_bytes(SMALL.replace(b"LOADTL/1\n", b""))
+    done = run("smooth", small.name, "-o", "o.nc", "--limits", "table-ac", cwd=tmp_path)
+    blocks = (tmp_path / "o.nc").read_bytes().count(b"\n")
+    lines = done.stderr.decode().splitlines()
+    found = re.fullmatch(r"PASSED, 1 to check  o\.nc  fanuc g1, (\d+) blocks from 4 poses", lines[0])
+    assert found
+    assert int(found[1]) == blocks
+    assert lines[1] == "        within 0.01 mm everywhere"
+    assert re.fullmatch(r" {8}measured: tip 0\.00\d\d mm, axis point 0\.0\d{3} mm \(H 10 mm\) in the program", lines[2])
+    assert lines[3] == "        2 of 2 corners rounded, no corner stays sharp"
+    assert re.fullmatch(r" {8}time on table-ac \d+\.\d s instead of \d+\.\d s( \([+-]\d+ %\))?", lines[5])
+    check = next(k for k, line in enumerate(lines) if line.startswith("CHECK   line 5: the CL file loads no tool"))
+    assert lines[check].endswith(" [CS334]")
+    assert lines[check + 1] == "        hint: see that it is the right one, or load it with LOADTL"

@@ -241,7 +241,8 @@ def test_commands_know_programs(tmp_path: Path) -> None:
     on = ("--control", control, "--machine", machine)
     made = run("filter", "part.ngc", *on, "-o", "new.ngc", cwd=tmp_path)
     assert made.returncode == DONE
-    assert made.stderr.decode().startswith("PASSED: 24 of 25 cuts smoothed in 2 runs within 0.01 mm")
+    assert made.stderr.decode().startswith("PASSED  new.ngc  linuxcnc g1, xyzac-trt, ")
+    assert "\n        24 of 25 cuts smoothed in 2 runs within 0.01 mm" in made.stderr.decode()
     assert re.search(r"1 +\d+  an arc\n", made.stderr.decode())
     assert run("filter", "-", *on, data=text.encode(), cwd=tmp_path).stdout == (tmp_path / "new.ngc").read_bytes()
     found = run("verify", "part.ngc", "new.ngc", *on, cwd=tmp_path)
@@ -306,4 +307,4 @@ def test_says_the_time_of_what_has_changed(tmp_path: Path) -> None:
     (tmp_path / "part.nc").write_text(text)
     on = ("--control", control, "--machine", machine, "--limits", machine, "-e", EPS)
     told = run("filter", "part.nc", *on, "-o", "new.nc", cwd=tmp_path).stderr.decode()
-    assert f"planned time {fast.seconds[0]:.1f} s, {fast.seconds[1]:.1f} s after (" in told
+    assert f"time of the runs {fast.seconds[1]:.1f} s instead of {fast.seconds[0]:.1f} s (" in told

@@ -105,9 +105,9 @@ def _lines(table: Table, commands: list[str], verbose: bool) -> Iterator[str]:
         yield f"from {100.0 * table.share:.2g} % of the poses: whole runs from the middle of the part"
     if verbose:
         yield f"law of lines: {table.law}"
-    yield f"unsmoothed: {table.unsmoothed:.1f} s" + (f", {table.against}" if table.against else "")
+    yield f"unsmoothed: {table.unsmoothed:.1f} s{', ' + table.against if table.against else ''}; saves in %"
     widths = [max(len(str(cell)) for cell in column) for column in zip(*map(_cells, table.rows), strict=True)]
-    head = ("form", "words", "method", "lines", "blocks", "kB", "s", "saves %", "tip mm", "axis point mm")
+    head = ("form", "words", "method", "lines", "blocks", "kB", "s", "saves", "tip mm", "axis mm")
     widths = [max(width, len(title)) for width, title in zip(widths, head, strict=True)]
     yield "  " + "  ".join(f"{title:<{width}}" for title, width in zip(head, widths, strict=True)).rstrip()
     best = table.best
@@ -121,13 +121,17 @@ def _lines(table: Table, commands: list[str], verbose: bool) -> Iterator[str]:
             yield f"  {told.removeprefix('; ')}"
 
 
+def _words(row: Row) -> str:
+    return row.words.removeprefix("rotary words of ")
+
+
 def _cells(row: Row) -> tuple[str, ...]:
     if row.seconds is None or row.saved is None or row.tip is None:
-        return (row.form, row.words, row.method, row.lines, *[""] * 6)
+        return (row.form, _words(row), row.method, row.lines, *[""] * 6)
     share = 100.0 * row.saved / (row.seconds + row.saved) if row.seconds + row.saved else 0.0
     return (
         row.form,
-        row.words,
+        _words(row),
         row.method,
         row.lines,
         f"{row.blocks:,}",

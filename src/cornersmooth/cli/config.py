@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from typing import Final
+
 import click
 
 from cornersmooth.cli import shop
 from cornersmooth.cli.options import outputs
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.show import say_json, say_line
+
+#: where a help says what holds without the option
+_DEFAULT: Final = re.compile(r"\[default: ([^]]+)\]")
 
 
 @click.command(
@@ -31,16 +37,18 @@ def command(source: str, as_json: bool) -> int:
     from cornersmooth.cli.smooth import command as smooth
 
     with smooth.make_context("smooth", [source]) as context:
-        rows = []
+        rows, told = [], []
         for option in shop.settable(smooth):
             value = context.params[str(option.name)]
             value = getattr(value, "name", value)  # a control or machine of one's own
             rows.append((shop.keys(option)[0], value, shop.origin(context, str(option.name))))
+            instead = _DEFAULT.search(option.help or "")
+            told.append(instead[1] if instead and value in (None, "", ()) else _told(value))
     if as_json:
         values = [dict(zip(("key", "value", "from"), row, strict=True)) for row in rows]
         say_json({"schema": "cornersmooth-config/1", "values": values})
         return 0
-    lines = [(key, _told(value), origin) for key, value, origin in rows]
+    lines = [(key, value, origin) for (key, _, origin), value in zip(rows, told, strict=True)]
     widths = [max(len(line[column]) for line in lines) for column in (0, 1)]
     for key, value, origin in lines:
         say_line(f"{key:<{widths[0]}}  {value:<{widths[1]}}  {origin}")
@@ -48,4 +56,8 @@ def command(source: str, as_json: bool) -> int:
 
 
 def _told(value: object) -> str:
-    return "" if value is None else ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+    if value is None or value == ():
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)

@@ -8,7 +8,7 @@ import click
 
 from cornersmooth.cli import completing
 from cornersmooth.cli.options import outputs
-from cornersmooth.cli.show import say_json
+from cornersmooth.cli.show import say_json, say_line
 
 if TYPE_CHECKING:
     from cornersmooth.nc import Control
@@ -57,14 +57,14 @@ def command(name: str | None, table: bool, as_json: bool) -> int:
         say_json({"schema": "cornersmooth-controls/1", "controls": controls})
         return 0
     for control in controls:
-        click.echo(_told("", control))
+        say_line(_told("", control))
         if control["aliases"]:
-            click.echo(f"  also called {', '.join(control['aliases'])}")
+            say_line(f"  also called {', '.join(control['aliases'])}")
         for form in control["forms"]:
-            click.echo(_told("  -f ", form))
-            click.echo(f"     with {', '.join(form['with'])}")
+            say_line(_told("  -f ", form))
+            say_line(f"     with {', '.join(form['with'])}")
         for extra in control["functions"]:
-            click.echo(_told("  --with ", extra))
+            say_line(_told("  --with ", extra))
     return 0
 
 

@@ -16,8 +16,18 @@ from cornersmooth.cli.inputs import Input, check_together, find_inputs, named_in
 from cornersmooth.cli.options import motion, nc_text, outputs, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand, command_line, loosened
-from cornersmooth.cli.show import console, more, print_line, print_message, say_json, say_line, warn
-from cornersmooth.errors import CornersmoothError, printable
+from cornersmooth.cli.show import (
+    INDENT,
+    more,
+    print_heading,
+    print_line,
+    print_message,
+    program_text,
+    say_json,
+    say_line,
+    warn,
+)
+from cornersmooth.errors import CornersmoothError
 from cornersmooth.output import FAILED, make_folder, open_output
 from cornersmooth.verdict import Verdict
 
@@ -202,7 +212,7 @@ def _filter(
     if given["as_json"]:
         say_json(contents)
     elif not given["quiet"]:
-        _show(name, line, found, given["verbose"], given["units"])
+        _show(name, contents, found, given["verbose"], given["units"])
     elif loosened(settings.tolerance):
         print_line(f"{name}: {line}")
     return int(bad)
@@ -269,29 +279,31 @@ def _show_wrong(name: str, wrong: Sequence[Problem]) -> None:
         print_line(f"{name}: {more(len(wrong) - _WRONG_SHOWN, 'problem')}")
 
 
-def _show(name: str, line: str, found: Filtered, verbose: int, given_units: str | None) -> None:
+def _show(name: str, contents: Mapping[str, Any], found: Filtered, verbose: int, given_units: str | None) -> None:
     """Print the verdict, what was measured, and what was left as it is."""
-    out = console()
-    out.print(printable(line), style="bold")
-    print_line(f"{name}: {found.lines} lines, {found.new_lines} after; all outside of runs is the same byte for byte")
+    verdict, _, what = contents["verdict_text"].partition(": ")
+    print_heading(
+        f"{verdict}  {program_text(contents['program'])}, {found.new_lines:,} lines from {found.lines:,} lines"
+    )
+    for part in (*what.split("; "), "all outside of runs is the same byte for byte"):
+        print_line(INDENT + part)
     if found.checked is not None:
         _show_wrong(name, found.checked.wrong)
     if found.seconds is not None:
         before, after = found.seconds
-        print_line(
-            f"{name}: planned time {before:.1f} s, {after:.1f} s after ({100.0 * (after / before - 1.0):+.1f} %)"
-        )
+        share = 100.0 * (after / before - 1.0)
+        print_line(f"{INDENT}time of the runs {after:.1f} s instead of {before:.1f} s ({share:+.1f} %)")
     if not found.units_said and given_units is None:
         warn("the program does not say its units: millimetres are taken; give --units", name)
     left = found.left if verbose else found.left[:_SHOWN]
     if left:
-        out.print(f"{'left as it is':>13}  first line  reason")
+        print_line(f"{'left as it is':>13}  first line  reason")
     for cuts in left:
-        out.print(f"{cuts.count:>13}  {cuts.line:>10}  {printable(cuts.reason)}")
+        print_line(f"{cuts.count:>13}  {cuts.line:>10}  {cuts.reason}")
     if len(left) < len(found.left):
-        out.print(f"... {len(found.left) - len(left)} more reasons; -v shows them")
+        print_line(f"... {len(found.left) - len(left)} more reasons; -v shows them")
     if found.cuts and not found.smoothed and any("tool tip control is off" in one.reason for one in found.left):
-        out.print("--tip-control says that tool tip control is on where the program begins")
+        print_line("--tip-control says that tool tip control is on where the program begins")
 
 
 def judgement_of(found: Filtered, tolerance: float) -> Judgement:

@@ -67,7 +67,7 @@ def command(source: str, tolerance: float, axis_length: float, as_json: bool, **
     rows = [row for part in (_file(info), _motion(info), _axis(info), _corners(info)) for row in part]
     width = max(len(label) for label, _ in rows)
     for label, text in rows:
-        say_line(f"{label:<{width}}  {text}".rstrip())
+        say_line(f"{label:<{width}}  {text}".rstrip(), indent=width + 2)
     for finding in findings_table(info.findings):
         for line in told_finding(name, finding).split("\n"):
             say_line(line)
@@ -134,6 +134,7 @@ def _corners(info: Info) -> Rows:
     if corners.not_smoothed:
         yield "stay sharp", _counts(corners.not_smoothed)
     yield "deviation", _spread(corners.deviation_mm, "mm")
+    yield "", "values are least / 5 % / median / 95 % / most (how many)"
 
 
 def _counts(counts: dict[str, int]) -> str:
@@ -144,4 +145,4 @@ def _spread(spread: Spread, unit: str) -> str:
     if not spread.count:
         return "none"
     levels = f"{spread.min:.4g} / {spread.p5:.4g} / {spread.p50:.4g} / {spread.p95:.4g} / {spread.max:.4g}"
-    return f"{levels} {unit} (least, 5 %, half, 95 %, most; {spread.count})"
+    return f"{levels} {unit} ({spread.count})"

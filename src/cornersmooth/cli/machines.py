@@ -8,7 +8,7 @@ import click
 
 from cornersmooth.cli import completing
 from cornersmooth.cli.options import outputs
-from cornersmooth.cli.show import say_json
+from cornersmooth.cli.show import say_json, say_line
 
 
 @click.command(
@@ -61,8 +61,9 @@ def command(name: str | None, table: bool, as_json: bool, pose: str | None) -> i
         machines = [asdict(load_machine(one)) for one in ([name] if name else machine_names())]
         say_json({"schema": "cornersmooth-machines/1", "machines": machines})
     elif name:
-        click.echo(load_machine(name).describe())
+        for line in load_machine(name).describe().splitlines():
+            say_line(line, indent=4)
     else:
         for machine in map(load_machine, machine_names()):
-            click.echo(f"{machine.name}: {machine.description}")
+            say_line(f"{machine.name}: {machine.description}")
     return 0

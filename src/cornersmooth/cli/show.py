@@ -6,7 +6,7 @@ import re
 import sys
 import textwrap
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
@@ -32,12 +32,15 @@ _SHARP_SHOWN = 10
 #: room for the labels of the summary
 _LABEL = 14
 
+#: of the lines below a verdict
+INDENT = " " * 8
 
-def console() -> Console:
-    """Console on standard error; rich itself honours NO_COLOR and a missing terminal."""
+
+def console(stream: TextIO | None = None) -> Console:
+    """Console on standard error, or another stream; rich itself honours NO_COLOR and a missing terminal."""
     from rich.console import Console
 
-    return Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    return Console(file=stream or sys.stderr, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 @contextmanager
@@ -73,7 +76,7 @@ def progress_bar(quiet: bool, *, rate: bool = False) -> Iterator[Progress | None
         yield advance
 
 
-def show_findings(source: str, findings: list[dict[str, Any]], verbose: int) -> None:
+def show_findings(source: str, findings: Sequence[dict[str, Any]], verbose: int) -> None:
     """Print the findings of one file, each on its line: first what is to be checked, all of it."""
     told = [finding for finding in findings if finding["code"] != NOT_VERIFIED]  # the first line says it
     ranked = sorted(told, key=_rank)
@@ -97,60 +100,84 @@ def _rank(finding: dict[str, Any]) -> int:
     return 0 if finding["to_check"] else ("error", "warning", "note").index(finding["severity"]) + 1
 
 
-def show_verdict(contents: dict[str, Any], saving: Saving | None = None) -> None:
-    """Print the verdict, in one line."""
-    from cornersmooth.report.verdict import first_line
+def show_verdict(contents: Mapping[str, Any], saving: Saving | None = None) -> None:
+    """Print what became of a program, and what is to be checked."""
+    head, *lines = verdict_block(contents, saving)
+    print_heading(head)
+    for line in lines:
+        print_line(line)
+    show_checks(contents["findings"])
 
-    console().print(printable(first_line(contents, saving)), style="bold")
+
+def verdict_block(contents: Mapping[str, Any], saving: Saving | None = None) -> Iterator[str]:
+    """Say what became of a program that was smoothed: the verdict and the program, the error, the corners, the time."""
+    from cornersmooth.report.verdict import method_text, sharp_line, time_text
+
+    summary, program = contents["summary"], contents["program"]
+    verdict, _, what = contents["verdict_text"].partition(": ")
+    blocks = f"{summary['blocks_out']:,} blocks from {contents['input']['poses']:,} poses"
+    yield f"{verdict}  {program_text(program)}, {blocks}"
+    yield from (INDENT + part for part in what.split("; "))
+    yield INDENT + _error_text(contents)
+    yield f"{INDENT}{summary['smoothed']:,} of {summary['corners']:,} corners rounded, {sharp_line(contents)}"
+    yield f"{INDENT}method {method_text(summary)}"
+    if saving is not None:
+        yield from (INDENT + part for part in time_text(saving, contents["times"]["limits"]).split("; "))
 
 
-def show_summary(contents: dict[str, Any], seconds: Mapping[str, float], verbose: int) -> None:
-    """Print the small table of one file, and its sharp corners."""
-    from rich.text import Text
+def program_text(program: Mapping[str, Any]) -> str:
+    """Say which program it is: its name, its control, its form, its machine."""
+    machine = f", {program['machine']}" if program["machine"] else ""
+    return f"{program['name'] or 'standard output'}  {program['control']} {program['form']}{machine}"
 
-    from cornersmooth.report.verdict import method_text, sharp_text
+
+def _error_text(contents: Mapping[str, Any]) -> str:
+    """Say how far the written path is off, or where it was not measured, the curves."""
+    found, summary, settings = contents.get("verification"), contents["summary"], contents["settings"]
+    kind, label, where = (
+        ("deviation", "measured", "in the program") if found else ("error", "computed", "on the curves")
+    )
+    known = found or summary
+    if settings["axis_tolerance_deg"] is not None:
+        second = f"tool axis {known[f'max_orientation_{kind}_deg']:.4f}°"
+    else:
+        name = "max_axis_point_deviation_mm" if found else "max_axis_error_mm"
+        second = f"axis point {known[name] or 0.0:.4f} mm (H {settings['axis_length_mm']:g} mm)"
+    return f"{label}: tip {known[f'max_tip_{kind}_mm'] or 0.0:.4f} mm, {second} {where}"
+
+
+def show_checks(findings: Sequence[Mapping[str, Any]]) -> None:
+    """Print what somebody has to look at before the program runs."""
+    for finding in findings:
+        if finding["to_check"]:
+            what, _, hint = finding["text"].partition("; ")
+            line = f"line {finding['line']}: " if finding["line"] else ""
+            times = f" ({finding['count']:,} times)" if finding["count"] > 1 else ""
+            print_line(f"{'CHECK':<{len(INDENT)}}{line}{what}{times} [{finding['code']}]")
+            if hint:
+                print_line(f"{INDENT}hint: {hint}")
+
+
+def show_summary(contents: Mapping[str, Any], seconds: Mapping[str, float], verbose: int) -> None:
+    """Print the sharp corners of one file; with `verbose` what limits the others, and the times of the stages."""
+    from cornersmooth.report.verdict import sharp_text
     from cornersmooth.smoothing.construction import construction_of
 
-    summary, settings = contents["summary"], contents["settings"]
-    given = contents["input"]
-    out = console()
-
-    def say(label: str, text: str) -> None:
-        out.print(Text.assemble((f"{label:<{_LABEL}}", "bold"), printable(text)))
-
-    say("input", f"{given['name']}: {given['dialect']}, {given['poses']} poses, {given['units']}")
-    sharp = ", ".join(f"{count} {reason}" for reason, count in summary["not_smoothed"].items())
-    say("corners", f"{summary['smoothed']} of {summary['corners']} rounded" + (f" ({sharp})" if sharp else ""))
-    say(
-        "limited by",
-        f"the tolerance ({summary['limited_by_tolerance']} of them), segment length ({summary['limited_by_segment']})",
-    )
-    own_axis = settings["axis_tolerance_deg"] is not None
-    allowed = f"tolerance {settings['tolerance_mm']:g} mm"
-    if own_axis:
-        say("error", f"tip {summary['max_tip_error_mm']:.4f} mm, {allowed}, axis {settings['axis_tolerance_deg']:g}°")
-    else:
-        say(
-            "error",
-            f"tip {summary['max_tip_error_mm']:.4f} mm, axis point {summary['max_axis_error_mm']:.4f} mm "
-            f"(H {settings['axis_length_mm']:g} mm), {allowed}",
-        )
-    say("tool axis", f"turned by up to {summary['max_orientation_error_deg']:.4f}° from the original")
-    say("method", method_text(summary))
-    if text := construction_of(settings["method"]).summary_text(summary):
-        say(settings["method"], text)
-    if "verification" in contents:
-        found = contents["verification"]
-        second = f"axis point {found['max_axis_point_deviation_mm'] or 0.0:.4f} mm"
-        if own_axis:
-            second = f"tool axis {found['max_orientation_deviation_deg']:.4f}°"
-        say(
-            "measured",
-            f"tip {found['max_tip_deviation_mm']:.4f} mm, {second} in the written program",
-        )
-    say("blocks", f"{summary['blocks_in']} in, {summary['blocks_out']} out")
+    summary, given = contents["summary"], contents["input"]
     if verbose:
-        say("seconds", ", ".join(f"{stage} {value:.3f}" for stage, value in seconds.items()))
+        sharp = ", ".join(f"{count} {reason}" for reason, count in summary["not_smoothed"].items())
+        rows = {
+            "input": f"{given['name']}: {given['dialect']}, {given['poses']} poses, {given['units']}",
+            "limited by": f"the tolerance ({summary['limited_by_tolerance']} corners), "
+            f"segment length ({summary['limited_by_segment']})",
+            "not rounded": sharp,
+            "tool axis": f"turned by up to {summary['max_orientation_error_deg']:.4f}° from the original",
+            contents["settings"]["method"]: construction_of(contents["settings"]["method"]).summary_text(summary),
+            "seconds": ", ".join(f"{stage} {value:.3f}" for stage, value in seconds.items()),
+        }
+        for label, text in rows.items():
+            if text:
+                print_line(f"{label:<{_LABEL}}{text}")
     shown = contents["sharp"] if verbose else contents["sharp"][:_SHARP_SHOWN]
     for corner in shown:
         print_line(f"{given['name']}{sharp_text(corner)}, stays sharp")
@@ -177,9 +204,17 @@ def say_json(contents: Mapping[str, Any]) -> None:
     print(text.encode("utf-8", "backslashreplace").decode(), end="")  # names need not be UTF-8  # noqa: T201
 
 
-def say_line(text: str) -> None:
-    """Print a line to standard output."""
-    print(printable(text))  # noqa: T201
+def print_heading(text: str) -> None:
+    """Print the first line of a result to standard error, in bold on a terminal."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        console().print(printable(text), style="bold", soft_wrap=False)
+    else:
+        print_line(text)
+
+
+def say_line(text: str, indent: int = 2) -> None:
+    """Print a line to standard output; what a terminal wraps is indented."""
+    _print(printable(text), sys.stdout, indent)
 
 
 def print_message(text: str) -> None:
@@ -193,16 +228,21 @@ def warn(text: str, place: str = "", code: str = "") -> None:
     print_message(message("warning", text, place=place, code=code))
 
 
-def _print(line: str, stream: TextIO) -> None:
+def _print(line: str, stream: TextIO, indent: int = 2) -> None:
     """Print a line as it is; on a terminal in colour, and wrapped between words."""
     if stream is None or not stream.isatty():
         print(line, file=stream)
         return
     from rich.text import Text
 
-    out = console()
-    wrapped = textwrap.wrap(line, out.width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    out = console(stream)
+    indent = len(INDENT) if line.startswith(("CHECK", INDENT)) else indent
+    wrapped = textwrap.wrap(
+        line, out.width, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
+    )
     shown = Text("\n".join(wrapped))
+    if line.startswith("CHECK"):
+        shown.stylize("bold yellow", 0, len(INDENT))
     if (found := _MESSAGE.match(line)) and found.end() <= len(wrapped[0]):
         shown.stylize(_STYLES[found["kind"]], *found.span("head"))
     out.print(shown)

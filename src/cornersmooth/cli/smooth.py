@@ -110,7 +110,7 @@ def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
         told = outcome.contents and not quiet and not given["as_json"]
         if told:
             show_verdict(outcome.contents, outcome.saving)
-        _tell(outcome, quiet, verbose)
+        _tell(outcome, quiet, verbose, alone=True)
         if outcome.contents and given["as_json"]:
             say_json(outcome.contents)
         if told:
@@ -146,7 +146,7 @@ def command(ending: Shutdown, /, inputs: tuple[str, ...], **given: Any) -> int:
     return worst
 
 
-def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> None:
+def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False, *, alone: bool = False) -> None:
     """Print what went wrong and what was noticed; where no line has told the verdict, any but a plain PASSED."""
     if outcome.message:
         print_message(outcome.message)
@@ -157,7 +157,10 @@ def _tell(outcome: Outcome, quiet: bool, verbose: int, told: bool = False) -> No
     ):
         print_line(f"{outcome.job.source}: {outcome.verdict_text}")
     if outcome.contents and not quiet:
-        show_findings(outcome.job.source, outcome.contents["findings"], verbose)
+        findings = outcome.contents["findings"]
+        if alone:  # the verdict has told what is to be checked
+            findings = [finding for finding in findings if not finding["to_check"]]
+        show_findings(outcome.job.source, findings, verbose)
 
 
 def _make_jobs(inputs: tuple[str, ...], given: dict[str, Any]) -> list[Job]:

@@ -229,24 +229,25 @@ def _tables(compared: Comparison, verbose: bool) -> Iterator[str]:
     own = settings.axis_tolerance
     second = f"axis point at {settings.axis_length:g} mm" if own is None else f"tool axis {own:g} deg"
     yield f"tolerance {settings.tolerance:g} mm, {second}"
-    yield (f"{'':<24}{'time s':>12}{'saves % of':>15}{'saves % of':>15}{'stops':>10}{'turning s':>12}{'length mm':>14}")
-    yield f"{'':<24}{'':>12}{'exact stop':>15}{'velocity jump':>15}"
+    yield f"{'':<22}{'time s':>10}{'saves % of':>11}{'saves % of':>14}{'stops':>6}{'turns s':>8}{'path mm':>9}"
+    yield f"{'':<22}{'':>10}{'exact stop':>11}{'velocity jump':>14}"
     for name, law in compared.laws.items():
         saved = saving.get(name, {})
-        parts = "".join(f"{saved[base]:>15.1f}" if base in saved else f"{'':>15}" for base in LAWS[:2])
-        yield (
-            f"{_TITLES[name]:<24}{law.total:>12.3f}{parts}{stops(law):>10}{turning_seconds(law):>12.3f}"
-            f"{law.length:>14.3f}"
+        parts = "".join(
+            f"{saved[base]:>{width}.1f}" if base in saved else f"{'':>{width}}"
+            for base, width in zip(LAWS[:2], (11, 14), strict=True)
         )
-    yield f"{'at constant feed':<24}{compared.constant_feed_seconds:>12.3f}"
+        told = f"{stops(law):>6}{turning_seconds(law):>8.1f}{law.length:>9.1f}"
+        yield f"{_TITLES[name]:<22}{law.total:>10.3f}{parts}{told}"
+    yield f"{'at constant feed':<22}{compared.constant_feed_seconds:>10.3f}"
     if not verbose:
         return
     yield ""
-    yield f"{'reached':<24}{'mm/s':>12}{'mm/s2':>12}{'across':>12}{'mm/s3':>14}"
+    yield f"{'reached':<22}{'mm/s':>12}{'mm/s2':>12}{'across':>12}{'mm/s3':>14}"
     for name, law in compared.laws.items():
         top = peaks(law)
         yield (
-            f"{_TITLES[name]:<24}{top.speed_mm_per_s:>12.3f}{top.accel_mm_per_s2:>12.1f}"
+            f"{_TITLES[name]:<22}{top.speed_mm_per_s:>12.3f}{top.accel_mm_per_s2:>12.1f}"
             f"{top.centripetal_mm_per_s2:>12.1f}{top.jerk_mm_per_s3:>14.1f}"
         )
     if compared.machine is not None:

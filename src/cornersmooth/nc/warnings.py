@@ -76,7 +76,7 @@ def _large_feeds(form: Form, program: Program, findings: Findings) -> None:
     cuts = ~rapid_moves(program.kind) & (program.feed_mode == FeedMode.PER_MINUTE)
     rows = np.flatnonzero(cuts & (program.feed > largest))
     if largest and len(rows):
-        text = f"feed beyond the F{largest:.10g} mm/min that the control takes: give a lower one"
+        text = f"feed beyond the F{largest:.10g} mm/min that the control takes; give a lower one"
         findings.add("CS388", "warning", int(program.line[rows[0]]), text, len(rows))
 
 

@@ -173,16 +173,29 @@ def first_line(contents: Mapping[str, Any], saving: Saving | None = None) -> str
         The report.
     saving : Saving, optional
     """
-    parts = [contents["verdict_text"]]
-    count = contents["summary"]["sharp"]
-    if count:
-        stay = "corner stays" if count == 1 else "corners stay"
-        parts.append(f"{count:,} {stay} sharp, first {sharp_text(contents['sharp'][0])}")
-    else:
-        parts.append("no corner stays sharp")
+    parts = [contents["verdict_text"], sharp_line(contents)]
     if saving is not None:
         parts.append(saving_text(saving))
     return "; ".join(parts)
+
+
+def sharp_line(contents: Mapping[str, Any]) -> str:
+    """Say how many corners stay sharp."""
+    count = contents["summary"]["sharp"]
+    if not count:
+        return "no corner stays sharp"
+    stay = "corner stays" if count == 1 else "corners stay"
+    return f"{count:,} {stay} sharp, first {sharp_text(contents['sharp'][0])}"
+
+
+def time_text(saving: Saving, limits: str | None) -> str:
+    """Say the planned time, in place of which, under whose limits, and what limits it."""
+    share = f" ({100.0 * (saving.written / saving.direct - 1.0):+.0f} %)" if saving.direct else ""
+    against = f" of {saving.against}" if saving.against else ""
+    where = f" on {limits}" if limits else ""
+    return f"time{where} {saving.written:.1f} s instead of {saving.direct:.1f} s{against}{share}" + limits_text(
+        saving.limits
+    )
 
 
 def method_text(summary: Mapping[str, Any]) -> str:
