@@ -120,9 +120,9 @@ def verdict_block(contents: Mapping[str, Any], saving: Saving | None = None) -> 
     yield from (INDENT + part for part in what.split("; "))
     yield INDENT + _error_text(contents)
     yield f"{INDENT}{summary['smoothed']:,} of {summary['corners']:,} corners rounded, {sharp_line(contents)}"
-    yield f"{INDENT}method {method_text(summary)}"
     if saving is not None:
         yield from (INDENT + part for part in time_text(saving, contents["times"]["limits"]).split("; "))
+    yield f"{INDENT}method {method_text(summary)}"
 
 
 def program_text(program: Mapping[str, Any]) -> str:
