@@ -13,11 +13,7 @@ from cornersmooth.cli.group import COMMANDS
 from writing import FORBIDDEN, MEAN, MOST, faults, paragraphs, plain, sentences, words
 
 ROOT = Path(__file__).resolve().parent.parent
-#: being rewritten
-LATER = ["CHANGELOG"]
-PAGES = [
-    path for name in ("*.md", "docs/*.md", "samples/*.md") for path in sorted(ROOT.glob(name)) if path.stem not in LATER
-]
+PAGES = [path for name in ("*.md", "docs/*.md", "samples/*.md") for path in sorted(ROOT.glob(name))]
 
 
 def prose(page: Path) -> list[tuple[str, bool]]:
