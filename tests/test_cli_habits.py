@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import sys
 from pathlib import Path
 
@@ -214,3 +215,20 @@ def test_a_terminal_shows_helps_and_messages_in_colour_but_for_no_color(
         assert b"\x1b[1" in seen
         plain = seen_on_a_terminal(*words, TERM="xterm", NO_COLOR="1")
         assert b"\x1b[3" not in plain
+
+
+def test_small_outputs_say_what_is_true(tmp_path: Path) -> None:
+    missing = run("config", "none.cls", cwd=tmp_path)
+    assert (missing.returncode, missing.stderr[:22]) == (3, b"none.cls: error[CS100]")
+    lines = run("config", cwd=tmp_path).stdout.decode().splitlines()
+    shown = {line.split()[0]: line.split("  ", 1)[1].strip().split("  ")[0] for line in lines}
+    assert (shown["form"], shown["chord"], shown["modal"]) == ("g1", "a tenth of -e, at most 0.0005", "no")
+    (tmp_path / "one.cls").write_bytes(b"UNITS/MM\nRAPID\nGOTO/0,0,0\n")
+    told = run("info", "one.cls", cwd=tmp_path).stdout.decode()
+    assert "every segment" not in told
+    assert re.search(r"^feeds +none$", told, re.MULTILINE)
+    (tmp_path / "part.cls").write_bytes(SMALL)
+    assert run("smooth", "part.cls", "-o", "part.nc", "-e", "0.02", cwd=tmp_path).returncode == DONE
+    for tolerance, verdict, code in (("0.02", b"PASSED: ", 0), ("0.000001", b"FAILED: ", 1)):
+        made = run("surface", "part.cls", "part.nc", "--tool", "4,2", "-e", tolerance, cwd=tmp_path)
+        assert (made.returncode, made.stdout[:8]) == (code, verdict)

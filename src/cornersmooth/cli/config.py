@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from typing import Final
 
@@ -11,6 +12,7 @@ from cornersmooth.cli import shop
 from cornersmooth.cli.options import outputs
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.show import say_json, say_line
+from cornersmooth.errors import InputError
 
 #: where a help says what holds without the option
 _DEFAULT: Final = re.compile(r"\[default: ([^]]+)\]")
@@ -36,6 +38,8 @@ def command(source: str, as_json: bool) -> int:
     """
     from cornersmooth.cli.smooth import command as smooth
 
+    if not os.path.exists(source):
+        raise InputError("CS100", "cannot read it: no such file or directory", "check the path", file=source)
     with smooth.make_context("smooth", [source]) as context:
         rows, told = [], []
         for option in shop.settable(smooth):

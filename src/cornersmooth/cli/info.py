@@ -104,7 +104,7 @@ def _motion(info: Info) -> Rows:
     by_unit = {"mm/min": motion.feeds_mm_per_min, "mm/rev": motion.feeds_mm_per_rev}
     feeds = [", ".join(f"{value:g}" for value in values) + f" {unit}" for unit, values in by_unit.items() if values]
     missing = f"{motion.feed_moves_without_feed} moves without" if motion.feed_moves_without_feed else ""
-    yield "feeds", "; ".join(part for part in (*feeds, missing) if part)
+    yield "feeds", "; ".join(part for part in (*feeds, missing) if part) or "none"
     yield "segments", _spread(motion.segment_length_mm, "mm")
     if info.arcs.count:
         yield "arcs", f"{info.arcs.count}, {info.arcs.helices} of them helices"
@@ -119,7 +119,8 @@ def _axis(info: Info) -> Rows:
     yield "tilt from +Z", _spread(axis.tilt_deg, "deg")
     yield "axis steps", _spread(axis.step_deg, "deg")
     kinds = {"translations": axis.translations, "pure rotations": axis.rotations, "repetitions": axis.repetitions}
-    yield "", _counts({name: count for name, count in kinds.items() if count}) or "every segment moves and turns"
+    if axis.step_deg.count:
+        yield "", _counts({name: count for name, count in kinds.items() if count}) or "every segment moves and turns"
 
 
 def _corners(info: Info) -> Rows:

@@ -14,6 +14,7 @@ from cornersmooth.cli.shop import ShopCommand
 from cornersmooth.cli.show import say_json, say_line
 from cornersmooth.errors import SettingsError
 from cornersmooth.output import open_output
+from cornersmooth.verdict import Verdict
 
 if TYPE_CHECKING:
     from cornersmooth.model import Program
@@ -91,6 +92,9 @@ def command(source: str, text: str, **given: Any) -> int:
     if given["as_json"]:
         say_json(found.as_dict())
     elif not given["quiet"]:
+        say_line(
+            f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"
+        )
         for line in surface_lines(found):
             say_line(line)
     return 0 if found.kept else 1

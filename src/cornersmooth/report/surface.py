@@ -66,7 +66,7 @@ def surface_lines(surface: SurfaceMap) -> Iterator[str]:
     yield f"{'passes':<18}{passes_text(surface.passes)}"
     if told["rms_mm"] is not None:
         yield f"{'all':<18}mean {told['mean_mm']:.6f} mm, root mean square {told['rms_mm']:.6f} mm"
-        yield f"{'within':<18}{told['within_tolerance_percent']:.4g} % within the tolerance of {surface.tolerance:g} mm"
+        yield f"{'within':<18}{told['within_tolerance_percent']:.4g} % of the points within {surface.tolerance:g} mm"
         yield ""
         yield from _histogram(surface)
 
