@@ -236,7 +236,7 @@ def _print(line: str, stream: TextIO, indent: int = 2) -> None:
     from rich.text import Text
 
     out = console(stream)
-    indent = len(INDENT) if line.startswith(("CHECK", INDENT)) else indent
+    indent = max(indent, len(INDENT)) if line.startswith(("CHECK", INDENT)) else indent
     wrapped = textwrap.wrap(
         line, out.width, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
     )

@@ -96,7 +96,7 @@ def command(source: str, text: str, **given: Any) -> int:
             f"{Verdict.of(problems=not found.kept)}: the surface is {'' if found.kept else 'not '}within the tolerance"
         )
         for line in surface_lines(found):
-            say_line(line)
+            say_line(line, indent=18)
     return 0 if found.kept else 1
 
 

@@ -273,10 +273,10 @@ def _axis_table(compared: Comparison) -> Iterator[str]:
     found = {name: axis_peaks(law) for name, law in compared.laws.items()}
     first = next(iter(found.values()))
     yield f"reached of the limits of {machine}, %: speed, acceleration, jerk"
-    yield f"{'':<24}" + "".join(f"{peak.name:>17}" for peak in first)
+    yield f"{'':<20}" + "".join(f"{peak.name:>12}" for peak in first)
     for name, axes in found.items():
-        told = ("".join(f"{100.0 * used:>5.0f}" for used in peak.used) for peak in axes)
-        yield f"{_TITLES[name]:<24}" + "".join(f"{text:>17}" for text in told)
+        told = (" ".join(f"{100.0 * used:.0f}" for used in peak.used) for peak in axes)
+        yield f"{_TITLES[name].replace(',', ''):<20}" + "".join(f"{text:>12}" for text in told)
     for order, per in enumerate(("s", "s2", "s3")):
         units = (f"{peak.limits[order]:g} {'mm' if peak.name in LINEAR else 'deg'}/{per}" for peak in first)
-        yield f"{('limits' if not order else ''):<24}" + "".join(f"{text:>17}" for text in units)
+        yield f"{('limits' if not order else ''):<20}" + "".join(f"{text:>12}" for text in units)

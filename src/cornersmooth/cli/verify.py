@@ -180,7 +180,7 @@ def command(source: str, text: str, **given: Any) -> int:
         show_findings(name, findings_table(findings), given["verbose"])
         say_line(verdict)
         for line in _summary(found):
-            say_line(line)
+            say_line(line, indent=18)
         if given["verbose"]:
             for line in _along(found, deviation_along(program, nc, **how)):
                 say_line(line)
