@@ -5,6 +5,8 @@ The decision gives places between which the nearest ones are; here they are look
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,7 +15,15 @@ import numpy as np
 from cornersmooth.model import Floats, Ints
 from cornersmooth.nc_reader.tool import WrittenAt
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.nearest import COLUMNS, Gap, Metric, distance_between, nearest_places
+from cornersmooth.verify.motions import inner_points
+from cornersmooth.verify.nearest import (
+    COLUMNS,
+    Gap,
+    Metric,
+    distance_between,
+    larger_square,
+    nearest_places,
+)
 
 #: segments on either side of a place among which a nearer one is looked for
 _REACH: Final = 2
@@ -21,6 +31,10 @@ _REACH: Final = 2
 #: bend, mm, from which on a place on a bent step is refined; how often, with a parabola through three points
 _BENT: Final = 1e-9
 _ROUNDS: Final = 2
+
+#: golden section, and how often: down to 1e-7 of two steps
+_GOLDEN: Final = (1.0 + math.sqrt(5.0)) / 2.0
+_SECTIONS: Final = 34
 
 
 @dataclass(frozen=True)
@@ -66,7 +80,14 @@ def gap_of_written(match: Match, rows: Ints, place: Floats) -> Gap:
 def written_together(match: Match, reached: Reached, rows: Ints) -> Gap:
     """Of rows of `of_written` from the nearest pose of the original."""
     vertex = reached.vertex[rows]
-    return gap_of_written(match, vertex, _place_of_written(match, vertex, "both"))
+    place = _place_of_written(match, vertex, "both")
+    six = match.six[vertex]
+
+    def squares(place: Floats) -> Floats:
+        return larger_square(match.task.six(*match.original.pose_at(place)) - six)
+
+    low, high = np.maximum(place - 1.0, match.low[vertex]), np.minimum(place + 1.0, match.high[vertex] + 1.0)
+    return gap_of_written(match, vertex, _lowest_between(squares, low, high))
 
 
 def of_original(match: Match) -> Reached:
@@ -79,9 +100,19 @@ def of_original(match: Match) -> Reached:
     limits = first[row], last[row] - 1
     place = nearest_places(point, match.six, row, 1, *limits)
     segment, tip, axis = _refined(match, point, place, "both")
-    trail = match.original.trail
-    gap = match.task.gap(tip, axis, point[:, :3], trail.axis[passing.vertex])
-    return Reached(passing.vertex, gap, segment)
+    original = match.original.trail.axis[passing.vertex]
+    far = np.flatnonzero(match.task.gap(tip, axis, point[:, :3], original).larger > match.tolerance)
+    if len(far):  # the sum of both squares is least there, but not the larger
+        here = segment[far]
+        nc, runs = match.nc.part(match.first, len(match.nc)), (first[row[far]], last[row[far]])
+
+        def squares(number: Floats) -> Floats:
+            return larger_square(inner_points(nc, match.motion, match.task, number) - point[far])
+
+        here = _lowest_between(squares, np.maximum(here - 1.0, runs[0]), np.minimum(here + 1.0, runs[1]))
+        six = inner_points(nc, match.motion, match.task, here)
+        segment[far], tip[far], axis[far] = here, six[:, :3], match.task.axis_of(six)
+    return Reached(passing.vertex, match.task.gap(tip, axis, point[:, :3], original), segment)
 
 
 def written_alone(match: Match, reached: Reached, rows: Ints, metric: Metric) -> Floats:
@@ -146,6 +177,17 @@ def _refined(match: Match, point: Floats, place: Floats, metric: Metric) -> tupl
     place = place.copy()
     place[bent] = segment + np.clip((here - start) / size, 0.0, 1.0)
     return place, tip, axis
+
+
+def _lowest_between(value: Callable[[Floats], Floats], low: Floats, high: Floats) -> Floats:
+    """(k,) where a function that falls and then rises is lowest between bounds: golden section."""
+    low, high = low.copy(), high.copy()
+    for _ in range(_SECTIONS):
+        left, right = high - (high - low) / _GOLDEN, low + (high - low) / _GOLDEN
+        falls = value(left) > value(right)
+        low, high = np.where(falls, left, low), np.where(falls, high, right)
+    lowest: Floats = (low + high) / 2.0
+    return lowest
 
 
 def _lowest(points: list[Floats], values: list[Floats]) -> Floats:
