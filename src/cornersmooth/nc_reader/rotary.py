@@ -301,7 +301,7 @@ class Rotary:
         room = np.maximum(rate * off, _F_STEP * way)
         printed = 2 * step + self.axis_length * turn_step  # who timed the block knew its length before it was rounded
         either = ~still & (length < self.tolerance + printed) & (swing > self.tolerance - printed)
-        room[either] += (rate * (swing - length))[either]
+        room[either] += (rate * np.abs(swing - length))[either]
         way = np.where(~still & (length < self.tolerance) & (swing > self.tolerance), swing, way)
         kind = np.where(still & (not self.tip_control), np.uint8(FeedIs.OF_AXIS_POINT), np.uint8(FeedIs.KNOWN))
         room[(rate * turn > FAST_TURN) | (~still & short)] = np.inf
