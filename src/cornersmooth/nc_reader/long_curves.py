@@ -6,7 +6,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.elements import Curves
-from cornersmooth.nc_reader.splines import BEZIER_KNOTS
+from cornersmooth.nc_reader.splines import bezier_curves
 
 
 def cut_long(curves: Curves) -> tuple[Curves, Bools]:
@@ -44,16 +44,7 @@ def cut_long(curves: Curves) -> tuple[Curves, Bools]:
     block = end - curves.points[owner] + 4 + k  # of the control point that ends each part
     end = np.where(mine, block, end)
     row = np.where(mine & (k > 0), block, row)
-    count = len(bezier)
-    parts = Curves(
-        element=row[mine],
-        end=end[mine],
-        order=np.full(count, 4, np.int64),
-        points=np.full(count, 4, np.int64),
-        point=bezier.reshape(-1, 6),
-        weight=np.ones(4 * count),
-        knot=np.tile(BEZIER_KNOTS, count),
-    )
+    parts = bezier_curves(row[mine], end[mine], bezier)
     others = curves.only(np.flatnonzero(~long))
     joined = Curves.joined([parts, others])
     return joined, np.isin(joined.element, parts.element)

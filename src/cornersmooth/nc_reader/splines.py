@@ -21,7 +21,7 @@ SPLINE_ORDER, LARGEST_WEIGHT = 4, 3.0
 _GAP = 1.1e-3
 
 #: of a cubic by its Bézier points
-BEZIER_KNOTS = np.array([0.0] * 4 + [1.0] * 4)
+_KNOTS = np.array([0.0] * 4 + [1.0] * 4)
 
 
 def knot_curves(
@@ -267,7 +267,9 @@ def poly_curves(
     square = _factors(table, rows, letters, "{}2") * length**2
     cube = _factors(table, rows, letters, "{}3") * length**3
     slope = end - start - square - cube
-    return _bezier(rows, start, start + slope / 3, start + 2 * slope / 3 + square / 3, end)
+    return bezier_curves(
+        rows, rows, np.stack((start, start + slope / 3, start + 2 * slope / 3 + square / 3, end), axis=1)
+    )
 
 
 def spl_curves(table: Table, six: Floats, before: Floats, spl: Bools, letters: str, problems: list[Problem]) -> Curves:
@@ -284,7 +286,7 @@ def spl_curves(table: Table, six: Floats, before: Floats, spl: Bools, letters: s
     off = np.abs(start - np.vstack((before, six))[rows]).max(axis=1)
     text = "a spline begins more than a micrometre beside where the block before has ended"
     problems.extend(Problem("CS519", 0, int(table.line[row]), text) for row in rows[off > _GAP].tolist())
-    return _bezier(rows, start, end + 2 * slope / 3 + square / 3, end + slope / 3, end)
+    return bezier_curves(rows, rows, np.stack((start, end + 2 * slope / 3 + square / 3, end + slope / 3, end), axis=1))
 
 
 def _factors(table: Table, rows: Ints, letters: str, name: str) -> Floats:
@@ -294,14 +296,15 @@ def _factors(table: Table, rows: Ints, letters: str, name: str) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def _bezier(rows: Ints, *points: Floats) -> Curves:
-    count = len(rows)
+def bezier_curves(row: Ints, end: Ints, points: Floats) -> Curves:
+    """Cubics by their Bézier points (c, 4, 6), from blocks `row` to `end`, of a parameter from 0 to 1."""
+    count = len(row)
     return Curves(
-        element=rows,
-        end=rows,
+        element=row,
+        end=end,
         order=np.full(count, 4, np.int64),
         points=np.full(count, 4, np.int64),
-        point=np.stack(points, axis=1).reshape(-1, 6),
+        point=points.reshape(-1, 6),
         weight=np.ones(4 * count),
-        knot=np.tile(BEZIER_KNOTS, count),
+        knot=np.tile(_KNOTS, count),
     )
