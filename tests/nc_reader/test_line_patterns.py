@@ -78,7 +78,7 @@ def test_fast_path_is_the_careful_path(control, seed, odd):
     patterns = LinePatterns(lexer)
     lines = lines_of(data, patterns)
     assert lines is not None or odd not in READABLE
-    fast = read(block_tables._read_chunk(data, 1, lexer, patterns, None))
+    fast = read(block_tables.read_lines(data, None, lexer, patterns=patterns))
     careful = read(block_tables._in_order(block_tables.LetteredLines(data, lexer), data, 1, lexer, None))
     assert fast == careful
     assert any(isinstance(item, dict) for _, item in fast[0])
@@ -88,7 +88,7 @@ def test_fast_path_is_the_careful_path(control, seed, odd):
 @pytest.mark.parametrize("control", SHAPES)
 def test_every_line_alone_says_the_same(control, seed):
     data, dialect = text(control, seed, None), dialect_of(control)
-    together = dict(lines_apart(block_tables._read_chunk(data, 1, dialect.lexer, LinePatterns(dialect.lexer), None)))
+    together = dict(lines_apart(block_tables.read_lines(data, None, dialect.lexer)))
     for number, line in enumerate(data.split(b"\n")[:-1], 1):
         alone = dialect.lexer.line(line, number, None)
         if isinstance(together[number], dict):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Final, Protocol
@@ -58,6 +58,7 @@ def read_lines(
     *,
     patterns: LinePatterns | None = None,
     number: int = 1,
+    show: Callable[[bytes], None] = lambda lines: None,
 ) -> Iterator[Table | Line]:
     """Give out the text in order, as runs of motion blocks and as other lines.
 
@@ -72,6 +73,8 @@ def read_lines(
         Those met so far in the same text.
     number : int
         Of the first line.
+    show : callable
+        Gets lines in which the digits of all others stand, before these are given out.
 
     Raises
     ------
@@ -80,7 +83,12 @@ def read_lines(
     """
     patterns = patterns or LinePatterns(lexer)
     for chunk in _chunks(data, lexer):
-        number += yield from _read_chunk(chunk, number, lexer, patterns, name)
+        chunk = lexer.unfolded(chunk)
+        lines = lines_of(chunk, patterns)
+        if lines is None or patterns.fresh:
+            show(chunk if lines is None else b"\n".join(patterns.fresh))
+            patterns.fresh.clear()
+        number += yield from _in_order(lines or LetteredLines(chunk, lexer), chunk, number, lexer, name)
 
 
 def _chunks(data: bytes | Readable, lexer: Lexer) -> Iterator[bytes]:
@@ -101,21 +109,12 @@ def _chunks(data: bytes | Readable, lexer: Lexer) -> Iterator[bytes]:
         yield chunk
 
 
-def _read_chunk(
-    chunk: bytes, number: int, lexer: Lexer, patterns: LinePatterns, name: str | None
-) -> Generator[Table | Line, None, int]:
-    """Give out the lines of a chunk and return how many there are."""
-    chunk = lexer.unfolded(chunk)
-    lines = lines_of(chunk, patterns) or LetteredLines(chunk, lexer)
-    return (yield from _in_order(lines, chunk, number, lexer, name))
-
-
 def _in_order(
     lines: RunLines, chunk: bytes, number: int, lexer: Lexer, name: str | None
 ) -> Generator[Table | Line, None, int]:
-    """Runs as tables, and one by one the other lines and those of runs that turn out to be none.
+    """Give out the lines of a chunk, runs as tables and the others one by one; return how many there are.
 
-    Asides within a run follow it.
+    Lines of runs that turn out to be none are given out one by one, too; asides within a run follow it.
     """
     bulk = lines.bulk()
 

@@ -109,6 +109,8 @@ class LinePatterns:
     def __init__(self, lexer: Lexer) -> None:
         self._lexer = lexer
         self._known: dict[bytes, list[tuple[LinePattern | None, int, int]]] = {}
+        #: a line of each pattern that is new
+        self.fresh: list[bytes] = []
 
     def of(self, line: bytes) -> LinePattern | None:
         """Pattern of a line without its end; None where its numbers are not of a kind that is read here."""
@@ -117,6 +119,7 @@ class LinePatterns:
         for pattern, literal, care in self._known.get(shape, ()):
             if not (value ^ literal) & care:
                 return pattern
+        self.fresh.append(line)
         pattern, alike = self._make(line)
         self._known.setdefault(shape, []).append((pattern, value, int.from_bytes(alike)))
         return pattern

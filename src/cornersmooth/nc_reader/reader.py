@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any, Final, NoReturn
 
@@ -108,11 +108,11 @@ class Reader:
 
     def lines(self, source: Readable) -> Iterator[Table | Line]:
         """Read lines, and take note of the digits of all of them."""
-        return read_lines(_Noted(source, self.note_digits), self.name, self.dialect.lexer)
+        return read_lines(source, self.name, self.dialect.lexer, show=self.note_digits)
 
-    def note_digits(self, piece: bytes) -> None:
-        """Take the digits of a piece of the text where they are finer than those before."""
-        finer = self.steps.finer(self.options.steps(piece))
+    def note_digits(self, lines: bytes) -> None:
+        """Take the digits of some lines where they are finer than those before."""
+        finer = self.steps.finer(self.options.steps(lines))
         if finer != self.steps:
             self.steps, self.rotary = finer, self.options.rotary(finer)
 
@@ -497,22 +497,3 @@ class Reader:
             self._axis_words.problem(table, kind, letters, self.tip_control, code, approach),
         )
         self.problems += [problem for problem in found if problem is not None]
-
-
-class _Noted:
-    """A text of which each piece that is read is shown to somebody.
-
-    Parameters
-    ----------
-    source : Readable
-    show : callable
-    """
-
-    def __init__(self, source: Readable, show: Callable[[bytes], None]) -> None:
-        self._source, self._show = source, show
-
-    def read(self, size: int, /) -> bytes:
-        """Next bytes, at most so many; none at the end."""
-        data = self._source.read(size)
-        self._show(data)
-        return data

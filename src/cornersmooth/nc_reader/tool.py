@@ -6,7 +6,7 @@ import numpy as np
 
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.nc_reader.arcs import arc_points
-from cornersmooth.nc_reader.curves import CurveGroup, groups
+from cornersmooth.nc_reader.curves import groups
 from cornersmooth.nc_reader.elements import Element, Elements
 
 
@@ -32,55 +32,26 @@ def between(values: Floats, start: Ints, end: Ints, fraction: Floats) -> Floats:
     return way
 
 
-class WrittenAt:
-    """Path elements (k,) whose poses are asked for at several fractions.
-
-    Parameters
-    ----------
-    nc : Elements
-    element : (k,) int64
-    """
-
-    def __init__(self, nc: Elements, element: Ints) -> None:
-        self._nc, self._element, self._before = nc, element, np.maximum(element - 1, 0)
-        kind = nc.kind[element]
-        self._on_arc = np.flatnonzero(kind == Element.ARC)
-        self._arc = np.searchsorted(nc.arcs.element, element[self._on_arc])
-        on = np.flatnonzero(kind == Element.CURVE)
-        row = np.searchsorted(nc.curves.element, element[on])
-        #: curves with the same knots, and which of the elements are which of them
-        self._curves: list[tuple[CurveGroup, Ints, Ints]] = []
-        whole = list(groups(nc.curves, np.unique(row))) if len(on) else []
-        for group in whole:
-            if len(whole) == 1:
-                mine, own = on, row
-            else:
-                chosen = np.isin(row, group.index)
-                mine, own = on[chosen], row[chosen]
-            self._curves.append((group, mine, np.searchsorted(group.index, own)))
-        self._curved = len(whole) == 1 and len(on) == len(element)
-
-    def at(self, fraction: Floats) -> tuple[Floats, Floats]:
-        """Tip and unit axis (k, 3), at a fraction of each element (curves: of the range of their parameter)."""
-        nc, before, element = self._nc, self._before, self._element
-        if self._curved:
-            tip, second = np.empty((len(element), 3)), np.empty((len(element), 3))
-        else:
-            tip, second = between(nc.tip, before, element, fraction), between(nc.second, before, element, fraction)
-        on, r = self._on_arc, self._arc
-        if len(on):
-            arcs, start, end = nc.arcs, nc.tip[before[on]], nc.tip[element[on]]
-            tip[on] = arc_points(start, end, arcs.centre[r], arcs.normal[r], arcs.sweep[r], fraction[on])
-        for group, mine, local in self._curves:
-            spans = group.spans
-            point = group.at_own(local, spans[0] + fraction[mine] * (spans[-1] - spans[0]))
-            tip[mine], second[mine] = point[:, :3], point[:, 3:]
-        return tip, directions(nc, tip, second)
-
-
 def written_at(nc: Elements, element: Ints, fraction: Floats) -> tuple[Floats, Floats]:
     """Tip and unit axis (k, 3) on path elements, at a fraction of each (curves: of the range of their parameter)."""
-    return WrittenAt(nc, element).at(fraction)
+    before, kind = np.maximum(element - 1, 0), nc.kind[element]
+    on = np.flatnonzero(kind == Element.CURVE)
+    if len(on) == len(element):
+        tip, second = np.empty((len(on), 3)), np.empty((len(on), 3))
+    else:
+        tip, second = between(nc.tip, before, element, fraction), between(nc.second, before, element, fraction)
+    arc = np.flatnonzero(kind == Element.ARC)
+    if len(arc):
+        arcs, start, end = nc.arcs, nc.tip[before[arc]], nc.tip[element[arc]]
+        r = np.searchsorted(arcs.element, element[arc])
+        tip[arc] = arc_points(start, end, arcs.centre[r], arcs.normal[r], arcs.sweep[r], fraction[arc])
+    row = np.searchsorted(nc.curves.element, element[on])
+    for group in groups(nc.curves, np.unique(row)) if len(on) else ():  # curves with the same knots
+        chosen = np.isin(row, group.index)
+        mine, local = on[chosen], np.searchsorted(group.index, row[chosen])
+        point = group.at_own(local, group.spans[0] + fraction[mine] * (group.spans[-1] - group.spans[0]))
+        tip[mine], second[mine] = point[:, :3], point[:, 3:]
+    return tip, directions(nc, tip, second)
 
 
 def moving_rapids(nc: Elements, first: int, stop: int) -> Ints:

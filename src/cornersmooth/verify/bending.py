@@ -61,46 +61,46 @@ def curve_bend(group: CurveGroup, second: Second, axis_length: float) -> Floats:
     """
     bends = []
     for k in range(len(group.spans) - 1):
-        points, weight = group.bezier(k)
-        tip, other = points[..., :3], points[..., 3:]
-        vector = (other - tip if second == "point" else other) * weight[..., None]
+        by_curve, by_weight = group.bezier(k)
+        points, weight = by_curve.transpose(1, 2, 0), by_weight.T  # each number of all curves side by side: the fastest
+        tip, other = points[:, :3], points[:, 3:]
+        vector = (other - tip if second == "point" else other) * weight[:, None]
         bends.append(_point_bend(tip, weight) + axis_length * _direction_bend(vector))
     return np.stack(bends, axis=1) if bends else np.zeros((len(group.index), 0))
 
 
 def _point_bend(points: Floats, weight: Floats) -> Floats:
-    """(k,) bend of rational Bézier curves with control points (k, d + 1, 3)."""
+    """(k,) bend of rational Bézier curves with control points (d + 1, 3, k) and weights (d + 1, k)."""
     if not np.ptp(weight):
         one: Floats = _derivatives(points)[1] / 8.0
         return one
-    away = points - points.mean(axis=1, keepdims=True)
-    reach = np.sqrt(_squares(away).max(axis=1))
-    first, second = _derivatives(away * weight[..., None])
-    least = weight.min(axis=1)
-    fall, curl = _derivatives(weight[..., None])
+    away = points - points.mean(axis=0)
+    reach = _largest(away)
+    first, second = _derivatives(away * weight[:, None])
+    least = weight.min(axis=0)
+    fall, curl = _derivatives(weight[:, None])
     slope = (first + fall * reach) / least
     bend: Floats = (second + curl * reach + 2.0 * fall * slope) / least / 8.0
     return np.where(least > 0.0, bend, np.inf)
 
 
 def _direction_bend(vector: Floats) -> Floats:
-    """(k,) bend of the directions of Bézier curves with control points (k, d + 1, 3)."""
-    middle = vector.mean(axis=1)
-    middle /= np.maximum(np.sqrt(np.einsum("ij,ij->i", middle, middle)), np.finfo(np.float64).tiny)[:, None]
-    least = np.einsum("ijk,ik->ij", vector, middle).min(axis=1)  # the curve is in the hull of its control points
+    """(k,) bend of the directions of Bézier curves with control points (d + 1, 3, k)."""
+    middle = vector.mean(axis=0)
+    middle /= np.maximum(np.sqrt(np.einsum("ik,ik->k", middle, middle)), np.finfo(np.float64).tiny)
+    least = np.einsum("jik,ik->jk", vector, middle).min(axis=0)  # the curve is in the hull of its control points
     first, second = _derivatives(vector)
     safe = np.where(least > 0.0, least, 1.0)
     return np.where(least > 0.0, (second / safe + _GOLDEN * (first / safe) ** 2) / 8.0, np.inf)
 
 
 def _derivatives(points: Floats) -> tuple[Floats, Floats]:
-    """(k,) bounds of the first and of the second derivative of Bézier curves with control points (k, d + 1, 3)."""
-    degree, step = points.shape[1] - 1, np.diff(points, axis=1)
-    bounds = [np.sqrt(_squares(values).max(axis=1, initial=0.0)) for values in (step, np.diff(step, axis=1))]
-    return degree * bounds[0], degree * max(degree - 1, 0) * bounds[1]
+    """(k,) bounds of the first and of the second derivative of Bézier curves with control points (d + 1, n, k)."""
+    degree, step = len(points) - 1, points[1:] - points[:-1]
+    return degree * _largest(step), degree * max(degree - 1, 0) * _largest(step[1:] - step[:-1])
 
 
-def _squares(vectors: Floats) -> Floats:
-    """(k, d) squares of vectors (k, d, n)."""
-    squares: Floats = np.einsum("ijk,ijk->ij", vectors, vectors)
-    return squares
+def _largest(vectors: Floats) -> Floats:
+    """(k,) the largest size of vectors (d, n, k)."""
+    size: Floats = np.sqrt(np.einsum("jik,jik->jk", vectors, vectors).max(axis=0, initial=0.0))
+    return size

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from cornersmooth.model import Floats, Ints
-from cornersmooth.verify.distances import (
-    Reached,
-    gap_of_written,
-    of_original,
-    of_written,
-    original_alone,
-    written_alone,
-    written_together,
-)
+from cornersmooth.verify.distances import Reached, gap_of_written, nearest, of_original, of_written
 from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Worst
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
@@ -177,7 +168,7 @@ def measure_written(match: Match, found: Findings) -> None:
     """Take down how far written vertices are from the original."""
     reached = of_written(match)
     lines = match.cl_lines(reached.place), match.nc_lines(reached.vertex)
-    _largest(match, found, reached, lines, mine=True)
+    _largest(match, found, reached, lines)
 
 
 def measure_original(match: Match, found: Findings) -> None:
@@ -187,35 +178,31 @@ def measure_original(match: Match, found: Findings) -> None:
     pose = original.pose[original.trail.owner[reached.vertex]]
     row = np.minimum(reached.place.astype(np.int64) + 1, len(match.six) - 1)
     nc_line = match.nc_lines(row)
-    _largest(match, found, reached, (original.program.line[pose], nc_line), mine=False)
+    _largest(match, found, reached, (original.program.line[pose], nc_line))
     gap, whole = reached.gap, original.trail.fraction[reached.vertex] == 1
     found.poses.append(Poses(pose[whole], gap.tip[whole], gap.axis_point[whole], gap.angle[whole], nc_line[whole]))
     _check_exact_poses(match, found, reached.vertex[whole], row[whole])
 
 
-def _largest(match: Match, found: Findings, reached: Reached, lines: tuple[Ints, Ints], *, mine: bool) -> None:
+def _largest(match: Match, found: Findings, reached: Reached, lines: tuple[Ints, Ints]) -> None:
     """Take what the vertices of one of the two motions found; only the largest are looked at closely."""
     result, gap = found.largest, reached.gap
 
-    def take(worst: Worst, known: Floats, closely: Callable[[Ints], Floats]) -> None:
+    def take(worst: Worst, name: str, metric: Metric) -> None:
+        known: Floats = getattr(gap, name)
         rows, some = np.flatnonzero(known > worst.value), _SOME
         while len(rows):
             first = rows[np.argpartition(-known[rows], some)[:some]] if len(rows) > some else rows
-            worst.update(closely(first), lines[0][first], lines[1][first])
+            off: Floats = getattr(nearest(match, reached, first, metric), name)
+            worst.update(np.minimum(off, known[first]), lines[0][first], lines[1][first])
             rows = np.setdiff1d(rows[known[rows] > worst.value], first, assume_unique=True)
             some *= 4
 
-    def together(name: str) -> Callable[[Ints], Floats]:
-        if not mine:
-            return lambda rows: getattr(gap, name)[rows]
-        return lambda rows: getattr(written_together(match, reached, rows), name)
-
-    take(result.together_tip, gap.tip, together("tip"))
-    take(result.together_axis_point, gap.axis_point, together("axis_point"))
-    take(result.orientation, gap.angle, together("angle"))
-    alone = written_alone if mine else original_alone
-    take(result.tip, gap.tip, lambda rows: alone(match, reached, rows, "tip"))
-    take(result.axis_point, gap.axis_point, lambda rows: alone(match, reached, rows, "axis point"))
+    take(result.together_tip, "tip", "both")
+    take(result.together_axis_point, "axis_point", "both")
+    take(result.orientation, "angle", "both")
+    take(result.tip, "tip", "tip")
+    take(result.axis_point, "axis_point", "axis point")
 
 
 def _check_exact_poses(match: Match, found: Findings, vertex: Ints, row: Ints) -> None:

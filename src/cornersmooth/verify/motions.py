@@ -116,10 +116,14 @@ def written_motion(nc: Elements, tolerance: float, axis_length: float, *, own_ax
     return Motion(side_by_side(tip, axis, axis_length, own_axis), owner, fraction, last, bends[1:])
 
 
-def inner_points(nc: Elements, motion: Motion, task: Task, number: Floats) -> Floats:
-    """(k, 6) points of a written motion at vertex numbers with fractions of the steps behind them."""
+def inner_points(nc: Elements, motion: Motion, task: Task, number: Floats, first: int = 0) -> Floats:
+    """(k, 6) points of a written motion at vertex numbers with fractions of the steps behind them.
+
+    The motion begins at the end of element `first`.
+    """
     before = number.astype(np.int64)
     after = np.minimum(before + 1, len(motion.owner) - 1)
     owner = motion.owner[after]
     start = np.where(motion.owner[before] == owner, motion.fraction[before], 0.0)
-    return task.six(*written_at(nc, owner, start + (number - before) * (motion.fraction[after] - start)))
+    share = start + (number - before) * (motion.fraction[after] - start)
+    return task.six(*written_at(nc, owner + first, share))
