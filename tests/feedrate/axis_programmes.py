@@ -47,7 +47,7 @@ def reference_time(law: TimeLaw, limits: Limits, step: float) -> float:
     sides = [orders(x[1:-1] + away) for away in (BESIDE, -BESIDE)]
     speed, accel, jerk = axes.limits
     h, n = np.diff(x), len(x) - 2
-    speed_limits, _ = path_limits(path, limits)
+    speed_limits = path_limits(path, limits).whole
     upper = node_caps(x, speed_limits.edge, speed_limits.cap)[1:-1].copy()
     for one, _, _ in sides:
         upper = np.minimum(upper, ((speed / np.maximum(np.abs(one), 1e-12)) ** 2).min(axis=1))

@@ -50,7 +50,7 @@ def reference_time(path: Path, limits: Limits, resolution: Resolution = FINE) ->
     resolution : Resolution
         How close the nodes are.
     """
-    speed_limits, stops = path_limits(path, limits)
+    speed_limits, stops = path_limits(path, limits).whole, np.flatnonzero(path.junction_speed == 0.0)
     total = 0.0
     for run, lead in enumerate(stops[:-1]):
         accel, jerk = limits.accel, limits.jerk
@@ -71,7 +71,7 @@ def reference_time(path: Path, limits: Limits, resolution: Resolution = FINE) ->
 
 
 def _nodes(speed_limits: Intervals, run: int, resolution: Resolution) -> Floats:
-    grid = make_grid([speed_limits], np.array([run]), resolution)
+    grid = make_grid(speed_limits, np.array([run]), resolution)
     return np.append(grid.start, grid.start[-1] + grid.width[-1])
 
 

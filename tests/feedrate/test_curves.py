@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cornersmooth.feedrate import Limits
 from cornersmooth.feedrate import rational_curves as curves
+from cornersmooth.feedrate.intervals import path_limits
+from cornersmooth.feedrate.motion import poses
+from cornersmooth.feedrate.path import build_path
 from cornersmooth.geometry import nurbs
+from cornersmooth.model import Program
+from cornersmooth.settings import Settings
+from cornersmooth.smoothing import smooth
 
 SIDES = np.array([0, 1])
 
@@ -64,30 +71,22 @@ def test_arc_length_and_back(given: tuple[float, float, float, tuple[float, floa
 
 
 @pytest.mark.parametrize("turn", [2.0, 45.0, 90.0, 150.0])
-def test_curvature_closed_form(turn: float) -> None:
-    points, weights = corner(turn, 0.4, 0.4, (1.0, 1.0))
-    beta = np.radians(turn) / 2
-    powers = halves(points, weights)
-    largest = curves.interval_curvatures(powers, curves.interval_borders(SIDES)).max(axis=1)
-    assert largest == pytest.approx(2 * np.sin(beta) / (0.4 * np.cos(beta) ** 2), rel=1e-9)
-    assert curves.curvature(powers, np.array([[0.0], [1.0]])) == pytest.approx(0.0, abs=1e-9)
+@pytest.mark.parametrize("weights", [(1.0, 1.0), (0.7, 2.5)])
+def test_curvature_bounds_the_speed(turn: float, weights: tuple[float, float]) -> None:
+    """Everywhere at most, and in the tightest interval not much less, than the centripetal limit allows."""
+    bend, limits = np.radians(turn), Limits(feed=1e6, centripetal=500.0)
+    tip = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0 + 3.0 * np.cos(bend), 3.0 * np.sin(bend), 0.0]])
+    smoothed = smooth(Program.from_poses(tip, [[0.0, 0.0, 1.0]] * 3), Settings(tolerance=0.05, weights=weights))
+    path = build_path(smoothed.program, smoothed.corners, smoothed.settings, limits)
+    found = path_limits(path, limits).whole
+    x = np.linspace(0.0, found.edge[-1], 20_001)[1:-1]
+    element = np.searchsorted(np.cumsum(path.length), x)
+    kappa = poses(path, element, x - np.append(0.0, np.cumsum(path.length))[element])[2]
+    used = kappa * found.cap[np.searchsorted(found.edge, x) - 1] / limits.centripetal_accel
+    assert 0.98 < used.max() <= 1.0 + 1e-6
 
 
-@pytest.mark.parametrize("given", CORNERS)
-def test_piece_curvature_is_an_upper_bound(given: tuple[float, float, float, tuple[float, float]]) -> None:
-    points, weights = corner(*given)
-    powers = halves(points, weights)
-    borders = curves.interval_borders(SIDES)
-    bound = curves.interval_curvatures(powers, borders)
-    for piece in range(curves.INTERVALS):
-        inside = borders[:, piece : piece + 1] + (borders[:, piece + 1 : piece + 2] - borders[:, piece : piece + 1]) * (
-            np.linspace(0.0, 1.0, 301)
-        )
-        assert (curves.curvature(powers, inside).max(axis=1) <= bound[:, piece] * (1 + 1e-3)).all()
-
-
-def test_a_leg_of_length_zero_is_straight() -> None:
+def test_length_beside_a_leg_of_length_zero() -> None:
     points, weights = corner(60.0, 0.4, 0.0, (1.0, 1.0))
     powers = halves(points, weights)
-    assert curves.interval_curvatures(powers, curves.interval_borders(SIDES)).max() == 0.0
     assert curves.interval_lengths(powers, curves.interval_borders(SIDES)).sum() == pytest.approx(0.4, rel=1e-12)

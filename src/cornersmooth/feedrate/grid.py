@@ -8,7 +8,6 @@ are one long cell.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,31 +80,32 @@ class Grid:
         return Grid(self.start[cells], self.width[cells], self.cap[cells], self.rows[:, cells], first)
 
 
-def make_grid(limits: Sequence[Intervals], runs: Ints, resolution: Resolution | None = None) -> Grid:
+def make_grid(limits: Intervals, runs: Ints, resolution: Resolution | None = None) -> Grid:
     """Cells for the given runs.
 
     Parameters
     ----------
-    limits : sequence of Intervals
-        Of the same path; the first are those of the path speed.
+    limits : Intervals
     runs : (r,) int64
         Which runs, ascending.
     """
     resolution = Resolution() if resolution is None else resolution
-    own = limits[0]
-    begin, end = own.edge[own.run[runs]], own.edge[own.run[runs + 1]]
-    accel, jerk = 0.5 / own.rows[0, own.run[runs]], 1.0 / own.rows[2, own.run[runs]]
-    rows = [_intervals(each, runs) for each in limits]
-    run, low, cap, before = (np.concatenate([part[i] for part in rows]) for i in range(4))
-    highest = np.maximum.reduceat(cap[: len(rows[0][0])], np.flatnonzero(np.isnan(rows[0][3])))
-    cap, before = np.minimum(cap, highest[run]), np.minimum(before, highest[run])
-    low = np.clip(low, begin[run], end[run])
+    begin, end = limits.edge[limits.run[runs]], limits.edge[limits.run[runs + 1]]
+    accel, jerk = limits.accel[runs], limits.jerk[runs]
+    # intervals of all runs, and the bound of the one before
+    counts = limits.run[runs + 1] - limits.run[runs]
+    run = np.repeat(np.arange(len(runs)), counts)
+    leads = np.cumsum(counts) - counts
+    interval = np.arange(len(run)) + (limits.run[runs] - leads)[run]
+    low, cap = limits.edge[interval], limits.cap[interval]
+    before = np.concatenate((cap[:1], cap[:-1]))
+    before[leads] = cap[leads]
     half_speed = cap**0.75 / (6.0 * np.sqrt(jerk[run]))
-    change = ~np.isnan(before) & (cap != before)
+    change = cap != before
 
     # the cells next to the stops
     front, back = _end_cells(half_speed, run, low, change, begin, end, accel, jerk)
-    smallest = SMALLEST * own.edge[-1]
+    smallest = SMALLEST * limits.edge[-1]
     least = np.minimum(smallest, (end - begin) / 12.0)  # else a cell far along the path may have no length at all
     front, back = np.maximum(resolution.end * front, least), np.maximum(resolution.end * back, least)
 
@@ -159,28 +159,14 @@ def make_grid(limits: Sequence[Intervals], runs: Ints, resolution: Resolution | 
     return in_cells(limits, grid, runs)
 
 
-def in_cells(limits: Sequence[Intervals], grid: Grid, runs: Ints) -> Grid:
+def in_cells(limits: Intervals, grid: Grid, runs: Ints) -> Grid:
     """Cells with the strictest limits of all intervals that each meets."""
-    cap, rows = np.full(len(grid.start), np.inf), np.zeros((5, len(grid.start)))
-    for each in limits:
-        met = cell_intervals(each, grid, runs)
-        cap = np.minimum(cap, np.minimum.reduceat(np.append(each.cap, np.inf), met)[::2])
-        for own, into in zip(each.rows, rows, strict=True):
-            if own.any():
-                np.maximum(into, np.maximum.reduceat(np.append(own, 0.0), met)[::2], out=into)
-    return replace(grid, cap=cap, rows=rows)
-
-
-def _intervals(limits: Intervals, runs: Ints) -> tuple[Ints, Floats, Floats, Floats]:
-    """Of all intervals of the runs: number of the run, start, bound of v², and that of the interval before or NaN."""
-    counts = limits.run[runs + 1] - limits.run[runs]
-    of_interval = np.repeat(np.arange(len(runs)), counts)
-    begin = np.cumsum(counts) - counts
-    interval = np.arange(len(of_interval)) + np.repeat(limits.run[runs] - begin, counts)
-    cap = limits.cap[interval]
-    before = np.concatenate((cap[:1], cap[:-1]))
-    before[begin] = np.nan
-    return of_interval, limits.edge[interval], cap, before
+    met = cell_intervals(limits, grid, runs)
+    cap = np.minimum.reduceat(np.append(limits.cap, np.inf), met)[::2]
+    rows = [
+        np.maximum.reduceat(np.append(row, 0.0), met)[::2] if row.any() else np.zeros(len(cap)) for row in limits.rows
+    ]
+    return replace(grid, cap=cap, rows=np.stack(rows))
 
 
 def _end_cells(

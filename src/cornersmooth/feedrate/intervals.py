@@ -9,6 +9,7 @@ needed, never lower: every limit is kept.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from cornersmooth.feedrate import arcs, rational_curves
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes
-from cornersmooth.feedrate.motion import curvature, derivatives
+from cornersmooth.feedrate.motion import curvature, known_by_way, taylor_along
 from cornersmooth.feedrate.path import Kind, Path
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.vectors import norm
@@ -28,6 +29,8 @@ INTERVALS = 4
 POLE_INTERVALS, FIRST_INTERVAL = 40, 0.05
 #: the cone at the pole in which derivatives are cut off here, over the cone of the machine: smaller, to be safe
 WITHIN = 0.5
+#: a radius of curvature below this is a cusp and is passed with the speed for this radius, mm
+SMALLEST_RADIUS = 1e-6
 #: places inside of every interval at which derivatives are sampled
 _QUARTERS = np.array([0.25, 0.5, 0.75])
 #: elements sampled together
@@ -52,27 +55,28 @@ class Intervals:
         Of z′ and z in a limit of acceleration, and of z″/2, z′ and z in one of jerk, over the limit.
     run : (r + 1,) int64
         Intervals ``run[i]`` to ``run[i + 1]`` lie between two stops.
+    accel, jerk : (r,) float64
+        Limits along the path of each run.
     """
 
     edge: Floats
     cap: Floats
     rows: Floats
     run: Ints
-
-    def with_others(self, other: Intervals | None) -> Intervals:
-        """Return the stricter limits of both, which have the same edges."""
-        if other is None:
-            return self
-        return replace(self, cap=np.minimum(self.cap, other.cap), rows=np.maximum(self.rows, other.rows))
+    accel: Floats
+    jerk: Floats
 
     @property
-    def strictest(self) -> tuple[Floats, Floats, Floats]:
-        """Lowest and highest bound of v² (r,), and largest rows (5, r), of each run."""
+    def level(self) -> Bools:
+        """(r,) bool: runs with one bound of v² and no limit of acceleration and jerk but that along the path."""
         begin = self.run[:-1]
         if not len(begin):
-            return np.zeros(0), np.zeros(0), np.zeros((5, 0))
+            return np.zeros(0, np.bool_)
         least, most = np.minimum.reduceat(self.cap, begin), np.maximum.reduceat(self.cap, begin)
-        return least, most, np.maximum.reduceat(self.rows, begin, axis=1)
+        largest, nothing = np.maximum.reduceat(self.rows, begin, axis=1), np.zeros(len(begin))
+        own = np.stack((0.5 / self.accel, nothing, 1.0 / self.jerk, nothing, nothing))
+        level: Bools = (least == most) & (largest <= own).all(axis=0)
+        return level
 
 
 Singles = NDArray[np.float32]
@@ -104,162 +108,83 @@ class AxisSamples:
     jerk: Floats
 
 
-@dataclass(frozen=True)
-class AxisLimits:
-    """Limits beyond those of the path speed, all over the same intervals.
+class PathLimits(NamedTuple):
+    """All limits of a path over the same intervals.
 
     Parameters
     ----------
+    whole : Intervals
+        All of them by their amounts.
     vectors : Intervals
-        Of tip and tool axis, and speeds of the axes of a machine.
-    machine : Intervals or None
-        Accelerations and jerks of the axes of a machine, by their amounts.
+        The same without accelerations and jerks of the axes of a machine.
     samples : AxisSamples or None
         What is known of these axes besides.
     """
 
+    whole: Intervals
     vectors: Intervals
-    machine: Intervals | None
     samples: AxisSamples | None
 
-    @property
-    def all(self) -> Intervals:
-        """All of them by their amounts."""
-        return self.vectors.with_others(self.machine)
 
+def path_limits(path: Path, limits: Limits, machine_axes: MachineAxes | None = None) -> PathLimits:
+    """Limits of speed, of tip and tool axis as vectors, and of the axes of a machine.
 
-def path_limits(path: Path, limits: Limits) -> tuple[Intervals, Ints]:
-    """Limits of the path speed, and elements (r + 1,) that begin at stops.
-
-    The limit of κ·v² is applied over short intervals of each curve with the largest curvature in the interval.
+    Transitions between a motion of the tip and a turn on the spot are left out but for the tip: by the way of the tip
+    the derivatives of everything else have no bound there. Pieces of runs and of NC programs on which the tip all but
+    stands while the axis turns are looked at closely where it is slowest.
     """
-    m = len(path)
-    cap = path.speed**2
-    arc = np.flatnonzero((path.kind == Kind.ARC) & ~path.turning)
-    if len(arc):
-        bound = limits.centripetal_accel / curvature(arcs.series(path.program, path.move[arc], 0.0))
-        cap[arc] = np.minimum(cap[arc], bound)
-    bent = np.flatnonzero(path.bent)
-    which, share, interval_cap = rational_curves.curvature_caps(
-        path.curves.tip, path.curves.half, path.row[bent], path.speed[bent], limits.centripetal_accel
-    )
-    which = bent[which]
-
-    # one slot for the junction before each element, then its intervals
-    count = np.ones(m, np.int64)
-    count[which] = rational_curves.INTERVALS
-    joined = np.isfinite(path.junction_speed[:-1]) & (path.junction_speed[:-1] > 0.0)
-    begin = np.concatenate(([0], np.cumsum(count + joined)))
-    total = int(begin[-1])
-    width, bounds = np.zeros(total), np.zeros(total)
-    first = begin[:-1] + joined
-    single = count == 1
-    width[first[single]] = path.length[single]
-    bounds[first[single]] = cap[single]
-    inside = first[which][:, None] + np.arange(rational_curves.INTERVALS)
-    width[inside] = share * (path.length[which] / share.sum(axis=1))[:, None]
-    bounds[inside] = interval_cap
-    bounds[begin[:-1][joined]] = path.junction_speed[:-1][joined] ** 2
-
-    stops = np.flatnonzero(path.junction_speed == 0.0) if m else np.zeros(1, np.int64)
-    kinds = np.array(((limits.accel, limits.jerk), limits.rapid_limits[1:], limits.angular_limits[1:]))
-    lead = stops[:-1]
-    accel, jerk = kinds[np.where(path.turning[lead], 2, path.rapid[lead])].T
-    rows = np.zeros((5, total))
-    size = np.diff(begin[stops])
-    rows[0], rows[2] = np.repeat(0.5 / accel, size), np.repeat(1.0 / jerk, size)
-    return Intervals(np.concatenate(([0.0], np.cumsum(width))), bounds, rows, begin[stops]), stops
-
-
-@dataclass(frozen=True)
-class _Quantities:
-    """What is limited: the tip and the tool axis by their lengths, then the axes of a machine with their signs.
-
-    Parameters
-    ----------
-    path : Path
-    vectors : (c,) int64
-        0 for the tip, 1 for the tool axis.
-    machine_axes : MachineAxes or None
-    bounds : (3, d) float64
-        Limits of speed, acceleration and jerk.
-    counts : (m, d) bool
-        Whether they are limited on each element.
-    """
-
-    path: Path
-    vectors: Ints
-    machine_axes: MachineAxes | None
-    bounds: Floats
-    counts: Bools
-
-    def sampled(self, element: Ints, fine: Floats) -> Floats:
-        """First three derivatives (3, g, p, 5, d) in intervals whose ends and quarters are at `fine` (g, 4·p + 1)."""
-        which, share = np.repeat(element, fine.shape[1]), fine.ravel()
-        found = []
-        if len(self.vectors):
-            orders = np.stack([norm(order) for order in derivatives(self.path, which, share)])
-            found.append(orders.transpose(0, 2, 1)[..., self.vectors])
-        if self.machine_axes is not None:
-            found.append(np.stack(self.machine_axes.orders(which, share)[1:]))
-        values = np.concatenate(found, axis=-1).reshape(3, *fine.shape, -1)
-        return values[:, :, np.arange(0, fine.shape[1] - 1, 4)[:, None] + np.arange(5)]
-
-
-def axis_limits(path: Path, limits: Limits, run: Ints, machine_axes: MachineAxes | None = None) -> AxisLimits | None:
-    """Limits that go beyond those of the path speed; None where there are none.
-
-    Transitions between a motion of the tip and a turn on the spot are left out but for the jerk of the tip: by the way
-    of the tip the derivatives of everything else have no bound there. Pieces of runs and of texts on which the tip all
-    but stands while the axis turns are looked at closely where it is slowest.
-
-    Parameters
-    ----------
-    run : (r + 1,) int64
-        Elements that begin at stops.
-    """
-    bounds = np.stack(limits.vector_limits, axis=1)
-    vectors = np.flatnonzero(np.isfinite(bounds).any(axis=0))
-    if not len(path) or (machine_axes is None and not len(vectors)):
-        return None
-    steady = ~path.of_curves(path.curves.resting)
-    counts = np.stack((~path.turning, ~path.turning & steady), axis=1)[:, vectors]
-    bounds, slow = bounds[:, vectors], path.of_curves(path.curves.slow) & ~path.turning
-    close, own = slow.copy(), len(vectors)
+    steady, moving = ~path.of_curves(path.curves.resting), ~path.turning
+    slow = path.of_curves(path.curves.slow) & moving
+    close, bounds = slow.copy(), np.stack(limits.vector_limits, axis=1)
     if machine_axes is not None:
         machine_axes = replace(machine_axes, cone=WITHIN * machine_axes.cone)
         bounds = np.concatenate((bounds, machine_axes.limits), axis=1)
-        counts = np.concatenate((counts, np.repeat(steady[:, None], bounds.shape[1] - own, axis=1)), axis=1)
         close |= machine_axes.near_pole() & steady
-    quantities = _Quantities(path, vectors, machine_axes, bounds, counts)
-    bent, asked = path.bent, counts.any(axis=1)
-    count = np.where(
-        asked, np.where(close, 2 * POLE_INTERVALS, np.where(bent, rational_curves.INTERVALS, INTERVALS)), 1
-    )
-    begin = np.concatenate(([0], np.cumsum(count)))
-    total = int(begin[-1])
-    width = np.repeat(path.length, count)
-    cap, rows = np.full((2, total), np.inf), np.zeros((2, 5, total))  # of vectors; of the machine
-    value = np.zeros((3, bounds.shape[1] - own, total, 3), np.float32)
+    columns = bounds.shape[1]
+    counts = np.stack((moving, moving & steady, *[steady] * (columns - 2)), axis=1)
+    curved = _curved(path, limits.centripetal_accel)
+    asked = curved | counts[:, np.isfinite(bounds).any(axis=0)].any(axis=1)
+
+    # one interval for the junction before each element, then its own
+    divided = np.where(close, 2 * POLE_INTERVALS, np.where(path.bent, rational_curves.INTERVALS, INTERVALS))
+    count = np.where(asked, divided, 1)
+    joined = np.isfinite(path.junction_speed[:-1]) & (path.junction_speed[:-1] > 0.0)
+    begin = np.concatenate(([0], np.cumsum(count + joined)))
+    total, first = int(begin[-1]), begin[:-1] + joined
+    fastest = path.speed**2
+    arc = np.flatnonzero((path.kind == Kind.ARC) & moving)
+    kappa = curvature(arcs.series(path.program, path.move[arc], 0.0))
+    fastest[arc] = np.minimum(fastest[arc], limits.centripetal_accel / kappa)
+    width, cap = (np.repeat(values, count + joined) for values in (path.length, fastest))
+    rows = np.zeros((2, 5, total))  # of vectors, of the machine
+    width[begin[:-1][joined]] = 0.0
+    cap[begin[:-1][joined]] = path.junction_speed[:-1][joined] ** 2
+    machine_cap = cap.copy()
+    value = np.zeros((3, columns - 2, total, 3), np.float32)
     missed = np.zeros(value.shape[:-1], np.float32)
     middle, known = np.full(total, 0.5), np.ones(total, np.bool_)
-    for curve, near in ((True, True), (True, False), (False, True), (False, False)):
-        chosen = np.flatnonzero(asked & (bent == curve) & (close == near))
+    for bent, near in ((True, True), (True, False), (False, True), (False, False)):
+        chosen = np.flatnonzero(asked & (path.bent == bent) & (close == near))
         size = _TOGETHER // 8 if near else _TOGETHER
         for at in range(0, len(chosen), size):
             element = chosen[at : at + size]
             graded = _graded(path, element, slow[element], machine_axes) if near else None
-            fine, share, quarters = _divided(path, element, curve, graded)
-            into = begin[element][:, None] + np.arange(share.shape[1])
+            fine, share, quarters = _divided(path, element, bent, graded)
+            into = first[element][:, None] + np.arange(share.shape[1])
             width[into] = share * path.length[element][:, None]
-            along = quantities.sampled(element, fine)
+            along = _sampled(path, element, fine, machine_axes)
             amounts = np.where(counts[element][:, None], _largest(along), 0.0)
-            cap[0, into], rows[0][:, into] = _judge(amounts[..., :own], bounds[:, :own])
+            most, rows[0][:, into] = _judge(amounts[..., :2], bounds[:, :2])
+            most = np.minimum(most, _judge(amounts[:1], bounds[:1])[0])
+            if bent:
+                most = np.minimum(most, limits.centripetal_accel / np.maximum(amounts[1, ..., 0], 1e-300))
+                most = np.maximum(most, limits.centripetal_accel * SMALLEST_RADIUS)
+            cap[into] = np.minimum(cap[into], most)
             if machine_axes is None:
                 continue
-            amounts, along = amounts[..., own:], along[..., own:]
-            cap[1, into], rows[1][:, into] = _judge(amounts, bounds[:, own:])
-            cap[0, into] = np.minimum(cap[0, into], _judge(amounts[:1], bounds[:1, own:])[0])
+            amounts, along = amounts[..., 2:], along[..., 2:]
+            most, rows[1][:, into] = _judge(amounts, bounds[:, 2:])
+            machine_cap[into] = np.minimum(cap[into], most)
             finite = np.isfinite(along).all(axis=(0, 3, 4))
             middle[into] = quarters[1]
             along = np.where((finite & steady[element][:, None])[..., None, None], along, 0.0)
@@ -269,11 +194,52 @@ def axis_limits(path: Path, limits: Limits, run: Ints, machine_axes: MachineAxes
             # where the tip all but stands, and derivatives change much, huge terms cancel
             even = (off <= _EVEN * np.abs(along).max(axis=3)).all(axis=(0, 3)) | ~slow[element][:, None]
             known[into] = (finite & even) | ~steady[element][:, None]
-    edge = np.concatenate(([0.0], np.cumsum(width)))
-    both = [Intervals(edge, *limit, begin[run]) for limit in zip(cap, rows, strict=True)]
+
+    stops = np.flatnonzero(path.junction_speed == 0.0) if len(path) else np.zeros(1, np.int64)
+    kinds = np.array(((limits.accel, limits.jerk), limits.rapid_limits[1:], limits.angular_limits[1:]))
+    accel, jerk = kinds[np.where(path.turning[stops[:-1]], 2, path.rapid[stops[:-1]])].T
+    along_path = np.repeat((0.5 / accel, 1.0 / jerk), np.diff(begin[stops]), axis=1)
+    rows[0][[0, 2]] = np.maximum(rows[0][[0, 2]], along_path)
+    vectors = Intervals(np.concatenate(([0.0], np.cumsum(width))), cap, rows[0], begin[stops], accel, jerk)
     if machine_axes is None:
-        return AxisLimits(both[0], None, None)
-    return AxisLimits(both[0], both[1], AxisSamples(value, missed, middle, known, *machine_axes.limits[1:]))
+        return PathLimits(vectors, vectors, None)
+    whole = replace(vectors, cap=np.minimum(cap, machine_cap), rows=rows.max(axis=0))
+    return PathLimits(whole, vectors, AxisSamples(value, missed, middle, known, *machine_axes.limits[1:]))
+
+
+def _curved(path: Path, most: float) -> Bools:
+    """(m,) bool: curves whose curvature may ask for less than the feed, by a look at few places."""
+    found = np.zeros(len(path), np.bool_)
+    for element in rational_curves.groups(np.flatnonzero(path.bent)):
+        borders = rational_curves.interval_borders(path.curves.half[path.row[element]])
+        tip, _, _ = taylor_along(path, np.repeat(element, borders.shape[1]), borders.ravel(), 3)
+        bend = curvature(tip).reshape(borders.shape).max(axis=1)
+        back = _turns_back(tip[1].reshape(*borders.shape, 3)).any(axis=1)
+        found[element] = (2.0 * bend * path.speed[element] ** 2 > most) | back
+    return found
+
+
+def _turns_back(tangents: Floats) -> Bools:
+    """(g, q - 1) bool: whether (g, q, 3) tangents turn by more than a right angle from one to the next."""
+    back: Bools = (tangents[:, 1:] * tangents[:, :-1]).sum(axis=-1) < 0.0
+    return back
+
+
+def _sampled(path: Path, element: Ints, fine: Floats, machine_axes: MachineAxes | None) -> Floats:
+    """First three derivatives (3, g, p, 5, d) in intervals whose ends and quarters are at `fine` (g, 4·p + 1).
+
+    Of the tip and the tool axis their lengths, then of the axes of a machine with their signs.
+    """
+    which, share = np.repeat(element, fine.shape[1]), fine.ravel()
+    tip, axis, speed = taylor_along(path, which, share)
+    of_machine = [] if machine_axes is None else [machine_axes.positions(which, share, tip, axis)]
+    orders = np.stack(known_by_way(np.concatenate((tip, axis, *of_machine), axis=-1), speed))
+    lengths = np.stack((norm(orders[..., :3]), norm(orders[..., 3:6])), axis=-1)
+    values = np.concatenate((lengths, orders[..., 6:]), axis=-1).reshape(3, *fine.shape, -1)
+    # a curve that turns back between two samples has a cusp
+    back = _turns_back(tip[1].reshape(*fine.shape, 3)) & path.bent[element][:, None]
+    values[1, :, 1:, 0][back] = 1.0 / SMALLEST_RADIUS
+    return values[:, :, np.arange(0, fine.shape[1] - 1, 4)[:, None] + np.arange(5)]
 
 
 def _graded(path: Path, element: Ints, slow: Bools, machine_axes: MachineAxes | None) -> Floats:

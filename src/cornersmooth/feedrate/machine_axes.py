@@ -74,7 +74,7 @@ class MachineAxes:
         ----------
         element : (m,) int64
         share : (m,) float64
-            Where on each element, as in `motion.derivatives`; infinite derivatives where the tip comes to a stand.
+            Where on each element, as in `taylor_along`; infinite derivatives where the tip comes to a stand.
         """
         tip, axis, speed = taylor_along(self.path, element, share)
         position = self.positions(element, share, tip, axis)

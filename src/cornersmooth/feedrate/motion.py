@@ -17,26 +17,11 @@ _NO_SPEED = np.finfo(np.float64).tiny
 _STRAIGHT = 1e-12
 
 
-def derivatives(path: Path, element: Ints, share: Floats) -> tuple[Floats, Floats, Floats]:
-    """First three derivatives (2, m, 3) of tip and tool axis by the path coordinate.
-
-    Per mm, mm², mm³; per rad where the tip stands still; infinite where it comes to a stand.
-
-    Parameters
-    ----------
-    path : Path
-    element : (m,) int64
-    share : (m,) float64
-        Where on each element: the part of its length for lines and arcs, the parameter t of its half for curves. Curves
-        of the paper's method are taken at v = u.
-    """
-    tip, axis, speed = taylor_along(path, element, share)
-    one, two, three = known_by_way(np.concatenate((tip, axis), axis=-1), speed)
-    return tuple(np.stack((order[:, :3], order[:, 3:])) for order in (one, two, three))  # type: ignore[return-value]
-
-
 def known_by_way(series: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
-    """First three derivatives by the way, infinite where the tip comes to a stand (see `taylor.by_way`)."""
+    """First three derivatives by the path coordinate, infinite where the tip comes to a stand (see `taylor.by_way`).
+
+    Per mm, mm², mm³; per rad where the tip stands still.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         one, two, three = taylor.by_way(series, speed)
     one, two, three = (np.where(np.isfinite(order), order, np.inf) for order in (one, two, three))
@@ -48,7 +33,13 @@ def taylor_along(
 ) -> tuple[Floats, Floats, Floats]:
     """Taylor series of tip and unit tool axis, (orders, m, 3) each, and of the coordinate's speed, (orders - 1, m).
 
-    By where it is on each element, which is `share` as in `derivatives`.
+    Parameters
+    ----------
+    path : Path
+    element : (m,) int64
+    share : (m,) float64
+        Where on each element: the part of its length for lines and arcs, the parameter t of its half for curves. Curves
+        of the paper's method are taken at v = u.
     """
     count = len(element)
     tip, lever = np.zeros((2, orders, count, 3))

@@ -12,7 +12,7 @@ import numpy as np
 
 from cornersmooth.feedrate import scurve
 from cornersmooth.feedrate.grid import in_cells, make_grid
-from cornersmooth.feedrate.intervals import AxisLimits, Intervals, axis_limits, path_limits
+from cornersmooth.feedrate.intervals import Intervals, PathLimits, path_limits
 from cornersmooth.feedrate.limits import Limits
 from cornersmooth.feedrate.machine_axes import MachineAxes, follow
 from cornersmooth.feedrate.path import Path, build_path
@@ -180,29 +180,22 @@ def _plan_part(
     if machine_axes is not None:
         path = replace(path, junction_speed=np.minimum(path.junction_speed, machine_axes.jump_speeds(limits.period)))
     path = replace(path, junction_speed=_not_crowded(path, limits.period))
-    own, stops = path_limits(path, limits)
-    more = axis_limits(path, limits, stops, machine_axes)
-    lowest, highest, rows = own.strictest
-    level = lowest == highest
-    if more is not None:
-        cap, _, others = more.all.strictest
-        level &= (cap >= lowest) & (others <= rows).all(axis=0)
-    parts = [_level_runs(own, np.flatnonzero(level))]
-    uneven = np.flatnonzero(~level)
-    if len(uneven):
-        parts.append(_uneven_runs(own, more, uneven, progress))
+    found = path_limits(path, limits, machine_axes)
+    level = found.whole.level
+    parts = [_level_runs(found.whole, np.flatnonzero(level))]
+    if not level.all():
+        parts.append(_uneven_runs(found, np.flatnonzero(~level), progress))
     run, *phases = (np.concatenate([part[i] for part in parts]) for i in range(7))
     order = np.argsort(run, kind="stable")
     order = order[phases[0][order] > 0.0]
-    return path, [phase[order] for phase in phases], float(own.edge[-1])
+    return path, [phase[order] for phase in phases], float(found.whole.edge[-1])
 
 
 def _level_runs(limits: Intervals, runs: Ints) -> tuple[Floats | Ints, ...]:
     """Phases of runs with one speed limit: S-curves in closed form."""
     first = limits.run[runs]
     begin, end, limit = limits.edge[first], limits.edge[limits.run[runs + 1]], np.sqrt(limits.cap[first])
-    accel, jerk = 0.5 / limits.rows[0, first], 1.0 / limits.rows[2, first]
-    duration, signed, _ = scurve.rest_to_rest(end - begin, limit, accel, jerk)
+    duration, signed, _ = scurve.rest_to_rest(end - begin, limit, limits.accel[runs], limits.jerk[runs])
     way, speed, rising = np.empty_like(duration), np.empty_like(duration), np.empty_like(duration)
     x, v, a = begin, np.zeros(len(runs)), np.zeros(len(runs))
     for phase in range(duration.shape[1]):
@@ -223,17 +216,15 @@ def _level_runs(limits: Intervals, runs: Ints) -> tuple[Floats | Ints, ...]:
     )
 
 
-def _uneven_runs(
-    own: Intervals, more: AxisLimits | None, runs: Ints, progress: Progress | None
-) -> tuple[Floats | Ints, ...]:
+def _uneven_runs(limits: PathLimits, runs: Ints, progress: Progress | None) -> tuple[Floats | Ints, ...]:
     """Phases of runs whose speed limit changes on the way: one per cell."""
-    grid = make_grid([own] if more is None else [own, more.all], runs)
+    grid = make_grid(limits.whole, runs)
     batch = problem_of(grid)
-    if more is None or more.samples is None:
+    if limits.samples is None:
         c = solve_runs(batch, grid, progress)
     else:
-        free = in_cells([own, more.vectors], grid, runs)
-        c = faster(grid, free, Places.of(grid, runs, more), batch, solve_runs(batch, grid, progress, gap=ROUGH))
+        free = in_cells(limits.vectors, grid, runs)
+        c = faster(grid, free, Places.of(grid, runs, limits), batch, solve_runs(batch, grid, progress, gap=ROUGH))
     z, slope, bend = batch.forms(c)
     v, a = np.sqrt(z), 0.5 * slope  # at the end of each cell
     before_v = np.concatenate(([0.0], v[:-1]))

@@ -1,4 +1,4 @@
-"""Rational polynomials over t ∈ [0, 1]: points, arc length and its inverse, curvature, for many curves at once.
+"""Rational polynomials over t ∈ [0, 1]: points, arc length and its inverse, for many curves at once.
 
 Written in powers of t they are evaluated by Horner's rule, every curve at parameters of its own.
 """
@@ -11,7 +11,7 @@ from math import comb
 import numpy as np
 
 from cornersmooth.geometry import nurbs
-from cornersmooth.model import Bools, Floats, Ints
+from cornersmooth.model import Floats, Ints
 from cornersmooth.vectors import norm, unit
 
 #: tip lengths up to this are no motion of the tip, mm
@@ -40,11 +40,6 @@ _NEWTON_STEPS = 3
 _SEARCHED, _ROUNDS, _LEAST_FELT = 25, 4, 1e-6
 #: parameter beside an end at which the tangent is taken where there is none at the end itself
 _BESIDE = 1e-3
-#: a radius of curvature below this is a cusp and is passed with the speed for this radius, mm
-SMALLEST_RADIUS = 1e-6
-#: samples of the curvature per interval, and rounds of closer sampling where it is largest
-_SAMPLES = 4
-_CLOSER = 3
 
 
 def polynomial(points: Floats, weights: Floats | None = None, half: Ints | None = None) -> Floats:
@@ -166,35 +161,6 @@ def lengths_before(powers: Floats, half: Ints, t: Floats) -> Floats:
     return np.take_along_axis(lengths, interval, axis=1) + _lengths(powers, low, t - low)
 
 
-def interval_curvatures(powers: Floats, borders: Floats) -> Floats:
-    """Upper ends of the curvature (g, p) between neighbouring parameters, 1/mm.
-
-    Sampled, and sampled again ever more closely around the largest sample.
-    """
-    g, p = len(powers), borders.shape[1] - 1
-    inner = np.linspace(0.0, 1.0, _SAMPLES + 1)[:-1]
-    step = np.diff(borders, axis=1)
-    t = np.concatenate(
-        ((borders[:, :-1, None] + step[..., None] * inner).reshape(g, p * _SAMPLES), borders[:, -1:]), axis=1
-    )
-    kappa = curvature(powers, t)
-    of_piece = np.arange(p)[:, None] * _SAMPLES + np.arange(_SAMPLES + 1)
-    largest = kappa[:, of_piece].max(axis=2)
-    rows = np.arange(g)
-    best = kappa.argmax(axis=1)
-    low, high = t[rows, np.maximum(best - 1, 0)], t[rows, np.minimum(best + 1, t.shape[1] - 1)]
-    part = np.linspace(0.0, 1.0, 9)
-    for _ in range(_CLOSER):
-        near = low[:, None] + (high - low)[:, None] * part
-        kappa = curvature(powers, near)
-        at = kappa.argmax(axis=1)
-        interval = np.clip((borders <= near[rows, at][:, None]).sum(axis=1) - 1, 0, p - 1)
-        largest[rows, interval] = np.maximum(largest[rows, interval], kappa[rows, at])
-        low, high = near[rows, np.maximum(at - 1, 0)], near[rows, np.minimum(at + 1, 8)]
-    found: Floats = largest
-    return found
-
-
 def slowest(powers: Floats) -> tuple[Floats, Floats, Floats]:
     """Where curves are slowest by their parameter, that speed (mm), and the share over which it is felt, (g, 2) each.
 
@@ -225,23 +191,6 @@ def slowest(powers: Floats) -> tuple[Floats, Floats, Floats]:
     return places, speeds, shares
 
 
-def curvature(powers: Floats, t: Floats) -> Floats:
-    """Curvature (g, m) at the parameters t (g, m), 1/mm; 0 where the curve is straight up to rounding."""
-    _, d1, d2 = _derivatives(powers, t, 2)
-    across = _size(np.cross(d1, d2, axis=0))
-    speed = _size(d1)
-    straight = across <= 1e-12 * speed * _size(d2)
-    kappa: Floats = np.where(straight, 0.0, across / np.where(straight, 1.0, speed**3))
-    return kappa
-
-
-def _turns_back(powers: Floats, borders: Floats) -> Bools:
-    """(g, p) bool: intervals on which the curve turns by more than a right angle."""
-    _, d1 = _derivatives(powers, borders, 1)
-    back: Bools = (d1[:, :, 1:] * d1[:, :, :-1]).sum(axis=0) < 0.0
-    return back
-
-
 def parameters_at(powers: Floats, half: Ints, which: Ints, distance: Floats) -> Floats:
     """Parameters t (q,) at arc length `distance` (q,) from the start of the halves `which` (q,)."""
     borders = interval_borders(half)
@@ -268,53 +217,6 @@ def turned_angle(tip: Floats, axis_point: Floats, half: Ints) -> Floats:
     step = norm(np.diff(axis, axis=1))
     swept: Floats = (2.0 * np.arcsin(np.minimum(0.5 * step, 1.0))).sum(axis=1)
     return swept
-
-
-def curvature_caps(powers: Floats, half: Ints, row: Ints, speed: Floats, most: float) -> tuple[Ints, Floats, Floats]:
-    """Where curvature asks for less than the feed.
-
-    Parameters
-    ----------
-    powers, half : (k, d + 1, 4) and (k,)
-        All curves.
-    row : (g,) int64
-        Which of them.
-    speed : (g,) float64, mm/s
-    most : float, mm/s²
-        Of κ·v².
-
-    Returns
-    -------
-    which : (b,) int64
-        Those of the g that are slowed down, ascending.
-    share : (b, INTERVALS) float64
-        Parts of their length.
-    cap : (b, INTERVALS) float64, (mm/s)²
-        v² at most, per part.
-    """
-    which, shares, bounds = [], [], []
-    for group in groups(np.arange(len(speed))):
-        tip = powers[row[group]]
-        borders = interval_borders(half[row[group]])
-        # a look at the borders alone leaves few curves that need the careful one
-        rough = curvature(tip, borders).max(axis=1)
-        turning_back = _turns_back(tip, borders)
-        slowed = np.flatnonzero((2.0 * rough * speed[group] ** 2 > most) | turning_back.any(axis=1))
-        if not len(slowed):
-            continue
-        tip, borders = tip[slowed], borders[slowed]
-        kappa, share = interval_curvatures(tip, borders), interval_lengths(tip, borders)
-        # a interval that turns back must be bent by that much; where no sample shows it, it is a cusp
-        cusp = turning_back[slowed] & (kappa * share < 1.0)
-        kappa = np.where(cusp, np.inf, kappa)
-        fastest = speed[group[slowed], None] ** 2
-        kappa = np.clip(kappa, most / fastest, 1.0 / SMALLEST_RADIUS)
-        which.append(group[slowed])
-        shares.append(share)
-        bounds.append(np.minimum(most / kappa, fastest))
-    if not which:
-        return np.zeros(0, np.int64), np.zeros((0, INTERVALS)), np.zeros((0, INTERVALS))
-    return np.concatenate(which), np.concatenate(shares), np.concatenate(bounds)
 
 
 def groups(rows: Ints) -> list[Ints]:

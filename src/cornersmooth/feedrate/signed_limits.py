@@ -19,7 +19,7 @@ import numpy as np
 
 from cornersmooth.feedrate.grid import Grid, cell_intervals
 from cornersmooth.feedrate.interior_point import GAP
-from cornersmooth.feedrate.intervals import AxisLimits, parabola
+from cornersmooth.feedrate.intervals import PathLimits, parabola
 from cornersmooth.feedrate.speed_problem import Batch, Row, both_signs, problem_of
 from cornersmooth.feedrate.windows import solve_runs
 from cornersmooth.model import Bools, Floats, Ints
@@ -114,7 +114,7 @@ class Places:
     unknown: Bools
 
     @classmethod
-    def of(cls, grid: Grid, runs: Ints, limits: AxisLimits) -> Places:
+    def of(cls, grid: Grid, runs: Ints, limits: PathLimits) -> Places:
         """All of them in the cells that lie between two others."""
         samples, edge = limits.samples, limits.vectors.edge
         assert samples is not None
