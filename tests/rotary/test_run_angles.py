@@ -58,7 +58,7 @@ def guide_of(
     """Angles at the places of the lines of one run."""
     from cornersmooth.smoothing.runs.rows import points_at
 
-    lines = polylines_of(runs, program.tip, program.tip + smoothed.settings.axis_length * program.axis)
+    lines = polylines_of(runs, program, smoothed.settings.axis_length)
     places = line_places(runs, lines, smoothed.program, smoothed.settings)
     tip, axis = points_at(runs.control, Splines(runs.knot, runs.knot_count), places.span, places.s)
     tip, axis = np.vstack((program.tip[:1], tip)), np.vstack((program.axis[:1], axis))

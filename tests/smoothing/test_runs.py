@@ -13,14 +13,16 @@ from scipy.optimize import NonlinearConstraint, minimize
 
 from cornersmooth import Program, Settings, smooth
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.smoothing.runs import solving
+from cornersmooth.model import Move, Status
+from cornersmooth.smoothing import global_runs
 from cornersmooth.smoothing.runs.banded import Gather, couplings, keep_in_planes, solve_blocks
 from cornersmooth.smoothing.runs.fitting import fit
 from cornersmooth.smoothing.runs.interior import COLD, Task, smoothest
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines, Samples
 from cornersmooth.smoothing.runs.rows import largest_curvature
-from cornersmooth.smoothing.runs.solving import RunCurves, solve_groups, solve_runs
+from cornersmooth.smoothing.runs.solving import RunCurves, solve_runs
 from cornersmooth.smoothing.runs.windows import Windows
+from cornersmooth.vectors import unit
 from oracle.share import covering_share, how_many
 from smoothing.runs_oracle import deviation, random_runs, spline_of, through
 
@@ -364,18 +366,26 @@ def test_tip_and_axis_point_deviate_to_opposite_sides_where_that_keeps_the_lever
 
 def test_groups_of_runs_are_solved_as_all_of_them_by_any_number_of_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = random_runs(7, 12, 14, H)
-    whole = solve_runs(lines, (0.01, 0.01), H)
-    monkeypatch.setattr(solving, "GROUP", 30)
-    told: list[tuple[int, int]] = []
-    found = [
-        solve_groups(lines, (0.01, 0.01), H, lambda *now: told.append(now), processes=processes) for processes in (1, 2)
-    ]
-    assert len(told) > 4  # three groups or more, twice
-    assert told[-1] == (len(lines.s), len(lines.s))
-    for curves, at_poses in found:
-        np.testing.assert_array_equal(curves.splines.knot, whole.splines.knot)
-        np.testing.assert_allclose(curves.control, whole.control, rtol=0, atol=1e-9)
-        for name in ("tip", "axis", "turn", "curvature"):
-            np.testing.assert_array_equal(getattr(at_poses, name), getattr(found[0][1], name))
-    np.testing.assert_array_equal(found[0][0].control, found[1][0].control)
-    assert found[0][1].tip.max() <= whole.tip_bound.max()
+    first = lines.first[:-1]
+    axis = unit(lines.point[:, 3:] - lines.point[:, :3])
+    kind = np.full(len(axis), Move.LINEAR)
+    kind[first] = Move.RAPID
+    program = Program.from_poses(lines.point[:, :3], axis, kind=kind, feed=900.0)
+    chosen = Settings(method="global", axis_length=H)
+    whole = smooth(program, chosen)
+    assert whole.runs is not None
+    monkeypatch.setattr(global_runs, "GROUP", 30)
+    for processes in (1, 2):
+        told: list[tuple[int, int]] = []
+        found = smooth(program, chosen, progress=lambda *now, told=told: told.append(now), processes=processes)
+        assert len(told) > 2  # groups
+        assert told[-1][0] == told[-1][1]
+        assert found.runs is not None
+        np.testing.assert_array_equal(found.runs.knot, whole.runs.knot)
+        np.testing.assert_allclose(found.runs.control, whole.runs.control, rtol=0, atol=1e-9)
+        in_run = whole.corners.status == Status.IN_RUN
+        np.testing.assert_array_equal(found.corners.status == Status.IN_RUN, in_run)
+        for name in ("tip_error", "axis_error", "orientation_error"):
+            column = getattr(found.corners, name)
+            np.testing.assert_allclose(column, getattr(whole.corners, name), rtol=0, atol=1e-9)
+        assert found.corners.tip_error[in_run].max() <= whole.runs.tip_bound.max() + 1e-9

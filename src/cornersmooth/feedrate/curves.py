@@ -170,7 +170,7 @@ class Curves:
     @classmethod
     def of_runs(cls, program: Program, runs: Runs, height: float) -> Curves:
         """Curves of whole runs, cut at all knots and poses."""
-        lines = polylines_of(runs, program.tip, program.tip + height * program.axis)
+        lines = polylines_of(runs, program, height)
         splines = Splines(runs.knot, runs.knot_count)
         pieces = Pieces.of(splines, lines)
         origin = lines.point[pieces.segment, :3]

@@ -27,6 +27,11 @@ def ranges(begin: Ints, counts: Ints) -> Ints:
     return whole
 
 
+def batches(counts: Ints, size: int) -> Ints:
+    """Rows at which batches of about `size` elements begin, a row or more in each, and the end of the last."""
+    return np.append(np.flatnonzero(np.diff(np.cumsum(counts) // size, prepend=-1)), len(counts))
+
+
 def search(values: Floats, counts: Ints, row: Ints, place: Floats, side: Literal["left", "right"] = "left") -> Ints:
     """`np.searchsorted` within rows.
 

@@ -107,7 +107,7 @@ class _RunRows:
 def _followed(smoothed: SmoothProgram, runs: Runs, path: RotaryWay) -> tuple[Runs, _RunRows]:
     """The runs that begin where a row ends and in which no solution may change, with their rows."""
     program = smoothed.program
-    lines = polylines_of(runs, program.tip, program.tip + smoothed.settings.axis_length * program.axis)
+    lines = polylines_of(runs, program, smoothed.settings.axis_length)
     places = line_places(runs, lines, program, smoothed.settings)
     inside = np.zeros(len(program), np.bool_)
     inside[places.pose] = True

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from cornersmooth.errors import Finding
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import ranges, spread, starts
+from cornersmooth.geometry.ragged import batches, ranges, spread, starts
 from cornersmooth.model import Bools, Corners, Floats, Ints, LimitedBy, Program, Runs, SmoothProgram, Status, Trait
+from cornersmooth.processes import map_in_processes
 from cornersmooth.settings import Settings
 from cornersmooth.slices import some_runs
 from cornersmooth.smoothing.construction import RUN_CURVATURE
@@ -19,9 +21,12 @@ from cornersmooth.smoothing.neighbours import find_neighbours
 from cornersmooth.smoothing.proportional import Proportional
 from cornersmooth.smoothing.runs.polylines import Polylines
 from cornersmooth.smoothing.runs.rows import TURNING
-from cornersmooth.smoothing.runs.solving import STEP, AtPoses, RunCurves, solve_groups
+from cornersmooth.smoothing.runs.solving import STEP, RunCurves, measured, solve_runs
 from cornersmooth.smoothing.transition import place_corners
 from cornersmooth.vectors import angle_between
+
+#: poses of runs that are solved together, about
+GROUP = 2500
 
 #: degrees: where the axis turns by more in a segment, output in curves (which cannot change F inside one) has no run.
 #: Between two control points so far apart nothing but the curve itself tells where the tool is.
@@ -31,6 +36,8 @@ STEEPEST = 30.0
 class GlobalRuns(Proportional):
     """Corners of a run are rounded together; those of runs that cannot be are rounded one by one."""
 
+    extra = (RUN_CURVATURE,)
+
     def smooth(
         self,
         program: Program,
@@ -38,25 +45,93 @@ class GlobalRuns(Proportional):
         progress: Callable[[int, int], None] | None = None,
         processes: int = 1,
     ) -> SmoothProgram:
-        """Round every corner by itself, then replace whole runs by one pair of curves."""
+        """Round every corner by itself, then replace whole runs by one pair of curves.
+
+        Groups of runs are solved side by side, or the windows of one: whole-program arrays stay few.
+        """
         corners = place_corners(program, settings, self)
         pose, count, steep = find_runs(program, settings, corners)
         findings = program.findings if not len(steep) else (*program.findings, _steep(program, steep))
         if not len(count):
             return SmoothProgram(program, corners, settings, findings)
-        point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
-        tolerances = settings.tip_tolerance, settings.axis_point_tolerance - TURNING * _turning(settings)
-        back = _backwards(point, count)
-        order = _turned(count, back)
-        lines = Polylines.through(point[order], count, STEP * min(tolerances))
-        curves, found = solve_groups(lines, tolerances, settings.axis_length, progress, processes=processes)
-        curves = _turned_curves(curves, back)
-        found = AtPoses(found.tip[order], found.axis[order], found.turn[order], found.curvature[order])
-        runs = _kept(curves, pose)
-        if not curves.kept.all():
-            first = int(pose[lines.first[:-1][~curves.kept][0]])
-            findings = (*findings, _one_by_one(program, first, curves, count))
-        return SmoothProgram(program, _with_runs(corners, runs, curves, found), settings, findings, runs)
+        first = batches(count, GROUP)
+        begin, alone = starts(count)[first], len(first) == 2
+
+        def solve(number: int) -> _Solved:
+            poses, runs = pose[begin[number] : begin[number + 1]], count[first[number] : first[number + 1]]
+            return _solve(program, settings, poses, runs, *((progress, processes) if alone else (None, 1)))
+
+        parts: dict[str, list[Any]] = {item.name: [] for item in fields(Runs)}
+        left = [pose[:0]]
+        for number, solved in enumerate(map_in_processes(solve, range(len(first) - 1), 1 if alone else processes)):
+            _mark(corners, solved)
+            left.append(solved.left)
+            for name, columns in parts.items():
+                columns.append(getattr(solved.runs, name))
+            if progress is not None:
+                progress(int(begin[number + 1]), len(pose))
+        alike: dict[str, Any] = {"step": parts.pop("step")[0]}
+        runs = Runs(**alike | {name: np.concatenate(parts.pop(name)) for name in tuple(parts)})
+        lost = np.concatenate(left)
+        if len(lost):
+            text = "corner rounded by itself: the curves of its run were not proved to keep the tolerance"
+            findings = (*findings, Finding("CS226", "note", int(program.line[lost[0]]), text, len(lost)))
+        return SmoothProgram(program, corners, settings, findings, runs if len(runs) else None)
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """Some runs with the curves that keep their tolerances, and what these are at the corners."""
+
+    runs: Runs
+    pose: Ints  # the corners of `runs`
+    columns: dict[str, Floats]  # what `Corners` holds of them
+    left: Ints  # corners of runs that were not proved
+
+
+def _solve(
+    program: Program,
+    settings: Settings,
+    pose: Ints,
+    count: Ints,
+    progress: Callable[[int, int], None] | None,
+    processes: int,
+) -> _Solved:
+    point = np.hstack((program.tip[pose], program.tip[pose] + settings.axis_length * program.axis[pose]))
+    # what turning the axis inside a line is worth at the axis point is left free
+    turning = TURNING * settings.tolerance * (settings.axis_length / settings.axis_scale)
+    tolerances = settings.tip_tolerance, settings.axis_point_tolerance - turning
+    back = _backwards(point, count)
+    lines = Polylines.through(point[_turned(count, back)], count, STEP * min(tolerances))
+    curves = _turned_curves(solve_runs(lines, tolerances, settings.axis_length, progress, processes=processes), back)
+    lines, splines, kept = curves.lines, curves.splines, curves.kept
+    run, place = spread(count)
+    inner = (place > 0) & (place < count[run] - 1)
+    known = inner & kept[run]
+    names = ("tip_error", "axis_error", "orientation_error", RUN_CURVATURE)
+    runs = Runs(
+        pose=pose[kept[run]],
+        count=count[kept],
+        s=lines.s[kept[run]],
+        step=lines.step,
+        knot=splines.knot[np.repeat(kept, splines.count)],
+        knot_count=splines.count[kept],
+        control=curves.control[kept[splines.control_run]],
+        tip_bound=curves.tip_bound[kept],
+        axis_bound=curves.axis_bound[kept],
+    )
+    columns = {name: values[known] for name, values in zip(names, measured(curves), strict=True)}
+    return _Solved(runs, pose[known], columns, pose[inner & ~kept[run]])
+
+
+def _mark(corners: Corners, solved: _Solved) -> None:
+    """Say in corners that nobody else has yet which are rounded by the curves of runs, in place."""
+    rows = np.searchsorted(corners.pose, solved.pose)
+    corners.status[rows], corners.limited_by[rows] = Status.IN_RUN, LimitedBy.TOLERANCE
+    corners.trim_in[rows] = corners.trim_out[rows] = 0.0  # those of the axis point are the same arrays
+    for name, values in solved.columns.items():
+        column = corners.extra[name] if name in corners.extra else getattr(corners, name)
+        column[rows] = values
 
 
 def corner_by_corner(smoothed: SmoothProgram, runs: Bools) -> SmoothProgram:
@@ -115,11 +190,6 @@ def _turned_curves(curves: RunCurves, back: Bools) -> RunCurves:
     )
 
 
-def _turning(settings: Settings) -> float:
-    """What the tolerance at `Settings.axis_scale` is worth at the axis point, mm."""
-    return settings.tolerance * (settings.axis_length / settings.axis_scale)
-
-
 def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[Ints, Ints, Ints]:
     """Poses of the runs that have a corner to round, repeated poses left out, and their number in each run.
 
@@ -157,61 +227,9 @@ def find_runs(program: Program, settings: Settings, corners: Corners) -> tuple[I
     return pose[ranges(first[wanted], number[wanted] + 1)], number[wanted] + 1, left
 
 
-def _kept(curves: RunCurves, pose: Ints) -> Runs:
-    """The runs that keep their tolerances."""
-    lines, splines, kept = curves.lines, curves.splines, curves.kept
-    poses = np.repeat(kept, lines.count)
-    return Runs(
-        pose=pose[poses],
-        count=lines.count[kept],
-        s=lines.s[poses],
-        step=lines.step,
-        knot=splines.knot[np.repeat(kept, splines.count)],
-        knot_count=splines.count[kept],
-        control=curves.control[kept[splines.control_run]],
-        tip_bound=curves.tip_bound[kept],
-        axis_bound=curves.axis_bound[kept],
-    )
-
-
-def _with_runs(corners: Corners, runs: Runs, curves: RunCurves, found: AtPoses) -> Corners:
-    """Corners with those of the runs marked, and what is known of them."""
-    run, place = spread(runs.count)
-    inner = np.flatnonzero((place > 0) & (place < runs.count[run] - 1))
-    rows = np.searchsorted(corners.pose, runs.pose[inner])
-    status, limited_by = corners.status.copy(), corners.limited_by.copy()
-    status[rows], limited_by[rows] = Status.IN_RUN, LimitedBy.TOLERANCE
-    values = {name: getattr(corners, name).copy() for name in ("tip_error", "axis_error", "orientation_error")}
-    known = np.repeat(curves.kept, curves.lines.count)
-    for name, column in (("tip_error", found.tip), ("axis_error", found.axis), ("orientation_error", found.turn)):
-        values[name][rows] = column[known][inner]
-    curvature = np.full(len(corners), np.nan)
-    curvature[rows] = found.curvature[known][inner]
-    trim_in, trim_out = corners.trim_in.copy(), corners.trim_out.copy()
-    trim_in[rows] = trim_out[rows] = 0.0
-    return replace(
-        corners,
-        status=status,
-        limited_by=limited_by,
-        trim_in=trim_in,
-        trim_out=trim_out,
-        axis_trim_in=trim_in,
-        axis_trim_out=trim_out,
-        extra={**corners.extra, RUN_CURVATURE: curvature},
-        **values,
-    )
-
-
 def _steep(program: Program, pose: Ints) -> Finding:
     text = f"corner rounded by itself: the tool axis turns by more than {STEEPEST:g} deg in one move of its run"
     return Finding("CS229", "note", int(program.line[pose[0]]), text, len(pose))
-
-
-def _one_by_one(program: Program, pose: int, curves: RunCurves, count: Ints) -> Finding:
-    kept: Bools = curves.kept
-    corners = int((count[~kept] - 2).sum())
-    text = "corner rounded by itself: the curves of its run were not proved to keep the tolerance"
-    return Finding("CS226", "note", int(program.line[pose]), text, corners)
 
 
 CONSTRUCTION = GlobalRuns()

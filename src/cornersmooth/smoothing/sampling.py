@@ -18,7 +18,7 @@ from cornersmooth.geometry.ragged import ranges, starts
 from cornersmooth.model import Bools, Floats, Ints, SmoothProgram
 from cornersmooth.smoothing.construction import construction_of
 from cornersmooth.smoothing.corner_table import Remainders
-from cornersmooth.smoothing.runs.rows import SectionRows, polylines_of, run_lines, section_rows
+from cornersmooth.smoothing.runs.rows import SectionRows, run_lines, section_rows, some_at_once
 from cornersmooth.smoothing.segments import Segments, lines_per_half, segments_of
 from cornersmooth.vectors import unit
 
@@ -94,12 +94,12 @@ class _RunRows:
     @classmethod
     def lines(cls, smoothed: SmoothProgram) -> _RunRows:
         """Ends of lines, with unit axes."""
-        program, runs, height = smoothed.program, smoothed.runs, smoothed.settings.axis_length
+        program, runs = smoothed.program, smoothed.runs
         inside = np.zeros(len(program), np.bool_)
-        if runs is None:
-            return cls(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), inside)
-        original = polylines_of(runs, program.tip, program.tip + height * program.axis)
-        pose, tip, axis = run_lines(runs, original, program, smoothed.settings)
+        found = [(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))]
+        if runs is not None:
+            found += [run_lines(part, program, smoothed.settings) for part in some_at_once(runs)]
+        pose, tip, axis = map(np.concatenate, zip(*found, strict=True))
         inside[pose] = True
         return cls(pose, tip, axis, inside)
 
@@ -109,7 +109,8 @@ class _RunRows:
         runs = smoothed.runs
         if runs is None:
             return cls.lines(smoothed)
-        rows = section_rows(runs, smoothed.program)
+        parts = [vars(section_rows(part, smoothed.program)) for part in some_at_once(runs)]
+        rows = SectionRows(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
         inside = np.zeros(len(smoothed.program), np.bool_)
         inside[runs.pose] = True
         inside[runs.pose[starts(runs.count)[:-1]]] = False

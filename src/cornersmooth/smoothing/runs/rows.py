@@ -9,12 +9,13 @@ control points are the blossoms of the run's spline at the knots of the section.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import search, spread, starts
+from cornersmooth.geometry.ragged import batches, search, spread, starts
 from cornersmooth.model import Floats, Ints, Program, Runs
 from cornersmooth.settings import STANDING, Settings
 from cornersmooth.smoothing.runs.polylines import Pieces, Polylines
@@ -30,6 +31,9 @@ _STANDING = 1e-30
 #: pieces measured together
 _TOGETHER = 8192
 
+#: poses of runs made to rows together, about
+_POSES = 20_000
+
 #: most lines for one segment
 _MOST_LINES = 20_000
 
@@ -43,9 +47,28 @@ CHOICE = 12
 STEPS_PER_UNIT = 1000.0
 
 
-def polylines_of(runs: Runs, tip: Floats, axis_point: Floats) -> Polylines:
-    """The original motion of the runs; `tip` and `axis_point` (n, 3) are those of all poses of the program."""
-    return Polylines(np.hstack((tip[runs.pose], axis_point[runs.pose])), runs.count, runs.s, runs.step)
+def polylines_of(runs: Runs, program: Program, axis_length: float) -> Polylines:
+    """The original motion of the runs."""
+    tip, axis = program.tip[runs.pose], program.axis[runs.pose]
+    return Polylines(np.hstack((tip, tip + axis_length * axis)), runs.count, runs.s, runs.step)
+
+
+def some_at_once(runs: Runs) -> Iterator[Runs]:
+    """Parts of the runs, so that arrays stay small."""
+    first = batches(runs.count, _POSES)
+    edges = [first] + [starts(count)[first] for count in (runs.count, runs.knot_count, runs.knot_count + 2)]
+    for run, pose, knot, control in zip(*(map(slice, edge[:-1], edge[1:]) for edge in edges), strict=True):
+        yield replace(
+            runs,
+            pose=runs.pose[pose],
+            count=runs.count[run],
+            s=runs.s[pose],
+            knot=runs.knot[knot],
+            knot_count=runs.knot_count[run],
+            control=runs.control[control],
+            tip_bound=runs.tip_bound[run],
+            axis_bound=runs.axis_bound[run],
+        )
 
 
 def points_at(control: Floats, splines: Splines, span: Ints, s: Floats) -> tuple[Floats, Floats]:
@@ -86,8 +109,9 @@ class LinePlaces:
     end: Ints  # row of the polylines that a place at the end of a run is, -1 for the others
 
 
-def run_lines(runs: Runs, lines: Polylines, program: Program, settings: Settings) -> tuple[Ints, Floats, Floats]:
+def run_lines(runs: Runs, program: Program, settings: Settings) -> tuple[Ints, Floats, Floats]:
     """Ends of the lines that runs are written as: poses that their segments end in (m,), tips and unit axes (m, 3)."""
+    lines = polylines_of(runs, program, settings.axis_length)
     found = line_places(runs, lines, program, settings)
     tip, axis = points_at(runs.control, Splines(runs.knot, runs.knot_count), found.span, found.s)
     at = np.flatnonzero(found.end >= 0)
@@ -100,9 +124,6 @@ def line_places(runs: Runs, lines: Polylines, program: Program, settings: Settin
     """Places on the curves where the lines end that runs are written as."""
     splines = Splines(runs.knot, runs.knot_count)
     pieces = Pieces.of(splines, lines)
-    if not len(pieces.segment):  # no run has been left with a curve
-        none = np.zeros(0, np.int64)
-        return LinePlaces(none, none, np.zeros(0), none)
     segment, first = np.unique(pieces.segment, return_index=True)  # one piece or more for every segment
     effort = _effort(runs, splines, lines, pieces, program, settings)
     number = np.clip(np.ceil(np.add.reduceat(effort, first) - 1e-9), 1, _MOST_LINES).astype(np.int64)

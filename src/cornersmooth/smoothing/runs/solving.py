@@ -1,20 +1,14 @@
-"""Runs solved and proved: knots by fitting, control points by the interior-point method, bounds for every piece.
-
-A whole program is solved in groups of runs, so that arrays stay small. Several processes work on groups side by side,
-or on the windows of one.
-"""
+"""Runs solved and proved: knots by fitting, control points by the interior-point method, bounds for every piece."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cornersmooth.geometry.bsplines import Splines
-from cornersmooth.geometry.ragged import spread, starts
+from cornersmooth.geometry.ragged import batches, spread, starts
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.processes import map_in_processes
 from cornersmooth.smoothing.runs.batches import Problem, solve_windows
@@ -48,9 +42,6 @@ MENDINGS, MENDED = 5, 16
 BLENDS = (0.9, 0.75, 0.5, 0.0)
 FADE = 8
 
-#: poses of a group, about
-GROUP = 2500
-
 
 @dataclass(frozen=True)
 class RunCurves:
@@ -72,7 +63,21 @@ def solve_runs(
     *,
     processes: int = 1,
 ) -> RunCurves:
-    """Find the smoothest pair of splines for every run; parameters are those of `solve_groups`."""
+    """Find the smoothest pair of splines for every run.
+
+    Parameters
+    ----------
+    lines : Polylines
+        Runs of 3 distinct poses or more.
+    tolerances : (float, float), mm
+        Of the tip and of the axis point at constant H.
+    axis_length : float, mm
+        H.
+    progress : callable, optional
+        Called with (poses done, poses in all).
+    processes : int
+        Processes that work; the result does not depend on it.
+    """
     splines, rough = fit(lines, tolerances)
     pieces = Pieces.of(splines, lines)
     problem = Problem(lines, splines, pieces, rough, tolerances, axis_length)
@@ -156,24 +161,24 @@ def _solve(
     processes: int,
 ) -> None:
     """Set the control points of the windows that are their `own` (rows of `windows.control`), some windows at once."""
-    batch = np.cumsum(windows.count) // BATCH
-    first = np.flatnonzero(np.concatenate(([True], batch[1:] != batch[:-1], [True])))
+    first = batches(windows.count, BATCH)
     at = starts(windows.count + 3)
 
     def settle(number: int) -> Floats:
         rows = np.arange(first[number], first[number + 1])
-        some = Windows.of(problem.splines, windows.begin[rows], windows.count[rows])
-        moved = solve_windows(problem, some, control, tight, gaps, near=gaps is MENDING_GAPS)
+        own_windows = Windows.of(problem.splines, windows.begin[rows], windows.count[rows])
+        moved = solve_windows(problem, own_windows, control, tight, gaps, near=gaps is MENDING_GAPS)
         return moved[own[at[rows[0]] : at[rows[-1] + 1]]]
 
-    batches = range(len(first) - 1)
+    some = range(len(first) - 1)
     # `control` must not change before all are found: neighbours look at it
     found = []
-    for number, mine in enumerate(map_in_processes(settle, batches, min(processes, len(batches)))):
+    for number, mine in enumerate(map_in_processes(settle, some, min(processes, len(some)))):
         found.append(mine)
         if progress is not None:
             last = first[number + 1] - 1
-            progress(int(windows.begin[last] + windows.count[last]), len(problem.splines.span_run))
+            done, total = int(windows.begin[last] + windows.count[last]), len(problem.splines.span_run)
+            progress(len(problem.lines.s) * done // total, len(problem.lines.s))
     if found:
         control[windows.control[own]] = np.concatenate(found)
 
@@ -199,71 +204,14 @@ def _touched(splines: Splines, pieces: Pieces, control: Ints) -> Ints:
     return np.flatnonzero(moved[splines.taps(pieces.span)].any(axis=1))
 
 
-@dataclass(frozen=True)
-class AtPoses:
-    """Curves at the n poses of their runs."""
+def measured(curves: RunCurves) -> tuple[Floats, Floats, Floats, Floats]:
+    """Curves at the n poses of their runs, (n,) each.
 
-    tip: Floats  # deviation at common parameters, mm
-    axis: Floats  # the same of the axis point
-    turn: Floats  # deviation of the axis, rad
-    curvature: Floats  # largest of the tip's curve in the halves of the segments beside the pose, 1/mm
-
-
-def solve_groups(
-    lines: Polylines,
-    tolerances: tuple[float, float],
-    axis_length: float,
-    progress: Callable[[int, int], None] | None = None,
-    *,
-    processes: int = 1,
-) -> tuple[RunCurves, AtPoses]:
-    """Find the smoothest pair of splines for every run, and measure them at the poses.
-
-    Parameters
-    ----------
-    lines : Polylines
-        Runs of 3 distinct poses or more.
-    tolerances : (float, float), mm
-        Of the tip and of the axis point at constant H.
-    axis_length : float, mm
-        H.
-    progress : callable, optional
-        Called with (poses done, poses in all).
-    processes : int
-        Processes that work; the result does not depend on it.
+    Returns
+    -------
+    Deviation of the tip and of the axis point at common parameters (mm), deviation of the axis (rad), and the largest
+    curvature of the tip's curve in the halves of the segments beside the pose (1/mm).
     """
-    group = np.cumsum(lines.count) // GROUP
-    first = np.flatnonzero(np.concatenate(([True], group[1:] != group[:-1], [True])))
-    alone = len(first) == 2
-
-    def share_of_one(done: int, total: int) -> None:
-        if progress is not None:
-            progress(len(lines.s) * done // total, len(lines.s))
-
-    def settle(number: int) -> tuple[RunCurves, AtPoses]:
-        runs = slice(first[number], first[number + 1])
-        poses = slice(lines.first[runs.start], lines.first[runs.stop])
-        own = Polylines(lines.point[poses], lines.count[runs], lines.s[poses], lines.step)
-        told, many = (share_of_one, processes) if alone else (None, 1)
-        curves = solve_runs(own, tolerances, axis_length, told, processes=many)
-        return curves, _measured(curves)
-
-    found = []
-    for number, solved in enumerate(map_in_processes(settle, range(len(first) - 1), 1 if alone else processes)):
-        found.append(solved)
-        if progress is not None:
-            progress(int(lines.first[first[number + 1]]), len(lines.s))
-    curves, at_poses = zip(*found, strict=True)
-
-    def joined(parts: Sequence[Any], *names: str) -> list[NDArray[Any]]:
-        return [np.concatenate([getattr(part, name) for part in parts]) for name in names]
-
-    splines = Splines(*joined([part.splines for part in curves], "knot", "count"))
-    rest = joined(curves, "control", "tip_bound", "axis_bound", "kept")
-    return RunCurves(lines, splines, *rest), AtPoses(*joined(at_poses, "tip", "axis", "turn", "curvature"))
-
-
-def _measured(curves: RunCurves) -> AtPoses:
     lines, splines = curves.lines, curves.splines
     run, _ = spread(lines.count)
     tip, axis = points_at(curves.control, splines, splines.span_at(run, lines.s), lines.s)
@@ -271,5 +219,4 @@ def _measured(curves: RunCurves) -> AtPoses:
     size = norm(lever)[:, None]
     off = tip - lines.point[:, :3]
     top = off + size * axis - lever
-    curvature = largest_curvature(lines, splines, curves.control)
-    return AtPoses(norm(off), norm(top), angle_between(axis, lever / size), curvature)
+    return norm(off), norm(top), angle_between(axis, lever / size), largest_curvature(lines, splines, curves.control)
