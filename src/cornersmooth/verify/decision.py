@@ -19,8 +19,7 @@ from cornersmooth.verify.chain import Path, Sections
 from cornersmooth.verify.motions import Motion, inner_points
 from cornersmooth.verify.nearest import COLUMNS, Metric
 from cornersmooth.verify.passage import Break, Walk
-from cornersmooth.verify.rapids import ARITHMETIC
-from cornersmooth.verify.task import APART, Task
+from cornersmooth.verify.task import ARITHMETIC, Task
 
 
 @dataclass(frozen=True)
@@ -52,10 +51,12 @@ class Decision:
 
     def __init__(self, task: Task) -> None:
         self._task = task
-        radius = task.tolerance + ARITHMETIC
-        self._walks: list[tuple[Metric, Walk]] = [("both", Walk(task.path, (APART if task.apart else 1.0) * radius))]
+        self._walks: list[tuple[Metric, Walk]] = [("both", Walk(task.path, task.radius))]
         if task.apart:
-            self._walks += [(metric, Walk(_only(task.path, metric), radius)) for metric in ("tip", "axis point")]
+            self._walks += [
+                (metric, Walk(_only(task.path, metric), task.tolerance + ARITHMETIC))
+                for metric in ("tip", "axis point")
+            ]
         #: place on the CL path of the last vertex
         self.reached = 0.0
 

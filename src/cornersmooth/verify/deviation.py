@@ -13,7 +13,8 @@ from cornersmooth.verify.findings import AXIS_OFF, Findings, Poses, Worst
 from cornersmooth.verify.match import Match
 from cornersmooth.verify.nearest import COLUMNS, Metric, on_segments
 from cornersmooth.verify.passage import AROUND, LONGER, MOST_BREAKS, Break
-from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
+from cornersmooth.verify.rapids import digit_errors
+from cornersmooth.verify.task import ARITHMETIC
 
 #: rows for which tip and axis point are looked at each on its own at a time: only the largest are wanted
 _SOME: Final = 16

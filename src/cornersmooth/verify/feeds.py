@@ -1,7 +1,4 @@
-"""Feeds: every written element must carry the feed of the original move it replaces.
-
-Where a rounded pose changes the feed, the change may lie anywhere inside the rounding.
-"""
+"""Feeds: every written element must carry the feed of a CL move that its tip may run along within the tolerance."""
 
 from __future__ import annotations
 
@@ -17,16 +14,14 @@ from cornersmooth.nc_reader.rotary import SHORT_STEPS
 from cornersmooth.verify.cl_motion import Original
 from cornersmooth.verify.findings import Findings, Runs
 from cornersmooth.verify.match import Match
-from cornersmooth.verify.rapids import ARITHMETIC
-
-#: a rounding reaches at most so many times as far as its first vertex that is visibly off the line
-_BEYOND_VISIBLE = 3.0
+from cornersmooth.verify.nearest import COLUMNS, on_segments
+from cornersmooth.verify.task import ARITHMETIC
 
 #: a tip that creeps goes at most so many times the room of the feed: `SHORT_STEPS` and two of which the room is two
 _CREEPING = (SHORT_STEPS + 2) / 2
 
-#: an element shorter than this may have the feed of any move so near, mm: ten steps of what CL files are written in
-_TINY = 1e-3
+#: segments on either side of a vertex that are looked at first (speed only)
+_FEW = 64
 
 #: elements that are looked at one by one in a run of wrong ones; none of those behind them is better
 _MOST_SINGLE = 50
@@ -67,11 +62,7 @@ def check_feeds(match: Match, found: Findings) -> None:
         in_a_row = in_a_row + 1 if joined and not good[k - 1] else 0
         if in_a_row >= _MOST_SINGLE:
             continue
-        ends = int(start[k]), int(end[k])
-        good[k] = fits(k, _alike(match, int(element[k]), *ends)).any() or _elsewhere(match, *ends, partial(fits, k))
-        if good[k]:
-            continue
-        good[k] = _inside_rounding(match, *ends, int(low[k]), _Said(nc, int(element[k])))
+        good[k] = _joined(partial(fits, k), _beside(match, int(start[k])), _beside(match, int(end[k])))
     wrong = np.flatnonzero(~good)
     if len(wrong):
         runs = np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1)
@@ -118,36 +109,20 @@ class _Said:
         return same
 
 
-def _alike(match: Match, element: int, start: int, end: int) -> Ints:
-    """Moves that an element may run along as well: its ends are as far from theirs as nobody can tell.
-
-    Digits do not tell apart what poses a digit apart lie between, and near the pole the axis turns ahead of time.
-    """
-    nc, six = match.nc, match.path.points
-    pole = match.task.axis_length * float(nc.second_room[element - 1 : element + 1].max()) if nc.rotary else 0.0
-    room = 2 * match.margin + pole  # a pose is a rounding off, and its place as far from it as the margin
-    if np.linalg.norm(match.six[end] - match.six[start]) < _TINY:
-        room = max(room, _TINY)
-    found = []
-    for vertex, step in ((start, -1), (end, 1)):
-        segment, fraction = int(match.segment[vertex]), match.fraction[vertex]
-        here = six[segment] + fraction * (six[segment + 1] - six[segment])
-        low, high = int(match.low[vertex]), int(match.high[vertex])
-        k = segment
-        while low <= k <= high and np.linalg.norm(six[k + (step > 0)] - here) <= room:
-            k += step
-        found.append(min(max(k, low), high))
-    return np.unique(match.original.trail.owner[found[0] + 1 : found[1] + 2])
-
-
-def _elsewhere(match: Match, start: int, end: int, fits: Callable[[Ints], Bools]) -> bool:
-    """Whether an element may run along moves that fit beside its place, or on another turn of a path to and fro.
-
-    Which of the poses within the tolerance a written one stands for nobody can tell.
-    """
-    owner = match.original.trail.owner
-    segments = match.reachable.segments(start), match.reachable.segments(end)
-    return all(map(len, segments)) and _joined(fits, *(owner[part + 1] for part in segments))
+def _beside(match: Match, vertex: int) -> Ints:
+    """Moves around its own that a vertex may be on: within the tolerance of its tip, which the feed is of."""
+    low, here, high = int(match.low[vertex]), int(match.segment[vertex]), int(match.high[vertex])
+    size = _FEW
+    while True:
+        first, stop = max(here - size, low), min(here + size, high) + 1
+        segments = np.arange(first, stop)
+        _, square = on_segments(match.six[vertex, None, None, :3], match.path.points, segments[None], COLUMNS["tip"])
+        off = np.flatnonzero(square[0] > (match.tolerance + ARITHMETIC) ** 2) + first
+        begin, end = off[off < here].max(initial=first - 1) + 1, off[off > here].min(initial=stop)
+        if (begin > first or first == low) and (end < stop or stop == high + 1):
+            owner: Ints = match.original.trail.owner[begin + 1 : end + 1]
+            return owner
+        size *= 4
 
 
 def _joined(fits: Callable[[Ints], Bools], first: Ints, last: Ints) -> bool:
@@ -157,57 +132,6 @@ def _joined(fits: Callable[[Ints], Bools], first: Ints, last: Ints) -> bool:
     run = np.cumsum(np.diff(good, prepend=False))
     one, other = (set(run[good & np.isin(moves, part)].tolist()) for part in (first, last))
     return not one.isdisjoint(other)
-
-
-def _inside_rounding(match: Match, start: int, end: int, move: int, said: _Said) -> bool:
-    """Whether an element lies in the rounding at one end of its move, and carries the feed of the move beyond."""
-    length, trail, pose, off = match.path.length, match.original.trail, match.original.pose, match.off
-    visible = match.margin / 2
-    low, high = int(match.low[start]), int(match.high[start])
-
-    def at(vertex: int) -> float:
-        segment = int(match.segment[vertex])
-        here: float = length[segment] + match.fraction[vertex] * (length[segment + 1] - length[segment])
-        return here
-
-    def beyond(towards: int) -> list[int]:
-        """Moves beyond the pose up to the next that leads anywhere: repeated poses are rounded as one."""
-        found = []
-        other = move + towards
-        while 0 <= other < len(pose):
-            found.append(other)
-            if length[trail.last[other]] - (length[trail.last[other - 1]] if other else 0.0) > match.margin:
-                break
-            other += towards
-        return found
-
-    for pose_vertex, vertex, step in (
-        (int(trail.last[move]), start, 1),
-        (int(trail.last[move - 1]) if move else -1, end, -1),
-    ):
-        if not low < pose_vertex <= high:
-            continue
-        if not said.near(match.original.program.feed[pose[beyond(step)]]).any():
-            continue
-        there = length[pose_vertex]
-        begin, other = length[trail.last[move - 1]], length[trail.last[move]]
-        far = abs(at(vertex) - there)
-        if far > (other - begin) / 2 + match.margin:
-            continue
-        reach = largest = 0.0
-        walker = vertex
-        while 0 <= walker < len(off) and match.on[walker] and step * (at(walker) - there) <= 0:
-            if off[walker] > visible:
-                reach = max(reach, abs(at(walker) - there))
-                largest = max(largest, float(off[walker]))
-            walker += step
-        if 0 <= walker < len(off):
-            largest = max(largest, float(off[walker]))
-        # the tip tells no more than that, and the axis of a rounding that ends where it stands may be far beyond
-        stands = np.linalg.norm(match.six[vertex, :3] - match.path.points[pose_vertex, :3]) <= match.margin
-        if far <= _BEYOND_VISIBLE * reach + match.margin or 0 < largest <= (np.inf if stands else 8 * visible):
-            return True
-    return False
 
 
 def _problem(program: Program, nc: Elements, pose: Ints, element: Ints, low: Ints, k: int) -> Problem:

@@ -8,7 +8,7 @@ from cornersmooth.model import Move
 from cornersmooth.nc_reader.elements import Problem
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.verify.hole_lines import HoleLines
-from cornersmooth.verify.rapids import ARITHMETIC
+from cornersmooth.verify.task import ARITHMETIC
 
 
 def check_hole(lines: HoleLines, move: int, group: list[int], cycle: Drilling, *, alone: bool) -> list[Problem]:

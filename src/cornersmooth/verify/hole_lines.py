@@ -14,7 +14,8 @@ from cornersmooth.nc_reader.tool import directions
 from cornersmooth.statements.cycles import Drilling
 from cornersmooth.statements.tool_changes import ToolChanges
 from cornersmooth.verify.cl_motion import Original
-from cornersmooth.verify.rapids import ARITHMETIC, digit_errors
+from cornersmooth.verify.rapids import digit_errors
+from cornersmooth.verify.task import ARITHMETIC
 
 #: moves behind a hole in which the next feed move or hole is looked for
 _NEXT = 16

@@ -15,9 +15,7 @@ from cornersmooth.model import Bools, Floats, Ints, Move
 from cornersmooth.nc_reader.elements import Elements, Problem
 from cornersmooth.nc_reader.tool import beyond_digits, directions
 from cornersmooth.verify.cl_motion import Original
-
-#: slack of arithmetic on coordinates that are a million times larger, mm
-ARITHMETIC = 1e-9
+from cornersmooth.verify.task import ARITHMETIC
 
 #: longer runs of stops that do not fit are not searched for their best correspondence
 _LONGEST_SEARCH = 2000

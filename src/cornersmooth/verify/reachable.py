@@ -13,7 +13,6 @@ import numpy as np
 from cornersmooth.model import Bools, Floats, Ints
 from cornersmooth.verify.free_space import FreeSpace, Reached
 from cornersmooth.verify.motions import Motion
-from cornersmooth.verify.rapids import ARITHMETIC
 from cornersmooth.verify.task import Task
 
 #: vertices on either side of one from whose places it is worked out: more places could only be found with more
@@ -80,7 +79,7 @@ class Reachable:
         space = FreeSpace(
             self.motion.six[first : last + 1].T,
             path.points[bottom : top + 1].T,
-            self.task.tolerance + ARITHMETIC + float(self.motion.bend[first:last].max(initial=0.0)),
+            self.task.radius + float(self.motion.bend[first:last].max(initial=0.0)),
             self.motion.bend[first:last],
             np.zeros(count),
             np.full(count + 1, np.inf),

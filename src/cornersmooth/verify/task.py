@@ -15,6 +15,9 @@ from cornersmooth.verify.chain import Path
 from cornersmooth.verify.cl_motion import Original, original_motion
 from cornersmooth.verify.nearest import Gap, distance_between
 
+#: slack of arithmetic on coordinates that are a million times larger, mm
+ARITHMETIC: Final = 1e-9
+
 #: how many tolerances tip and axis point may be away from one common pose, though each is near its own path
 APART: Final = 2.0
 
@@ -104,6 +107,11 @@ class Task:
     def degrees(self, off: Floats | float) -> Floats:
         """What axis points that are `off` by so many mm make of the axis, where that has a tolerance of its own."""
         return np.degrees(2.0 * np.arcsin(np.minimum(np.asarray(off) / (2.0 * self.axis_length), 1.0)))
+
+    @property
+    def radius(self) -> float:
+        """Distance, mm, within which tip and axis point must be at a common pose."""
+        return (APART if self.apart else 1.0) * (self.tolerance + ARITHMETIC)
 
     def margin(self, nc: Elements) -> float:
         """Distance that printed digits may account for, mm: never more than a share of the tolerance."""
