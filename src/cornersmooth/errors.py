@@ -44,7 +44,6 @@ def message(
         What happened. Without `hint`, that is what follows the first ``"; "``.
     code, place : str
         Where they are known.
-    hint : str
     count : int
         How often it was met.
     beside : str

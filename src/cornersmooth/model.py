@@ -176,7 +176,6 @@ class Program:
         Sorted by `Statement.pose`, then by source order.
     units : {"mm", "inch"}
         Units of the file, and of the NC text made from it.
-    source : Source
     findings : tuple of Finding
         What the reader noticed.
 
@@ -492,7 +491,6 @@ class SmoothProgram:
     ----------
     program : Program
         The original motion.
-    corners : Corners
     settings : Settings
         What it was made with.
     findings : tuple of Finding

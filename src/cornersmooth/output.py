@@ -145,7 +145,6 @@ class Output:
 
     Parameters
     ----------
-    stream : HashedStream
     path : str
         Where the text is until then; empty where it goes straight to a stream or device.
     failed : bool

@@ -40,7 +40,6 @@ def sample(smoothed: SmoothProgram, *, chord: float | None = None) -> PathPoints
 
     Parameters
     ----------
-    smoothed : SmoothProgram
     chord : float, mm, optional
         Largest distance between the curves and the lines through the points; that of the settings by default.
 

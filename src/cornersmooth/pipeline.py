@@ -49,12 +49,8 @@ class Result:
 
     Parameters
     ----------
-    program : Program
-    smoothed : SmoothProgram
-    form : Form
     frame : Frame
         What stands around the motion, with what the text says of how it was made.
-    written : Written
     verification : Verification or None
         None where the text was not read back.
     unverified : str
@@ -136,7 +132,6 @@ def smooth(
 
     Parameters
     ----------
-    program : Program
     settings : Settings, optional
         Defaults: ε 0.01 mm, H 10 mm; the global method in curves, the proportional one in lines and without a form.
     form : Form, optional

@@ -25,7 +25,6 @@ class Provenance:
         Of the program.
     tolerance, axis_length : float, mm
         ε and H.
-    method, control, form : str
     machine : str
         Empty for none.
     tcp : bool

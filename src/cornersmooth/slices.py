@@ -25,7 +25,6 @@ def some_poses(program: Program, first: int, stop: int) -> Program:
 
     Parameters
     ----------
-    program : Program
     first, stop : int
         An arc that ends at the first pose is left out: it begins outside. Earlier statements come
         before the first pose.

@@ -57,10 +57,6 @@ def read_apt(
     fast : bool
         Convert plain GOTO lines in bulk; the result is the same, bit for bit.
 
-    Returns
-    -------
-    Program
-
     Raises
     ------
     InputError

@@ -209,7 +209,6 @@ def _held(before: Sequence[Statement], at_once: Sequence[Statement]) -> tuple[li
 
     Parameters
     ----------
-    before : sequence of Statement
     at_once : sequence of Statement
         What the operation says itself before its first move: that takes the place of what held.
     """

@@ -79,10 +79,6 @@ def read_points(data: bytes, *, name: str, units: Units | None = None, lenient: 
     lenient : bool
         Normalise axis vectors of any length and skip feeds that are not positive, with findings.
 
-    Returns
-    -------
-    Program
-
     Raises
     ------
     InputError

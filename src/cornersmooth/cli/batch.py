@@ -18,7 +18,6 @@ class Batch:
 
     Parameters
     ----------
-    jobs : list of Job
     processes : int
         0 for all cores.
     scheduler : str

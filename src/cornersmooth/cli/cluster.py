@@ -37,7 +37,6 @@ def run_on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[int, Outco
 
     Parameters
     ----------
-    jobs : list of Job
     scheduler : str
         Address such as ``tcp://host:8786``, or a scheduler file.
 
@@ -74,7 +73,6 @@ def do(job: Job, folder: str, proof: str, version: str) -> Outcome:
 
     Parameters
     ----------
-    job : Job
     folder : str
         Where relative paths begin.
     proof : str

@@ -25,7 +25,6 @@ class Input:
 
     Parameters
     ----------
-    path : str
     stem : str
         Its place below the folder that was named, without the ending: where its outputs go below theirs.
     """
@@ -56,7 +55,6 @@ def find_inputs(named: tuple[str, ...], patterns: tuple[str, ...]) -> list[Input
 
     Parameters
     ----------
-    named : tuple of str
     patterns : tuple of str
         What the names of files in folders are like; those of CL files where it is empty.
 

@@ -51,12 +51,8 @@ class Job:
     ----------
     source, target : str
         Input and NC file; ``-`` for the standard streams.
-    reports : tuple of str
     reading : dict
         Keyword arguments of `cornersmooth.read`.
-    settings : Settings
-    form : Form
-    frame : Frame
     feed : float or None, mm/min
         For moves without one.
     verify : bool
@@ -152,7 +148,6 @@ def check(job: Job, *, replace_target: bool | None = False) -> dict[str, bool | 
 
     Parameters
     ----------
-    job : Job
     replace_target : bool or None
         Whether the NC file may be replaced, besides `Job.force`: as `force` of `cornersmooth.output.check_output`.
 

@@ -204,7 +204,6 @@ class _Head:
         In which it was written; None where it does not say.
     remark : str
         What is strange about it; empty for nothing.
-    problem : Problem or None
     """
 
     taken: tuple[str, ...] = ()

@@ -53,7 +53,6 @@ def report(
         What was not verified, and why; empty for nothing.
     source_sha256 : str
         Of the CL file; empty where it is not known.
-    nc_file : NcFile, optional
     command, loosened, times
         As `record` has them.
     """

@@ -30,7 +30,6 @@ def corner_table(smoothed: SmoothProgram, rows: Ints | None = None, *, dense: bo
 
     Parameters
     ----------
-    smoothed : SmoothProgram
     rows : (g,) int64, optional
         Rows of `smoothed.corners`; all of them by default.
     dense : bool

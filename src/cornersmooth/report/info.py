@@ -64,14 +64,12 @@ class Motion:
     ----------
     moves : dict
         Kind of move to how many there are.
-    chains, longest_chain_poses : int
     feed_length_mm, rapid_length_mm : float
         Lengths of linear feed moves and of rapids; arcs are not among them.
     box_min_mm, box_max_mm : list of 3 floats
         Corners of the box around all tips.
     feeds_mm_per_min, feeds_mm_per_rev : list of float
         The different feeds, ascending.
-    feed_moves_without_feed : int
     segment_length_mm : Spread
         Lengths of the linear feed segments of the chains.
     """
@@ -131,12 +129,10 @@ class CornerSummary:
     ----------
     tolerance_mm, axis_length_mm : float
         ε and H this holds for.
-    count, smoothed : int
     tip_turn_deg : Spread
         Turn of the tip path at the corners that have a tip segment on both sides.
     sharp : int
         Corners whose tip path turns by more than 10 degrees.
-    limited_by_tolerance, limited_by_segment : int
     not_smoothed : dict
         Reason to count.
     deviation_mm : Spread
@@ -161,14 +157,12 @@ class OperationSummary:
 
     Parameters
     ----------
-    number : int
     name : str
         Empty where the file gives none.
     tool : int or None
         Number of its tool.
     first_line, last_line : int
         In the CL file.
-    poses : int
     feed_length_mm : float
         Of its linear feed moves.
     axis : {"fixed", "indexed", "simultaneous"}
@@ -221,7 +215,6 @@ def describe(program: Program, tolerance: float, axis_length: float) -> Info:
 
     Parameters
     ----------
-    program : Program
     tolerance : float, mm
         ε.
     axis_length : float, mm

@@ -36,8 +36,6 @@ class NcFile:
     ----------
     name : str or None
         As the caller named it; None for a stream.
-    sha256 : str or None
-    control : str
     form : str or None
         None where a program does not name it.
     machine : str or None
@@ -78,7 +76,6 @@ def record(
     ----------
     kind : {"smooth", "verify", "filter"}
         Command that it is of.
-    judgement : Judgement
     source : mapping
         The input, as `cl_file` gives it.
     program : NcFile or None

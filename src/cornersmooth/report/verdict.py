@@ -73,7 +73,6 @@ class Judgement:
 
     Parameters
     ----------
-    verdict : Verdict
     to_check : int
         Warnings that bear on the metal.
     left_out : int
@@ -171,7 +170,6 @@ def first_line(contents: Mapping[str, Any], saving: Saving | None = None) -> str
     ----------
     contents : mapping
         The report.
-    saving : Saving, optional
     """
     parts = [contents["verdict_text"], sharp_line(contents)]
     if saving is not None:

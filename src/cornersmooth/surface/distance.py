@@ -35,7 +35,6 @@ class Cutter:
 
     Parameters
     ----------
-    tool : Tool
     edge : float, mm
         Height over the tip at which it ends.
     """
@@ -55,8 +54,6 @@ def distance_to_motion(points: Floats, motion: RuledMotion, tool: Tool, edge: fl
     Parameters
     ----------
     points : (k, 3) float64, mm
-    motion : RuledMotion
-    tool : Tool
     edge : float, mm
         Length of the cutting edge; what is higher over the tip does not cut.
     reach : float, mm

@@ -63,8 +63,6 @@ def envelope_points(
 
     Parameters
     ----------
-    motion : RuledMotion
-    tool : Tool
     edge : float, mm
         Length of the cutting edge: heights over the tip up to which the surface is looked at.
     levels : int

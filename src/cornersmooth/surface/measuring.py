@@ -35,11 +35,9 @@ class SurfaceMap:
 
     Parameters
     ----------
-    points : EnvelopePoints
     off : (k,) float64, mm
         Distance to the written volume less that to the original volume: negative where the written motion cuts below
         the original surface (overcut), positive where it leaves material (undercut); NaN beyond `reach`.
-    tool : Tool
     edge, tolerance, reach : float, mm
     buried : int
         Points of the envelope that another part of the original path cuts away; they are not among the rows.
@@ -140,9 +138,7 @@ def measure_surface(
 
     Parameters
     ----------
-    program : Program
     nc : NcProgram, bytes or path
-    tool : Tool
     tolerance : float, mm
         ε.
     edge : float, mm

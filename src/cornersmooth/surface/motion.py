@@ -80,7 +80,6 @@ class Parts:
 
     Parameters
     ----------
-    motion : RuledMotion
     segment : (p,) int64
     low, high : (p,) float64
         Shares of the segment where the part begins and ends.

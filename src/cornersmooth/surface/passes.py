@@ -62,7 +62,6 @@ def neighbouring_passes(
 
     Parameters
     ----------
-    original, written : RuledMotion
     radius : float, mm
         Of the tool's corner.
     within : float, mm

@@ -22,7 +22,6 @@ class Choices:
 
     Parameters
     ----------
-    texts : sequence of bytes
     ids : (m,) or () int
         Which text each row has.
     count : int
@@ -86,7 +85,6 @@ def splice(text: bytes, lengths: Ints, start: int, heads: Choices, tails: Choice
 
     Parameters
     ----------
-    text : bytes
     lengths : (r,) int64
         Size of each row in it.
 

@@ -91,7 +91,6 @@ class Layout:
     ----------
     template : (width,) uint8
         A row with its constant characters; zero bytes where others are written. The width is a multiple of `WORD`.
-    cells : tuple of Cell
     spans : tuple of (int, int)
         First column of each word with its number, and the one behind it.
     tail : int

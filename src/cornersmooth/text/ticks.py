@@ -118,7 +118,6 @@ def format_number(value: float, decimals: int, *, trim: bool = False, plus: bool
 
     Parameters
     ----------
-    value : float
     decimals : int
         Digits after the point; 0 writes no point unless `trim`.
     trim : bool
