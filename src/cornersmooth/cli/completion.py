@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from cornersmooth.cli.headings import EXIT_CODES
+
 _LINES = {
     "bash": 'eval "$(cornersmooth completion bash)"    # in ~/.bashrc',
     "zsh": 'eval "$(cornersmooth completion zsh)"     # in ~/.zshrc, behind compinit',
@@ -11,11 +13,7 @@ _LINES = {
 }
 
 
-@click.command(
-    "completion",
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
-)
+@click.command("completion", epilog=EXIT_CODES)
 @click.argument("shell", type=click.Choice(list(_LINES)))
 def command(shell: str) -> int:
     """Print what makes SHELL complete commands, options, names of controls, machines and forms, and files.

@@ -9,6 +9,7 @@ from typing import Final
 import click
 
 from cornersmooth.cli import shop
+from cornersmooth.cli.headings import EXIT_CODES
 from cornersmooth.cli.options import outputs
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.show import say_json, say_line
@@ -18,11 +19,7 @@ from cornersmooth.errors import InputError
 _DEFAULT: Final = re.compile(r"\[default: ([^]]+)\]")
 
 
-@click.command(
-    "config",
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
-)
+@click.command("config", epilog=EXIT_CODES)
 @click.argument("source", type=PATH, metavar="[IN]", default=".")
 @outputs.as_json
 def command(source: str, as_json: bool) -> int:

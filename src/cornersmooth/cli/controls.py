@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli import completing
+from cornersmooth.cli.headings import EXIT_CODES
 from cornersmooth.cli.options import outputs
 from cornersmooth.cli.show import say_json, say_line
 
@@ -23,11 +24,7 @@ _MODES = {
 }
 
 
-@click.command(
-    "controls",
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
-)
+@click.command("controls", epilog=EXIT_CODES)
 @click.argument("name", required=False, metavar="[NAME|FILE]", shell_complete=completing.controls)
 @outputs.table
 @outputs.as_json

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import click
 
+from cornersmooth.cli.headings import EXIT_CODES
 from cornersmooth.cli.options import outputs
 from cornersmooth.cli.show import say_json, say_line
 
@@ -33,11 +34,7 @@ KINDS: Final = {
 _WIDTH: Final = 80
 
 
-@click.command(
-    "explain",
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
-)
+@click.command("explain", epilog=EXIT_CODES)
 @click.argument("code", required=False, metavar="[CODE]")
 @outputs.as_json
 def command(code: str | None, as_json: bool) -> int:

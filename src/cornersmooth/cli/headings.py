@@ -23,6 +23,9 @@ HEADINGS: Final = (
     "Verification",
     "Batches",
 )
+#: epilogs of commands that read no input, and of those that do and write no program
+EXIT_CODES: Final = "Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written."
+EXIT_CODES_OF_READERS: Final = EXIT_CODES.replace("; 4", "; 3 input cannot be read or is not valid; 4")
 #: room for the names of options
 _NAMES: Final = 26
 
@@ -35,9 +38,24 @@ class HeadedOption(click.Option):
         self.heading = heading
 
 
-def option(heading: str, *names: str, **given: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def option(heading: str, *names: str, **given: Any) -> Decorator:
     """Give an option, as `click.option` does, its place in the help: one of `HEADINGS`."""
+    if "default" in given:
+        given.setdefault("show_default", "[default" not in given["help"])  # some helps say it in words
     return click.option(*names, cls=HeadedOption, heading=heading, **given)
+
+
+def flag(heading: str, *names: str, help: str) -> Decorator:
+    """Give an option without a value."""
+    return option(heading, *names, is_flag=True, help=help)
+
+
+def number(heading: str, *names: str, unit: str, help: str, default: float | None = None) -> Decorator:
+    """Give an option that is a number; `unit` is what the help shows in its place."""
+    return option(heading, *names, type=float, metavar=unit, default=default, help=help)
 
 
 class HeadedCommand(click.Command):

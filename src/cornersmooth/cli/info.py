@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli.files import read_input
+from cornersmooth.cli.headings import EXIT_CODES_OF_READERS
 from cornersmooth.cli.options import outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
@@ -17,13 +18,7 @@ if TYPE_CHECKING:
     from cornersmooth.report.info import Info, Spread
 
 
-@click.command(
-    "info",
-    cls=ShopCommand,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid; "
-    "4 output cannot be written.",
-)
+@click.command("info", cls=ShopCommand, epilog=EXIT_CODES_OF_READERS)
 @click.argument("source", type=PATH, metavar="IN")
 @smoothing.tolerance
 @smoothing.axis_length

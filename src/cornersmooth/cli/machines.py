@@ -7,15 +7,12 @@ from dataclasses import asdict
 import click
 
 from cornersmooth.cli import completing
+from cornersmooth.cli.headings import EXIT_CODES
 from cornersmooth.cli.options import outputs
 from cornersmooth.cli.show import say_json, say_line
 
 
-@click.command(
-    "machines",
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
-)
+@click.command("machines", epilog=EXIT_CODES)
 @click.argument("name", required=False, metavar="[NAME|FILE]", shell_complete=completing.machines)
 @outputs.table
 @outputs.as_json

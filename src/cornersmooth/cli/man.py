@@ -9,13 +9,10 @@ from collections.abc import Iterator
 import click
 
 from cornersmooth import __version__
+from cornersmooth.cli.headings import EXIT_CODES
 
 
-@click.command(
-    "man",
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-    epilog="Exit codes: 0 done; 2 wrong usage or configuration; 4 output cannot be written.",
-)
+@click.command("man", epilog=EXIT_CODES)
 def command() -> int:
     """Print the manual page of all commands, for the program man.
 
@@ -37,7 +34,7 @@ def _page(group: click.Group) -> Iterator[str]:
     help_text = _paragraphs(group.help or "")
     yield rf"cornersmooth \- {_plain(next(help_text)[1].rstrip('.'))}"
     yield ".SH SYNOPSIS"
-    with click.Context(group, info_name="cornersmooth") as context:
+    with click.Context(group, info_name="cornersmooth", **group.context_settings) as context:
         commands = [(name, group.get_command(context, name)) for name in group.list_commands(context)]
         for name, _ in commands:
             yield rf"\fBcornersmooth {name}\fR [\fIoptions\fR] ..."
@@ -53,7 +50,7 @@ def _page(group: click.Group) -> Iterator[str]:
 
 
 def _section(name: str, one: click.Command, parent: click.Context) -> Iterator[str]:
-    with click.Context(one, info_name=name, parent=parent, **one.context_settings) as context:
+    with click.Context(one, info_name=name, parent=parent) as context:
         yield f'.SH "{name.upper()}"'
         pieces = " ".join(one.collect_usage_pieces(context))
         yield rf"\fBcornersmooth {_plain(name)}\fR {_plain(pieces)}"

@@ -9,7 +9,7 @@ import click
 
 from cornersmooth.cli import completing
 from cornersmooth.cli.files import read_input
-from cornersmooth.cli.headings import option
+from cornersmooth.cli.headings import flag, option
 from cornersmooth.cli.options import motion, nc_text, outputs, reading, smoothing
 from cornersmooth.cli.options.parameters import PATH
 from cornersmooth.cli.shop import ShopCommand
@@ -26,7 +26,6 @@ limits = option(
     "Everyday",
     "--limits",
     required=True,
-    type=str,
     metavar="NAME|FILE",
     shell_complete=completing.machines,
     help="Machine that the program runs on: a name that 'cornersmooth machines' lists (its numbers are examples), or a "
@@ -37,30 +36,18 @@ tilt = option(
     "--tilt",
     type=click.FloatRange(0.0, 90.0),
     default=45.0,
-    show_default=True,
     metavar="DEG",
     help="Largest tilt about X and about Y, either way; 0 for none.",
 )
-no_turn = option(
-    "Limits",
-    "--no-turn",
-    is_flag=True,
-    help="Do not turn the part about Z. A table that turns without end does that itself.",
+no_turn = flag(
+    "Limits", "--no-turn", help="Do not turn the part about Z. A table that turns without end does that itself."
 )
-plans = option(
-    "Limits",
-    "--plans",
-    type=click.IntRange(min=1),
-    default=6,
-    show_default=True,
-    help="Setups that are planned as written.",
-)
+plans = option("Limits", "--plans", type=click.IntRange(min=1), default=6, help="Setups that are planned as written.")
 
 
 @click.command(
     "setup",
     cls=ShopCommand,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 2 wrong usage or configuration; 3 input cannot be read or is not valid.",
 )
 @click.argument("source", type=PATH, metavar="IN")

@@ -44,7 +44,6 @@ _NAMED = 3
 @click.command(
     "smooth",
     cls=ShopCommand,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 done; 1 the program FAILED, or is not PASSED under --strict; 2 wrong usage or configuration; "
     "3 input cannot be read or is not valid; 4 output cannot be written. With several inputs: that of the worst.",
 )

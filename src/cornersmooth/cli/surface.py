@@ -26,7 +26,6 @@ _SUFFIXES = (".json", ".csv", ".html", ".png", ".svg", ".pdf")
 @click.command(
     "surface",
     cls=ShopCommand,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 the surface is within the tolerance; 1 it is not; 2 wrong usage or configuration; 3 an input "
     "cannot be read or is not valid; 4 output cannot be written.",
 )

@@ -41,7 +41,6 @@ _ALIKE = 1e-9
 @click.command(
     "verify",
     cls=ShopCommand,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     epilog="Exit codes: 0 PASSED or INCOMPLETE; 1 FAILED or NOT VERIFIED, and INCOMPLETE under --strict; "
     "2 wrong usage or configuration; 3 an input cannot be read or is not valid; 4 output cannot be written.",
 )

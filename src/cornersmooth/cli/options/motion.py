@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli import completing
-from cornersmooth.cli.headings import option
+from cornersmooth.cli.headings import flag, number, option
 from cornersmooth.cli.options.parameters import PATH, Duration, all_of
 from cornersmooth.methods import METHODS
 
@@ -16,27 +16,11 @@ if TYPE_CHECKING:
     from cornersmooth.feedrate import Limits
 
 _LIMITS = {
-    "feed": option(
-        "Limits", "--feed", type=float, metavar="MM/MIN", help="Feed of all feed moves instead of the programmed ones."
-    ),
-    "accel": option(
-        "Limits",
-        "--accel",
-        type=float,
-        default=1000.0,
-        show_default=True,
-        metavar="MM/S2",
-        help="Acceleration along the path.",
-    ),
-    "jerk": option(
-        "Limits", "--jerk", type=float, default=5000.0, show_default=True, metavar="MM/S3", help="Jerk along the path."
-    ),
-    "centripetal": option(
-        "Limits",
-        "--centripetal",
-        type=float,
-        metavar="MM/S2",
-        help="Acceleration across the path. [default: that of --accel]",
+    "feed": number("Limits", "--feed", unit="MM/MIN", help="Feed of all feed moves instead of the programmed ones."),
+    "accel": number("Limits", "--accel", unit="MM/S2", default=1000.0, help="Acceleration along the path."),
+    "jerk": number("Limits", "--jerk", unit="MM/S3", default=5000.0, help="Jerk along the path."),
+    "centripetal": number(
+        "Limits", "--centripetal", unit="MM/S2", help="Acceleration across the path. [default: that of --accel]"
     ),
     "period": option(
         "Limits",
@@ -47,64 +31,24 @@ _LIMITS = {
         help="Interpolation period, as in 2ms: at corners that stay sharp the velocity changes by at most accel times "
         "period. [default: 2ms]",
     ),
-    "rapid": option(
-        "Limits",
-        "--rapid",
-        type=float,
-        default=10000.0,
-        show_default=True,
-        metavar="MM/MIN",
-        help="Speed of rapid moves.",
+    "rapid": number("Limits", "--rapid", unit="MM/MIN", default=10000.0, help="Speed of rapid moves."),
+    "rapid_accel": number(
+        "Limits", "--rapid-accel", unit="MM/S2", help="Acceleration of rapids. [default: that of --accel]"
     ),
-    "rapid_accel": option(
-        "Limits",
-        "--rapid-accel",
-        type=float,
-        metavar="MM/S2",
-        help="Acceleration of rapids. [default: that of --accel]",
+    "rapid_jerk": number("Limits", "--rapid-jerk", unit="MM/S3", help="Jerk of rapids. [default: that of --jerk]"),
+    "angular_feed": number(
+        "Limits", "--angular-feed", unit="DEG/S", default=30.0, help="Speed of moves that only turn the tool axis."
     ),
-    "rapid_jerk": option(
-        "Limits", "--rapid-jerk", type=float, metavar="MM/S3", help="Jerk of rapids. [default: that of --jerk]"
+    "angular_accel": number("Limits", "--angular-accel", unit="DEG/S2", default=150.0, help="Their acceleration."),
+    "angular_jerk": number("Limits", "--angular-jerk", unit="DEG/S3", default=3000.0, help="Their jerk."),
+    "vector_jerk": number(
+        "Limits", "--vector-jerk", unit="MM/S3", help="Jerk of the tip in any direction. [default: no limit]"
     ),
-    "angular_feed": option(
-        "Limits",
-        "--angular-feed",
-        type=float,
-        default=30.0,
-        show_default=True,
-        metavar="DEG/S",
-        help="Speed of moves that only turn the tool axis.",
+    "turn_speed": number(
+        "Limits", "--turn-speed", unit="DEG/S", help="Turning of the tool axis in all moves. [default: no limit]"
     ),
-    "angular_accel": option(
-        "Limits",
-        "--angular-accel",
-        type=float,
-        default=150.0,
-        show_default=True,
-        metavar="DEG/S2",
-        help="Their acceleration.",
-    ),
-    "angular_jerk": option(
-        "Limits", "--angular-jerk", type=float, default=3000.0, show_default=True, metavar="DEG/S3", help="Their jerk."
-    ),
-    "vector_jerk": option(
-        "Limits",
-        "--vector-jerk",
-        type=float,
-        metavar="MM/S3",
-        help="Jerk of the tip in any direction. [default: no limit]",
-    ),
-    "turn_speed": option(
-        "Limits",
-        "--turn-speed",
-        type=float,
-        metavar="DEG/S",
-        help="Turning of the tool axis in all moves. [default: no limit]",
-    ),
-    "turn_accel": option(
-        "Limits", "--turn-accel", type=float, metavar="DEG/S2", help="Its acceleration. [default: no limit]"
-    ),
-    "turn_jerk": option("Limits", "--turn-jerk", type=float, metavar="DEG/S3", help="Its jerk. [default: no limit]"),
+    "turn_accel": number("Limits", "--turn-accel", unit="DEG/S2", help="Its acceleration. [default: no limit]"),
+    "turn_jerk": number("Limits", "--turn-jerk", unit="DEG/S3", help="Its jerk. [default: no limit]"),
 }
 
 
@@ -120,10 +64,9 @@ def limits_of(given: dict[str, Any]) -> Limits:
     return Limits(**{name: given[name] for name in _LIMITS})
 
 
-feed_from_plan = option(
+feed_from_plan = flag(
     "Limits",
     "--feed-from-plan",
-    is_flag=True,
     help="Give every block the feed that a plan of the program reaches there, within --accel, --jerk and the limits of "
     "--machine: for controls that do not look ahead.",
 )
@@ -158,13 +101,12 @@ def planned_limits_of(given: dict[str, Any]) -> Limits | None:
 limits = option(
     "Limits",
     "--limits",
-    type=str,
     metavar="NAME|FILE",
     shell_complete=completing.machines,
     help="Say the time under the limits of this machine's axes; the words of the program stay as they are. A name that "
     "'cornersmooth machines' lists, or a TOML file with [dynamics.X] and so on. [default: those of --machine]",
 )
-planned_time = option("Limits", "--time", is_flag=True, help="Say the time of programs of more than 20,000 poses, too.")
+planned_time = flag("Limits", "--time", help="Say the time of programs of more than 20,000 poses, too.")
 text = option(
     "Everyday",
     "--text",
@@ -175,7 +117,6 @@ text = option(
 text_machine = option(
     "Reading",
     "--text-machine",
-    type=str,
     metavar="NAME|FILE",
     shell_complete=completing.machines,
     help="Machine whose rotary words --text has. [default: that of its head, else --machine]",
@@ -199,7 +140,6 @@ law = option(
     "--law",
     type=click.Choice(["direct_exact_stop", "direct_velocity_jump", *METHODS, "as_written"]),
     default="as_written",
-    show_default=True,
     metavar="LAW",
     help="Motion that --csv writes: as_written, direct_exact_stop, direct_velocity_jump, or the curves of a method "
     f"({', '.join(METHODS)}).",

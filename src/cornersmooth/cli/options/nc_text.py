@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from cornersmooth.cli import completing
-from cornersmooth.cli.headings import option
+from cornersmooth.cli.headings import flag, option
 from cornersmooth.cli.options.parameters import LENGTH, PATH, all_of
 from cornersmooth.errors import SettingsError
 
@@ -20,7 +20,6 @@ form = option(
     "Everyday",
     "-f",
     "--form",
-    type=str,
     metavar="g1|g6.2|...",
     shell_complete=completing.forms,
     help="Dense lines, or curves in the control's own form; 'cornersmooth controls' lists them. [default: g1]",
@@ -28,33 +27,26 @@ form = option(
 control = option(
     "Everyday",
     "--control",
-    type=str,
     metavar="NAME|FILE",
     shell_complete=completing.controls,
     default="fanuc",
-    show_default=True,
     help="Control that the program is for: a name that 'cornersmooth controls' lists, or a TOML file.",
 )
 machine = option(
     "Everyday",
     "--machine",
-    type=str,
     metavar="NAME|FILE",
     shell_complete=completing.machines,
     help="Write rotary words of this machine instead of tool vectors: a name that 'cornersmooth machines' "
     "lists, or a TOML file.",
 )
-no_tcp = option(
-    "Control",
-    "--no-tcp",
-    is_flag=True,
-    help="Positions of the machine's axes, for controls that do not keep the tool tip.",
+no_tcp = flag(
+    "Control", "--no-tcp", help="Positions of the machine's axes, for controls that do not keep the tool tip."
 )
 extras = option(
     "Control",
     "--with",
     "extras",
-    type=str,
     metavar="NAME",
     multiple=True,
     help="Switch a function of the control on, such as cycle832; 'cornersmooth controls' lists them. May be repeated.",
@@ -62,7 +54,6 @@ extras = option(
 program_name = option(
     "Program",
     "--program-name",
-    type=str,
     metavar="TEXT",
     help="Name or number of the NC program. [default: from the name of the CL file]",
 )
@@ -75,7 +66,6 @@ line_ends = option(
 work_offset = option(
     "Program",
     "--work-offset",
-    type=str,
     metavar="WORD",
     help="Work offset, such as G55, or the number of a preset; 'none' leaves it out. [default: G54, or preset 1]",
 )
@@ -98,10 +88,9 @@ rewind = option(
     help="Where a rotary axis would pass its limit in a cut, leave the cut along the tool by this length. "
     "The axis turns back above the retract, and the cut goes on. [default: an error]",
 )
-skip_cycles = option(
+skip_cycles = flag(
     "Holes and planes",
     "--skip-cycles",
-    is_flag=True,
     help="Leave out holes whose cycle cannot be written; the program says NOT DRILLED there. [default: an error]",
 )
 cycles = option(
@@ -109,7 +98,6 @@ cycles = option(
     "--cycles",
     type=click.Choice(["moves", "native"]),
     default="moves",
-    show_default=True,
     help="Holes as plain moves, or as the control's own cycles where it has such and the tool stays along Z (or in a "
     "tilted plane).",
 )
@@ -118,7 +106,6 @@ planes = option(
     "--planes",
     type=click.Choice(["none", "tilted"]),
     default="none",
-    show_default=True,
     help="Whether a tool that keeps a tilted axis between rapids runs in a tilted plane of the control: CYCLE800, "
     "PLANE SPATIAL, G68.2, G254.",
 )
@@ -130,11 +117,10 @@ header = option(
     help="Lines to write after the head; {program} and {units} are filled in.",
 )
 footer = option("Program", "--footer", type=PATH, metavar="FILE", help="Lines to write before the tail.")
-slower = option(
+slower = flag(
     "Verification",
     "--planned-feeds",
     "slower",
-    is_flag=True,
     help="Feeds of the program may be lower than those of the CL file, as --feedrate plan of smooth writes them.",
 )
 trusted = option(
@@ -149,35 +135,25 @@ trusted = option(
 digits = option(
     "Control",
     "--digits",
-    type=str,
     metavar="N|NAME",
     default="",
     help="Decimals of lengths in mm (in inches one more), or an increment system of the control, as in IS-B. "
     "[default: what the control takes; fanuc IS-C]",
 )
-block_numbers = option("Program", "--block-numbers", is_flag=True, help="Number the blocks.")
-modal = option(
-    "Program",
-    "--modal",
-    is_flag=True,
-    help="Leave out words that repeat from block to block, where the control keeps them.",
+block_numbers = flag("Program", "--block-numbers", help="Number the blocks.")
+modal = flag(
+    "Program", "--modal", help="Leave out words that repeat from block to block, where the control keeps them."
 )
-no_comments = option("Program", "--no-comments", is_flag=True, help="Leave out what the CL file says in words.")
-no_verify = option(
-    "Verification",
-    "--no-verify",
-    is_flag=True,
-    help="Do not read the program back and measure it before it takes its place.",
+no_comments = flag("Program", "--no-comments", help="Leave out what the CL file says in words.")
+no_verify = flag(
+    "Verification", "--no-verify", help="Do not read the program back and measure it before it takes its place."
 )
-strict = option(
+strict = flag(
     "Verification",
     "--strict",
-    is_flag=True,
     help="Take no verdict but PASSED: else the program goes to OUT.failed, and 1 is returned.",
 )
-strict_verdict = option(
-    "Verification", "--strict", is_flag=True, help="Take no verdict but PASSED: else 1 is returned."
-)
+strict_verdict = flag("Verification", "--strict", help="Take no verdict but PASSED: else 1 is returned.")
 
 
 def writing_options(function: Callable[..., Any]) -> Callable[..., Any]:

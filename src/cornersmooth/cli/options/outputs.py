@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cornersmooth.cli.headings import option
+from cornersmooth.cli.headings import Decorator, flag, option
 from cornersmooth.cli.options.parameters import PATH, Jobs
 
 output = option(
@@ -18,13 +18,12 @@ directory = option(
 glob = option(
     "Batches",
     "--glob",
-    type=str,
     metavar="PATTERN",
     multiple=True,
     help="Files to take from folders, as in '*.cls'. May be repeated. [default: names of CL files]",
 )
-skip_existing = option(
-    "Batches", "--skip-existing", is_flag=True, help="Leave outputs that exist as they are, whatever they were made of."
+skip_existing = flag(
+    "Batches", "--skip-existing", help="Leave outputs that exist as they are, whatever they were made of."
 )
 summary = option("Batches", "--summary", type=PATH, help="Write a row for each file of a batch: .json or .csv.")
 jobs = option(
@@ -40,53 +39,32 @@ jobs = option(
 scheduler = option(
     "Batches",
     "--scheduler",
-    type=str,
     metavar="ADDRESS|FILE",
     help="Have a Dask cluster do the files of a batch: tcp://HOST:8786, or the scheduler's file. See docs/batch.md.",
 )
-reports = option(
-    "Everyday",
-    "--report",
-    "reports",
-    type=PATH,
-    multiple=True,
-    help="Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} is "
-    "the input's name.",
+
+
+def _reports(text: str) -> Decorator:
+    return option("Everyday", "--report", "reports", type=PATH, multiple=True, help=text)
+
+
+reports = _reports(
+    "Write a report; .json, .csv or .html (a page to look at) decides the form. May be repeated; {stem} is "
+    "the input's name."
 )
-json_reports = option(
-    "Everyday",
-    "--report",
-    "reports",
-    type=PATH,
-    multiple=True,
-    help="Write what was done: .json. May be repeated; {stem} is the input's name.",
+json_reports = _reports("Write what was done: .json. May be repeated; {stem} is the input's name.")
+found_reports = _reports(
+    "Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
+    "repeated."
 )
-found_reports = option(
-    "Everyday",
-    "--report",
-    "reports",
-    type=PATH,
-    multiple=True,
-    help="Write what was found: .json for the results, .csv for a row per pose, .html for a page to look at. May be "
-    "repeated.",
+page_reports = _reports("Write a page to look at: .html. May be repeated.")
+surface_reports = _reports(
+    "Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be repeated."
 )
-page_reports = option(
-    "Everyday", "--report", "reports", type=PATH, multiple=True, help="Write a page to look at: .html. May be repeated."
-)
-surface_reports = option(
-    "Everyday",
-    "--report",
-    "reports",
-    type=PATH,
-    multiple=True,
-    help="Write what was found: .json, .csv for a row per point, .html, or a map: .png, .svg, .pdf. May be repeated.",
-)
-as_json = option("Output", "--json", "as_json", is_flag=True, help="One JSON object instead of lines to read.")
-table = option(
-    "Output", "--table", is_flag=True, help="Print the table of the name: what a TOML file of your own starts from."
-)
-force = option("Everyday", "--force", is_flag=True, help="Replace existing files.")
-quiet = option("Output", "-q", "--quiet", is_flag=True, help="Only errors.")
+as_json = flag("Output", "--json", "as_json", help="One JSON object instead of lines to read.")
+table = flag("Output", "--table", help="Print the table of the name: what a TOML file of your own starts from.")
+force = flag("Everyday", "--force", help="Replace existing files.")
+quiet = flag("Output", "-q", "--quiet", help="Only errors.")
 verbose = option("Output", "-v", "--verbose", count=True, help="More: every finding, times of the stages.")
 verbose_found = option(
     "Output",

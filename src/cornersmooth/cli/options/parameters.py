@@ -12,6 +12,8 @@ from typing import Any
 
 import click
 
+from cornersmooth.cli.headings import Decorator
+
 _LENGTH = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(mm|in|inch|\")?")
 
 
@@ -95,7 +97,6 @@ class ToolShape(click.ParamType[Any]):
 LENGTH = Length()
 #: whether a file can be read is said where it is read, with the exit code of inputs
 PATH = click.Path(readable=False)
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 def all_of(function: Callable[..., Any], options: Iterable[Decorator]) -> Callable[..., Any]:
