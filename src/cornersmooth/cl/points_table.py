@@ -1,7 +1,7 @@
 """Text of point files into a table of numbers: separators, decimal commas, comments, encodings, line numbers.
 
-Two ways lead to the same table. The fast one converts a chunk of lines at once and only accepts it where every line is
-laid out like its first; the careful one goes line by line, accepts what is unusual and names the line of what is wrong.
+Two ways lead to the same table. The fast one converts a chunk of lines at once where every line holds plain numbers; the
+careful one goes line by line, accepts what is unusual and names the line of what is wrong.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import numpy as np
 
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.points_header import Columns, is_header
+from cornersmooth.cl.source import UTF16_BOMS, UTF8_BOM
+from cornersmooth.cl.source import clean as plain_lines
 from cornersmooth.model import Floats, Ints
 from cornersmooth.text import parse_numbers
 
@@ -28,24 +30,12 @@ _SEPARATOR = re.compile(r"\s*,\s*|\s+")
 _QUOTED = re.compile(rb'"([^",;\n]*)"')
 _QUOTED_COMMA = re.compile(rb'"([+-]?\d+),(\d+)"')
 _FIRST_ROW = re.compile(rb"[^\n]*[^\s,;][^\n]*")
-_UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 #: bytes converted at once; large enough for whole-array speed, small enough for the caches
 _CHUNK = 1 << 18
 
-_PART, _BLANK, _COMMA, _NEWLINE, _OTHER = range(5)
-
-
-def _classes() -> np.ndarray[tuple[int], np.dtype[np.uint8]]:
-    table = np.full(256, _OTHER, np.uint8)
-    table[list(b"0123456789+-.eE")] = _PART
-    table[list(b" \t")] = _BLANK
-    table[ord(",")] = _COMMA
-    table[ord("\n")] = _NEWLINE
-    return table
-
-
-_CLASS = _classes()
+#: bytes between cells
+_GAP = np.isin(np.arange(256), list(b" \t,\n"))
 
 
 @dataclass(frozen=True)
@@ -79,15 +69,9 @@ def clean(data: bytes, file: str) -> PointText:
     Raises
     ------
     InputError
-        CS160 where commas may be decimal or separating, CS161 for binary data.
+        CS150 for an empty file, CS160 where commas may be decimal or separating, CS161 for binary data.
     """
-    if data.startswith(_UTF16):
-        data = data.decode("utf-16", "replace").encode()
-    data = data.removeprefix(b"\xef\xbb\xbf")
-    if b"\0" in data[:_CHUNK]:
-        raise error("CS161", file, data.count(b"\n", 0, data.index(b"\0")) + 1)
-    if b"\r" in data:
-        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = plain_lines(data, file, empty="CS150", binary="CS161")
     if b'"' in data:
         data = _QUOTED.sub(rb"\1", _QUOTED_COMMA.sub(rb"\1.\2", data))
     header, header_line, certain, start = _head(data)
@@ -214,9 +198,9 @@ def is_row(line: str) -> bool:
 def leading_lines(data: bytes, most: int = 200) -> Iterator[str]:
     """Yield the first lines that are neither blank nor comment, decoded."""
     head = data[: most * 400]
-    if data.startswith(_UTF16):
+    if data.startswith(UTF16_BOMS):
         head = head.decode("utf-16", "replace").encode()
-    for line in _decode(head.removeprefix(b"\xef\xbb\xbf")).splitlines()[:most]:
+    for line in _decode(head.removeprefix(UTF8_BOM)).splitlines()[:most]:
         if line.strip() and not _COMMENT_MARK.match(line):
             yield line
 
@@ -232,8 +216,7 @@ def _head(data: bytes) -> tuple[str | None, int, bool, int]:
     """Header, its line, whether it is certain, and where the rows start."""
     start, line, comment, comment_line = 0, 1, None, 0
     while start < len(data):
-        end = data.find(b"\n", start)
-        end = len(data) if end < 0 else end
+        end = data.index(b"\n", start)
         text = _decode(data[start:end])
         mark = _COMMENT_MARK.match(text)
         if mark:
@@ -242,9 +225,9 @@ def _head(data: bytes) -> tuple[str | None, int, bool, int]:
         elif text.strip():
             if any(_NUMBER.fullmatch(cell) for cell in re.split(r"[\s,;]+", text)):
                 break
-            return text, line, True, min(end + 1, len(data))
+            return text, line, True, end + 1
         start, line = end + 1, line + 1
-    return comment, comment_line, False, min(start, len(data))
+    return comment, comment_line, False, start
 
 
 def _plain_commas(body: bytes, file: str, first_line: int) -> bytes:
@@ -252,8 +235,7 @@ def _plain_commas(body: bytes, file: str, first_line: int) -> bytes:
     separator = ";" if b";" in body else "\t" if b"\t" in body else None
     at = body.find(b",")
     if at >= 0:
-        end = body.find(b"\n", at)
-        row = _decode(body[body.rfind(b"\n", 0, at) + 1 : end if end >= 0 else len(body)]).strip()
+        row = _decode(body[body.rfind(b"\n", 0, at) + 1 : body.index(b"\n", at)]).strip()
         cells = [cell.strip() for cell in row.split(separator)]
         cells = [cell for cell in cells if not cell[:1].isalpha()]
         if len(cells) >= 3 and all(_DECIMAL_COMMA.fullmatch(cell) for cell in cells if cell):
@@ -273,37 +255,19 @@ def _number(cell: str) -> float:
 
 
 def _fast(chunk: bytes, width: int) -> tuple[Floats, Ints] | None:
-    """Do what `careful` does if all lines of the chunk are laid out like its first; None for any other."""
-    kinds = _CLASS[np.frombuffer(chunk, np.uint8)]
-    part = kinds == _PART
-    cell = np.flatnonzero(part & ~np.concatenate(([False], part[:-1])))
-    if not len(cell) or len(cell) % width or bool((kinds == _OTHER).any()):
+    """Do what `careful` does where every line has `width` plain numbers, or nothing; None for any other chunk."""
+    letters = chunk.translate(None, b" \t")
+    if b",," in letters or b"\n," in letters or letters[:1] == b",":  # an empty cell
         return None
-    newline = np.flatnonzero(kinds == _NEWLINE)
+    gap = _GAP[np.frombuffer(chunk, np.uint8)]
+    cell = np.flatnonzero(~gap & np.concatenate(([True], gap[:-1])))
+    if not len(cell) or len(cell) % width:
+        return None
+    newline = np.flatnonzero(np.frombuffer(chunk, np.uint8) == ord("\n"))
     row = np.searchsorted(newline, cell[::width])
     if (row != np.searchsorted(newline, cell[width - 1 :: width])).any() or (np.diff(row) == 0).any():
         return None
-    end = newline[row[0]] if row[0] < len(newline) else len(chunk)
-    if not _same_gaps(cell.reshape(-1, width), np.flatnonzero(kinds == _COMMA), end, len(chunk)):
-        return None
     try:
-        values = parse_numbers(chunk.replace(b",", b" "))  # a comma may end a row
+        return parse_numbers(chunk.replace(b",", b" ")).reshape(-1, width), row  # a comma may end a row
     except ValueError:
         return None
-    if len(values) != len(cell):
-        return None
-    return values.reshape(-1, width), row
-
-
-def _same_gaps(cell: Ints, comma: Ints, end: int, size: int) -> bool:
-    """Whether commas stand between the same cells in every row as in the first, which ends at `end`."""
-    gaps = np.searchsorted(cell[0], comma[comma < end], side="right") - 1  # a gap lies after the cell of its number
-    if len(comma) != len(cell) * len(gaps):
-        return False
-    if not len(gaps):
-        return True
-    if gaps[0] < 0 or (np.diff(gaps) == 0).any():  # an empty cell
-        return False
-    grid = comma.reshape(len(cell), len(gaps))
-    after = np.append(cell.ravel()[1:], size).reshape(cell.shape)
-    return bool(((grid > cell[:, gaps]) & (grid < after[:, gaps])).all())

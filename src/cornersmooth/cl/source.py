@@ -11,8 +11,8 @@ from typing import Final, Protocol
 from cornersmooth.cl.messages import error
 
 _GZIP: Final = b"\x1f\x8b"
-_UTF8_BOM: Final = b"\xef\xbb\xbf"
-_UTF16_BOMS: Final = (b"\xff\xfe", b"\xfe\xff")
+UTF8_BOM: Final = b"\xef\xbb\xbf"
+UTF16_BOMS: Final = (b"\xff\xfe", b"\xfe\xff")
 
 #: bytes that are read of an input, and of a gzip file: text of CL files is a tenth of itself when it is packed
 LARGEST: Final = 2 << 30
@@ -76,26 +76,26 @@ def read_bounded(file: _Reader, name: str, *, size_limit: bool = True, most: int
     return data
 
 
-def clean(data: bytes, name: str) -> bytes:
+def clean(data: bytes, name: str, *, empty: str = "CS101", binary: str = "CS102") -> bytes:
     """Return the text in UTF-8 or an eight-bit code, with LF after every line.
 
     Raises
     ------
     InputError
-        CS101 for an empty file, CS102 for a binary one.
+        The codes `empty` and `binary`, for files that are.
     """
-    if data.startswith(_UTF16_BOMS):  # what PowerShell's > makes of a text file
+    if data.startswith(UTF16_BOMS):  # what PowerShell's > makes of a text file
         try:
             data = data.decode("utf-16").encode()
         except UnicodeDecodeError as why:
-            raise error("CS102", name, None) from why
-    data = data.removeprefix(_UTF8_BOM)
+            raise error(binary, name, None) from why
+    data = data.removeprefix(UTF8_BOM)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if data.endswith(_CTRL_Z):
         data = data.rstrip(_CTRL_Z)
     if not data or data.isspace():
-        raise error("CS101", name, 1)
+        raise error(empty, name, 1)
     if (at := data.find(b"\0")) >= 0:
-        raise error("CS102", name, data.count(b"\n", 0, at) + 1)
+        raise error(binary, name, data.count(b"\n", 0, at) + 1)
     return data if data.endswith(b"\n") else data + b"\n"
