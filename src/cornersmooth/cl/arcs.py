@@ -68,13 +68,11 @@ class Arc:
     certain: bool = False  #: the sense of rotation is written out, and no matter of dialect
 
 
-def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | None, decimals: int) -> Arc:
+def read_arc(record: Record, file: str, rule: ArcRule | None, decimals: int) -> Arc:
     """Read CIRCLE or MOVARC.
 
     Parameters
     ----------
-    values : list of float
-        Its numbers, in order.
     file : str
         For messages.
     rule : {"left", "right", "tangent"} or None
@@ -87,7 +85,7 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
     InputError
         CS106, CS113, CS120, CS124, CS125, CS127
     """
-    words = [value for value in record.args if isinstance(value, str)]
+    values, words = record.values, record.words
     if record.word == "MOVARC" and record.args[:9:4] == _PARTS_OF_MOVARC:  # DMG MORI MfgSuite
         words = words[3:]
     for word in words:
@@ -97,7 +95,7 @@ def read_arc(record: Record, values: list[float], file: str, rule: ArcRule | Non
     count = len(values)
     turns, sweep = 1.0, math.nan
     if record.word == "MOVARC":
-        named = len(words) < sum(isinstance(value, str) for value in record.args)
+        named = len(words) < len(record.words)
         wanted, fits = "x,y,z,i,j,k,r,ANGLE,a", count == 8 and words == ["ANGLE"]
         sweep = math.radians(values[-1]) if fits else sweep
         fits = fits or (named and count == 7 and not words)

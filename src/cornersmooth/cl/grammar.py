@@ -76,10 +76,25 @@ class Record:
     points: tuple[tuple[int, tuple[Argument, ...]], ...] = ()
     cut_short: bool = False
 
+    @property
+    def option(self) -> Argument:
+        """The first argument; an empty word where there is none."""
+        return self.args[0] if self.args else ""
+
+    @property
+    def values(self) -> list[float]:
+        """The arguments that are numbers."""
+        return [value for value in self.args if isinstance(value, float)]
+
+    @property
+    def words(self) -> list[str]:
+        """The other arguments."""
+        return [value for value in self.args if isinstance(value, str)]
+
     def moved(self, lines: int) -> Record:
         """Return the same statement so many lines further down."""
         points = tuple((line + lines, args) for line, args in self.points)
-        return Record(self.line + lines, self.word, self.args, self.text, self.rest, points, self.cut_short)
+        return replace(self, line=self.line + lines, points=points)
 
 
 @dataclass

@@ -19,7 +19,7 @@ from cornersmooth.cl.words import (
     near_motion_word,
 )
 
-HANDLERS: Final = motion_statements.HANDLERS | state_statements.HANDLERS
+HANDLERS: Final = motion_statements.HANDLERS | state_statements.FED | state_statements.KEPT
 
 #: words that may stand between an arc and the GOTO that ends it
 _WITHIN_ARC: Final = GOTO_WORDS | frozenset(
@@ -90,6 +90,8 @@ def obey(state: ReaderState, record: Record) -> None:
         if record.rest:
             raise state.fail("CS107", record.line, word=word, text=record.rest)
         handler(state, record)
+        if word in state_statements.KEPT:
+            state.keep(record)
         return
     if any(isinstance(value, float) and not math.isfinite(value) for value in record.args):
         raise state.fail("CS196", record.line, word=word)
@@ -115,7 +117,7 @@ def _after_end(state: ReaderState, record: Record, word: str) -> None:
 
 def _refused(record: Record, word: str) -> str | None:
     """Code of the error for a statement that is not carried out although it may move the tool."""
-    first = record.args[0] if record.args else ""
+    first = record.option
     name = word.rpartition("=")[2]  # M1=MACRO
     if word in _CHOOSING and isinstance(first, str):
         name = first  # LOAD/HEAD,2

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
@@ -13,7 +12,7 @@ from cornersmooth.cl.builder import check_range
 from cornersmooth.cl.grammar import NUMBER, Argument, Record, number
 from cornersmooth.cl.nurbs import CURVE_DIGITS, Curve, lines_of
 from cornersmooth.cl.reader_state import ReaderState
-from cornersmooth.cl.state_statements import joined
+from cornersmooth.cl.state_statements import Handler, joined
 from cornersmooth.cl.surfaces import read_drive_arc, read_helix
 from cornersmooth.cl.systems import Vector
 from cornersmooth.cl.words import GOTO_WORDS
@@ -83,8 +82,7 @@ def _retract(state: ReaderState, record: Record) -> None:
     if not state.builder.n:
         raise _no_retract(state, record, "it is before the first position", "put a GOTO before it")
     if state.clearance is None:
-        want = "put CLEARP/XYPLAN,z before it"
-        raise _no_retract(state, record, "no clearance plane is known", want)
+        raise _no_retract(state, record, "no clearance plane is known", "put CLEARP/XYPLAN,z before it")
     tip, axis = state.builder.last_tip(), state.builder.last_axis()
     normal, point = state.clearance
     normal = normal or axis
@@ -131,9 +129,8 @@ def _check_curve(state: ReaderState, record: Record) -> None:
 
 def _circle(state: ReaderState, record: Record) -> None:
     _check_curve(state, record)
-    values = [value for value in record.args if isinstance(value, float)]
     decimals = state.dialect.decimals if state.dialect.strips_zeros else 0
-    state.arc = _placed(state, read_arc(record, values, state.file, state.arc_rule, decimals))
+    state.arc = _placed(state, read_arc(record, state.file, state.arc_rule, decimals))
     _at_feed(state, record)
 
 
@@ -220,7 +217,7 @@ def _at_feed(state: ReaderState, record: Record) -> None:
         state.rapid = False
 
 
-HANDLERS: Final[dict[str, Callable[[ReaderState, Record], None]]] = {
+HANDLERS: Final[dict[str, Handler]] = {
     **dict.fromkeys(GOTO_WORDS, _goto),
     "RETRCT": _retract,
     "FROM": _from,

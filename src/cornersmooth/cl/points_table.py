@@ -1,7 +1,7 @@
 """Text of point files into a table of numbers: separators, decimal commas, comments, encodings, line numbers.
 
-Two ways lead to the same table. The fast one converts a chunk of lines at once where every line holds plain numbers; the
-careful one goes line by line, accepts what is unusual and names the line of what is wrong.
+Two ways lead to the same table. The fast one converts a chunk of lines at once where every line holds plain numbers.
+The careful one goes line by line, accepts what is unusual and names the line of what is wrong.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from cornersmooth.cl.messages import error
 from cornersmooth.cl.points_header import Columns, is_header
-from cornersmooth.cl.source import UTF16_BOMS, UTF8_BOM
+from cornersmooth.cl.source import UTF8_BOM, UTF16_BOMS
 from cornersmooth.cl.source import clean as plain_lines
 from cornersmooth.model import Floats, Ints
 from cornersmooth.text import parse_numbers

@@ -46,7 +46,7 @@ _NO_TURN: Final = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 
 
 def _rapid(state: ReaderState, record: Record) -> None:
-    option = record.args[0] if record.args else ""
+    option = record.option
     if isinstance(option, float):
         text = joined(record.args)
         raise state.fail("CS115", record.line, word="RAPID", text=text, want="write RAPID, and GOTO with the position")
@@ -63,8 +63,8 @@ def _rapid(state: ReaderState, record: Record) -> None:
 
 
 def _feed(state: ReaderState, record: Record) -> None:
-    values = [value for value in record.args if isinstance(value, float)]
-    words = [value for value in record.args if isinstance(value, str)]
+    values = record.values
+    words = record.words
     units = [word for word in words if word in FEED_UNITS]
     if len(values) != 1 or len(units) != len(words) or len(units) > 1:
         state.note("CS136", record.line, text=joined(record.args))
@@ -96,7 +96,6 @@ def _units(state: ReaderState, record: Record) -> None:
         want = "use UNITS/MM or UNITS/INCHES"
         raise state.fail("CS115", record.line, word=record.word, text=joined(record.args), want=want)
     state.stated_units.append((record.line, units, state.builder.n))
-    state.keep(record)
 
 
 def _multax(state: ReaderState, record: Record) -> None:
@@ -104,12 +103,10 @@ def _multax(state: ReaderState, record: Record) -> None:
         text = joined(record.args)
         raise state.fail("CS115", record.line, word="MULTAX", text=text, want="use MULTAX/ON or MULTAX/OFF")
     state.builder.lock_axis(record.args[:1] in (("OFF",), ("NOMORE",)))
-    state.keep(record)
 
 
 def _tlaxis(state: ReaderState, record: Record) -> None:
     _set_axis(state, record, state.vector(record))
-    state.keep(record)
 
 
 def _set_axis(state: ReaderState, record: Record, axis: Vector) -> None:
@@ -125,14 +122,12 @@ def _set_axis(state: ReaderState, record: Record, axis: Vector) -> None:
 
 def _tool_path(state: ReaderState, record: Record) -> None:
     state.builder.set_axis(UP)  # NX repeats i,j,k on the first point of a path that is tilted
-    state.keep(record)
 
 
 def _csys(state: ReaderState, record: Record) -> None:
     if len(record.args) == 12:  # SolidWorks CAM: rows of [R|t]; positions stay in the world, R's z is the axis
         values = state.numbers(record)
         _set_axis(state, record, (values[2], values[6], values[10]))
-    state.keep(record)
 
 
 def _msys(state: ReaderState, record: Record) -> None:
@@ -146,15 +141,13 @@ def _msys(state: ReaderState, record: Record) -> None:
         _enter(state, IDENTITY)
     elif system is None or state.first_system[1] is None:
         _frame(state, record)
-        return
     else:
         _enter(state, system.seen_from(state.first_system[1]))
         state.note("CS146", record.line, word=record.word)
-    state.keep(record)
 
 
 def _system(record: Record) -> System | None:
-    values = [value for value in record.args if isinstance(value, float)]
+    values = record.values
     return from_numbers(values) if len(values) == len(record.args) == 9 and max(map(abs, values)) <= FARTHEST else None
 
 
@@ -171,8 +164,8 @@ def _enter(state: ReaderState, system: System) -> None:
 
 def _clearance(state: ReaderState, record: Record) -> None:
     """CLEARP/d, /a,b,c,d or /XYPLAN,d, CLRSRF/x,y,z or /a,b,c,d: where RETRCT ends (ICAM, CLEARP and CLRSRF)."""
-    values = [value for value in record.args if isinstance(value, float)]
-    words = [value for value in record.args if isinstance(value, str)]
+    values = record.values
+    words = record.words
     normal: Vector | None = None
     if len(values) == 1 and len(words) < 2:
         normal = _PLANES.get(words[0]) if words else UP
@@ -186,21 +179,18 @@ def _clearance(state: ReaderState, record: Record) -> None:
         state.clearance = None, (values[0], values[1], values[2])  # the plane through this point, square to the tool
     else:
         state.clearance = None
-    state.keep(record)
 
 
 def _offset(state: ReaderState, record: Record) -> None:
     """FIXTURE/n, FIXTUR/n, WCS/n: another work offset of the machine, which the text does not select."""
     if state.builder.n and record.args != state.offsets.get(record.word):
         _frame(state, record)
-    else:
-        state.keep(record)
     state.offsets[record.word] = record.args
 
 
 def _mcs(state: ReaderState, record: Record) -> None:
     """MCS/ of CAMplete, MCSYS/NUM,n,POINT,...,VECTOR,...,VECTOR,... of MfgSuite: positions are in this system."""
-    values = [value for value in record.args if isinstance(value, float)]
+    values = record.values
     axes = values[:6] if record.word == "MCS" else values[4:10]
     turned = len(axes) == 6 and max(abs(a - b) for a, b in zip(axes, (1, 0, 0, 0, 1, 0), strict=True)) > _TURNED
     moved = state.builder.n and (state.first_system is None or state.first_system[0] != record.args)
@@ -208,13 +198,11 @@ def _mcs(state: ReaderState, record: Record) -> None:
         _frame(state, record)
     else:
         state.first_system = record.args, None
-        state.keep(record)
 
 
 def _comment(state: ReaderState, record: Record) -> None:
     """Comments that say which system positions are in: Creo's $$-> CSYS, and the 3 rows after CATIA's $$*CATIA0."""
     text = str(record.args[0])
-    state.keep(record)
     if text.startswith("*CATIA0"):
         state.rows = []
     elif text.startswith("->") and text[2:].lstrip().upper().startswith("CSYS"):
@@ -237,20 +225,18 @@ def _same_system(state: ReaderState, record: Record, word: str, given: list[str]
 
 
 def _cutcom(state: ReaderState, record: Record) -> None:
-    option = record.args[0] if record.args else ""
+    option = record.option
     if option in ("LEFT", "RIGHT", "ON") and "LENGTH" not in record.args:
         if not state.builder.keep.now:
             state.note("CS138", record.line)
         state.builder.keep.set(state.builder.n, float(Keep.CUTTER_COMPENSATION))
     elif option in _ENDS:
         state.builder.keep.set(state.builder.n, float(Keep.NO))
-    state.keep(record)
 
 
 def _cycle(state: ReaderState, record: Record) -> None:
-    state.hole = not (record.args and record.args[0] in _ENDS)
+    state.hole = record.option not in _ENDS
     state.set_kind()
-    state.keep(record)
 
 
 def _frame(state: ReaderState, record: Record) -> None:
@@ -258,43 +244,36 @@ def _frame(state: ReaderState, record: Record) -> None:
         if not state.lenient:
             raise state.fail("CS117", record.line, word=record.word)
         state.note("CS143", record.line, word=record.word)
-    state.keep(record)
 
 
 def _changes_nothing(record: Record) -> bool:
     """Whether a coordinate change is switched off, or by nothing: its numbers are zero, or the matrix of no turn."""
-    first = record.args[0] if record.args else ""
-    values = [value for value in record.args if isinstance(value, float)]
-    return first in _ENDS or (bool(values) and not any(values)) or values == _NO_TURN
+    values = record.values
+    return record.option in _ENDS or (bool(values) and not any(values)) or values == _NO_TURN
 
 
 def _set(state: ReaderState, record: Record) -> None:
     if "INCR" in record.args or "INCREM" in record.args:
         text = joined(record.args)
         raise state.fail("CS115", record.line, word="SET", text=text, want="write absolute positions")
-    state.keep(record)
 
 
 def _trntyp(state: ReaderState, record: Record) -> None:
-    if record.args[:1] == ("WORLD",):
-        state.keep(record)
-    else:
+    if record.args[:1] != ("WORLD",):
         _frame(state, record)
 
 
 def _syn(state: ReaderState, record: Record) -> None:
-    words = [value.strip("'").upper() for value in record.args if isinstance(value, str)]
+    words = [value.strip("'").upper() for value in record.words]
     if words[:1] and words[0] in MOTION_WORDS:
         text, want = joined(record.args), "motion statements keep their names"
         raise state.fail("CS115", record.line, word="SYN", text=text, want=want)
     if len(words) == 2:  # ICAM: the first word now means the second, also a comment
         state.renamed[words[0]] = "$$" if words[1].startswith("$$") else words[1]
-    state.keep(record)
 
 
 def _fini(state: ReaderState, record: Record) -> None:
     state.finished = True
-    state.keep(record)
 
 
 def joined(args: tuple[Argument, ...]) -> str:
@@ -302,9 +281,13 @@ def joined(args: tuple[Argument, ...]) -> str:
     return ",".join(f"{value:g}" if isinstance(value, float) else value for value in args)
 
 
-HANDLERS: Final[dict[str, Callable[[ReaderState, Record], None]]] = {
-    "RAPID": _rapid,
-    "FEDRAT": _feed,
+Handler = Callable[[ReaderState, Record], None]
+
+#: of statements that become a part of the motion
+FED: Final[dict[str, Handler]] = {"RAPID": _rapid, "FEDRAT": _feed}
+
+#: of statements that the program keeps, too
+KEPT: Final[dict[str, Handler]] = {
     "UNITS": _units,
     "UNIT": _units,
     "MULTAX": _multax,

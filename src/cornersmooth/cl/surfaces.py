@@ -27,9 +27,12 @@ from cornersmooth.errors import InputError
 from cornersmooth.model import Floats
 
 _SURFACE: Final = re.compile(r"\((CIRCLE|CYLNDR)/(CANON,)?([^()]*)\)", re.IGNORECASE)
-_LINE: Final = re.compile(r"\(LINE/([^()]*)\)", re.IGNORECASE)
-_POINT: Final = re.compile(r"\(POINT/([^()]*)\)", re.IGNORECASE)
-_PLANE: Final = re.compile(r"\(PLANE/([^()A-Z]*)\)", re.IGNORECASE)
+#: check surfaces and their numbers, in the order in which they count
+_CHECKS: Final = (
+    ("LINE", 6, re.compile(r"\(LINE/([^()]*)\)", re.IGNORECASE)),
+    ("POINT", 3, re.compile(r"\(POINT/([^()]*)\)", re.IGNORECASE)),
+    ("PLANE", 4, re.compile(r"\(PLANE/([^()A-Z]*)\)", re.IGNORECASE)),
+)
 _MEETING: Final = re.compile(r",([0-9]+),INTOF,", re.IGNORECASE)
 
 Direction = tuple[str, Vector] | None
@@ -86,7 +89,7 @@ def read_helix(record: Record, start: Vector, direction: Direction, file: str) -
     InputError
         CS106, CS120, CS124-CS127
     """
-    values = [value for value in record.args if isinstance(value, float)]
+    values = record.values
     if len(values) != len(record.args) or len(values) not in (14, 17):
         want = "centre, tangent, axis, pitch, radius, (angle, height, turns,) end"
         raise error("CS120", file, record.line, word="HELICAL", count=len(values), s="s", want=want)
@@ -131,27 +134,20 @@ def _end(record: Record, arc: Arc, start: Floats, check: str, file: str) -> Vect
     found = _MEETING.search(check)
     wanted = int(found[1]) if found is not None else 1
     near = max(RADIUS_DIGITS * arc.resolution, RADIUS_SHARE * arc.radius)
-    lines, points, planes = _LINE.findall(check), _POINT.findall(check), _PLANE.findall(check)
-    if lines:
-        values = _values(lines[-1], record, file)
-        if len(values) != 6:
-            raise _refuse(record, file, f"LINE has {len(values)} numbers")
-        origin, last = np.array(values).reshape(2, 3)
-        plane = np.cross(last - origin, normal)
-    elif points:
-        values = _values(points[-1], record, file)
-        if len(values) != 3:
-            raise _refuse(record, file, f"POINT has {len(values)} numbers")
-        origin, last = centre, np.array(values)
-        plane = np.cross(last - origin, normal)
-    elif planes:
-        values = _values(planes[-1], record, file)
-        if len(values) != 4:
-            raise _refuse(record, file, f"PLANE has {len(values)} numbers")
-        plane = np.array(values[:3])
-        origin, last = plane * values[3], None
-    else:
+    shapes = ((name, size, surface.findall(check)) for name, size, surface in _CHECKS)
+    name, size, texts = next((shape for shape in shapes if shape[2]), ("", 0, []))
+    if not texts:
         raise _refuse(record, file, "its check surface is not understood")
+    values = _values(texts[-1], record, file)
+    if len(values) != size:
+        raise _refuse(record, file, f"{name} has {len(values)} numbers")
+    last = None if name == "PLANE" else np.array(values[-3:])
+    if last is None:
+        plane = np.array(values[:3])
+        origin = plane * values[3]
+    else:
+        origin = np.array(values[:3]) if name == "LINE" else centre
+        plane = np.cross(last - origin, normal)
     spoke = start - centre
     if last is not None:
         out = last - centre
